@@ -1,0 +1,291 @@
+"""A normal form that recognizes zero: quotients of polynomials over atoms, with exact coefficients.
+
+Owns `is_zero` and `shorter`, which decide whether a determinant vanishes, whether a discriminant cancels, and whether
+an author's inverse is right. Atoms are variables and what is no polynomial; sin^2 + cos^2 = 1, cosh^2 - sinh^2 = 1,
+sqrt(u)^2 = u and exp(a + b) = exp(a) exp(b) are used. Equal normal forms mean equal values wherever both are defined;
+unequal ones mean nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+from potto.core.terms import ONE, ZERO, Const, Prim, Term, add, const, div, mul, neg, postorder, pow_, prim
+
+Monomial = tuple[tuple[Term, int], ...]
+Polynomial = Mapping[Monomial, Fraction]
+
+_LARGEST = 400
+_BITS = 4096
+
+
+class _TooLarge(Exception):
+    """Internal: the normal form is given up."""
+
+
+@dataclass(frozen=True)
+class Rational:
+    """top / below."""
+
+    top: Polynomial
+    below: Polynomial
+
+    @property
+    def whole(self) -> bool:
+        return self.below == _ONE
+
+
+_ONE: Polynomial = {(): Fraction(1)}
+
+
+def normal(term: Term) -> Rational | None:
+    """The normal form; None where it would be too large or a value is not a number."""
+    memo: dict[Term, Rational] = {}
+    try:
+        for node in postorder(term):
+            memo[node] = _node(node, memo)
+    except _TooLarge:
+        return None
+    return memo[term]
+
+
+def is_zero(term: Term) -> bool:
+    """Whether a term is 0 wherever it is defined. False also where that is not known."""
+    if isinstance(term, Const):
+        return term.value == 0
+    found = normal(term)
+    return found is not None and not found.top
+
+
+def equal(first: Term, second: Term) -> bool:
+    return first is second or is_zero(add(first, neg(second)))
+
+
+def shorter(term: Term) -> Term:
+    """The same value with what cancels taken out, if that is shorter; else the term as it is."""
+    if not isinstance(term, Prim):
+        return term
+    found = normal(term)
+    if found is None or not found.whole:
+        return term
+    expanded = as_term(found.top)
+    return expanded if expanded is not None and _size(expanded) < _size(term) else term
+
+
+def _size(term: Term) -> int:
+    sizes: dict[Term, int] = {}
+    for node in postorder(term):
+        parts = node.args if isinstance(node, Prim) else ()
+        sizes[node] = min(1 + sum(sizes[p] for p in parts), 1 << 60)
+    return sizes[term]
+
+
+def as_term(polynomial: Polynomial) -> Term | None:
+    """A polynomial as a term; None if a coefficient is no double."""
+    terms: list[Term] = []
+    for monomial, coefficient in polynomial.items():
+        factors = [atom if n == 1 else pow_(atom, const(n)) for atom, n in monomial]
+        size = abs(coefficient)
+        if Fraction(float(size)) == size:
+            term = mul(const(float(size)), *factors)
+        elif max(size.numerator, size.denominator) < 1 << 53:
+            term = div(mul(const(size.numerator), *factors), const(size.denominator))
+        else:
+            return None
+        terms.append(neg(term) if coefficient < 0 else term)
+    terms.sort(key=lambda t: isinstance(t, Prim) and t.op == "neg")
+    return add(*terms) if terms else ZERO
+
+
+# Arithmetic
+
+
+def _node(node: Term, memo: Mapping[Term, Rational]) -> Rational:
+    if isinstance(node, Const) and node.name is None:
+        if not abs(node.value) < float("inf"):
+            raise _TooLarge
+        return Rational({(): Fraction(node.value)} if node.value else {}, _ONE)
+    if not isinstance(node, Prim):
+        return _atom(node)
+    args = [memo[a] for a in node.args if a in memo]
+    match node.op:
+        case "add":
+            result = args[0]
+            for arg in args[1:]:
+                result = _plus(result, arg)
+            return result
+        case "neg":
+            return Rational({m: -c for m, c in args[0].top.items()}, args[0].below)
+        case "mul":
+            result = args[0]
+            for arg in args[1:]:
+                result = _product(result, arg)
+            return result
+        case "div":
+            return _product(args[0], _flip(args[1]))
+        case "pow" if isinstance(node.args[1], Const) and node.args[1].value.is_integer():
+            return _power(args[0], int(node.args[1].value))
+        case "pow" if isinstance(node.args[1], Const) and node.args[1].value == 0.5:
+            return _atom(prim("sqrt", node.args[0]))
+        case "exp":
+            return _exponential(node, args[0])
+        case _:
+            return _atom(node)
+
+
+def _atom(term: Term) -> Rational:
+    return Rational({((term, 1),): Fraction(1)}, _ONE)
+
+
+def _plus(a: Rational, b: Rational) -> Rational:
+    if a.below == b.below:
+        return _reduced(_sum(a.top, b.top), a.below)
+    return _reduced(_sum(_times(a.top, b.below), _times(b.top, a.below)), _times(a.below, b.below))
+
+
+def _product(a: Rational, b: Rational) -> Rational:
+    if a.top == b.below:
+        return Rational(b.top, a.below) if a.top else a
+    if a.below == b.top:
+        return Rational(a.top, b.below)
+    return _reduced(_times(a.top, b.top), _times(a.below, b.below))
+
+
+def _flip(a: Rational) -> Rational:
+    if not a.top:
+        raise _TooLarge
+    return Rational(a.below, a.top)
+
+
+def _power(a: Rational, n: int) -> Rational:
+    if abs(n) > 24:
+        raise _TooLarge
+    base = _flip(a) if n < 0 else a
+    result = Rational(_ONE, _ONE)
+    for _ in range(abs(n)):
+        result = _product(result, base)
+    return result
+
+
+def _reduced(top: Polynomial, below: Polynomial) -> Rational:
+    """Common monomials cancelled, and a denominator of one monomial kept monic."""
+    if not top:
+        return Rational(top, _ONE)
+    if top == below:
+        return Rational(_ONE, _ONE)
+    if below != _ONE:
+        shared = _shared([*top, *below])
+        if shared:
+            top = {_without(m, shared): c for m, c in top.items()}
+            below = {_without(m, shared): c for m, c in below.items()}
+        lead = next(iter(below.values()))
+        if lead != 1:
+            top = {m: c / lead for m, c in top.items()}
+            below = {m: c / lead for m, c in below.items()}
+    return Rational(top, below)
+
+
+def _shared(monomials: list[Monomial]) -> dict[Term, int]:
+    common = dict(monomials[0])
+    for monomial in monomials[1:]:
+        other = dict(monomial)
+        common = {a: min(n, other[a]) for a, n in common.items() if a in other}
+        if not common:
+            break
+    return common
+
+
+def _without(monomial: Monomial, shared: Mapping[Term, int]) -> Monomial:
+    return tuple((a, n - shared.get(a, 0)) for a, n in monomial if n > shared.get(a, 0))
+
+
+def _sum(a: Polynomial, b: Polynomial) -> Polynomial:
+    result = dict(a)
+    for monomial, coefficient in b.items():
+        total = result.get(monomial, Fraction(0)) + coefficient
+        if total:
+            result[monomial] = total
+        else:
+            result.pop(monomial, None)
+    return _checked(result)
+
+
+def _checked(result: Polynomial) -> Polynomial:
+    if len(result) > _LARGEST or any(c.numerator.bit_length() > _BITS for c in result.values()):
+        raise _TooLarge
+    return result
+
+
+def _times(a: Polynomial, b: Polynomial) -> Polynomial:
+    if a == _ONE:
+        return b
+    if b == _ONE:
+        return a
+    if len(a) * len(b) > 4 * _LARGEST:
+        raise _TooLarge
+    result: Polynomial = {}
+    for m, c in a.items():
+        for n, d in b.items():
+            result = _sum(result, _joined(m, n, c * d))
+    return result
+
+
+def _joined(first: Monomial, second: Monomial, coefficient: Fraction) -> Polynomial:
+    counts = dict(first)
+    for atom, n in second:
+        counts[atom] = counts.get(atom, 0) + n
+    for atom, n in counts.items():
+        square = _square(atom) if n >= 2 else None
+        if square is not None:
+            rest = {a: k for a, k in counts.items() if a is not atom}
+            if n > 2:
+                rest[atom] = n - 2
+            return _times(square, {_sorted(rest): coefficient})
+    return {_sorted(counts): coefficient}
+
+
+def _sorted(counts: Mapping[Term, int]) -> Monomial:
+    return tuple(sorted(counts.items(), key=lambda pair: pair[0].digest))
+
+
+def _square(atom: Term) -> Polynomial | None:
+    """What the square of an atom is, where an identity says so."""
+    if isinstance(atom, Prim) and len(atom.args) == 1:
+        (inner,) = atom.args
+        if atom.op in ("cos", "cosh"):
+            other = prim("sin" if atom.op == "cos" else "sinh", inner)
+            sign = Fraction(-1 if atom.op == "cos" else 1)
+            return {(): Fraction(1), ((other, 2),): sign}
+        if atom.op == "sqrt":
+            found = normal(inner)
+            return found.top if found is not None and found.whole else None
+        if atom.op == "abs":
+            found = normal(mul(inner, inner))
+            return found.top if found is not None and found.whole else None
+    if isinstance(atom, Prim) and atom.op == "hypot":
+        found = normal(add(*(mul(a, a) for a in atom.args)))
+        return found.top if found is not None and found.whole else None
+    return None
+
+
+def _exponential(node: Prim, inner: Rational) -> Rational:
+    """exp of a sum as a product of powers of exp(monomial)."""
+    if not inner.whole:
+        return _atom(node)
+    top: dict[Term, int] = {}
+    below: dict[Term, int] = {}
+    for monomial, coefficient in inner.top.items():
+        whole = coefficient.denominator == 1 and abs(coefficient) <= 64
+        scale = Fraction(1) if whole else coefficient
+        part = as_term({monomial: abs(scale)})
+        if part is None:
+            return _atom(node)
+        side = top if (coefficient > 0) else below
+        atom = prim("exp", part)
+        side[atom] = side.get(atom, 0) + (int(abs(coefficient)) if whole else 1)
+    return Rational({_sorted(top): Fraction(1)}, {_sorted(below): Fraction(1)})
+
+
+__all__ = ["ONE", "Rational", "as_term", "equal", "is_zero", "normal", "shorter"]

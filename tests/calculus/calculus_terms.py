@@ -1,0 +1,124 @@
+"""Core terms from text, and their values by mpmath: what the tests of the calculus share.
+
+`term("(x - 0.5)**2 - t")` reads Python's notation; `where(s, a, b)` is a Branch on s >= 0, `H(s)` the bracket,
+`integral(body, (x, lo, hi), ...)` an integral, outermost variable first. `value` is an evaluator of its own, so that
+nothing here is checked against itself.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Mapping
+from typing import Any
+
+import mpmath
+
+from potto.core import terms as t
+from potto.core.terms import Term
+
+_BINARY = {ast.Add: t.add, ast.Sub: t.sub, ast.Mult: t.mul, ast.Div: t.div, ast.Pow: t.pow_}
+
+
+def term(text: str) -> Term:
+    return _read(ast.parse(text.strip().replace("^", "**"), mode="eval").body)
+
+
+def _read(node: ast.expr) -> Term:
+    match node:
+        case ast.Constant(value=value):
+            return t.const(float(value))
+        case ast.Name(id="pi"):
+            return t.PI
+        case ast.Name(id="inf"):
+            return t.INF
+        case ast.Name(id=name):
+            return t.var(name)
+        case ast.BinOp(left=left, op=op, right=right):
+            return _BINARY[type(op)](_read(left), _read(right))
+        case ast.UnaryOp(operand=operand):
+            return t.neg(_read(operand))
+        case ast.Call(func=ast.Name(id=name), args=args):
+            return _call(name, args)
+        case _:
+            raise ValueError(ast.dump(node))
+
+
+def _call(name: str, args: list[ast.expr]) -> Term:
+    if name == "integral":
+        ranges = [list(a.elts) for a in args[1:] if isinstance(a, ast.Tuple)]
+        names = tuple(r[0].id for r in ranges if isinstance(r[0], ast.Name))
+        return t.integral(names, tuple((_read(r[1]), _read(r[2])) for r in ranges), _read(args[0]))
+    read = [_read(a) for a in args]
+    match name:
+        case "where":
+            return t.branch((read[0],), False, read[1], read[2])
+        case "H":
+            return t.branch((read[0],), False, t.ONE, t.ZERO)
+        case "delta":
+            return t.delta(tuple(read))
+        case _:
+            return t.prim(name, *read)
+
+
+# Values
+
+
+def value(term: Term, env: Mapping[str, Any]) -> Any:
+    """The value of a term by mpmath; nan where it is not real."""
+    match term:
+        case t.Const(name="pi"):
+            return +mpmath.pi
+        case t.Const(value=number):
+            return mpmath.mpf(number)
+        case t.Var(name=name):
+            return mpmath.mpf(env[name])
+        case t.Branch():
+            surface = value(term.surface, env)
+            holds = surface > 0 if term.strict else surface >= 0
+            return value(term.then if holds else term.orelse, env)
+        case t.If():
+            return value(term.then if _truth(term.condition, env) else term.orelse, env)
+        case t.Prim(op=op, args=args):
+            return _builtin(op, [value(a, env) for a in args])
+        case _:
+            raise ValueError(type(term).__name__)
+
+
+def _truth(term: Term, env: Mapping[str, Any]) -> bool:
+    assert isinstance(term, t.Prim)
+    if term.op in ("and", "or"):
+        left, right = (_truth(a, env) for a in term.args)
+        return (left and right) if term.op == "and" else (left or right)
+    if term.op == "not":
+        return not _truth(term.args[0], env)
+    a, b = (value(x, env) for x in term.args)
+    return bool({"lt": a < b, "le": a <= b, "eq": a == b, "ne": a != b}[term.op])
+
+
+_NAMES = {"max": max, "min": min, "abs": abs, "clamp": lambda x, lo, hi: min(max(x, lo), hi)}
+
+
+def _builtin(op: str, args: list[Any]) -> Any:
+    if any(a != a for a in args):
+        return mpmath.nan
+    try:
+        match op:
+            case "add":
+                result = mpmath.fsum(args)
+            case "mul":
+                result = mpmath.fprod(args)
+            case "neg":
+                result = -args[0]
+            case "div":
+                if args[1] == 0:
+                    return mpmath.nan if args[0] == 0 else mpmath.inf * mpmath.sign(args[0])
+                result = args[0] / args[1]
+            case "pow":
+                if args[0] == 0 and args[1] < 0:
+                    return mpmath.inf
+                result = mpmath.power(*args)
+            case _:
+                result = (_NAMES.get(op) or getattr(mpmath, op))(*args)
+    except (ZeroDivisionError, ValueError):
+        return mpmath.nan
+    return mpmath.nan if isinstance(result, mpmath.mpc) else result
