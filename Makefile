@@ -1,0 +1,33 @@
+# Everything works from a clean clone with nothing but Python 3.11 or newer: the first target that needs it makes .venv.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.stamp
+
+.PHONY: demo test quick check format clean
+
+demo: $(STAMP)  ## the paper's programs, evaluated and differentiated
+	@PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python examples/demo.py
+
+test: $(STAMP)  ## every test
+	$(BIN)/python -m pytest
+
+quick: $(STAMP)  ## the tests that take no time
+	$(BIN)/python -m pytest -m "not slow"
+
+check: $(STAMP)  ## lints, types, floors
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/python -m pytest tests/test_architecture.py
+
+format: $(STAMP)  ## what ruff can put right by itself
+	$(BIN)/ruff check --fix .
+
+clean:  ## start over
+	rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache .hypothesis
+
+$(STAMP): pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Potto needs Python 3.11 or newer; try make PYTHON=python3.11"; exit 1; }
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
+	touch $(STAMP)

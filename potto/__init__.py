@@ -1,0 +1,47 @@
+"""Potto: a differentiable language with an integral primitive.
+
+Owns the names that Python programs use. They are loaded when they are first used, so that `import potto` costs nothing.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+# At once, because `potto.settings` is a module as well: this binding comes after, and stays.
+from potto.diagnostics import PottoError
+from potto.settings import settings
+
+if TYPE_CHECKING:
+    from potto.api import Function, Module, Workspace, compile, deriv, grad, load
+    from potto.runtime.estimate import Estimate
+
+__version__ = "0.1.0"
+__all__ = [
+    "Estimate",
+    "Function",
+    "Module",
+    "PottoError",
+    "Workspace",
+    "__version__",
+    "compile",
+    "deriv",
+    "grad",
+    "load",
+    "settings",
+]
+
+_HOMES = {"Estimate": "potto.runtime.estimate"}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in __all__:
+        raise AttributeError(f"module 'potto' has no attribute {name!r}")
+    from importlib import import_module
+
+    value = getattr(import_module(_HOMES.get(name, "potto.api")), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

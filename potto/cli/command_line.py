@@ -1,0 +1,84 @@
+"""From the words of a command line to the command that they name.
+
+Owns the parser of arguments and what all commands share. Only the module of the command that runs is imported.
+"""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+import importlib
+import sys
+from collections.abc import Callable
+from typing import Any, NoReturn
+
+from potto import __version__
+from potto.cli import COMMANDS, LATER, module_of
+from potto.cli.console import Console, standard_console
+
+
+class _Parser(argparse.ArgumentParser):
+    """An argument parser that says what is wrong in one line and where to read more."""
+
+    def error(self, message: str) -> NoReturn:
+        sys.stderr.write(f"{self.prog}: {message}\ntry `{self.prog} --help`\n")
+        raise SystemExit(2)
+
+
+def dispatch(arguments: list[str]) -> int:
+    """Find the command, parse its arguments, run it."""
+    if arguments and arguments[0] in COMMANDS:
+        module = importlib.import_module(module_of(arguments[0]))
+        parser = _command_parser(arguments[0], module)
+        options = parser.parse_intermixed_args(arguments[1:])
+        run: Callable[[argparse.Namespace, Console], int] = module.run
+        return run(options, standard_console(options.color))
+    if arguments and arguments[0] in LATER:
+        sys.stderr.write(f"potto {arguments[0]}: this command comes with a later release; see `potto --help`\n")
+        return 2
+    return _without_command(arguments)
+
+
+def _without_command(arguments: list[str]) -> int:
+    if not arguments or arguments[0] in ("-h", "--help", "help"):
+        sys.stdout.write(_overview())
+        return 0 if arguments else 2
+    if arguments[0] in ("-V", "--version"):
+        sys.stdout.write(f"potto {__version__}\n")
+        return 0
+    word = arguments[0]
+    if word.startswith("-"):
+        sys.stderr.write(f"potto: there is no option {word}\ntry `potto --help`\n")
+        return 2
+    near = difflib.get_close_matches(word, COMMANDS, 1)
+    hint = f"; did you mean `{near[0]}`?" if near else ""
+    sys.stderr.write(f"potto: there is no command `{word}`{hint}\ntry `potto --help`\n")
+    return 2
+
+
+def _command_parser(name: str, module: Any) -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog=f"potto {name}",
+        description=module.SUMMARY,
+        epilog=f"example:\n{module.EXAMPLE}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    module.configure(parser)
+    parser.add_argument("--json", action="store_true", help="answer with one JSON object")
+    parser.add_argument(
+        "--color",
+        choices=("auto", "always", "never"),
+        default="auto",
+        help="colours: auto means on a terminal, unless NO_COLOR is set",
+    )
+    return parser
+
+
+def _overview() -> str:
+    lines = ["usage: potto COMMAND …", "", "A language whose integrals may jump and still have exact derivatives.", ""]
+    lines.append("commands:")
+    for name in COMMANDS:
+        lines.append(f"  {name:<9} {importlib.import_module(module_of(name)).SUMMARY}")
+    lines += ["", "`potto COMMAND --help` says more, with an example. `potto --version` says which Potto this is.", ""]
+    return "\n".join(lines)

@@ -1,0 +1,1 @@
+"""The prompt of Potto: the only package that will know the terminal. It comes with a later release."""

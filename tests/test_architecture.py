@@ -1,0 +1,139 @@
+"""The floors of the house: a module imports only from its own floor and the floors below."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+
+# From the top floor down. Packages on one floor may import each other unless they are listed as strangers.
+FLOORS: tuple[tuple[str, ...], ...] = (
+    ("potto_lsp", "potto_repl", "potto.__main__", "potto.cli"),
+    ("potto.ide", "potto.session", "potto.api"),
+    ("potto.runtime",),
+    ("potto.kernels", "potto.integrate"),
+    ("potto.check",),
+    ("potto.calculus",),
+    ("potto.elaborate",),
+    ("potto.types",),
+    ("potto.modules", "potto.primitives", "potto.diffeos", "potto.measures"),
+    ("potto.syntax", "potto.core"),
+    ("potto.render", "potto.excerpt", "potto.settings"),
+    ("potto.source", "potto.diagnostics", "potto.query"),
+)
+# What a package must not import although its floor would let it.
+FORBIDDEN: dict[str, tuple[str, ...]] = {
+    "potto.syntax": ("potto.core",),
+    "potto.core": ("potto.syntax",),
+    "potto.ide": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.api"),  # answers without numbers
+}
+# Who may import a package that is not ours; nobody else may, at the top of a module or inside of a function.
+OUTSIDERS: dict[str, tuple[str, ...]] = {
+    "lark": ("potto.syntax",),
+    "numpy": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.api", "potto.session", "potto_repl"),
+    "scipy": ("potto.kernels", "potto.integrate", "potto.runtime"),
+    "mpmath": ("potto.core.reference",),
+    "pygls": ("potto_lsp",),
+    "lsprotocol": ("potto_lsp",),
+    "prompt_toolkit": ("potto_repl",),
+    "llvmlite": ("potto.kernels",),
+}
+
+
+def _files() -> Iterator[tuple[str, Path]]:
+    for folder, package in (("potto", "potto"), ("lsp/potto_lsp", "potto_lsp"), ("repl/potto_repl", "potto_repl")):
+        for path in sorted((ROOT / folder).rglob("*.py")):
+            parts = (package, *path.relative_to(ROOT / folder).with_suffix("").parts)
+            yield ".".join(parts[:-1] if parts[-1] == "__init__" else parts), path
+
+
+MODULES = dict(_files())
+
+
+def _floor(module: str) -> int | None:
+    """The floor of a module, counted from the top; None for the package `potto` itself."""
+    for number, names in enumerate(FLOORS):
+        if any(_inside(module, name) for name in names):
+            return number
+    return None
+
+
+def _inside(module: str, package: str) -> bool:
+    return module == package or module.startswith(package + ".")
+
+
+def _imports(module: str, path: Path) -> Iterator[tuple[str, int]]:
+    """Every module that a file imports anywhere, also inside of functions; what only type checkers see is left out."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    skipped = {id(inner) for node in ast.walk(tree) if _typing_only(node) for inner in ast.walk(node)}
+    for node in ast.walk(tree):
+        if id(node) in skipped and not isinstance(node, ast.If):
+            continue
+        if isinstance(node, ast.Import):
+            yield from ((alias.name, node.lineno) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = _absolute(module, path, node)
+            for alias in node.names:
+                full = f"{base}.{alias.name}"
+                yield (full if full in MODULES else base), node.lineno
+
+
+def _absolute(module: str, path: Path, node: ast.ImportFrom) -> str:
+    if not node.level:
+        return node.module or ""
+    package = module.split(".") if path.name == "__init__.py" else module.split(".")[:-1]
+    return ".".join([*package[: len(package) - node.level + 1], *([node.module] if node.module else [])])
+
+
+def _typing_only(node: ast.AST) -> bool:
+    return isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
+
+
+@pytest.mark.parametrize("module", sorted(MODULES))
+def test_a_module_imports_only_downwards(module: str) -> None:
+    here = _floor(module)
+    if module == "potto":  # loads its names when they are used
+        return
+    assert here is not None, f"{module} stands on no floor: add it to FLOORS"
+    for target, line in _imports(module, MODULES[module]):
+        there = _floor(target)
+        if there is None:
+            continue
+        where = f"{MODULES[module]}:{line}"
+        assert there >= here, f"{where}: {module} imports {target} from a floor above"
+        for package, forbidden in FORBIDDEN.items():
+            wrong = _inside(module, package) and any(_inside(target, name) for name in forbidden)
+            assert not wrong, f"{where}: {module} must not know {target}"
+
+
+@pytest.mark.parametrize("module", sorted(MODULES))
+def test_only_its_owner_imports_a_library(module: str) -> None:
+    for target, line in _imports(module, MODULES[module]):
+        owners = OUTSIDERS.get(target.split(".")[0])
+        if owners is not None:
+            allowed = any(_inside(module, owner) for owner in owners)
+            assert allowed, f"{MODULES[module]}:{line}: {module} may not import {target}"
+
+
+@pytest.mark.parametrize("module", sorted(MODULES))
+def test_a_module_says_what_it_owns(module: str) -> None:
+    assert ast.get_docstring(ast.parse(MODULES[module].read_text(encoding="utf-8"))), f"{module} has no docstring"
+
+
+def test_the_front_end_starts_without_numpy() -> None:
+    """What the editor needs, checking included, must not load numpy even by accident."""
+    import subprocess
+    import sys
+
+    code = "import sys, potto.check, potto.render; sys.exit('numpy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False).returncode == 0
+
+
+def test_every_file_is_small_enough_to_read() -> None:
+    for module, path in MODULES.items():
+        lines = path.read_text(encoding="utf-8").count("\n")
+        assert lines <= 800, f"{module} has {lines} lines"
