@@ -1,0 +1,103 @@
+"""Addition, multiplication, division and powers: the builtins that programs write as operators, and `pow`."""
+
+from __future__ import annotations
+
+from potto.core.terms import ONE, ZERO, Const, Term, div, if_, mul, neg, pow_, prim, sub
+from potto.primitives.registry import Primitive, Terms, register
+
+
+def _product_partials(*args: Term) -> Terms:
+    return tuple(mul(*args[:i], *args[i + 1 :]) for i in range(len(args)))
+
+
+def _quotient_partials(a: Term, b: Term) -> Terms:
+    # (a/b)/b, not a/b^2: b^2 overflows or vanishes long before the quotient does.
+    return div(ONE, b), neg(div(div(a, b), b))
+
+
+def _power_partials(base: Term, exponent: Term) -> Terms:
+    # Where the exponent is 0 the power is 1 everywhere, but 0 * base^(-1) is nan at base 0; where the base is 0 the
+    # power stays 0 as a positive exponent moves, but 0 * log(0) is nan.
+    by_base = if_(prim("eq", exponent, ZERO), ZERO, mul(exponent, pow_(base, sub(exponent, ONE))))
+    by_exponent = if_(prim("eq", base, ZERO), ZERO, mul(prim("pow", base, exponent), prim("log", base)))
+    return by_base, by_exponent
+
+
+def _power_edges(base: Term, exponent: Term) -> Terms:
+    """At base 0, unless the exponent is a natural number."""
+    whole = isinstance(exponent, Const) and exponent.value >= 0 and exponent.value.is_integer()
+    return () if whole else (base,)
+
+
+add = register(
+    Primitive(
+        "add",
+        arity=None,
+        numpy="add",
+        mpmath="fadd",
+        surface=False,
+        doc="The sum of its arguments.",
+        partials=lambda *args: (ONE,) * len(args),
+        domain=((-1e6, 1e6),),
+        example="1 + 2 + 3",
+    )
+)
+
+mul_ = register(
+    Primitive(
+        "mul",
+        arity=None,
+        numpy="multiply",
+        mpmath="fmul",
+        surface=False,
+        doc="The product of its arguments.",
+        partials=_product_partials,
+        domain=((-1e6, 1e6),),
+        example="2*3*4",
+    )
+)
+
+neg_ = register(
+    Primitive(
+        "neg",
+        arity=1,
+        numpy="negative",
+        mpmath="fneg",
+        surface=False,
+        doc="The number with the other sign.",
+        partials=lambda x: (neg(ONE),),
+        domain=((-1e6, 1e6),),
+        inverse=lambda y: (neg(y),),
+        increasing=-1,
+        example="-3",
+    )
+)
+
+div_ = register(
+    Primitive(
+        "div",
+        arity=2,
+        numpy="divide",
+        mpmath="fdiv",
+        surface=False,
+        doc="The quotient of two numbers.",
+        partials=_quotient_partials,
+        domain=((-1e6, 1e6), (1e-6, 1e6)),
+        edges=lambda a, b: (b,),
+        example="1/4",
+    )
+)
+
+pow_entry = register(
+    Primitive(
+        "pow",
+        arity=2,
+        numpy="power",
+        mpmath="power",
+        doc="A base to a real exponent, the same as `base ^ exponent`. A negative base takes whole exponents only.",
+        partials=_power_partials,
+        domain=((1e-3, 1e3), (-20.0, 20.0)),
+        edges=_power_edges,
+        example="pow(2, 10)",
+    )
+)

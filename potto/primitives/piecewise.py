@@ -1,0 +1,144 @@
+"""Builtins with kinks (abs, min, max, clamp), whose derivatives choose a side, and those that jump (sign, floor, ceil).
+
+A derivative chooses by a `Branch` on the kink itself, so that whoever cuts an integral along surfaces sees one
+surface where the builtin bends and where its derivative jumps.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import combinations
+
+from potto.core.terms import ONE, ZERO, Term, branch, const, neg, prim, sub
+from potto.primitives.registry import Primitive, Terms, register
+
+
+def _absolute_roots(y: Term) -> Terms:
+    nowhere = const(math.nan)
+    return branch((y,), False, y, nowhere), branch((y,), False, neg(y), nowhere)
+
+
+def _choose(op: str, args: Terms) -> Terms:
+    """The partials of min or max, folded from the left: of what is best so far, and of the next argument."""
+    best = args[0]
+    chosen: list[Term] = [ONE] + [ZERO] * (len(args) - 1)
+    for i in range(1, len(args)):
+        margin = sub(best, args[i]) if op == "max" else sub(args[i], best)
+        for j in range(i):
+            chosen[j] = branch((margin,), False, chosen[j], ZERO)
+        chosen[i] = branch((margin,), False, ZERO, ONE)
+        best = prim(op, best, args[i])
+    return tuple(chosen)
+
+
+def _differences(*args: Term) -> Terms:
+    return tuple(sub(a, b) for a, b in combinations(args, 2))
+
+
+def _clamp_partials(x: Term, lo: Term, hi: Term) -> Terms:
+    """clamp is min(max(x, lo), hi), also where lo > hi."""
+
+    def choose(of_x: Term, of_lo: Term, of_hi: Term) -> Term:
+        def below(limit: Term, inside: Term) -> Term:
+            return inside if inside is of_hi else branch((limit,), False, inside, of_hi)
+
+        return branch((sub(x, lo),), False, below(sub(hi, x), of_x), below(sub(hi, lo), of_lo))
+
+    return choose(ONE, ZERO, ZERO), choose(ZERO, ONE, ZERO), choose(ZERO, ZERO, ONE)
+
+
+absolute = register(
+    Primitive(
+        "abs",
+        arity=1,
+        numpy="abs",
+        mpmath="fabs",
+        doc="The absolute value.",
+        partials=lambda x: (branch((x,), False, ONE, neg(ONE)),),
+        domain=((-1e6, 1e6),),
+        kinks=lambda x: (x,),
+        inverse=_absolute_roots,
+        example="abs(-2)",
+    )
+)
+
+minimum = register(
+    Primitive(
+        "min",
+        arity=None,
+        numpy="minimum",
+        mpmath="minimum",
+        doc="The least of two or more numbers.",
+        partials=lambda *args: _choose("min", args),
+        domain=((-1e6, 1e6),),
+        kinks=_differences,
+        example="min(3, 1, 2)",
+    )
+)
+
+maximum = register(
+    Primitive(
+        "max",
+        arity=None,
+        numpy="maximum",
+        mpmath="maximum",
+        doc="The greatest of two or more numbers.",
+        partials=lambda *args: _choose("max", args),
+        domain=((-1e6, 1e6),),
+        kinks=_differences,
+        example="max(3, 1, 2)",
+    )
+)
+
+clamp = register(
+    Primitive(
+        "clamp",
+        arity=3,
+        numpy="potto.clamp",
+        mpmath="clamp",
+        doc="x, but at least lo and at most hi: clamp(x, lo, hi) is min(max(x, lo), hi).",
+        partials=_clamp_partials,
+        domain=((-1e3, 1e3), (-1e3, 1e3), (-1e3, 1e3)),
+        kinks=lambda x, lo, hi: (sub(x, lo), sub(hi, x), sub(hi, lo)),
+        example="clamp(1.5, 0, 1)",
+    )
+)
+
+sign = register(
+    Primitive(
+        "sign",
+        arity=1,
+        numpy="sign",
+        mpmath="sign",
+        doc="-1, 0 or 1. It jumps, so it takes plain values only; under an integral use `[x > 0]`.",
+        plain=True,
+        domain=((-1e6, 1e6),),
+        example="sign(-2.5)",
+    )
+)
+
+floor = register(
+    Primitive(
+        "floor",
+        arity=1,
+        numpy="floor",
+        mpmath="floor",
+        doc="The greatest whole number that is not above x. It jumps, so it takes plain values only.",
+        plain=True,
+        domain=((-1e6, 1e6),),
+        example="floor(2.7)",
+    )
+)
+
+ceil = register(
+    Primitive(
+        "ceil",
+        arity=1,
+        numpy="ceil",
+        mpmath="ceil",
+        doc="The least whole number that is not below x. It jumps, so it takes plain values only.",
+        plain=True,
+        domain=((-1e6, 1e6),),
+        example="ceil(2.2)",
+    )
+)
