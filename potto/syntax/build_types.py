@@ -1,0 +1,113 @@
+"""Reductions of written types. See `build` for the conventions."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from potto.source import Span
+from potto.syntax import kinds
+from potto.syntax.build import Context, Values, Written
+from potto.syntax.nodes import DiffeoType, FunctionType, ListType, Parameter, RealType, TupleType, TypeExpr
+from potto.syntax.tokens import Token
+
+_KNOWN = "types are `Real`, `Real*`, `Real[x]`, `Dist[x]`, `(T, U)`, `[T]`, `T -> U` and `Diffeo[n]`"
+
+
+class _Parens(NamedTuple):
+    """Parentheses among types: the parameters of a function type if `->` follows, else a tuple or a grouping."""
+
+    span: Span
+    parameters: tuple[Parameter, ...]
+
+
+def type_name(context: Context, v: Values) -> RealType:
+    return _real(context, v[0], False, (), v[0].end)
+
+
+def type_star(context: Context, v: Values) -> RealType:
+    if v[1].text != "*" or v[0].text != "Real":
+        span = Span(v[0].start, v[1].end)
+        context.report(kinds.BAD_TYPE(span, f"`{v[0].text}{v[1].text}` is not a type", help=_KNOWN))
+    return _real(context, v[0], True, (), v[1].end)
+
+
+def type_indexed(context: Context, v: Values) -> TypeExpr:
+    head: Token = v[0]
+    indices: list[Token] = v[2]
+    end = v[3].end
+    span = Span(head.start, end)
+    numbers = [token for token in indices if token.kind == "NUMBER"]
+    if head.text == "Diffeo":
+        if len(indices) == 1 and numbers and numbers[0].text.isdigit():
+            # A hundred digits are no number of dimensions; what is too large is reported by those who know why.
+            return DiffeoType(span, int(numbers[0].text[:9]))
+        context.report(kinds.BAD_TYPE(span, "`Diffeo` takes the number of its variables, as in `Diffeo[2]`"))
+        return DiffeoType(span, max(1, len(indices)))
+    for token in numbers:
+        context.report(kinds.BAD_TYPE(token.span, f"`{head.text}[…]` names variables of integration, not numbers"))
+    return _real(context, head, False, tuple(token.text for token in indices if token.kind == "NAME"), end)
+
+
+def _real(context: Context, head: Token, star: bool, variables: tuple[str, ...], end: int) -> RealType:
+    span = Span(head.start, end)
+    if head.text == "Dist":
+        if not variables:
+            context.report(kinds.BAD_TYPE(span, "a distribution names its variables, as in `Dist[x]`"))
+        return RealType(span, "Dist", star, variables)
+    if head.text == "Diffeo":
+        context.report(kinds.BAD_TYPE(span, "`Diffeo` takes the number of its variables, as in `Diffeo[2]`"))
+    elif head.text != "Real" and head.text:
+        context.report(kinds.BAD_TYPE(head.span, f"there is no type `{head.text}`", help=_KNOWN))
+    return RealType(span, "Real", star, variables)
+
+
+def parameter(context: Context, v: Values) -> Written:
+    """`name: T` between the commas of parentheses."""
+    return Written(v[0], None, as_type(context, v[2]), "")
+
+
+def type_unit(_: Context, v: Values) -> _Parens:
+    return _Parens(Span(v[0].start, v[1].end), ())
+
+
+def type_parens(_: Context, v: Values) -> _Parens:
+    return _Parens(Span(v[0].start, v[2].end), tuple(v[1]))
+
+
+def type_parameter(context: Context, v: Values) -> Parameter:
+    written = as_type(context, v[0])
+    return Parameter(written.span, "", written)
+
+
+def type_parameter_named(context: Context, v: Values) -> Parameter:
+    written = as_type(context, v[2])
+    return Parameter(Span(v[0].start, written.span.end), v[0].text, written)
+
+
+def list_type(context: Context, v: Values) -> ListType:
+    return ListType(Span(v[0].start, v[2].end), as_type(context, v[1]))
+
+
+def function_type(context: Context, v: Values) -> FunctionType:
+    left, result = v[0], as_type(context, v[2])
+    if isinstance(left, _Parens):
+        return FunctionType(Span(left.span.start, result.span.end), left.parameters, result)
+    return FunctionType(Span(left.span.start, result.span.end), (Parameter(left.span, "", left),), result)
+
+
+def as_type(context: Context, value: TypeExpr | _Parens) -> TypeExpr:
+    """A type that no `->` follows: parentheses become a tuple, or what is in them."""
+    if not isinstance(value, _Parens):
+        return value
+    types: list[TypeExpr] = []
+    for found in value.parameters:
+        assert found.annotation is not None
+        if found.name:
+            context.report(kinds.BAD_TYPE(found.span, "only the parameters of a function type have names", help=_KNOWN))
+        types.append(found.annotation)
+    if len(types) == 1:
+        return types[0]
+    if not types:
+        context.report(kinds.BAD_TYPE(value.span, "there is no empty type", help=_KNOWN))
+        return RealType(value.span, "Real", False, ())
+    return TupleType(value.span, tuple(types))

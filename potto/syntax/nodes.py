@@ -1,0 +1,429 @@
+"""The syntax tree: immutable nodes that say what was written and where.
+
+Spans are relative to the start of the chunk. Nothing here knows types or meaning. Chains of `+ -` and of `* /` are
+flat, so that a sum of thousands of terms is no deeper than one of two.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from potto.source import Span
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    span: Span
+    text: str
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class Name:
+    span: Span
+    id: str
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """`module.name`, written without blanks; `path` is the dotted module (`pkg.m`), `path_span` its place."""
+
+    span: Span
+    path: str
+    path_span: Span
+    name: str
+    name_span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Unary:
+    span: Span
+    op: Literal["-", "+", "not"]
+    operand: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class Operand:
+    """One further operand of a chain, with the operator in front of it."""
+
+    op: str
+    op_span: Span
+    value: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class Chain:
+    """`a + b - c` or `a * b / c`: left-associative operators of one precedence (`rest` is never empty)."""
+
+    span: Span
+    first: Expr
+    rest: tuple[Operand, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Power:
+    span: Span
+    base: Expr
+    exponent: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class Compare:
+    """`a <= x < b`: a chained comparison (`rest` is never empty; ops: < <= > >= == !=)."""
+
+    span: Span
+    first: Expr
+    rest: tuple[Operand, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Logic:
+    """`p and q and r` or `p or q`, flat."""
+
+    span: Span
+    op: Literal["and", "or"]
+    operands: tuple[Expr, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Bracket:
+    """The Iverson bracket `[p]`: 1 where p holds, else 0. p is a Compare, a Logic or a `not`."""
+
+    span: Span
+    condition: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class ListLiteral:
+    span: Span
+    items: tuple[Expr, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Tuple:
+    """`(a, b)`, two items or more."""
+
+    span: Span
+    items: tuple[Expr, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Paren:
+    """`(e)`: kept so that the formatter prints what was written."""
+
+    span: Span
+    inner: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class If:
+    """`if p then a else b` or `p ? a : b`."""
+
+    span: Span
+    condition: Expr
+    then: Expr
+    orelse: Expr
+    style: Literal["if", "?:"]
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    span: Span
+    name: str
+    annotation: TypeExpr | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Lambda:
+    """`\\(x, y) . \\c . e` is two Lambdas; `\\(x, y) . c . e` is one with two groups. Each group is one call."""
+
+    span: Span
+    groups: tuple[tuple[Parameter, ...], ...]
+    body: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class Argument:
+    span: Span
+    name: str | None
+    name_span: Span | None
+    value: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class Apply:
+    """One group of arguments given to a function: `f(a, b)`, `f (a, b)`, `f x`. `f x y` is two Applys."""
+
+    span: Span
+    function: Expr
+    arguments: tuple[Argument, ...]
+    parenthesized: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """`[lo, hi]` as the bounds of one variable of integration."""
+
+    span: Span
+    lo: Expr
+    hi: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class MeasureBound:
+    """`x ~ normal(m, s)` among the bounds of an integral."""
+
+    span: Span
+    variable: str
+    variable_span: Span
+    measure: str
+    measure_span: Span
+    arguments: tuple[Expr, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Binder:
+    """A variable where it is bound, here after `d`."""
+
+    span: Span
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Integral:
+    """`integral (bounds) body d(variables)`: the first variable is the outermost."""
+
+    span: Span
+    bounds: tuple[Interval | MeasureBound, ...]
+    body: Expr
+    variables: tuple[Binder, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Sum:
+    """`sum i in lo..hi (body)`."""
+
+    span: Span
+    variable: Binder
+    lo: Expr
+    hi: Expr
+    body: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class Binding:
+    """`name = e` or `(a, b) = e`; in a definition's block or in a `let`."""
+
+    span: Span
+    targets: tuple[Binder, ...]
+    value: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class Let:
+    """`let a = e; (b, c) = f in body`."""
+
+    span: Span
+    bindings: tuple[Binding, ...]
+    body: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class InlineDiffeo:
+    """`diffeo(e, f)`: the condition holds where the first component is >= 0."""
+
+    span: Span
+    components: tuple[Expr, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorExpr:
+    """A place where the text could not be read as an expression. A diagnostic has said why."""
+
+    span: Span
+    text: str
+
+
+Expr = (
+    Number
+    | Name
+    | Member
+    | Unary
+    | Chain
+    | Power
+    | Compare
+    | Logic
+    | Bracket
+    | ListLiteral
+    | Tuple
+    | Paren
+    | If
+    | Lambda
+    | Apply
+    | Integral
+    | Sum
+    | Let
+    | InlineDiffeo
+    | ErrorExpr
+)
+
+
+# Written types
+
+
+@dataclass(frozen=True, slots=True)
+class RealType:
+    """`Real`, `Real*` (accepts what varies) or `Real[x, y]`, `Dist[x]`."""
+
+    span: Span
+    head: Literal["Real", "Dist"]
+    star: bool
+    variables: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class TupleType:
+    span: Span
+    items: tuple[TypeExpr, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ListType:
+    span: Span
+    item: TypeExpr
+
+
+@dataclass(frozen=True, slots=True)
+class FunctionType:
+    """`(A, name: B) -> C`; parameters in one group."""
+
+    span: Span
+    parameters: tuple[Parameter, ...]
+    result: TypeExpr
+
+
+@dataclass(frozen=True, slots=True)
+class DiffeoType:
+    """`Diffeo[2]`."""
+
+    span: Span
+    dims: int
+
+
+TypeExpr = RealType | TupleType | ListType | FunctionType | DiffeoType
+
+
+# Top-level items: one per chunk
+
+
+@dataclass(frozen=True, slots=True)
+class ImportedName:
+    span: Span
+    name: str
+    name_span: Span
+    alias: str | None
+    alias_span: Span | None
+
+
+@dataclass(frozen=True, slots=True)
+class FromImport:
+    """`from pkg.m import a, b as c`."""
+
+    span: Span
+    module: str
+    module_span: Span
+    names: tuple[ImportedName, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Import:
+    """`import pkg.m` or `import pkg.m as k`."""
+
+    span: Span
+    module: str
+    module_span: Span
+    alias: str | None
+    alias_span: Span | None
+
+
+@dataclass(frozen=True, slots=True)
+class Definition:
+    """`def f(a, b)(c) body` (groups not empty) or `name = e` (groups empty).
+
+    `bindings` are the lines before a def's last line; `result` is an annotation `-> T`.
+    """
+
+    span: Span
+    name: str
+    name_span: Span
+    groups: tuple[tuple[Parameter, ...], ...]
+    result: TypeExpr | None
+    bindings: tuple[Binding, ...]
+    body: Expr
+    keyword: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Inverse:
+    """`inverse (u, v) . (x, y)`: the author's inverse of a diffeomorphism."""
+
+    span: Span
+    parameters: tuple[Parameter, ...]
+    components: tuple[Expr, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class DiffeoDefinition:
+    """`diffeo name(x, y; c) = (u, v)` in a .po, or `name = \\(x, y) . \\c . (u, v)` in a .diffeo file.
+
+    `variables` are the variables of integration, `groups` the further groups of parameters as they are called
+    (for the `;` form: one group per call is `(x, y)` then `(c, …)`), `components` the result, `where` conditions
+    that select a branch (a box or a sign).
+    """
+
+    span: Span
+    name: str
+    name_span: Span
+    variables: tuple[Parameter, ...]
+    groups: tuple[tuple[Parameter, ...], ...]
+    bindings: tuple[Binding, ...]
+    components: tuple[Expr, ...]
+    inverse: Inverse | None
+    where: tuple[Expr, ...]
+    keyword: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Print:
+    span: Span
+    arguments: tuple[Expr, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class For:
+    """`for v in list: statements`."""
+
+    span: Span
+    variable: Binder
+    iterable: Expr
+    body: tuple[Statement, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ExpressionStatement:
+    span: Span
+    value: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class BrokenItem:
+    """A chunk whose head could not be read. `name` is the best guess at what it was to define."""
+
+    span: Span
+    name: str | None
+
+
+Statement = Print | For | ExpressionStatement | Binding
+Item = FromImport | Import | Definition | DiffeoDefinition | Print | For | ExpressionStatement | BrokenItem
+Node = Expr | TypeExpr | Item | Binding | Binder | Argument | Parameter | Operand | Interval | MeasureBound | Inverse

@@ -1,0 +1,143 @@
+"""The LALR tables of the grammar: computed by lark once, then read from a cache in the user's cache folder.
+
+Owns `Tables` and `tables()`. lark is imported only when the cache has to be filled: importing it costs more than
+everything else here. The cache is JSON under a name that holds a hash of the grammar, so that it can neither run code
+nor be stale; when it can't be read or written, the tables are computed again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+STARTS = ("chunk", "expression")
+_FORMAT = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """A reduction: `size` symbols become one `origin`; `action` names what builds its value, None passes it on."""
+
+    origin: str
+    size: int
+    action: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Tables:
+    """`rows[state][symbol]` is a state to go to (>= 0) or `~rule` to reduce by (< 0)."""
+
+    rules: tuple[Rule, ...]
+    rows: tuple[dict[str, int], ...]
+    starts: dict[str, int]
+    ends: dict[str, int]
+
+
+def grammar_text() -> str:
+    """The grammar file's text."""
+    return Path(__file__).with_name("grammar.lark").read_text(encoding="utf-8")
+
+
+def cache_folder() -> Path:
+    """Where Potto keeps what it can compute again: `POTTO_CACHE`, or `potto` in the user's cache folder."""
+    own = os.environ.get("POTTO_CACHE")
+    if own:
+        return Path(own)
+    if sys.platform == "win32":
+        base = os.environ.get("LOCALAPPDATA") or os.path.expanduser("~\\AppData\\Local")
+    elif sys.platform == "darwin":
+        base = os.path.expanduser("~/Library/Caches")
+    else:
+        base = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    return Path(base) / "potto"
+
+
+@lru_cache(maxsize=1)
+def tables() -> Tables:
+    """The tables of the grammar, from the cache if it has them."""
+    grammar = grammar_text()
+    key = hashlib.sha256(f"{_FORMAT}\n{grammar}".encode()).hexdigest()[:24]
+    path = cache_folder() / f"grammar-{key}.json"
+    cached = _read(path)
+    if cached is not None:
+        return cached
+    computed = compute(grammar)
+    _write(path, computed)
+    return computed
+
+
+def compute(grammar: str) -> Tables:
+    """Let lark compute the tables of a grammar."""
+    table = lark_parser(grammar).parser.parser.parser.parse_table
+    rules: dict[Any, int] = {}
+    rows: list[dict[str, int]] = [{} for _ in table.states]
+    for state, actions in table.states.items():
+        for symbol, (action, target) in actions.items():
+            rows[state][symbol] = target if action.name == "Shift" else ~rules.setdefault(target, len(rules))
+    known = tuple(Rule(rule.origin.name, len(rule.expansion), _action(rule)) for rule in rules)
+    return Tables(known, tuple(rows), dict(table.start_states), dict(table.end_states))
+
+
+def lark_parser(grammar: str) -> Any:
+    """lark's own parser of the grammar, over tokens of ours; also the oracle of the tests."""
+    from lark import Lark, Token
+    from lark.lexer import Lexer
+
+    class Tokens(Lexer):
+        """Gives lark the `(kind, text, start)` triples that it was called with."""
+
+        def __init__(self, _configuration: Any) -> None:
+            pass
+
+        def lex(self, lexer_state: Any, parser_state: Any) -> Iterator[Token]:
+            for kind, text, start in lexer_state.text:
+                yield Token(kind, text, start)
+
+    return Lark(grammar, parser="lalr", lexer=Tokens, start=list(STARTS), keep_all_tokens=True)
+
+
+def _action(rule: Any) -> str | None:
+    if rule.alias:
+        return str(rule.alias)
+    return None if len(rule.expansion) == 1 else str(rule.origin.name)
+
+
+def _read(path: Path) -> Tables | None:
+    """The cached tables; None if there are none, or none that can be trusted to be whole."""
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+        rules = tuple(Rule(origin, size, action) for origin, size, action in data["rules"])
+        rows = tuple(data["rows"])
+        starts, ends = data["starts"], data["ends"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return Tables(rules, rows, starts, ends)
+
+
+def _write(path: Path, computed: Tables) -> None:
+    """Write the cache in one step. That it can't be written (a read-only home) costs time, nothing else."""
+    data = {
+        "rules": [[rule.origin, rule.size, rule.action] for rule in computed.rules],
+        "rows": computed.rows,
+        "starts": computed.starts,
+        "ends": computed.ends,
+    }
+    import tempfile
+
+    temporary = None
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".grammar-", suffix=".tmp")
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            json.dump(data, file, separators=(",", ":"))
+        os.replace(temporary, path)
+    except OSError:
+        if temporary is not None and os.path.exists(temporary):
+            os.unlink(temporary)

@@ -1,0 +1,64 @@
+"""Characters and operators that are no part of the language, and what their author may have meant."""
+
+from __future__ import annotations
+
+import unicodedata
+
+from potto.diagnostics import Diagnostic
+from potto.source import Span
+from potto.syntax import kinds
+from potto.syntax.tokens import PLAIN_OPERATOR
+
+_MEANT = {
+    "!": "write `not`",
+    "%": "Potto has no remainder; `x - floor(x/n)*n` is one",
+    "|": "write `abs(x)`, or `or` between conditions",
+    "&": "write `and` between conditions",
+    "{": "group with `(` and `)`",
+    "}": "group with `(` and `)`",
+    "·": "write `*`",
+    "×": "write `*`",
+    "÷": "write `/`",
+    "√": "write `sqrt(x)`",
+    "π": "write `pi`",
+    "∞": "write `inf`",
+    "→": "write `->`",
+    "∑": "write `sum i in 1..n (body)`",
+    "∧": "write `and`",
+    "∨": "write `or`",
+    "¬": "write `not`",
+    "²": "write `^2`",
+    "³": "write `^3`",
+    "“": "Potto has no text strings",
+    "”": "Potto has no text strings",
+    "`": "Potto has no backquotes",
+}
+
+
+def foreign_operator(word: str, span: Span) -> tuple[str, Diagnostic]:
+    """What an operator of another language means here, and the message that says so."""
+    plain = PLAIN_OPERATOR[word]
+    message = f"`{word}` is written `{plain}` in Potto"
+    return plain, kinds.OTHER_LANGUAGE(span, message, help=f"write `{plain}`")
+
+
+def string_literal(word: str, span: Span) -> Diagnostic:
+    """The message for a quoted text."""
+    return kinds.OTHER_LANGUAGE(span, "Potto has no text strings", help="take the quotes out to use a name")
+
+
+def unknown_character(text: str, start: int) -> tuple[int, Diagnostic | None]:
+    """The end of a run of one unknown character, and the message for it (blanks of other scripts are let pass)."""
+    char, end = text[start], start + 1
+    while end < len(text) and text[end] == char:
+        end += 1
+    if char.isspace():
+        return end, None
+    if char == "\0":
+        message, help = "this is not text: it has NUL bytes", "is it a binary file, or text in UTF-16?"
+    else:
+        name = unicodedata.name(char, "")
+        shown = f"`{char}`" if char.isprintable() else f"U+{ord(char):04X}"
+        message = f"Potto does not know the character {shown}" + (f" ({name.lower()})" if ord(char) > 126 and name else "")
+        help = _MEANT.get(char, "take it out")
+    return end, kinds.UNKNOWN_CHARACTER(Span(start, end), message, help=help)
