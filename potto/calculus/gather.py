@@ -46,8 +46,9 @@ def split(term: Prim, value: Term, name: str) -> Steps:
     """Equations that together have the roots of `term = value`."""
     if value is ZERO and term.op == "mul":
         return tuple(Step(factor, ZERO) for factor in term.args if name in factor.free)
-    if value is ZERO and term.op == "div":
-        return (Step(term.args[0], ZERO),)
+    if term.op == "div":
+        top, below = term.args
+        return (Step(top if value is ZERO else sub(top, mul(value, below)), ZERO),)
     if term.op in _SPLIT:
         return _SPLIT[term.op](term, value)
     same = _same_builtin(term, value)
@@ -86,7 +87,9 @@ def _same_builtin(term: Prim, value: Term) -> Steps | None:
 
 def _polynomial_in_something(term: Prim, value: Term, name: str) -> Steps | None:
     whole = sub(term, value)
-    for inner in dominators(term, name)[1:]:
+    for inner in dominators(whole, name):
+        if inner is whole or inner is term:
+            continue
         hidden = inner.name if isinstance(inner, Var) else fresh("z", whole.free)
         outer = whole if isinstance(inner, Var) else replaced(whole, inner, var(hidden))
         found = collect(outer, hidden)

@@ -119,20 +119,32 @@ def square_root(value: Term) -> Term:
         return _constant_root(value)
     base = squared(value)
     if base is not None:
-        return prim("abs", base)
+        return _size(base)
     if range_of(value).negative:
         return NAN
     if isinstance(value, Prim) and value.op == "div":
         below = squared(value.args[1])
         if below is not None:
-            return div(square_root(value.args[0]), prim("abs", below))
+            return div(square_root(value.args[0]), _size(below))
     if isinstance(value, Prim) and value.op == "mul":
         bases = [squared(f) if not isinstance(f, Const) else None for f in value.args]
-        outside: list[Term] = [prim("abs", b) for b in bases if b is not None]
+        outside: list[Term] = [_size(b) for b in bases if b is not None]
         inside = [f for f, b in zip(value.args, bases, strict=True) if b is None]
         if outside:
             return mul(*outside, square_root(mul(*inside))) if inside else mul(*outside)
     return prim("sqrt", factored(value))
+
+
+def _size(term: Term) -> Term:
+    """abs(term), unless its form shows its sign."""
+    bounds = range_of(term)
+    if bounds.lo >= 0:
+        return term
+    return minus(term) if bounds.hi <= 0 else prim("abs", minus(term) if _is_neg(term) else term)
+
+
+def _is_neg(term: Term) -> bool:
+    return isinstance(term, Prim) and term.op == "neg"
 
 
 def factored(value: Term) -> Term:

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-from potto.core.terms import ONE, ZERO, Const, Prim, Term, add, const, div, mul, neg, postorder, pow_, prim
+from potto.core.terms import ZERO, Const, Prim, Term, add, const, div, mul, neg, postorder, pow_, prim
 
 Monomial = tuple[tuple[Term, int], ...]
 Polynomial = Mapping[Monomial, Fraction]
@@ -72,6 +72,18 @@ def shorter(term: Term) -> Term:
         return term
     expanded = as_term(found.top)
     return expanded if expanded is not None and _size(expanded) < _size(term) else term
+
+
+def tidy(term: Term) -> Term:
+    """The same value for people to read: as one quotient of expanded polynomials, if that is no longer."""
+    found = normal(term)
+    if found is None:
+        return term
+    top, below = as_term(found.top), as_term(found.below)
+    if top is None or below is None:
+        return term
+    whole = div(top, below)
+    return whole if _size(whole) <= _size(term) else term
 
 
 def _size(term: Term) -> int:
@@ -175,6 +187,13 @@ def _reduced(top: Polynomial, below: Polynomial) -> Rational:
         return Rational(top, _ONE)
     if top == below:
         return Rational(_ONE, _ONE)
+    if len(below) > 1 or len(top) > 1:
+        exact = _divided(top, below)
+        if exact is not None:
+            return Rational(exact, _ONE)
+        exact = _divided(below, top)
+        if exact is not None:
+            return _reduced(_ONE, exact)
     if below != _ONE:
         shared = _shared([*top, *below])
         if shared:
@@ -185,6 +204,41 @@ def _reduced(top: Polynomial, below: Polynomial) -> Rational:
             top = {m: c / lead for m, c in top.items()}
             below = {m: c / lead for m, c in below.items()}
     return Rational(top, below)
+
+
+def _divided(top: Polynomial, below: Polynomial) -> Polynomial | None:
+    """top / below where that is a polynomial again, by division of leading monomials."""
+    if len(below) < 2 or len(top) < len(below) or len(top) * len(below) > _LARGEST:
+        return None
+    rank = {a: i for i, a in enumerate(sorted({a for m in (*top, *below) for a, _ in m}, key=lambda a: a.digest))}
+
+    def order(monomial: Monomial) -> list[tuple[int, int]]:
+        counts = dict(monomial)
+        return [(rank[a], counts.get(a, 0)) for a in sorted(rank, key=rank.__getitem__)]
+
+    lead = max(below, key=order)
+    rest, result = dict(top), dict[Monomial, Fraction]()
+    for _ in range(_LARGEST):
+        if not rest:
+            return result
+        head = max(rest, key=order)
+        counts = dict(head)
+        if any(counts.get(a, 0) < n for a, n in lead):
+            return None
+        step = _without(head, dict(lead))
+        factor = rest[head] / below[lead]
+        result[step] = factor
+        for monomial, coefficient in below.items():
+            counts = dict(step)
+            for a, n in monomial:
+                counts[a] = counts.get(a, 0) + n
+            key = _sorted(counts)
+            total = rest.get(key, Fraction(0)) - factor * coefficient
+            if total:
+                rest[key] = total
+            else:
+                rest.pop(key, None)
+    return None
 
 
 def _shared(monomials: list[Monomial]) -> dict[Term, int]:
@@ -287,5 +341,3 @@ def _exponential(node: Prim, inner: Rational) -> Rational:
         side[atom] = side.get(atom, 0) + (int(abs(coefficient)) if whole else 1)
     return Rational({_sorted(top): Fraction(1)}, {_sorted(below): Fraction(1)})
 
-
-__all__ = ["ONE", "Rational", "as_term", "equal", "is_zero", "normal", "shorter"]

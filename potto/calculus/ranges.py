@@ -9,8 +9,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
-from potto.core.terms import Branch, Const, If, Prim, Term, Var, postorder
+from potto.core.terms import Branch, Const, If, Prim, Term, Var, children, postorder
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +52,24 @@ def ranges(term: Term, box: Mapping[str, tuple[float, float]] | None = None) -> 
     return found
 
 
+# What the form alone shows, kept as long as the term lives: roots are built up and asked about step by step.
+_known: WeakKeyDictionary[Term, Range] = WeakKeyDictionary()
+
+
 def range_of(term: Term, box: Mapping[str, tuple[float, float]] | None = None) -> Range:
-    return ranges(term, box)[term]
+    if box:
+        return ranges(term, box)[term]
+    stack = [term]
+    while stack:
+        node = stack[-1]
+        missing = [c for c in children(node) if c not in _known]
+        if node in _known or not missing:
+            stack.pop()
+            if node not in _known:
+                _known[node] = _node(node, _known, {})
+        else:
+            stack.extend(missing)
+    return _known[term]
 
 
 def positive(term: Term) -> bool:

@@ -40,7 +40,7 @@ from potto.core.terms import (
 )
 from potto.primitives import PRIMITIVES
 
-_MOST = 64  # goals for one surface
+_MOST = 256  # equations that lead to several others, for one surface
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,10 +134,8 @@ class _Search:
         self.reasons: list[str] = []
 
     def run(self, first: Goal) -> None:
-        goals = [first]
-        for _ in range(_MOST * 8):
-            if not goals:
-                return
+        goals, cases = [first], 0
+        while goals:
             goal = goals.pop()
             if self.name not in goal.inner.free or _absent(goal.value):
                 continue  # constant along the variable (no root is isolated), or no root
@@ -149,9 +147,10 @@ class _Search:
                     self.reasons.append(found.reason)
                 else:
                     goals.extend(reversed(found))
-                if len(goals) > _MOST:
-                    break
-        self.reasons.append("there are too many cases")
+                    cases += len(found) > 1
+                if cases > _MOST:
+                    self.reasons.append("there are too many cases")
+                    return
 
     def found(self, goal: Goal) -> None:
         root = goal.value

@@ -1,0 +1,331 @@
+"""Diffeomorphisms checked: each condition under an integral, and each definition of a diffeomorphism.
+
+Owns the queries `check_conditions` and `diffeo_info`. What a condition is comes from `conditions`, whether it can be
+integrated over from `verdict`; here both meet the program: places, the author's `inverse` and `where`, messages.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from potto.calculus.conditions import Condition, conditions_of, expanded, skeleton
+from potto.calculus.invert import Failure, Inverse, invert
+from potto.calculus.isolate import Guard
+from potto.calculus.linear import affine
+from potto.calculus.verdict import (
+    COMPONENTS,
+    NO_INVERSE,
+    NOT_DIFFERENTIABLE,
+    WRONG_INVERSE,
+    Problem,
+    failure,
+    judge,
+    kinks,
+    listed,
+    singular,
+)
+from potto.calculus.verify import Refuted, Untested, Verified, verify
+from potto.core.printer import format_term
+from potto.core.terms import ONE, ZERO, Branch, Const, Global, Hole, Lam, Term, Tuple, const, postorder, sub
+from potto.diagnostics import Diagnostic
+from potto.elaborate import core, elaborate_expression
+from potto.modules import definition
+from potto.query import Database, query
+from potto.source import Span
+from potto.syntax import nodes
+
+Box = Mapping[str, tuple[float, float]]
+
+
+@dataclass(frozen=True, slots=True)
+class DiffeoInfo:
+    """What is known of a diffeomorphism, for hover and `potto deriv`.
+
+    branches: the variables over the values of the components, once for each branch; empty if there is none.
+    values: names for the values of the components, as `branches` uses them.
+    proven: shown by symbols; else `notes` say what was tried.
+    """
+
+    name: str
+    variables: tuple[str, ...]
+    parameters: tuple[tuple[str, ...], ...]
+    components: tuple[Term, ...]
+    values: tuple[str, ...]
+    branches: tuple[tuple[Term, ...], ...]
+    determinant: Term | None
+    method: str
+    proven: bool
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class _Study:
+    diagnostics: tuple[Diagnostic, ...]
+    info: DiffeoInfo | None
+
+
+@query
+def check_conditions(db: Database, file: str, name: str) -> tuple[Diagnostic, ...]:
+    """The diagnostics of a definition's conditions (spans relative to it), or of the diffeomorphism that it is."""
+    item = definition(db, file, name)
+    if isinstance(item, nodes.DiffeoDefinition):
+        return _studied(db, file, name).diagnostics
+    elaborated = core(db, file, name)
+    found = conditions_of(elaborated.term, lambda g: exported(db, g.module, g.name), lambda g: _whole(db, g))
+    spans = dict(elaborated.origins)
+    fallback = Span(0, 0) if item is None else item.name_span
+    return tuple(_judged(found, spans, fallback))
+
+
+@query
+def diffeo_info(db: Database, file: str, name: str) -> DiffeoInfo | None:
+    """Inverse and determinant of a diffeomorphism; None for other definitions."""
+    if not isinstance(definition(db, file, name), nodes.DiffeoDefinition):
+        return None
+    return _studied(db, file, name).info
+
+
+@query
+def exported(db: Database, file: str, name: str) -> Term | None:
+    """The conditions and calls of a definition over its parameters: what a caller's check reads."""
+    return skeleton(core(db, file, name).term)
+
+
+def _whole(db: Database, target: Global) -> Term | None:
+    return core(db, target.module, target.name).term
+
+
+# Conditions under integrals
+
+
+def _judged(found: Iterable[Condition], spans: Mapping[Term, Span], fallback: Span) -> Iterable[Diagnostic]:
+    said: set[tuple[str, Span, str]] = set()
+    for condition in found:
+        if any(isinstance(n, Hole) for c in condition.coordinates for n in postorder(c)):
+            continue  # a diagnostic has said what is wrong there
+        own = isinstance(condition.anchor, Branch) and condition.anchor.coordinates == condition.coordinates
+        problem = judge(condition.coordinates, condition.variables, condition.box, own)
+        if isinstance(problem, Problem):
+            span = spans.get(condition.anchor, fallback)
+            key = (problem.kind.code, span, problem.message)
+            if key not in said:
+                said.add(key)
+                yield _diagnostic(problem, span, condition.calls)
+
+
+def _diagnostic(problem: Problem, span: Span, calls: Sequence[str] = ()) -> Diagnostic:
+    notes = problem.notes
+    if calls:
+        notes = (*notes, "the condition is inside " + ", called by ".join(f"`{c}`" for c in reversed(calls)))
+    return problem.kind(span, problem.message, label=problem.label, notes=notes, help=problem.help)
+
+
+# Definitions of diffeomorphisms
+
+
+@query
+def _studied(db: Database, file: str, name: str) -> _Study:
+    item = definition(db, file, name)
+    assert isinstance(item, nodes.DiffeoDefinition)
+    term = expanded(core(db, file, name).term, lambda g: _whole(db, g))
+    groups, body = _groups(term)
+    components = body.items if isinstance(body, Tuple) else (body,)
+    if not groups or any(isinstance(n, Hole) for n in postorder(*components)):
+        return _Study((), None)
+    variables, parameters = groups[0], tuple(groups[1:])
+    where = _conditions(db, file, item)
+    box = _box(where, variables)
+    span = _components_span(item)
+    problem = _wrong_shape(components, variables, box) or singular(components, variables)
+    if problem is not None:
+        return _Study((_diagnostic(problem, span),), None)
+    return _inverted(db, file, item, _Map(components, variables, parameters, where, box), span)
+
+
+@dataclass(frozen=True, slots=True)
+class _Map:
+    components: tuple[Term, ...]
+    variables: tuple[str, ...]
+    parameters: tuple[tuple[str, ...], ...]
+    where: tuple[Guard, ...]
+    box: Box
+
+
+def _groups(term: Term) -> tuple[list[tuple[str, ...]], Term]:
+    groups: list[tuple[str, ...]] = []
+    while isinstance(term, Lam):
+        groups.append(term.params)
+        term = term.body
+    return groups, term
+
+
+def _components_span(item: nodes.DiffeoDefinition) -> Span:
+    if not item.components:
+        return item.name_span
+    return item.components[0].span.cover(item.components[-1].span)
+
+
+def _wrong_shape(components: Sequence[Term], variables: Sequence[str], box: Box) -> Problem | None:
+    if len(components) != len(variables):
+        return Problem(
+            COMPONENTS,
+            f"{_many(len(components), 'component')} over {_many(len(variables), 'variable')}",
+            f"{len(components)} here, {len(variables)} variables",
+            (),
+            f"give {_many(len(variables), 'component')}: an invertible map has as many as variables",
+        )
+    kink = kinks(components, variables, box)
+    if kink is None:
+        return None
+    return Problem(
+        NOT_DIFFERENTIABLE,
+        f"the map is not differentiable where `{format_term(kink)}` is 0",
+        "has a kink",
+        ("a diffeomorphism is differentiable everywhere, and so is its inverse",),
+        "keep to one side of the kink with `where`, or split the map at it",
+    )
+
+
+def _many(count: int, noun: str) -> str:
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def _inverted(db: Database, file: str, item: nodes.DiffeoDefinition, what: _Map, span: Span) -> _Study:
+    """The inverse: the author's, verified, or the one that is found."""
+    found = invert(what.components, what.variables, bool(what.where))
+    if item.inverse is not None:
+        return _authors(db, file, item, what, found)
+    if isinstance(found, Failure):
+        return _Study((_diagnostic(failure(found, what.components, what.variables), span),), None)
+    branches = found.branches
+    notes: tuple[str, ...] = ()
+    if what.where and len(branches) > 1:
+        kept = [b for b in branches if isinstance(_on_branch(what, found.values, b), Verified)]
+        if not kept:
+            problem = Problem(
+                NO_INVERSE,
+                f"none of the {len(branches)} solutions found lies on the branch that `where` selects",
+                "no inverse on this branch",
+                (),
+                "widen `where`, or add the inverse: `inverse (u, v) . (x, y)`",
+            )
+            return _Study((_diagnostic(problem, span),), None)
+        branches = tuple(kept)
+        notes = ("the branch was selected at sample points",)
+    info = DiffeoInfo(
+        item.name, what.variables, what.parameters, what.components, found.values, branches,
+        found.determinant, found.method, True, notes,
+    )  # fmt: skip
+    return _Study((), info)
+
+
+def _on_branch(what: _Map, values: Sequence[str], inverse: Sequence[Term]) -> Verified | Refuted | Untested:
+    return verify(what.components, what.variables, values, inverse, what.where, what.box)
+
+
+def _authors(
+    db: Database, file: str, item: nodes.DiffeoDefinition, what: _Map, found: Inverse | Failure
+) -> _Study:
+    """The author's inverse, verified."""
+    assert item.inverse is not None
+    given = item.inverse
+    values, parts = _given_inverse(db, file, item)
+    if len(values) != len(what.components) or len(parts) != len(what.variables):
+        problem = Problem(
+            COMPONENTS,
+            f"the inverse takes {_many(len(values), 'value')} to {_many(len(parts), 'component')}, "
+            f"but the map takes {_many(len(what.variables), 'variable')} to {_many(len(what.components), 'component')}",
+            "wrong number",
+            (),
+            "the inverse takes the components, in their order, back to the variables",
+        )
+        return _Study((_diagnostic(problem, given.span),), None)
+    outcome = _on_branch(what, values, parts)
+    if isinstance(outcome, Refuted):
+        return _Study((_diagnostic(_wrong(what, outcome), given.span),), None)
+    if isinstance(outcome, Untested):
+        problem = Problem(
+            WRONG_INVERSE,
+            "the inverse could not be verified: no point was found where both it and the map are defined",
+            "not verified",
+            (f"tried {listed(what.variables)} between -3 and 3, or as `where` says",),
+            "say with `where` in which box the map is used",
+        )
+        return _Study((_diagnostic(problem, given.span),), None)
+    notes = () if outcome.proven else (f"the inverse was verified at {outcome.tested} sample points only",)
+    det = found.determinant
+    info = DiffeoInfo(
+        item.name, what.variables, what.parameters, what.components, values, (parts,), det, "given", outcome.proven,
+        notes,
+    )  # fmt: skip
+    return _Study((), info)
+
+
+def _wrong(what: _Map, refuted: Refuted) -> Problem:
+    at = ", ".join(f"{n} = {v:.6g}" for n, v in refuted.point.items())
+    back = ", ".join(f"{n} = {v:.6g}" for n, v in refuted.back.items())
+    hint = "" if what.where else "; if it is right on one branch only, select that with `where`"
+    return Problem(
+        WRONG_INVERSE,
+        f"this inverse does not lead back: from {at} it gives {back}",
+        "not the inverse",
+        ("checked at sample points",),
+        f"correct the inverse{hint}",
+    )
+
+
+# The author's inverse and branch
+
+
+def _function(db: Database, file: str, groups: Sequence[tuple[nodes.Parameter, ...]], body: nodes.Expr) -> Term:
+    span = body.span
+    return elaborate_expression(db, file, nodes.Lambda(span, tuple(g for g in groups if g), body)).term
+
+
+def _given_inverse(db: Database, file: str, item: nodes.DiffeoDefinition) -> tuple[tuple[str, ...], tuple[Term, ...]]:
+    """The names of the values and the components of the inverse, over them and the map's own parameters."""
+    assert item.inverse is not None
+    given = item.inverse
+    body: nodes.Expr = given.components[0]
+    if len(given.components) > 1:
+        body = nodes.Tuple(given.span, given.components)
+    term = _function(db, file, (given.parameters, *item.groups), body)
+    groups, inner = _groups(expanded(term, lambda g: _whole(db, g)))
+    return groups[0] if groups else (), inner.items if isinstance(inner, Tuple) else (inner,)
+
+
+def _conditions(db: Database, file: str, item: nodes.DiffeoDefinition) -> tuple[Guard, ...]:
+    """`where` as guards over the map's variables and parameters."""
+    guards: list[Guard] = []
+    for expr in item.where:
+        inner = expr if isinstance(expr, nodes.Bracket) else nodes.Bracket(expr.span, expr)
+        body: nodes.Expr = nodes.Let(expr.span, item.bindings, inner) if item.bindings else inner
+        term = _groups(_function(db, file, (item.variables, *item.groups), body))[1]
+        guards.extend(_conjunction(term))
+    return tuple(guards)
+
+
+def _conjunction(term: Term) -> list[Guard]:
+    """[p and q and ...] as single conditions; anything else as one that is positive where it holds."""
+    guards: list[Guard] = []
+    while isinstance(term, Branch) and term.orelse is ZERO:
+        guards.append(Guard(term.surface, term.strict))
+        term = term.then
+    if term is not ONE:
+        guards.append(Guard(sub(term, const(0.5))))
+    return guards
+
+
+def _box(where: Iterable[Guard], variables: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """Bounds of single variables, where `where` says them as constants."""
+    box: dict[str, tuple[float, float]] = {}
+    for guard in where:
+        for name in guard.surface.free & frozenset(variables):
+            found = affine(guard.surface, (name,))
+            if found is None or not isinstance(found.rest, Const) or not isinstance(found.coefficients[0], Const):
+                continue
+            slope, bound = found.coefficients[0].value, -found.rest.value / found.coefficients[0].value
+            lo, hi = box.get(name, (float("-inf"), float("inf")))
+            box[name] = (max(lo, bound), hi) if slope > 0 else (lo, min(hi, bound))
+    return box

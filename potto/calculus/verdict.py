@@ -1,0 +1,200 @@
+"""Whether a condition can be integrated over: singular, invertible, solvable or none of it.
+
+Owns `judge`, a pure function of a condition's coordinates, and the kinds of diagnostics that say no. For a condition
+under an integral it is enough that its first coordinate can be solved for one variable of integration with all roots,
+or that it is strictly monotone in one; a map with as many coordinates as variables must also not be singular.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from potto.calculus.derivative import NotSmooth, partial
+from potto.calculus.invert import Failure, Inverse, dependence, invert, jacobian
+from potto.calculus.linear import determinant
+from potto.calculus.normal import is_zero
+from potto.calculus.ranges import ranges
+from potto.calculus.solve import Sections, sections
+from potto.core.printer import format_term
+from potto.core.terms import If, Prim, Term, postorder, var
+from potto.diagnostics import Kind, declare
+from potto.primitives import PRIMITIVES
+
+SINGULAR = declare("P0401", "a map that is not invertible")
+NO_INVERSE = declare("P0402", "a condition whose inverse was not found")
+WRONG_INVERSE = declare("P0403", "the given inverse is wrong")
+COMPONENTS = declare("P0404", "a diffeomorphism with the wrong number of components")
+NOT_DIFFERENTIABLE = declare("P0405", "a diffeomorphism that is not differentiable")
+MEASURE_ZERO = declare("P0406", "a condition that holds on no area", "warning")
+
+Box = Mapping[str, tuple[float, float]]
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """What is wrong with a condition, for a diagnostic to be made of."""
+
+    kind: Kind
+    message: str
+    label: str = ""
+    notes: tuple[str, ...] = ()
+    help: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """A condition that can be integrated over.
+
+    pivot: the variable that its first coordinate is solved for.
+    completion: the coordinates that were left out and were added to make the map invertible.
+    roots: the sections in the pivot; None where the coordinate is only known to be monotone.
+    """
+
+    pivot: str
+    completion: tuple[Term, ...]
+    determinant: Term | None
+    roots: Sections | None
+    inverse: Inverse | None = None
+
+
+def judge(coordinates: Sequence[Term], variables: Sequence[str], box: Box, whole: bool = False) -> Verdict | Problem:
+    """The verdict on a condition; `whole`: its author wrote all coordinates, as many as variables."""
+    surface = coordinates[0]
+    if len(coordinates) > 1:
+        if whole and len(coordinates) > len(variables):
+            return _too_many(coordinates, variables)
+        if len(coordinates) == len(variables):
+            problem = singular(coordinates, variables)
+            if problem is not None:
+                return problem
+    problem = _empty(surface, box)
+    if problem is not None:
+        return problem
+    reasons: list[str] = []
+    mine = [v for v in variables if v in surface.free]
+    for name in reversed(mine):
+        found = sections(surface, name)
+        if isinstance(found, Sections) and found.complete:
+            return _solved(coordinates, variables, name, found)
+        reasons.append(f"for `{name}`: {found.reason}")
+    for name in reversed(mine):
+        if monotone(surface, name, box):
+            return _solved(coordinates, variables, name, None)
+    if len(coordinates) == len(variables):
+        inverse = invert(coordinates, variables)
+        if isinstance(inverse, Inverse):
+            return Verdict(mine[-1], (), inverse.determinant, None, inverse)
+    return no_inverse(surface, mine, reasons)
+
+
+def _solved(coordinates: Sequence[Term], variables: Sequence[str], name: str, found: Sections | None) -> Verdict:
+    """The coordinates that are missing are the other variables: with the first one solved for `name`, that inverts."""
+    missing = tuple(var(v) for v in variables if v != name) if len(coordinates) < len(variables) else ()
+    completed = (coordinates[0], *missing) if missing else tuple(coordinates)
+    det = determinant(jacobian(completed, variables)) if len(completed) == len(variables) else None
+    return Verdict(name, missing, det, found)
+
+
+def monotone(surface: Term, name: str, box: Box) -> bool:
+    """Whether the surface is strictly monotone in a variable throughout the box, as far as ranges show."""
+    try:
+        slope = partial(surface, name)
+    except NotSmooth:
+        return False
+    bounds = ranges(slope, box)[slope]
+    return bounds.positive or bounds.negative
+
+
+# Problems
+
+
+def shown(terms: Sequence[Term]) -> str:
+    return ", ".join(f"`{format_term(t)}`" for t in terms)
+
+
+def listed(names: Sequence[str], last: str = "and") -> str:
+    quoted = [f"`{n}`" for n in names]
+    return quoted[0] if len(quoted) == 1 else ", ".join(quoted[:-1]) + f" {last} " + quoted[-1]
+
+
+def singular(coordinates: Sequence[Term], variables: Sequence[str]) -> Problem | None:
+    try:
+        rows = jacobian(coordinates, variables)
+    except NotSmooth:
+        return None
+    det = determinant(rows)
+    if not is_zero(det):
+        return None
+    table = "; ".join(", ".join(format_term(entry) for entry in row) for row in rows)
+    return Problem(
+        SINGULAR,
+        f"({', '.join(map(format_term, coordinates))}) is not invertible in {listed(variables)}: its determinant is 0",
+        "singular",
+        (f"the derivative is ({table}), whose determinant is 0", dependence(coordinates, variables)),
+        "let the coordinates vary independently; `diffeo(...)` and `[...]` may leave out all but the first",
+    )
+
+
+def _too_many(coordinates: Sequence[Term], variables: Sequence[str]) -> Problem:
+    return Problem(
+        COMPONENTS,
+        f"{len(coordinates)} coordinates over {_count(len(variables))} of integration ({listed(variables)})",
+        f"{len(coordinates)} coordinates",
+        (),
+        "give as many coordinates as variables, or the first one alone",
+    )
+
+
+def _count(n: int) -> str:
+    return f"{n} variable" if n == 1 else f"{n} variables"
+
+
+def _empty(surface: Term, box: Box) -> Problem | None:
+    bounds = ranges(surface, box)[surface]
+    if bounds.hi > 0:
+        return None
+    return Problem(
+        MEASURE_ZERO,
+        f"`{format_term(surface)}` is never positive, so the condition holds at most on a set without area",
+        "never positive",
+        (),
+        "the integral is that of the other branch",
+    )
+
+
+def no_inverse(surface: Term, variables: Sequence[str], reasons: Sequence[str]) -> Problem:
+    return Problem(
+        NO_INVERSE,
+        f"no inverse was found for `{format_term(surface)}` in {listed(variables, 'or')}",
+        "cannot be solved for where it is 0",
+        tuple(reasons),
+        "write the condition so that one variable can be isolated, or name it as a diffeomorphism with its `inverse`",
+    )
+
+
+def kinks(coordinates: Sequence[Term], variables: Sequence[str], box: Box) -> Term | None:
+    """A place where a coordinate is not differentiable: the term whose zeros are the kinks."""
+    names = frozenset(variables)
+    for node in postorder(*coordinates):
+        if isinstance(node, If) and node.condition.free & names:
+            return node.condition
+        if not isinstance(node, Prim) or not node.free & names or node.op not in PRIMITIVES:
+            continue
+        for kink in PRIMITIVES[node.op].kinks(*node.args):
+            if kink.free & names:
+                bounds = ranges(kink, box)[kink]
+                if bounds.lo < 0 < bounds.hi:
+                    return kink
+    return None
+
+
+def failure(found: Failure, coordinates: Sequence[Term], variables: Sequence[str]) -> Problem:
+    """What to say when a diffeomorphism has no inverse."""
+    return Problem(
+        NO_INVERSE,
+        f"no inverse was found for ({', '.join(map(format_term, coordinates))}) in {listed(variables)}",
+        "no inverse found",
+        (found.reason,),
+        "add the inverse: `inverse (u, v) . (x, y)` with the variables in terms of the components",
+    )
