@@ -12,4 +12,4 @@ import numpy as np
 
 def clamp(x: Any, lo: Any, hi: Any, out: Any = None) -> Any:
     """min(max(x, lo), hi), nan where any of them is."""
-    return np.minimum(np.maximum(x, lo, out=out), hi, out=out)
+    return np.minimum(np.maximum(x, lo), hi, out=out)

@@ -1,0 +1,210 @@
+"""The surfaces of a term: where it jumps, where it has a kink, where it stops being smooth, through its calls.
+
+Owns `findings`. A function compiled alone exports its conditions as terms over its parameters; here a caller's
+arguments are put in for them. Each jump comes with the trace that forces it: the path of sites from the term to the
+branch. Plain conditions and sums that decide what there is are asked of `decide`, so that a recursion is followed
+only as deep as its values go.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from potto.calculus.trace import CallSite, Part, Side, layout
+from potto.core.terms import (
+    App, Const, Delta, Deriv, If, Integral, Lam, Prim, Proj, Sum, Term, Tuple, const, fresh,
+    postorder, proj, rename_bound, substitute, tuple_,
+)  # fmt: skip
+from potto.primitives import PRIMITIVES
+
+DEEPEST = 2000
+
+Kind = Literal["jump", "kink", "edge"]
+# Where a part of the program gets its functions from: a Lam for the head of a call, or None if it is not known here.
+Resolve = Callable[[Term], "Lam | None"]
+# The value of a plain term (a condition: 1 or 0), or None where it is not decided.
+Decide = Callable[[Term], "float | None"]
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One surface `surface = 0`, over the variables of the term that was searched.
+
+    kind: a jump (a branch), a kink (abs, max) or an edge, where the term stops being smooth or defined (sqrt at 0).
+    path: for a jump, the sites of the trace that lead to the branch.
+    calls: the calls on that path, for messages.
+    """
+
+    kind: Kind
+    surface: Term
+    path: tuple[int, ...] = ()
+    strict: bool = False
+    coordinates: tuple[Term, ...] = ()
+    calls: tuple[App, ...] = ()
+
+
+class TooDeep(Exception):
+    """A recursion was followed past `DEEPEST` calls."""
+
+
+def undecided(term: Term) -> float | None:
+    return term.value if isinstance(term, Const) else None
+
+
+def uncurry(function: Lam, groups: int) -> tuple[tuple[str, ...], Term]:
+    """The parameters and the body that `groups` groups of arguments reach; fewer if the function has fewer."""
+    params, body = function.params, function.body
+    for _ in range(groups - 1):
+        if not isinstance(body, Lam):
+            break
+        clash = set(params) & set(body.params)
+        if clash:
+            names: dict[str, str] = {}
+            for name in clash:
+                names[name] = fresh(name, {*params, *body.params, *body.free, *names.values()})
+            body = rename_bound(body, names)
+            assert isinstance(body, Lam)
+        params, body = params + body.params, body.body
+    return params, body
+
+
+def fitted(args: tuple[Term, ...], arity: int) -> tuple[Term, ...]:
+    """A group of arguments as the parameters take it: one tuple for several parameters, or several for one."""
+    if len(args) == 1 and arity > 1:
+        return tuple(proj(args[0], i) for i in range(arity))
+    if arity == 1 and len(args) > 1:
+        return (tuple_(args),)
+    return args
+
+
+def findings(term: Term, resolve: Resolve, decide: Decide = undecided) -> tuple[Finding, ...]:
+    """All surfaces of a term, jumps with the trace that forces them. Raises TooDeep."""
+    return tuple(_Search(resolve, decide).term(term, {}, (), (), 0))
+
+
+@dataclass(frozen=True, slots=True)
+class _Search:
+    resolve: Resolve
+    decide: Decide
+
+    def term(
+        self, term: Term, mapping: dict[str, Term], path: tuple[int, ...], calls: tuple[App, ...], depth: int
+    ) -> Iterator[Finding]:
+        if depth > DEEPEST:
+            raise TooDeep
+        shape = layout(term)
+        for node in shape.order:
+            if isinstance(node, Prim):
+                yield from self.builtin(node, mapping)
+            elif isinstance(node, Integral):
+                yield from self.nested(node, mapping)
+        for number, site in enumerate(shape.sites):
+            here = (*path, number)
+            match site:
+                case Side(branch=branch):
+                    coordinates = tuple(substitute(c, mapping) for c in branch.coordinates)
+                    yield Finding("jump", coordinates[0], here, branch.strict, coordinates, calls)
+                case Part():
+                    yield from self.part(site, mapping, here, calls, depth)
+                case CallSite():
+                    yield from self.call(site, mapping, here, calls, depth)
+
+    def builtin(self, node: Prim, mapping: dict[str, Term]) -> Iterator[Finding]:
+        entry = PRIMITIVES[node.op]
+        if not node.free:
+            return
+        for kink in entry.kinks(*node.args):
+            if kink.free:
+                yield Finding("kink", substitute(kink, mapping))
+        if node.op != "div":  # a pole is no edge to cut at: the integral diverges there or the pole is outside
+            for edge in entry.edges(*node.args):
+                if edge.free:
+                    yield Finding("edge", substitute(edge, mapping))
+
+    def nested(self, node: Integral, mapping: dict[str, Term]) -> Iterator[Finding]:
+        from potto.calculus.sweep import outer_findings
+
+        inner = substitute(node, mapping)
+        assert isinstance(inner, Integral)
+        yield from outer_findings(inner, self.resolve, self.decide)
+
+    def part(
+        self, site: Part, mapping: dict[str, Term], path: tuple[int, ...], calls: tuple[App, ...], depth: int
+    ) -> Iterator[Finding]:
+        owner = site.owner
+        if isinstance(owner, If):
+            outcome = self.decide(substitute(owner.condition, mapping))
+            if outcome is not None and bool(outcome) != (site.index == 0):
+                return
+        if isinstance(owner, Sum):
+            lo, hi = (self.decide(substitute(b, mapping)) for b in (owner.lo, owner.hi))
+            if lo is None or hi is None:
+                return
+            for number in range(int(lo), int(hi) + 1):
+                inner = {**mapping, owner.variable: const(number)}
+                yield from self.term(owner.body, inner, (*path, number - int(lo)), calls, depth + 1)
+            return
+        yield from self.term(site.body.body, mapping, path, calls, depth + 1)
+
+    def call(
+        self, site: CallSite, mapping: dict[str, Term], path: tuple[int, ...], calls: tuple[App, ...], depth: int
+    ) -> Iterator[Finding]:
+        head = substitute(site.head, mapping)
+        dual = isinstance(head, Deriv)
+        while isinstance(head, Deriv):
+            head = head.function
+        function = head if isinstance(head, Lam) else self.resolve(head)
+        if function is None:
+            return
+        groups = tuple(tuple(substitute(a, mapping) for a in group) for group in site.groups)
+        params, body = uncurry(function, len(groups))
+        args: list[Term] = []
+        shape: Lam = function
+        for group in groups:
+            args.extend(fitted(group, len(shape.params)))
+            if isinstance(shape.body, Lam):
+                shape = shape.body
+        if len(args) != len(params):
+            return
+        if dual:
+            args = [_primal(a) for a in args]
+        yield from self.term(body, dict(zip(params, args, strict=True)), path, (*calls, site.call), depth + 1)
+
+
+def _primal(arg: Term) -> Term:
+    """The value of a dual given to a derivative; functions are given as derivatives of functions."""
+    if isinstance(arg, Deriv):
+        return arg.function
+    if isinstance(arg, Tuple) and len(arg.items) == 2:
+        return arg.items[0]
+    if isinstance(arg, (Lam, Const)):
+        return arg
+    return proj(arg, 0) if isinstance(arg, (Proj, App)) else arg
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """A branch or a delta under an integral: the integral, the coordinates as its variables see them, the calls."""
+
+    integral: Integral
+    coordinates: tuple[Term, ...]
+    strict: bool
+    calls: tuple[App, ...]
+
+
+def conditions(term: Term, resolve: Resolve) -> tuple[Condition, ...]:
+    """The diffeomorphisms under each integral of a term (deltas too), through the calls that `resolve` knows."""
+    out: list[Condition] = []
+    for node in postorder(term):
+        if not isinstance(node, Integral):
+            continue
+        for found in findings(node.body, resolve):
+            if found.kind == "jump" and found.surface.free & set(node.variables):
+                out.append(Condition(node, found.coordinates, found.strict, found.calls))
+        for inner in postorder(node.body):
+            if isinstance(inner, Delta) and inner.free & set(node.variables):
+                out.append(Condition(node, inner.coordinates, False, ()))
+    return tuple(out)
+

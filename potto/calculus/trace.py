@@ -1,0 +1,140 @@
+"""Where a term can branch: the sites that a trace names.
+
+Owns `layout`. A kernel takes a trace, one entry per site of its term: a branch (as it falls, or forced to a side), a
+call (the callee's trace) or a part that is compiled on its own (a lazy side of a conditional, a sum). The order of
+sites is a property of the term alone, so a caller and a separately compiled callee agree on it without meeting.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+from potto.core.terms import (
+    App, Branch, Deriv, If, Integral, Lam, Sum, Term,
+    children, lam, postorder,
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Side:
+    """A site whose sides are evaluated everywhere and selected: the branch itself."""
+
+    branch: Branch
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A site that is a kernel of its own: the then (or else) side of a lazy conditional, or a sum's body.
+
+    `owner` is the If, Branch or Sum; `body` the part as a function of its free variables, in sorted order.
+    """
+
+    owner: Term
+    index: int
+    body: Lam
+
+
+@dataclass(frozen=True, slots=True)
+class CallSite:
+    """A call: `head` applied to groups of arguments."""
+
+    call: App
+    head: Term
+    groups: tuple[tuple[Term, ...], ...]
+
+
+Site = Side | Part | CallSite
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """The sites of one term, and the terms evaluated at once (not inside a part, a function or an integral)."""
+
+    sites: tuple[Site, ...]
+    index: dict[tuple[Term, int], int]
+    order: tuple[Term, ...]
+
+
+def spine(call: App) -> tuple[Term, tuple[tuple[Term, ...], ...]]:
+    """Head and groups of a curried call: `f (x, y) c` is f and ((x, y), (c,))."""
+    groups: list[tuple[Term, ...]] = []
+    term: Term = call
+    while isinstance(term, App):
+        groups.append(term.args)
+        term = term.function
+    return term, tuple(reversed(groups))
+
+
+@lru_cache(maxsize=65536)
+def is_heavy(term: Term, calls: bool) -> bool:
+    """Whether a side of a conditional is worth evaluating only where it is taken.
+
+    Integrals and sums are; calls are too (`calls`) under a plain condition, which may be what ends a recursion.
+    """
+    return any(isinstance(t, (Integral, Sum)) or (calls and isinstance(t, App)) for t in postorder(term))
+
+
+def is_lazy(term: If | Branch) -> bool:
+    calls = isinstance(term, If)
+    return is_heavy(term.then, calls) or is_heavy(term.orelse, calls)
+
+
+def part(term: Term) -> Lam:
+    """A term as a function of its free variables, in sorted order."""
+    return lam(tuple(sorted(term.free)), term)
+
+
+def immediate(term: Term) -> tuple[Term, ...]:
+    """The children that are evaluated together with the term itself."""
+    match term:
+        case Lam() | Integral() | Deriv():
+            return ()
+        case Sum():
+            return (term.lo, term.hi)
+        case If():
+            return (term.condition,) if is_lazy(term) else children(term)
+        case Branch():
+            return (term.surface,) if is_lazy(term) else (term.surface, term.then, term.orelse)
+        case App():
+            head, groups = spine(term)
+            return (head, *(a for group in groups for a in group))
+        case _:
+            return children(term)
+
+
+@lru_cache(maxsize=16384)
+def layout(term: Term) -> Layout:
+    order: list[Term] = []
+    seen: set[Term] = set()
+    stack: list[tuple[Term, bool]] = [(term, False)]
+    while stack:
+        node, done = stack.pop()
+        if done:
+            order.append(node)
+        elif node not in seen:
+            seen.add(node)
+            stack.append((node, True))
+            stack.extend((c, False) for c in reversed(immediate(node)) if c not in seen)
+    sites: list[Site] = []
+    index: dict[tuple[Term, int], int] = {}
+
+    def site(term: Term, which: int, entry: Site) -> None:
+        index[term, which] = len(sites)
+        sites.append(entry)
+
+    for node in order:
+        if isinstance(node, (If, Branch)) and is_lazy(node):
+            if isinstance(node, Branch):
+                site(node, 2, Side(node))
+            site(node, 0, Part(node, 0, part(node.then)))
+            site(node, 1, Part(node, 1, part(node.orelse)))
+        elif isinstance(node, Branch):
+            site(node, 2, Side(node))
+        elif isinstance(node, Sum):
+            site(node, 0, Part(node, 0, lam(tuple(sorted(node.body.free | {node.variable})), node.body)))
+        elif isinstance(node, App):
+            site(node, 0, CallSite(node, *spine(node)))
+    return Layout(tuple(sites), index, tuple(order))
+
+

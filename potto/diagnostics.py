@@ -1,0 +1,89 @@
+"""Messages to the user as values.
+
+Owns `Diagnostic` and the table of kinds. A kind is declared beside the check that raises it:
+`NOT_DEFINED = declare("P0201", "a name that is not defined")`, and raised as
+`NOT_DEFINED(span, "...", help="...")`. Rendering for people and for machines is in `render`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from potto.source import Span
+
+Severity = Literal["error", "warning", "info", "hint"]
+
+
+@dataclass(frozen=True, slots=True)
+class Related:
+    """Another place that a diagnostic talks about. `file` None means the diagnostic's own file.
+
+    `owner` is the name of the chunk (definition) that `span` is relative to; None means the diagnostic's own chunk,
+    and the empty string means that the span is absolute.
+    """
+
+    span: Span
+    message: str
+    file: str | None = None
+    owner: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnostic:
+    """One message. `span` is relative to its chunk until `shift` has made it absolute.
+
+    `label` stands beside the underlined place ("varies inside the integral"), `notes` explain, `help` says what to do.
+    """
+
+    code: str
+    severity: Severity
+    message: str
+    span: Span
+    label: str = ""
+    related: tuple[Related, ...] = ()
+    notes: tuple[str, ...] = ()
+    help: str = ""
+    tags: tuple[Literal["unnecessary", "deprecated"], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of diagnostic: its stable code and what it is about."""
+
+    code: str
+    title: str
+    severity: Severity = field(default="error")
+
+    def __call__(
+        self,
+        span: Span,
+        message: str,
+        *,
+        label: str = "",
+        related: tuple[Related, ...] = (),
+        notes: tuple[str, ...] = (),
+        help: str = "",
+        tags: tuple[Literal["unnecessary", "deprecated"], ...] = (),
+    ) -> Diagnostic:
+        return Diagnostic(self.code, self.severity, message, span, label, related, notes, help, tags)
+
+
+KINDS: dict[str, Kind] = {}
+
+
+def declare(code: str, title: str, severity: Severity = "error") -> Kind:
+    """Declare a kind of diagnostic, once, beside the check that raises it."""
+    if code in KINDS:
+        raise ValueError(f"diagnostic {code} is declared twice")
+    kind = Kind(code, title, severity)
+    KINDS[code] = kind
+    return kind
+
+
+class PottoError(Exception):
+    """The program, not Potto, is at fault: carries the diagnostics that say how."""
+
+    def __init__(self, diagnostics: tuple[Diagnostic, ...] | list[Diagnostic]) -> None:
+        self.diagnostics = tuple(diagnostics)
+        super().__init__("; ".join(f"{d.code}: {d.message}" for d in self.diagnostics))

@@ -1,0 +1,194 @@
+"""Where the integrals of a batch are cut along one variable.
+
+Owns `segments`: bounds and sections, evaluated for the whole batch with their tangents, sorted, clipped to the
+bounds, and turned into stretches on which the integrand is smooth. A cut counts only strictly inside the bounds: a
+surface that lies exactly on an edge gives no boundary term, and is reported (`Edge`) since the one-sided derivatives
+then differ.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from potto.integrate.maps import Segments, choose
+from potto.integrate.plan import LevelPlan
+from potto.integrate.rules import EPS
+from potto.kernels.cells import Array, Cell, Value
+
+Bools = npt.NDArray[np.bool_]
+
+
+@dataclass
+class Row:
+    """One candidate cut for the whole batch: where it is, how it moves, which cut of the level it belongs to."""
+
+    x: Array
+    t: tuple[Any, ...]
+    cut: int
+    turning: bool
+
+
+@dataclass
+class Edge:
+    """A surface that lies on a bound, for some of the batch: `owner` (m,), at the upper bound or not, its speeds."""
+
+    cut: int
+    owner: npt.NDArray[np.int64]
+    upper: bool
+    x: Array
+    root_t: Array
+    bound_t: Array
+
+
+@dataclass
+class Cuts:
+    """The outcome for one variable: orientation (B,), segments, whether anything moves, edges, bounds' errors."""
+
+    sign: Array
+    segments: Segments
+    moving: bool
+    edges: list[Edge]
+    bound_error: Array | None
+    bound_nan: Bools | None
+
+
+def as_array(x: Any, batch: int) -> Array:
+    if isinstance(x, np.ndarray):
+        return x
+    return np.full(batch, x)
+
+
+def frame_rows(plan: LevelPlan, values: tuple[Value, ...]) -> tuple[Cell, Cell, list[Row]]:
+    cells = []
+    for value in values:
+        assert isinstance(value, Cell)
+        cells.append(value)
+    rows = [
+        Row(cell.v, cell.t, cut, turning)  # type: ignore[arg-type]
+        for cell, (cut, turning) in zip(cells[2:], plan.rows, strict=True)
+    ]
+    return cells[0], cells[1], rows
+
+
+def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, directions: int) -> Cuts:
+    """Cut [lo, hi] at the rows; reversed bounds are turned round and counted negative."""
+    low, high = as_array(lo.v, batch), as_array(hi.v, batch)
+    tl, th = _tangents(lo.t, batch, directions), _tangents(hi.t, batch, directions)
+    sign = np.where(high < low, -1.0, 1.0)
+    if (sign < 0).any():
+        turn = sign < 0
+        low, high = np.where(turn, high, low), np.where(turn, low, high)
+        tl, th = np.where(turn, th, tl), np.where(turn, tl, th)
+    count = len(rows)
+    x = np.empty((count + 2, batch))
+    t = np.zeros((directions, count + 2, batch))
+    x[0], x[-1] = low, high
+    t[:, 0], t[:, -1] = tl, th
+    inside = np.zeros((count + 2, batch), dtype=bool)
+    edges: list[Edge] = []
+    beyond: list[tuple[Array, bool]] = []
+    for i, row in enumerate(rows, 1):
+        root = as_array(row.x, batch)
+        inner = (root > low) & (root < high)
+        inside[i] = inner
+        x[i] = np.where(inner, root, high)
+        for d in range(directions):
+            speed = row.t[d] if d < len(row.t) and row.t[d] is not None else 0.0
+            t[d, i] = np.where(inner, speed, th[d])
+        if row.turning or (row.cut >= 0 and _any_turning(plan, row)):
+            beyond.append((root, True))
+        if directions and row.cut >= 0 and plan.level.cuts[row.cut].jumps:
+            edges.extend(_edges(row, root, low, high, tl, th, directions, batch))
+    if count:
+        x, t, inside = _sorted(plan, rows, x, t, inside)
+    return _pieces(x, t, sign, beyond, edges, lo, hi, batch)
+
+
+def _any_turning(plan: LevelPlan, row: Row) -> bool:
+    return plan.level.cuts[row.cut].turning
+
+
+def _tangents(t: tuple[Any, ...], batch: int, directions: int) -> Array:
+    out = np.zeros((directions, batch))
+    for d, x in enumerate(t):
+        if x is not None:
+            out[d] = x
+    return out
+
+
+def _edges(
+    row: Row, root: Array, low: Array, high: Array, tl: Array, th: Array, directions: int, batch: int
+) -> list[Edge]:
+    """Where a jump lies on a bound (to rounding) and does not move with it."""
+    out: list[Edge] = []
+    speed = _tangents(row.t, batch, directions)
+    for upper, bound, tb in ((False, low, tl), (True, high, th)):
+        with np.errstate(invalid="ignore"):
+            on = (root == bound) & np.isfinite(bound) & (low < high)
+            moves = np.abs(speed - tb) > 64 * EPS * np.maximum(np.abs(speed), np.abs(tb))
+        owner = np.nonzero(on & moves.any(axis=0))[0]
+        if owner.size:
+            out.append(Edge(row.cut, owner, upper, bound[owner], speed[:, owner], tb[:, owner]))
+    return out
+
+
+def _sorted(
+    plan: LevelPlan, rows: list[Row], x: Array, t: Array, inside: Bools
+) -> tuple[Array, Array, Bools]:
+    order = np.argsort(x, axis=0, kind="stable")
+    # the bounds stay first and last even among equals: candidates were clipped to the upper bound
+    x = np.take_along_axis(x, order, axis=0)
+    if t.shape[0]:
+        t = np.take_along_axis(t, np.broadcast_to(order, t.shape), axis=1)
+        inside = np.take_along_axis(inside, order, axis=0)
+        same = (x[1:] == x[:-1]) & inside[1:] & inside[:-1]
+        if same.any():
+            rank = np.array([0, *(_rank(plan, r) for r in rows), 0])[order]
+            _agree(t, same, rank)
+    return x, t, inside
+
+
+def _rank(plan: LevelPlan, row: Row) -> int:
+    if row.cut < 0:
+        return 0
+    return 2 if plan.level.cuts[row.cut].jumps else 1
+
+
+def _agree(t: Array, same: Bools, rank: npt.NDArray[np.int64]) -> None:
+    """Coinciding cuts move as one, as the one that jumps does: the empty stretch between them is left out."""
+    count = same.shape[0]
+    for i in [*range(count), *reversed(range(count))]:
+        first = same[i] & (rank[i] >= rank[i + 1])
+        t[:, i + 1] = np.where(first, t[:, i], t[:, i + 1])
+        rank[i + 1] = np.where(first, rank[i], rank[i + 1])
+        second = same[i] & ~first
+        t[:, i] = np.where(second, t[:, i + 1], t[:, i])
+        rank[i] = np.where(second, rank[i + 1], rank[i])
+
+
+def _pieces(
+    x: Array, t: Array, sign: Array, beyond: list[tuple[Array, bool]], edges: list[Edge], lo: Cell, hi: Cell, batch: int
+) -> Cuts:
+    a, b = x[:-1], x[1:]
+    full = b > a
+    owner, place = np.nonzero(full.T)
+    a, b = a[place, owner], b[place, owner]
+    ta, tb = t[:, place, owner], t[:, place + 1, owner]
+    left, right = np.full(a.shape, -np.inf), np.full(a.shape, np.inf)
+    for root, _ in beyond:
+        at = root[owner]
+        left = np.where((at <= a) & (at > left), at, left)
+        right = np.where((at >= b) & (at < right), at, right)
+    moving = bool(ta.any() or tb.any())
+    error = None
+    for bound in (lo, hi):
+        if bound.e is not None:
+            error = np.zeros(batch) if error is None else error
+            error = error + bound.e
+    bad = np.isnan(x[0]) | np.isnan(x[-1])
+    made = Segments(owner, a, b, ta, tb, choose(a, b, left, right), left, right)
+    return Cuts(sign, made, moving, edges, error, bad if bad.any() else None)

@@ -1,0 +1,162 @@
+"""From pieces to points: how u in [0, 1] runs through a segment between two cuts.
+
+Owns `Segments` and `points`. A segment whose end is a turning point (or has one just beyond it) is run through so
+that square roots there become smooth; infinite ends are pulled in. A point's label says by which share it moves with
+the segment's two ends when these move.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from potto.kernels.cells import Array
+
+Ints = npt.NDArray[np.int64]
+
+LINEAR, LEFT, RIGHT, BOTH, UP, DOWN, WHOLE = range(7)
+# Powers by which a piece at the end of its segment is graded once it has shown itself not to be smooth there.
+GRADE = 6
+
+
+@dataclass
+class Segments:
+    """Stretches between neighbouring cuts, for a batch of integrals.
+
+    owner: (S,) index of the integral. a, b: (S,) ends, a < b. ta, tb: (k, S) how they move. kind: (S,) the map.
+    left, right: (S,) turning points that the map resolves (where `kind` says so).
+    """
+
+    owner: Ints
+    a: Array
+    b: Array
+    ta: Array
+    tb: Array
+    kind: Ints
+    left: Array
+    right: Array
+
+    def pick(self, index: Any) -> Segments:
+        return Segments(self.owner[index], self.a[index], self.b[index], self.ta[:, index], self.tb[:, index],
+                        self.kind[index], self.left[index], self.right[index])  # fmt: skip
+
+
+def choose(a: Array, b: Array, left: Array, right: Array) -> Ints:
+    """The map for each segment; a turning point further away than the segment is long needs no care."""
+    kind = np.zeros(a.shape, dtype=np.int64)
+    low, high = np.isinf(a), np.isinf(b)
+    with np.errstate(invalid="ignore"):
+        width = b - a
+        near_left, near_right = (a - left <= width) & ~low, (right - b <= width) & ~high
+    kind[near_left] = LEFT
+    kind[near_right] = RIGHT
+    kind[near_left & near_right] = BOTH
+    kind[high] = UP
+    kind[low] = DOWN
+    kind[low & high] = WHOLE
+    return kind
+
+
+def points(seg: Segments, u: Array) -> tuple[Array, Array, Array]:
+    """x, dx/du and the label of each point; `u` is (P, n), row by row in the segments of `seg` (P of them)."""
+    a, b = seg.a[:, None], seg.b[:, None]
+    if not seg.kind.any():
+        width = b - a
+        return a + width * u, np.broadcast_to(width, u.shape), u
+    x, slope, label = np.empty_like(u), np.empty_like(u), np.empty_like(u)
+    for kind in np.unique(seg.kind):
+        rows = np.nonzero(seg.kind == kind)[0]
+        part = seg.pick(rows)
+        x[rows], slope[rows], label[rows] = _MAPS[int(kind)](part, u[rows])
+    return x, slope, label
+
+
+def _label(seg: Segments, x: Array) -> Array:
+    a, b = seg.a[:, None], seg.b[:, None]
+    return (x - a) / (b - a)
+
+
+def _linear(seg: Segments, u: Array) -> tuple[Array, Array, Array]:
+    width = (seg.b - seg.a)[:, None]
+    return seg.a[:, None] + width * u, width * np.ones_like(u), u
+
+
+def _left(seg: Segments, u: Array) -> tuple[Array, Array, Array]:
+    """x = c + q², q linear in u: square roots at c <= a become smooth."""
+    c = seg.left[:, None]
+    q0, q1 = np.sqrt(seg.a[:, None] - c), np.sqrt(seg.b[:, None] - c)
+    q = q0 + (q1 - q0) * u
+    x = c + q * q
+    return x, 2 * q * (q1 - q0), _label(seg, x)
+
+
+def _right(seg: Segments, u: Array) -> tuple[Array, Array, Array]:
+    c = seg.right[:, None]
+    q0, q1 = np.sqrt(c - seg.a[:, None]), np.sqrt(c - seg.b[:, None])
+    q = q0 + (q1 - q0) * u
+    x = c - q * q
+    return x, -2 * q * (q1 - q0), _label(seg, x)
+
+
+def _both(seg: Segments, u: Array) -> tuple[Array, Array, Array]:
+    """x = c + (d - c) sin²(φ/2), φ linear in u: square roots at both c <= a and d >= b become smooth."""
+    c, d = seg.left[:, None], seg.right[:, None]
+    half0 = np.arctan2(np.sqrt(seg.a[:, None] - c), np.sqrt(d - seg.a[:, None]))
+    half1 = np.arctan2(np.sqrt(seg.b[:, None] - c), np.sqrt(d - seg.b[:, None]))
+    half = half0 + (half1 - half0) * u
+    sine, cosine = np.sin(half), np.cos(half)
+    x = np.where(half < np.pi / 4, c + (d - c) * sine**2, d - (d - c) * cosine**2)
+    return x, 2 * (d - c) * sine * cosine * (half1 - half0), _label(seg, x)
+
+
+def _up(seg: Segments, u: Array) -> tuple[Array, Array, Array]:
+    """[a, inf): x = a + u/(1-u); moves with a."""
+    rest = 1.0 - u
+    return seg.a[:, None] + u / rest, 1.0 / (rest * rest), np.zeros_like(u)
+
+
+def _down(seg: Segments, u: Array) -> tuple[Array, Array, Array]:
+    return seg.b[:, None] - (1.0 - u) / u, 1.0 / (u * u), np.ones_like(u)
+
+
+def _whole(seg: Segments, u: Array) -> tuple[Array, Array, Array]:
+    """(-inf, inf): x = w/(1-w²), w = 2u - 1; nothing moves."""
+    low = u < 0.5
+    near = np.where(low, u, 1.0 - u)  # distance from the nearer end, exact near both
+    w = np.where(low, 2 * near - 1, 1 - 2 * near)
+    gap = 4 * near * (1 - near)
+    return w / gap, 2 * (1 + w * w) / (gap * gap), np.zeros_like(u)
+
+
+_MAPS = {LINEAR: _linear, LEFT: _left, RIGHT: _right, BOTH: _both, UP: _up, DOWN: _down, WHOLE: _whole}
+
+
+def grade(u0: Array, u1: Array, end: Ints, t: Array) -> tuple[Array, Array]:
+    """u and du/dt for t in [0, 1] over pieces [u0, u1]; `end` -1 or 1 crowds the points at the left or right end."""
+    width = (u1 - u0)[:, None]
+    u = u0[:, None] + width * t
+    slope = np.broadcast_to(width, u.shape)
+    if end.any():
+        slope = slope.copy()
+        rows = np.nonzero(end < 0)[0]
+        u[rows] = u0[rows, None] + width[rows] * t[rows] ** GRADE
+        slope[rows] = width[rows] * GRADE * t[rows] ** (GRADE - 1)
+        rows = np.nonzero(end > 0)[0]
+        s = 1.0 - t[rows]
+        u[rows] = u1[rows, None] - width[rows] * s**GRADE
+        slope[rows] = width[rows] * GRADE * s ** (GRADE - 1)
+    return u, slope
+
+
+def velocity(seg: Segments, label: Array, direction: int) -> tuple[Array, Array]:
+    """(v, dv/dx) of the points in one direction: the ends' speeds, linear in between."""
+    ta, tb = seg.ta[direction][:, None], seg.tb[direction][:, None]
+    low, high = np.isinf(seg.a)[:, None], np.isinf(seg.b)[:, None]
+    with np.errstate(invalid="ignore"):
+        width = np.where(low | high, np.inf, (seg.b - seg.a)[:, None])
+    ta = np.where(low, np.where(high, 0.0, tb), ta)
+    tb = np.where(high, ta, tb)
+    return ta + (tb - ta) * label, (tb - ta) / width

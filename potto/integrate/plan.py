@@ -1,0 +1,209 @@
+"""What is known of an integral before any number: its levels, the kernels' terms, and the traces of its jumps.
+
+Owns `Plan` and its cache. A plan is made once for an integral, the functions that it calls and the plain decisions
+that were met on the way (which side of a recursion's condition, the bounds of a sum); it is used again as long as
+those decisions come out the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from potto.calculus.surfaces import Decide, Resolve, findings
+from potto.calculus.sweep import Cut, Level, sweep
+from potto.calculus.trace import layout
+from potto.core.terms import (
+    Branch, Const, If, Integral, Lam, ListOf, Prim, Proj, Term, Tuple, lam, postorder, tuple_,
+)  # fmt: skip
+from potto.kernels.cells import Mask, Trace
+
+
+@dataclass(frozen=True)
+class LevelPlan:
+    """One variable: its frame (bounds, then candidate cuts, as one tuple term) and what the cuts are."""
+
+    level: Level
+    frame: Lam
+    rows: tuple[tuple[int, bool], ...]
+    searched: tuple[Cut, ...]
+    families: tuple[tuple[int, Any], ...]
+    decided: tuple[int, ...]
+    surfaces: Lam
+
+    @property
+    def variable(self) -> str:
+        return self.level.variable
+
+
+@dataclass(frozen=True)
+class Group:
+    """A surface with jumps: which branches it decides, and along which traces."""
+
+    number: int
+    cut: Cut
+
+
+@dataclass(frozen=True)
+class Plan:
+    """An integral, ready to be evaluated for any parameters.
+
+    decisions: plain terms and the values that they had when the plan was made; it holds where they are the same.
+    """
+
+    term: Integral
+    levels: tuple[LevelPlan, ...]
+    groups: tuple[Group, ...]
+    body: Lam
+    vanishing: Any
+    decisions: tuple[tuple[Term, float | None], ...]
+
+    @cached_property
+    def single(self) -> bool:
+        return len(self.levels) == 1
+
+    def trace(self, sides: Mapping[int, Mask]) -> Trace | None:
+        """The trace that forces the groups to the sides given: a mask, true where the canonical surface is >= 0."""
+        if not sides:
+            return None
+        trace: Trace = {}
+        for group in self.groups:
+            mask = sides.get(group.number)
+            if mask is None:
+                continue
+            for jump in group.cut.jumps:
+                if jump.path:
+                    _force(trace, jump.path, mask if jump.orientation > 0 else ~mask)  # type: ignore[operator]
+        return trace
+
+
+def _force(trace: Trace, path: tuple[int, ...], mask: Mask) -> None:
+    for at in path[:-1]:
+        trace = trace.setdefault(at, {})
+    trace[path[-1]] = mask
+
+
+def function_of(term: Term) -> Lam:
+    """A term as a function of its free variables, in sorted order."""
+    return lam(tuple(sorted(term.free)), term)
+
+
+def make(term: Integral, resolve: Resolve, decide: Decide) -> Plan:
+    """The plan of an integral. `resolve` gives the functions that it calls, `decide` the values of plain terms."""
+    decisions: dict[Term, float | None] = {}
+
+    def remember(plain: Term) -> float | None:
+        if plain not in decisions:
+            decisions[plain] = decide(plain)
+        return decisions[plain]
+
+    found = findings(term.body, resolve, remember)
+    swept = sweep(term, found, resolve, remember)
+    groups: list[Group] = []
+    levels: list[LevelPlan] = []
+    for level in swept.levels:
+        decided = []
+        for cut in level.cuts:
+            if cut.jumps:
+                decided.append(len(groups))
+                groups.append(Group(len(groups), cut))
+        levels.append(_level(level, tuple(decided), groups))
+    numbers = {j.path: (g.number, j.orientation) for g in groups for j in g.cut.jumps}
+    vanishing = _vanishing(term.body, numbers)
+    kept = tuple((t, v) for t, v in decisions.items() if not isinstance(t, Const))
+    return Plan(term, tuple(levels), tuple(groups), function_of(term.body), vanishing, kept)
+
+
+def _level(level: Level, decided: tuple[int, ...], groups: list[Group]) -> LevelPlan:
+    terms: list[Term] = [level.lo, level.hi]
+    rows: list[tuple[int, bool]] = []  # (which cut, or -1 for a hint; whether turning)
+    families: list[tuple[int, Any]] = []
+    searched: list[Cut] = []
+    for number, cut in enumerate(level.cuts):
+        if cut.roots is None:
+            searched.append(cut)
+            continue
+        for root in cut.roots:
+            terms.append(root)
+            rows.append((number, cut.turning))
+        families.extend((number, family) for family in cut.families)
+    for hint in level.hints:
+        terms.append(hint)
+        rows.append((-1, False))
+    surfaces = function_of(tuple_(tuple(groups[g].cut.surface for g in decided)))
+    return LevelPlan(
+        level, function_of(tuple_(tuple(terms))), tuple(rows), tuple(searched), tuple(families), decided, surfaces
+    )
+
+
+# Where the integrand is exactly zero, told from the sides alone
+
+Zero = Callable[[Mapping[int, Mask]], Any]
+
+
+def _vanishing(body: Term, numbers: Mapping[tuple[int, ...], tuple[int, int]]) -> Any:
+    """A test on sides: True, False, or ("and" | "or", tests), or (group, orientation, then, orelse)."""
+    index = layout(body).index
+    memo: dict[Term, Any] = {}
+    for node in postorder(body):
+        memo[node] = _zero(node, memo, index, numbers)
+    return memo[body]
+
+
+def _zero(node: Term, memo: dict[Term, Any], index: Mapping[tuple[Term, int], int], numbers: Any) -> Any:
+    match node:
+        case Const():
+            return node.value == 0
+        case Prim(op="mul"):
+            return _join("or", [memo[a] for a in node.args], True)
+        case Prim(op="add"):
+            return _join("and", [memo[a] for a in node.args], False)
+        case Prim(op="div" | "neg" | "sqrt" | "sin" | "abs"):
+            return memo[node.args[0]]
+        case Branch():
+            place = numbers.get((index.get((node, 2), -1),))
+            then, orelse = memo[node.then], memo[node.orelse]
+            if place is None or (then is False and orelse is False):
+                return _join("and", [then, orelse], False)
+            return ("side", *place, then, orelse)
+        case If():
+            return _join("and", [memo[node.then], memo[node.orelse]], False)
+        case Tuple() | ListOf():
+            return _join("and", [memo[a] for a in node.items], False)
+        case Proj():
+            return memo[node.term]
+        case _:
+            return False
+
+
+def _join(how: str, tests: list[Any], decisive: bool) -> Any:
+    """`decisive` is the value of one test that settles the whole."""
+    if any(t is decisive for t in tests):
+        return decisive
+    rest = tuple(t for t in tests if t is not (not decisive))
+    if not rest:
+        return not decisive
+    return rest[0] if len(rest) == 1 else (how, *rest)
+
+
+def vanishes(test: Any, sides: Mapping[int, Mask]) -> Any:
+    """Evaluate a vanishing test on sides: False, True or a mask."""
+    if isinstance(test, bool):
+        return test
+    if test[0] == "side":
+        _, group, orientation, then, orelse = test
+        mask = sides.get(group)
+        a, b = vanishes(then, sides), vanishes(orelse, sides)
+        if mask is None:
+            return a & b
+        if orientation < 0:
+            a, b = b, a
+        return (mask & a) | (~mask & b)  # type: ignore[operator]
+    result = vanishes(test[1], sides)
+    for inner in test[2:]:
+        result = result | vanishes(inner, sides) if test[0] == "or" else result & vanishes(inner, sides)
+    return result
+
+

@@ -1,0 +1,161 @@
+"""Sections of surfaces that have no closed form: periodic families, and roots found by numbers.
+
+Owns `searched_rows`. A family is a root for each integer in a range that the bounds give. Where nothing is known but
+the surface itself, sign changes are looked for on a grid that is refined where the surface comes close to zero
+without crossing it, and each is bracketed and polished; how a root moves follows from the surface's own derivatives.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from potto.core.terms import Lam, Term, lam
+from potto.integrate.cuts import Row, as_array
+from potto.integrate.plan import LevelPlan, function_of
+from potto.kernels.cells import Array, Cell, Value, pad
+
+GRID = 64
+MOST_IN_FAMILY = 100_000
+BISECTIONS = 64
+
+
+def searched_rows(level: LevelPlan, env: dict[str, Value], lo: Cell, hi: Cell, batch: int, machine: Any) -> list[Row]:
+    """The candidate cuts of one variable beyond the closed-form ones."""
+    rows: list[Row] = []
+    for cut, family in level.families:
+        rows += _family(level, cut, family, env, lo, hi, batch, machine)
+    for cut in level.searched:
+        number = level.level.cuts.index(cut)
+        rows += _search(number, cut.surface, level.variable, env, lo, hi, batch, machine)
+    return rows
+
+
+def _call(function: Lam, env: dict[str, Value], machine: Any) -> Cell:
+    value = machine.evaluate(function, {n: env[n] for n in function.params}, None)
+    assert isinstance(value, Cell)
+    return value
+
+
+def _at(term: Term, variable: str, x: Any, env: dict[str, Value], machine: Any) -> Any:
+    """A term's value with the variable at x, by a machine without directions."""
+    function = function_of(term)
+    here = {n: Cell(v.v) if isinstance(v, Cell) else v for n, v in env.items()}
+    here[variable] = Cell(x)
+    return _call(function, here, machine.with_directions(0)).v
+
+
+def _family(
+    level: LevelPlan, cut: int, family: Any, env: dict[str, Value], lo: Cell, hi: Cell, batch: int, machine: Any
+) -> list[Row]:
+    ends = [as_array(_at(family.inner, level.variable, x.v, env, machine), batch) for x in (lo, hi)]
+    low, high = as_array(np.minimum(lo.v, hi.v), batch), as_array(np.maximum(lo.v, hi.v), batch)
+    for stop in family.stops:
+        at = as_array(_at(stop, level.variable, lo.v, env, machine), batch)
+        inside = (at > low) & (at < high)
+        ends.append(np.where(inside, as_array(_at(family.inner, level.variable, at, env, machine), batch), np.nan))
+    stack = np.stack(ends)
+    with np.errstate(invalid="ignore"):
+        first = np.ceil(np.nanmin(stack, axis=0) - 1e-6)
+        last = np.floor(np.nanmax(stack, axis=0) + 1e-6)
+    count = np.nanmax(last - first + 1) if np.isfinite(last - first).any() else 0
+    if not np.isfinite(stack).all() or count > MOST_IN_FAMILY:
+        machine.note_unfinished("a condition has too many roots to cut at")
+        count = min(count, MOST_IN_FAMILY) if np.isfinite(count) else 0
+    function = function_of(family.root)
+    turning = level.level.cuts[cut].turning
+    rows = []
+    for j in range(int(count)):
+        here = dict(env)
+        here[family.index] = pad(Cell(first + j), machine.directions)
+        root = _call(function, here, machine)
+        rows.append(Row(np.where(first + j <= last, root.v, np.nan), root.t, cut, turning))
+    return rows
+
+
+def _search(
+    cut: int, surface: Term, variable: str, env: dict[str, Value], lo: Cell, hi: Cell, batch: int, machine: Any
+) -> list[Row]:
+    low, high = as_array(np.minimum(lo.v, hi.v), batch), as_array(np.maximum(lo.v, hi.v), batch)
+    function = lam(tuple(sorted(surface.free)), surface)
+    columns = {
+        n: Cell(v.v[:, None] if isinstance(v.v, np.ndarray) else v.v) if isinstance(v, Cell) else v
+        for n, v in env.items()
+        if n in function.params
+    }
+    still = machine.with_directions(0)
+
+    def psi(x: Array) -> Array:
+        value = _call(function, {**columns, variable: Cell(x)}, still).v
+        return np.broadcast_to(value, x.shape)
+
+    x = _grid(low[:, None], high[:, None], np.linspace(0.0, 1.0, GRID + 1)[None, :])
+    a, b = _brackets(psi, x)
+    roots = _bisect(psi, a, b)
+    return [_moving(cut, function, variable, env, roots[:, i], machine) for i in range(roots.shape[1])]
+
+
+def _grid(low: Array, high: Array, s: Array) -> Array:
+    """Points that run through [low, high], also where an end is infinite."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        finite = low + (high - low) * s
+        up = low + s / (1 - s)
+        down = high - (1 - s) / s
+        whole = (2 * s - 1) / (4 * s * (1 - s))
+    x = np.where(np.isinf(high), np.where(np.isinf(low), whole, up), np.where(np.isinf(low), down, finite))
+    return np.where(np.isfinite(x), x, np.nan)
+
+
+def _brackets(psi: Any, x: Array) -> tuple[Array, Array]:
+    """Intervals with a sign change, per batch member and padded with nan; dips towards zero are looked at closer."""
+    y = psi(x)
+    for _ in range(3):
+        inner = np.abs(y[:, 1:-1])
+        dip = (inner < np.abs(y[:, :-2])) & (inner <= np.abs(y[:, 2:])) & (np.sign(y[:, :-2]) == np.sign(y[:, 2:]))
+        dip &= np.sign(y[:, 1:-1]) == np.sign(y[:, 2:])
+        columns = np.nonzero(dip.any(axis=0))[0] + 1
+        if not columns.size:
+            break
+        extra = [x]
+        for s in (0.25, 0.5, 0.75):
+            extra.append(x[:, columns - 1] + s * (x[:, columns] - x[:, columns - 1]))
+            extra.append(x[:, columns] + s * (x[:, columns + 1] - x[:, columns]))
+        x = np.sort(np.concatenate(extra, axis=1), axis=1)
+        y = psi(x)
+    change = (y[:, :-1] * np.sign(y[:, 1:]) < 0) | ((y[:, :-1] == 0) & (y[:, 1:] != 0))
+    most = int(change.sum(axis=1).max()) if change.size else 0
+    a = np.full((x.shape[0], most), np.nan)
+    b = np.full((x.shape[0], most), np.nan)
+    row, column = np.nonzero(change)
+    slot = (np.cumsum(change, axis=1) - 1)[row, column]
+    a[row, slot], b[row, slot] = x[row, column], x[row, column + 1]
+    return a, b
+
+
+def _bisect(psi: Any, a: Array, b: Array) -> Array:
+    if a.shape[1] == 0:
+        return a
+    fa = psi(a)
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (a + b)
+        f = psi(middle)
+        left = fa * np.sign(f) <= 0
+        b = np.where(left, middle, b)
+        fa = np.where(left, fa, f)
+        a = np.where(left, a, middle)
+    return 0.5 * (a + b)
+
+
+def _moving(cut: int, function: Lam, variable: str, env: dict[str, Value], root: Array, machine: Any) -> Row:
+    """The root as a candidate cut: dx = -psi_theta / psi_x."""
+    k = machine.directions
+    if not k:
+        return Row(root, (), cut, False)
+    here = {n: pad(v, k + 1) for n, v in env.items()}
+    here[variable] = Cell(root, None, (None,) * k + (1.0,))
+    value = _call(function, here, machine.with_directions(k + 1))
+    slope = value.t[k]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = tuple(None if x is None else -np.asarray(x) / slope for x in value.t[:k])
+    return Row(root, t, cut, False)

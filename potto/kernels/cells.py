@@ -1,0 +1,144 @@
+"""What kernels compute with: batches of numbers that carry errors and tangents.
+
+Owns `Cell`. A cell is a number for every point of a batch, with an absolute error bound and one tangent per direction
+of differentiation, each again with an error bound. A missing part (None) is exactly zero. Values of a program are
+cells, tuples and lists of values, and functions (anything with the methods of `FunctionLike`).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Protocol, Union
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from potto.core.terms import Lam
+
+Array = npt.NDArray[np.float64]
+Number = Union[float, Array]
+Mask = Union[bool, npt.NDArray[np.bool_]]
+# A trace: for a branching site of a kernel a mask (forced) or the trace of a callee; sites not named go as they fall.
+Trace = dict[int, Any]
+Pattern = Any
+
+
+class Cell:
+    """A number per point: `v` value, `e` absolute error, `t` tangents, `et` their absolute errors.
+
+    `v` is a float (the same at every point) or an array; the parts broadcast against each other.
+    """
+
+    __slots__ = ("e", "et", "t", "v")
+
+    def __init__(
+        self,
+        v: Number,
+        e: Number | None = None,
+        t: tuple[Number | None, ...] = (),
+        et: tuple[Number | None, ...] = (),
+    ) -> None:
+        self.v = v
+        self.e = e
+        self.t = t
+        self.et = et if et else (None,) * len(t)
+
+    def __repr__(self) -> str:
+        return f"Cell(v={self.v!r}, e={self.e!r}, t={self.t!r}, et={self.et!r})"
+
+    def map(self, change: Any) -> Cell:
+        """The cell with `change` done to every part that is an array."""
+
+        def part(x: Number | None) -> Number | None:
+            return change(x) if isinstance(x, np.ndarray) else x
+
+        return Cell(change(self.v) if isinstance(self.v, np.ndarray) else self.v, part(self.e),
+                    tuple(map(part, self.t)), tuple(map(part, self.et)))  # fmt: skip
+
+    def arrays(self) -> list[Array]:
+        return [x for x in (self.v, self.e, *self.t, *self.et) if isinstance(x, np.ndarray)]
+
+
+class FunctionLike(Protocol):
+    """A function as a value: the term it came from and the values of the term's free variables."""
+
+    lam: Lam
+    captured: dict[str, Value]
+
+    def pattern(self, directions: int) -> Pattern: ...
+
+
+Value = Union[Cell, "tuple[Value, ...]", "list[Value]", FunctionLike]
+
+
+def pattern(value: Value, directions: int) -> Pattern:
+    """What a kernel is specialized for: which parts of a value are there at all.
+
+    A cell gives (has an error, per direction 0 none, 1 one, 2 any other tangent); structure is mirrored.
+    """
+    if isinstance(value, Cell):
+        tangents = tuple(
+            0 if x is None else (1 if x.__class__ is float and x == 1.0 else 2) for x in value.t
+        ) or (0,) * directions  # fmt: skip
+        return (value.e is not None or any(x is not None for x in value.et), tangents)
+    if isinstance(value, tuple):
+        return ("tuple", *(pattern(item, directions) for item in value))
+    if isinstance(value, list):
+        return ("list",)
+    return ("function", *value.pattern(directions))
+
+
+def scalar_parts(value: Value, directions: int) -> tuple[Number, ...]:
+    """(v, e, t..., et...) of a cell with zeros for what is missing: what generated code unpacks."""
+    if not isinstance(value, Cell):
+        from potto.kernels.errors import not_a_number
+
+        raise not_a_number(value)
+    zero = (0.0,) * directions
+    t = tuple(0.0 if x is None else x for x in value.t) or zero
+    et = tuple(0.0 if x is None else x for x in value.et) or zero
+    return (value.v, 0.0 if value.e is None else value.e, *t, *et)
+
+
+def pad(value: Value, directions: int) -> Value:
+    """The value seen with more directions, in which it does not move."""
+    if isinstance(value, Cell):
+        more = directions - len(value.t)
+        return Cell(value.v, value.e, value.t + (None,) * more, value.et + (None,) * more) if more else value
+    if isinstance(value, tuple):
+        return tuple(pad(item, directions) for item in value)
+    if isinstance(value, list):
+        return [pad(item, directions) for item in value]
+    return value.padded(directions)  # type: ignore[attr-defined, no-any-return]
+
+
+def map_arrays(value: Value, change: Any) -> Value:
+    """The value with `change` done to every array in it (a gather, a reshape)."""
+    if isinstance(value, Cell):
+        return value.map(change)
+    if isinstance(value, tuple):
+        return tuple(map_arrays(item, change) for item in value)
+    if isinstance(value, list):
+        return [map_arrays(item, change) for item in value]
+    return value.mapped(change)  # type: ignore[attr-defined, no-any-return]
+
+
+def all_arrays(value: Value) -> list[Array]:
+    if isinstance(value, Cell):
+        return value.arrays()
+    if isinstance(value, (tuple, list)):
+        return [a for item in value for a in all_arrays(item)]
+    return [a for item in value.captured.values() for a in all_arrays(item)]
+
+
+def map_trace(trace: Trace | None, change: Any) -> Trace | None:
+    """The trace with `change` done to every mask that is an array."""
+    if trace is None:
+        return None
+    out: Trace = {}
+    for at, entry in trace.items():
+        if isinstance(entry, dict):
+            out[at] = map_trace(entry, change)
+        else:
+            out[at] = change(entry) if isinstance(entry, np.ndarray) else entry
+    return out

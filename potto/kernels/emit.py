@@ -1,0 +1,249 @@
+"""Arithmetic of kernels: from a builtin's entry to lines of Python over numpy arrays.
+
+Owns `Scalar` (the variables that hold the parts of a cell) and `Lines`. Per builtin the value, and where they exist
+the error bound and the tangents, are emitted together, from the partial derivatives of the registry:
+v = f(a), t_d = sum_i p_i(a) t_i,d, e = sum_i |p_i| e_i and et_d = sum_i |p_i| et_i,d + sum_ij |t_i,d p_ij| e_j, first
+order in the errors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+from potto.calculus.derivative import partial
+from potto.core.terms import Branch, Const, If, Prim, Term, Var, postorder, var
+from potto.primitives import PRIMITIVES
+
+ZERO = "0.0"
+ONE = "1.0"
+UNIT_ROUNDOFF = 2.0**-53
+COMPARISONS = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!="}
+
+
+@dataclass(frozen=True, slots=True)
+class Scalar:
+    """Names of the variables that hold a cell's parts; None where a part is exactly zero, "1.0" where it is one."""
+
+    v: str
+    e: str | None
+    t: tuple[str | None, ...]
+    et: tuple[str | None, ...]
+
+    @property
+    def exact(self) -> bool:
+        return self.e is None and not any(self.et)
+
+    @property
+    def plain(self) -> bool:
+        """Whether there is nothing but a value."""
+        return self.exact and not any(self.t)
+
+
+@lru_cache(maxsize=4096)
+def partials(op: str, arity: int) -> tuple[tuple[str, ...], tuple[Term, ...]]:
+    """Placeholder names for the arguments of a builtin, and its partial derivatives over them."""
+    names = tuple(f"#{i}" for i in range(arity))
+    rule = PRIMITIVES[op].partials
+    if rule is None:
+        return names, ()
+    return names, tuple(rule(*map(var, names)))
+
+
+@lru_cache(maxsize=4096)
+def second_partial(op: str, arity: int, i: int, j: int) -> Term:
+    names, first = partials(op, arity)
+    return partial(first[i], names[j])
+
+
+class Lines:
+    """Generated lines in order, with fresh names and the numpy functions that they use."""
+
+    def __init__(self, directions: int, rounding: bool) -> None:
+        self.directions = directions
+        self.rounding = rounding
+        self.lines: list[str] = []
+        self.functions: dict[str, str] = {}
+        self.count = 0
+        self.none: tuple[None, ...] = (None,) * directions
+
+    def name(self, letter: str = "v") -> str:
+        self.count += 1
+        return f"{letter}{self.count}"
+
+    def let(self, expression: str, letter: str = "v") -> str:
+        name = self.name(letter)
+        self.lines.append(f"{name} = {expression}")
+        return name
+
+    def ufunc(self, name: str) -> str:
+        local = "f_" + name.replace(".", "_")
+        self.functions[local] = name
+        return local
+
+    def constant(self, value: float) -> Scalar:
+        text = repr(float(value))
+        if text in ("inf", "-inf", "nan"):
+            text = f"float({text!r})"
+        return Scalar(text, None, self.none, self.none)
+
+    def plain(self, text: str) -> Scalar:
+        return Scalar(text, None, self.none, self.none)
+
+    # Sums of products, with what is zero or one left out
+
+    def product(self, *factors: str) -> str:
+        factors = tuple(f for f in factors if f != ONE)
+        return "*".join(factors) if factors else ONE
+
+    def total(self, terms: Sequence[str]) -> str | None:
+        """A variable that holds the sum; long sums are cut into lines, which Python's parser prefers."""
+        if not terms:
+            return None
+        if len(terms) == 1:
+            return terms[0] if terms[0].isidentifier() or terms[0] == ONE else self.let(terms[0], "t")
+        name = self.let(" + ".join(terms[:24]), "t")
+        for start in range(24, len(terms), 24):
+            name = self.let(" + ".join([name, *terms[start : start + 24]]), "t")
+        return name
+
+    # Builtins
+
+    def apply(self, op: str, args: Sequence[Scalar]) -> Scalar:
+        if op in COMPARISONS:
+            a, b = args
+            return self.plain(self.let(f"{a.v} {COMPARISONS[op]} {b.v}", "m"))
+        if op in ("and", "or", "not"):
+            f = self.ufunc("logical_" + op)
+            return self.plain(self.let(f"{f}({', '.join(a.v for a in args)})", "m"))
+        if op == "add":
+            return self.add(args)
+        if op == "mul":
+            return self.mul(args)
+        if op in ("min", "max") and len(args) > 2:
+            result = args[0]
+            for arg in args[1:]:
+                result = self.apply(op, (result, arg))
+            return result
+        value = self.value(op, args)
+        return self.chain(op, args, value)
+
+    def value(self, op: str, args: Sequence[Scalar]) -> str:
+        a = [x.v for x in args]
+        if op == "neg":
+            return self.let(f"-{a[0]}")
+        if op == "pow":
+            square = {"2.0": "{0}*{0}", "3.0": "{0}*{0}*{0}"}.get(a[1])
+            if square is not None:
+                return self.let(square.format(a[0]))
+            return self.let(f"{self.ufunc('power')}({a[0]}, {a[1]})")
+        if op == "div":
+            return self.let(f"{self.ufunc('divide')}({a[0]}, {a[1]})")
+        return self.let(f"{self.ufunc(PRIMITIVES[op].numpy)}({', '.join(a)})")
+
+    def add(self, args: Sequence[Scalar]) -> Scalar:
+        v = self.total([a.v for a in args]) or ZERO
+        t = tuple(self.total([x for a in args if (x := a.t[d])]) for d in range(self.directions))
+        e = self.total([a.e for a in args if a.e])
+        et = tuple(self.total([x for a in args if (x := a.et[d])]) for d in range(self.directions))
+        return self.rounded(Scalar(v, e, t, et))
+
+    def mul(self, args: Sequence[Scalar]) -> Scalar:
+        result = args[0]
+        if all(a.plain for a in args) and not self.rounding:
+            return self.plain(self.let("*".join(a.v for a in args[:24]))) if len(args) <= 24 else self.mul_folded(args)
+        for arg in args[1:]:
+            result = self.times(result, arg)
+        return result
+
+    def mul_folded(self, args: Sequence[Scalar]) -> Scalar:
+        name = args[0].v
+        for arg in args[1:]:
+            name = self.let(f"{name}*{arg.v}")
+        return self.plain(name)
+
+    def times(self, a: Scalar, b: Scalar) -> Scalar:
+        v = self.let(f"{a.v}*{b.v}")
+        t, et = [], []
+        for d in range(self.directions):
+            terms = [self.product(p, q) for p, q in ((a.v, b.t[d]), (b.v, a.t[d])) if q]
+            t.append(self.total(terms))
+            bounds = [
+                f"abs({self.product(p, q)})"
+                for p, q in ((a.v, b.et[d]), (b.v, a.et[d]), (a.t[d], b.e), (b.t[d], a.e))
+                if p and q
+            ]
+            et.append(self.total(bounds))
+        e = self.total([f"abs({p}*{q})" for p, q in ((a.v, b.e), (b.v, a.e)) if q])
+        return self.rounded(Scalar(v, e, tuple(t), tuple(et)))
+
+    def chain(self, op: str, args: Sequence[Scalar], v: str) -> Scalar:
+        """The chain rule by the registry's partials, for arguments that move or are not exact."""
+        if all(a.plain for a in args):
+            return self.rounded(self.plain(v))
+        names, first = partials(op, len(args))
+        if not first:  # a builtin that jumps: constant between its jumps
+            return self.plain(v)
+        local = {n: self.plain(a.v) for n, a in zip(names, args, strict=True)}
+        memo: dict[Term, Scalar] = {}
+        moving = [i for i, a in enumerate(args) if not a.plain]
+        slope = {i: self.smooth(first[i], local, memo).v for i in moving}
+        t, et = [], []
+        for d in range(self.directions):
+            t.append(self.total([self.product(slope[i], x) for i in moving if (x := args[i].t[d])]))
+            bounds = [f"abs({self.product(slope[i], x)})" for i in moving if (x := args[i].et[d])]
+            for i in moving:
+                for j in moving:
+                    if args[i].t[d] and args[j].e:
+                        curve = self.smooth(second_partial(op, len(args), i, j), local, memo).v
+                        if curve != ZERO:
+                            bounds.append(f"abs({self.product(curve, args[i].t[d] or ONE, args[j].e or ONE)})")
+            et.append(self.total(bounds))
+        e = self.total([f"abs({self.product(slope[i], x)})" for i in moving if (x := args[i].e)])
+        return self.rounded(Scalar(v, e, tuple(t), tuple(et)))
+
+    def rounded(self, x: Scalar) -> Scalar:
+        """With the rounding of this operation added to the bounds, where the kernel keeps track of it."""
+        if not self.rounding:
+            return x
+        unit = repr(UNIT_ROUNDOFF)
+        e = self.let(f"{x.e + ' + ' if x.e else ''}{unit}*abs({x.v})", "e")
+        et = tuple(
+            self.let(f"{old + ' + ' if old else ''}{2 * UNIT_ROUNDOFF!r}*abs({t})", "e") if t else old
+            for t, old in zip(x.t, x.et, strict=True)
+        )
+        return Scalar(x.v, e, x.t, et)
+
+    def smooth(self, term: Term, local: dict[str, Scalar], memo: dict[Term, Scalar]) -> Scalar:
+        """A term made of builtins and selections only, such as a partial derivative; values only."""
+        rounding, self.rounding = self.rounding, False
+        for node in postorder(term):
+            if node in memo:
+                continue
+            match node:
+                case Const():
+                    memo[node] = self.constant(node.value)
+                case Var():
+                    memo[node] = local[node.name]
+                case Prim():
+                    memo[node] = self.apply(node.op, [memo[a] for a in node.args])
+                case Branch():
+                    mask = self.let(f"{memo[node.surface].v} {'>' if node.strict else '>='} 0.0", "m")
+                    memo[node] = self.select(mask, memo[node.then], memo[node.orelse])
+                case If():
+                    memo[node] = self.select(memo[node.condition].v, memo[node.then], memo[node.orelse])
+                case _:
+                    raise TypeError(f"{type(node).__name__} in a partial derivative")
+        self.rounding = rounding
+        return memo[term]
+
+    def select(self, mask: str, a: Scalar, b: Scalar) -> Scalar:
+        def pick(x: str | None, y: str | None) -> str | None:
+            if x == y:
+                return x
+            return self.let(f"{self.ufunc('support.select')}({mask}, {x or ZERO}, {y or ZERO})", "s")
+
+        v = pick(a.v, b.v)
+        assert v is not None
+        return Scalar(v, pick(a.e, b.e), tuple(map(pick, a.t, b.t)), tuple(map(pick, a.et, b.et)))

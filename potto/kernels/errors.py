@@ -1,0 +1,24 @@
+"""What can go wrong while a program is evaluated: the kinds of diagnostics P05xx raised by kernels."""
+
+from __future__ import annotations
+
+from potto.diagnostics import PottoError, declare
+from potto.source import Span
+
+NOWHERE = Span(0, 0)
+
+NOT_A_NUMBER = declare("P0502", "a value of the wrong kind where a number is needed")
+TOO_DEEP = declare("P0503", "a recursion that does not end")
+BROKEN = declare("P0504", "a program with errors cannot be evaluated")
+BAD_SUM = declare("P0507", "the bounds of a sum are not integers")
+NO_MEANING = declare("P0508", "a delta outside of an integral")
+WRONG_CALL = declare("P0509", "a function called with values that do not fit it")
+
+
+def not_a_number(value: object) -> PottoError:
+    kind = {tuple: "a tuple", list: "a list"}.get(type(value), "a function")
+    return PottoError([NOT_A_NUMBER(NOWHERE, f"{kind} stands where a number is needed")])
+
+
+def wrong_call(message: str, help: str = "") -> PottoError:
+    return PottoError([WRONG_CALL(NOWHERE, message, help=help)])

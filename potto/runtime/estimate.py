@@ -1,0 +1,62 @@
+"""Answers: numbers with the error that they may have, and what they cost.
+
+Owns `Estimate`. A value is a float, an array over the batch that was asked for, a tuple (of such) or, for a function,
+None with its text in `text`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class OneSided:
+    """A surface lies on an edge of the domain: the derivatives on the two sides of the parameters differ."""
+
+    variable: str
+    surface: str
+    backward: Any
+    forward: Any
+
+    def __str__(self) -> str:
+        return (
+            f"the surface {self.surface} lies on a bound of `{self.variable}`: the one-sided derivatives differ "
+            f"({_number(self.backward)} backward, {_number(self.forward)} forward)"
+        )
+
+
+def _number(x: Any) -> str:
+    flat = np.asarray(x, dtype=float).ravel()
+    return f"{flat[0]:.12g}" if flat.size == 1 else f"{flat[0]:.12g}, ..."
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """The outcome of an evaluation.
+
+    value, error: the number and a bound of its absolute error; arrays for a batch, tuples for tuples.
+    tangent, tangent_error: the same of the derivative, where a dual was asked for; else None.
+    converged: whether the accuracy asked for was reached; `reasons` says why not.
+    evals: evaluations of integrands. seconds, compile_seconds: time in all, and the part spent on making kernels.
+    notes: what a careful reader should know (one-sided derivatives).
+    """
+
+    value: Any
+    error: Any
+    tangent: Any = None
+    tangent_error: Any = None
+    converged: bool = True
+    evals: int = 0
+    seconds: float = 0.0
+    compile_seconds: float = 0.0
+    method: str = "exact"
+    reasons: tuple[str, ...] = ()
+    notes: tuple[OneSided, ...] = ()
+    stats: dict[str, Any] = field(default_factory=dict)
+    text: str | None = None
+
+    def __float__(self) -> float:
+        return float(self.value)

@@ -1,0 +1,187 @@
+"""Evaluating a program: from a term (or a function and numbers) to an `Estimate`.
+
+Owns `evaluate` and `Program`. A program keeps its linker, so that definitions are looked up and constants computed
+once; every evaluation has books of its own.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from potto.calculus.surfaces import TooDeep
+from potto.core.printer import format_term
+from potto.core.terms import Term
+from potto.diagnostics import PottoError
+from potto.kernels import compile as compiling
+from potto.kernels import errors
+from potto.kernels.cells import Cell, Value
+from potto.runtime.estimate import Estimate, OneSided
+from potto.runtime.functions import Closure, Derivative
+from potto.runtime.machine import Books, Linker, Machine
+from potto.settings import DEFAULTS, Settings
+
+Lookup = Callable[[str, str], Term]
+
+
+class Program:
+    """The definitions that terms refer to, for any number of evaluations."""
+
+    def __init__(self, lookup: Lookup) -> None:
+        self.linker = Linker(lookup)
+
+    def machine(self, settings: Settings) -> Machine:
+        return Machine(self.linker, settings, Books())
+
+    def value(self, machine: Machine, term: Term, env: Mapping[str, Value] | None = None) -> Value:
+        """The value of a term, with every internal limit turned into a PottoError."""
+        return guarded(lambda: machine.term(term, dict(env or {})))
+
+    def evaluate(
+        self, term: Term, settings: Settings = DEFAULTS, env: Mapping[str, Value] | None = None
+    ) -> Estimate:
+        """The estimate of a term. Raises PottoError where the program has no value."""
+        machine = self.machine(settings)
+        with Clock() as clock:
+            value = self.value(machine, term, env)
+        return report(value, machine, clock)
+
+    def call(
+        self, function: Value, groups: Sequence[Sequence[Value]], settings: Settings = DEFAULTS
+    ) -> Estimate:
+        """The estimate of a function's value for arguments; `groups` as the function is curried."""
+        machine = self.machine(settings)
+        with Clock() as clock:
+            value = guarded(lambda: machine.call(function, tuple(tuple(g) for g in groups), None))
+        return report(value, machine, clock)
+
+
+def evaluate(term: Term, lookup: Lookup, settings: Settings = DEFAULTS) -> Estimate:
+    """The estimate of a closed term whose definitions `lookup` gives. Raises PottoError."""
+    return Program(lookup).evaluate(term, settings)
+
+
+def guarded(action: Callable[[], Value]) -> Value:
+    try:
+        with np.errstate(all="ignore"):
+            return action()
+    except (RecursionError, TooDeep):
+        raise PottoError([errors.TOO_DEEP(
+            errors.NOWHERE, "calls inside each other are nested too deeply",
+            help="make sure that the condition that ends the recursion becomes true",
+        )]) from None  # fmt: skip
+
+
+class Clock:
+    """Wall time, and kernels made meanwhile."""
+
+    seconds = 0.0
+
+    def __enter__(self) -> Clock:
+        self.start = time.perf_counter()
+        self.compiled = compiling.counts.compiled
+        self.reused = compiling.counts.reused
+        self.spent = compiling.counts.seconds
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.seconds = time.perf_counter() - self.start
+        self.compiled = compiling.counts.compiled - self.compiled
+        self.reused = compiling.counts.reused - self.reused
+        self.spent = compiling.counts.seconds - self.spent
+
+
+def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
+    books, settings = machine.books, machine.settings
+    method = "exact" if not books.methods else "+".join(sorted(books.methods))
+    stats = {
+        "kernels compiled": clock.compiled,
+        "kernels reused": clock.reused,
+        "integrals": books.integrals,
+        "evaluations": books.evaluations,
+    }
+    notes = tuple(_notes(books))
+    common = dict(
+        evals=books.evaluations, seconds=clock.seconds, compile_seconds=clock.spent, method=method, notes=notes,
+        stats=stats,
+    )  # fmt: skip
+    if isinstance(value, Closure):
+        kind = "derivative of a function" if isinstance(value, Derivative) else "function"
+        return Estimate(None, None, text=f"<{kind}>", **common)  # type: ignore[arg-type]
+    if isinstance(value, list):
+        parts = [report(item, machine, clock) for item in value]
+        return Estimate([p.value for p in parts], [p.error for p in parts], **common)  # type: ignore[arg-type]
+    numbers, bounds = numbers_of(value), bounds_of(value)
+    tangents, tangent_bounds = tangents_of(value)
+    reasons = list(books.unfinished)
+    missed = [_missed(v, e, settings) for v, e in [*_flat(numbers, bounds), *_flat(tangents, tangent_bounds)]]
+    if not reasons and any(missed):
+        reasons.append(next(m for m in missed if m))
+    return Estimate(
+        numbers, bounds, tangents, tangent_bounds, converged=not reasons, reasons=tuple(reasons), **common  # type: ignore[arg-type]
+    )
+
+
+def _notes(books: Books) -> list[OneSided]:
+    out: list[OneSided] = []
+    for variable, surface, backward, forward in books.edges:
+        note = OneSided(variable, f"{format_term(surface)} = 0", np.squeeze(backward), np.squeeze(forward))
+        if not any(o.surface == note.surface and o.variable == variable for o in out):
+            out.append(note)
+    return out
+
+
+def numbers_of(value: Value) -> Any:
+    if isinstance(value, Cell):
+        return value.v if isinstance(value.v, np.ndarray) else float(value.v)
+    if isinstance(value, tuple):
+        return tuple(numbers_of(v) for v in value)
+    raise errors.not_a_number(value)
+
+
+def bounds_of(value: Value) -> Any:
+    if isinstance(value, Cell):
+        e = value.e
+        return 0.0 if e is None else (e if isinstance(e, np.ndarray) else float(e))
+    if isinstance(value, tuple):
+        return tuple(bounds_of(v) for v in value)
+    raise errors.not_a_number(value)
+
+
+def tangents_of(value: Value) -> tuple[Any, Any]:
+    """The tangents in the one direction that a cell carries; None, None for a plain value."""
+    if isinstance(value, Cell):
+        if not value.t:
+            return None, None
+        t, et = value.t[0], value.et[0]
+        return (0.0 if t is None else t), (0.0 if et is None else et)
+    if isinstance(value, tuple):
+        pairs = [tangents_of(v) for v in value]
+        if all(p[0] is None for p in pairs):
+            return None, None
+        return tuple(p[0] for p in pairs), tuple(p[1] for p in pairs)
+    return None, None
+
+
+def _flat(numbers: Any, bounds: Any) -> list[tuple[Any, Any]]:
+    if numbers is None:
+        return []
+    if isinstance(numbers, tuple):
+        return [pair for n, b in zip(numbers, bounds, strict=True) for pair in _flat(n, b)]
+    return [(numbers, bounds)]
+
+
+def _missed(value: Any, error: Any, settings: Settings) -> str | None:
+    """Why an answer is not as accurate as was asked, or None."""
+    v, e = np.abs(np.asarray(value, dtype=float)), np.asarray(error, dtype=float)
+    if np.isnan(v).any():
+        return "the value is not a number"
+    with np.errstate(invalid="ignore"):
+        bad = ~(e <= np.maximum(settings.atol, settings.rtol * v)) & ~np.isinf(v)
+        bad &= ~(v <= 1e3 * e) | (e > 1e-10)  # a zero by cancellation has no relative accuracy
+    if bad.any():
+        return "rounding limits the accuracy" if (e[bad] < 1e-6 * v[bad]).all() else "the error estimate is too large"
+    return None

@@ -1,0 +1,93 @@
+"""Functions as values at run time.
+
+Owns `Closure`, `Derivative` and `Paired`. A closure is a term with the values of its free variables. `deriv f` keeps
+f: where it is called it takes duals; where it is given to a derivative as the dual of f, f itself is differentiated.
+A function written by hand for duals (`Paired`) is called with pairs instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from potto.core.terms import Lam
+from potto.kernels.cells import Cell, Pattern, Value, map_arrays, pad
+
+
+class Closure:
+    """A function: its term and the values of the term's free variables. `inexact` if its values carry errors."""
+
+    __slots__ = ("captured", "inexact", "lam", "origin")
+
+    def __init__(self, lam: Lam, captured: dict[str, Value], inexact: bool, origin: tuple[str, str] | None = None) -> None:
+        self.lam = lam
+        self.captured = captured
+        self.inexact = inexact
+        self.origin = origin
+
+    def pattern(self, directions: int) -> Pattern:
+        moves = tuple(any(_moves(v, d) for v in self.captured.values()) for d in range(directions))
+        return (self.inexact, *moves)
+
+    def change(self, how: Callable[[Value], Value]) -> Closure:
+        if not self.captured:
+            return self
+        return Closure(self.lam, {n: how(v) for n, v in self.captured.items()}, self.inexact, self.origin)
+
+    def padded(self, directions: int) -> Closure:
+        return self.change(lambda v: pad(v, directions))
+
+    def mapped(self, change: Any) -> Closure:
+        return self.change(lambda v: map_arrays(v, change))
+
+    def still(self) -> Closure:
+        return self.change(still)
+
+
+class Derivative(Closure):
+    """`deriv f` as a value; `primal` is f."""
+
+    __slots__ = ("primal",)
+
+    def __init__(self, primal: Closure) -> None:
+        super().__init__(primal.lam, primal.captured, primal.inexact, primal.origin)
+        self.primal = primal
+
+    def change(self, how: Callable[[Value], Value]) -> Closure:
+        return Derivative(self.primal.change(how))
+
+
+class Paired(Closure):
+    """A function on duals, written by hand, standing for the function whose dual it is; `pairs` takes the pairs."""
+
+    __slots__ = ("pairs",)
+
+    def __init__(self, pairs: Closure) -> None:
+        super().__init__(pairs.lam, pairs.captured, pairs.inexact, pairs.origin)
+        self.pairs = pairs
+
+    def pattern(self, directions: int) -> Pattern:
+        return (self.inexact, *(True for _ in range(directions)))
+
+    def change(self, how: Callable[[Value], Value]) -> Closure:
+        return Paired(self.pairs.change(how))
+
+
+def _moves(value: Value, direction: int) -> bool:
+    if isinstance(value, Cell):
+        return direction < len(value.t) and value.t[direction] is not None
+    if isinstance(value, (tuple, list)):
+        return any(_moves(v, direction) for v in value)
+    return bool(value.pattern(direction + 1)[1 + direction])
+
+
+def still(value: Value) -> Value:
+    """The value with tangents and errors left out."""
+    if isinstance(value, Cell):
+        return Cell(value.v)
+    if isinstance(value, tuple):
+        return tuple(still(v) for v in value)
+    if isinstance(value, list):
+        return [still(v) for v in value]
+    assert isinstance(value, Closure)
+    return value.still()

@@ -1,0 +1,243 @@
+"""Integrals as kernels meet them: over whatever batch they stand in.
+
+Owns `integrate`: makes the batch one axis, finds (or makes) the plan for the functions and plain values at hand,
+chooses the method, and gives the result the shape of the batch again.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from potto.calculus.surfaces import TooDeep
+from potto.core.terms import Global, Integral, Lam, Sum, Term, Var, postorder, substitute, var
+from potto.diagnostics import PottoError
+from potto.integrate.levels import Iteration, Sums
+from potto.integrate.plan import Plan, make
+from potto.kernels import errors
+from potto.kernels.cells import Array, Cell, Number, Value, all_arrays, map_arrays
+from potto.runtime.functions import Closure, Derivative
+
+if TYPE_CHECKING:
+    from potto.runtime.machine import Machine
+
+START_ORDER = 10
+BATCH_ORDER = 6
+BATCH = 4096  # members integrated at once
+MOST_PLANS = 1024
+MOST_LEVELS = 3
+
+
+@dataclass
+class Linked:
+    """The functions that an integral calls, as terms whose free variables have names of their own."""
+
+    functions: dict[str, Lam]
+    env: dict[str, Value]
+
+
+def integrate(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
+    """The value of an integral in an environment whose numbers may be batches of any shape."""
+    machine.enter()
+    try:
+        return _integrate(machine.inside(), term, env, machine.root)
+    except TooDeep:
+        raise PottoError([errors.TOO_DEEP(
+            errors.NOWHERE, "the recursion under this integral does not end for these parameters",
+            help="the condition that ends it must be decided by parameters alone",
+        )]) from None  # fmt: skip
+    finally:
+        machine.books.depth = max(0, machine.books.depth - 1)
+
+
+def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermost: bool) -> Value:
+    arrays = [a for value in env.values() for a in all_arrays(value)]
+    shape = np.broadcast_shapes(*(a.shape for a in arrays))
+    batch = int(np.prod(shape)) if shape else 1
+    if batch == 0:
+        return Cell(np.zeros(shape))
+    flat = {n: map_arrays(v, lambda a: np.ascontiguousarray(np.broadcast_to(a, shape)).reshape(-1))
+            for n, v in env.items()}  # fmt: skip
+    machine.books.integrals += 1
+    linked = link(flat)
+    groups = split_by_decisions(machine, term, linked, batch)
+    if groups is None:
+        return _shaped(solve(machine, term, linked, flat, batch, outermost), shape)
+    result: Sums | None = None
+    for index in groups:
+        here = {n: map_arrays(v, lambda a, index=index: a[index]) for n, v in flat.items()}  # type: ignore[misc]
+        part = solve(machine, term, link(here), here, index.size, outermost)
+        if result is None:
+            m, k = part.v.shape[0], part.t.shape[1]
+            result = Sums(np.zeros((m, batch)), np.zeros((m, batch)), np.zeros((m, k, batch)), np.zeros((m, k, batch)))
+        result.v[:, index], result.e[:, index] = part.v, part.e
+        result.t[:, :, index], result.et[:, :, index] = part.t, part.et
+    assert result is not None
+    return _shaped(result, shape)
+
+
+def solve(
+    machine: Machine, term: Integral, linked: Linked, env: dict[str, Value], batch: int, outermost: bool
+) -> Sums:
+    plan = plan_for(machine, term, linked)
+    method = machine.settings.method
+    if outermost and (method in ("mc", "qmc") or (method == "auto" and len(term.variables) > MOST_LEVELS)):
+        from potto.integrate.sampling import sample
+
+        sums = sample(plan, machine, env, batch, method)
+        machine.books.methods.add("mc" if method == "mc" else "qmc")
+        return sums
+    machine.books.methods.add("quadrature")
+    if batch <= BATCH:
+        return Iteration(plan, machine, START_ORDER if batch <= 64 else BATCH_ORDER).run(0, env, batch, {}, machine)
+    parts = []
+    for start in range(0, batch, BATCH):
+        here = {n: map_arrays(v, lambda a, s=start: a[s : s + BATCH]) for n, v in env.items()}  # type: ignore[misc]
+        size = min(BATCH, batch - start)
+        parts.append(Iteration(plan, machine, BATCH_ORDER).run(0, here, size, {}, machine))
+    m = max(p.v.shape[0] for p in parts)
+
+    def joined(name: str) -> Array:
+        rows = [getattr(p, name) for p in parts]
+        return np.concatenate([np.broadcast_to(r, (m, *r.shape[1:])) for r in rows], axis=-1)
+
+    return Sums(joined("v"), joined("e"), joined("t"), joined("et"))
+
+
+def _shaped(sums: Sums, shape: tuple[int, ...]) -> Value:
+    def part(x: Array) -> Number:
+        return x.reshape(shape) if shape else float(x[0])
+
+    def cell(c: int) -> Cell:
+        t = tuple(part(sums.t[c, d]) for d in range(sums.t.shape[1]))
+        et = tuple(part(sums.et[c, d]) for d in range(sums.et.shape[1]))
+        return Cell(part(sums.v[c]), part(sums.e[c]), t, et)
+
+    if sums.v.shape[0] == 1:
+        return cell(0)
+    return tuple(cell(c) for c in range(sums.v.shape[0]))
+
+
+# Functions that an integral calls
+
+
+def link(env: dict[str, Value]) -> Linked:
+    functions: dict[str, Lam] = {}
+    extended: dict[str, Value] = dict(env)
+
+    def add(name: str, function: Closure) -> None:
+        while isinstance(function, Derivative):
+            function = function.primal
+        renamed: dict[str, Term] = {}
+        for inner, value in function.captured.items():
+            own = f"{name}@{inner}"
+            renamed[inner] = var(own)
+            extended[own] = value
+            if isinstance(value, Closure):
+                add(own, value)
+        linked = substitute(function.lam, renamed)
+        assert isinstance(linked, Lam)
+        functions[name] = linked
+
+    for name, value in env.items():
+        if isinstance(value, Closure):
+            add(name, value)
+    return Linked(functions, extended)
+
+
+# Plans
+
+_plans: OrderedDict[Any, list[Plan]] = OrderedDict()
+_lock = threading.Lock()
+
+
+def plan_for(machine: Machine, term: Integral, linked: Linked) -> Plan:
+    """The plan for these functions and plain values; made once."""
+    key = (term.digest, tuple((n, f.digest) for n, f in sorted(linked.functions.items())), id(machine.linker))
+    with _lock:
+        candidates = list(_plans.get(key, ()))
+    for plan in candidates:
+        if all(decide(machine, t, linked) == value for t, value in plan.decisions):
+            return plan
+    plan = make(
+        term,
+        lambda head: linked.functions.get(head.name) if isinstance(head, Var) else machine.linker.function(head),
+        lambda plain: decide(machine, plain, linked),
+    )
+    with _lock:
+        _plans.setdefault(key, []).append(plan)
+        _plans.move_to_end(key)
+        if len(_plans) > MOST_PLANS:
+            _plans.popitem(last=False)
+    return plan
+
+
+def decide(machine: Machine, plain: Term, linked: Linked) -> float | None:
+    """The value of a plain term over parameters, where it is one number for the whole batch."""
+    env: dict[str, Value] = {}
+    for name in plain.free:
+        value = linked.env.get(name)
+        if value is None:
+            return None
+        if isinstance(value, Cell):
+            flat = np.asarray(value.v)
+            if flat.ndim and flat.size and not (flat == flat.flat[0]).all():
+                return None
+            env[name] = Cell(float(flat.flat[0]))
+        else:
+            env[name] = value.still() if isinstance(value, Closure) else value
+    try:
+        result = machine.with_directions(0).term(plain, env)
+    except PottoError:
+        return None
+    if isinstance(result, Cell):
+        number = np.asarray(result.v)
+        return float(number.flat[0])
+    return None
+
+
+def split_by_decisions(machine: Machine, term: Integral, linked: Linked, batch: int) -> list[Any] | None:
+    """Members of the batch for which recursions and sums under the integral take the same course, if not all do."""
+    if batch == 1:
+        return None
+    deciding = deciding_names(machine, term, linked)
+    rows = []
+    for name in sorted(deciding):
+        value = linked.env.get(name)
+        if isinstance(value, Cell) and isinstance(value.v, np.ndarray) and value.v.size > 1:
+            rows.append(value.v)
+    if not rows:
+        return None
+    _, where = np.unique(np.stack(rows), axis=1, return_inverse=True)
+    where = np.asarray(where).reshape(-1)
+    count = int(where.max()) + 1
+    return [np.nonzero(where == g)[0] for g in range(count)] if count > 1 else None
+
+
+def deciding_names(machine: Machine, term: Integral, linked: Linked) -> frozenset[str]:
+    """Parameters that reach the condition of a recursion or the bounds of a sum under the integral."""
+    names: set[str] = set()
+    recursive = False
+    seen: set[Term] = set()
+    todo: list[Term] = [term.body, *linked.functions.values()]
+    while todo:
+        for node in postorder(todo.pop()):
+            if isinstance(node, Global) and node not in seen:
+                seen.add(node)
+                found = machine.linker.function(node)
+                if found is not None:
+                    inside = postorder(found)
+                    recursive = recursive or any(n in seen for n in inside if isinstance(n, Global))
+                    recursive = recursive or any(isinstance(n, Sum) for n in inside)
+                    todo.append(found)
+            elif isinstance(node, Sum):
+                names |= node.lo.free | node.hi.free
+    if recursive:
+        names |= {n for n in term.free if isinstance(linked.env.get(n), Cell)}
+    return frozenset(names)
+
+

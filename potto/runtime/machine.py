@@ -1,0 +1,294 @@
+"""The machine: what kernels ask for while they run.
+
+Owns `Machine`. It knows the program's definitions (through `Linker`), the settings and the books of one evaluation,
+and how many directions of differentiation are carried. Machines with other numbers of directions share everything
+else. Calls, lazy sides, sums and integrals of generated code come here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from potto.calculus.surfaces import uncurry
+from potto.core.terms import (
+    Branch, Deriv, Global, Hole, If, Integral, Lam, Sum, Term, lam, postorder,
+)  # fmt: skip
+from potto.core.terms import Delta as DeltaTerm
+from potto.diagnostics import PottoError
+from potto.kernels import errors
+from potto.kernels.cells import Array, Cell, Number, Trace, Value, pad, pattern
+from potto.kernels.compile import kernel
+from potto.runtime.functions import Closure, Derivative, Paired
+from potto.settings import Settings
+
+DEEPEST_CALLS = 3000
+MOST_TERMS = 10_000_000
+SUM_CHUNK = 1 << 18
+
+
+@dataclass
+class Books:
+    """What one evaluation has done so far."""
+
+    evaluations: int = 0
+    depth: int = 0
+    unfinished: list[str] = field(default_factory=list)
+    edges: list[tuple[str, Term, Array, Array]] = field(default_factory=list)
+    methods: set[str] = field(default_factory=set)
+    integrals: int = 0
+    pieces: int = 0
+
+
+class Linker:
+    """The definitions that a program refers to. `lookup` gives the term of a definition or raises PottoError."""
+
+    def __init__(self, lookup: Callable[[str, str], Term]) -> None:
+        self.lookup = lookup
+        self.terms: dict[tuple[str, str], Term] = {}
+        self.exactness: dict[Term, bool] = {}
+        self.constants: dict[tuple[str, str], Value] = {}
+
+    def term(self, module: str, name: str) -> Term:
+        key = (module, name)
+        if key not in self.terms:
+            self.terms[key] = self.lookup(module, name)
+        return self.terms[key]
+
+    def inexact(self, term: Term) -> bool:
+        """Whether a value of the term may carry an integration error: whether an integral is reached from it."""
+        found = self.exactness.get(term)
+        if found is not None:
+            return found
+        self.exactness[term] = False  # while a recursion comes back here
+        result = False
+        for node in postorder(term):
+            if isinstance(node, Integral) or (
+                isinstance(node, Global) and self.inexact(self.term(node.module, node.name))
+            ):
+                result = True
+                break
+        self.exactness[term] = result
+        return result
+
+    def function(self, head: Term) -> Lam | None:
+        """The Lam that a Global leads to; through definitions that are other names or derivatives of functions."""
+        for _ in range(100):
+            if isinstance(head, Lam):
+                return head
+            if isinstance(head, Deriv):
+                head = head.function
+            elif isinstance(head, Global):
+                head = self.term(head.module, head.name)
+            else:
+                return None
+        return None
+
+
+@dataclass
+class Machine:
+    """One evaluation, carrying `directions` tangents; `rounding` where rounding errors are kept track of."""
+
+    linker: Linker
+    settings: Settings
+    books: Books
+    directions: int = 0
+    rounding: bool = True
+    root: bool = True
+
+    @property
+    def rtol(self) -> float:
+        return self.settings.rtol
+
+    @property
+    def atol(self) -> float:
+        return self.settings.atol
+
+    @property
+    def max_evaluations(self) -> int:
+        return self.settings.max_evals
+
+    def with_directions(self, directions: int) -> Machine:
+        if directions == self.directions:
+            return self
+        return replace(self, directions=directions)
+
+    def inside(self) -> Machine:
+        """The machine for an integrand: rounding is estimated by the integrator, not kept track of."""
+        return replace(self, rounding=False, root=False) if self.rounding or self.root else self
+
+    # Books
+
+    def count(self, evaluations: int) -> None:
+        self.books.evaluations += evaluations
+
+    def exhausted(self) -> bool:
+        return self.books.evaluations > self.settings.max_evals
+
+    def note_edge(self, variable: str, surface: Any, backward: Array, forward: Array) -> None:
+        self.books.edges.append((variable, surface, backward, forward))
+
+    def note_unfinished(self, reason: str) -> None:
+        if reason not in self.books.unfinished:
+            self.books.unfinished.append(reason)
+
+    # Terms over batches
+
+    def evaluate(self, function: Lam, env: dict[str, Value], trace: Trace | None) -> Value:
+        """The value of a function of free variables (in sorted order) in an environment."""
+        return self.run(function, [env[p] for p in function.params], trace)
+
+    def run(self, function: Lam, args: list[Value], trace: Trace | None) -> Value:
+        k = self.directions
+        patterns = tuple(pattern(a, k) for a in args)
+        return kernel(function, patterns, k, self.rounding, self).run(self, trace, *args)
+
+    def term(self, term: Term, env: dict[str, Value]) -> Value:
+        return self.evaluate(lam(tuple(sorted(term.free)), term), env, None)
+
+    def part(self, term: Term, env: dict[str, Value]) -> Value:
+        return self.term(term, env)
+
+    # Definitions and functions
+
+    def inexact(self, term: Term) -> bool:
+        return self.linker.inexact(term)
+
+    def global_value(self, module: str, name: str) -> Value:
+        term = self.linker.term(module, name)
+        if isinstance(term, Lam):
+            return Closure(term, {}, self.rounding or self.linker.inexact(term), (module, name))
+        key = (module, name)
+        if key not in self.linker.constants:
+            self.enter()
+            still = replace(self, directions=0, rounding=True)
+            self.linker.constants[key] = still.term(term, {})
+            self.books.depth -= 1
+        return pad(self.linker.constants[key], self.directions)
+
+    def closure(self, function: Lam, captured: dict[str, Value]) -> Value:
+        return Closure(function, captured, self.rounding or self.linker.inexact(function) or _any_inexact(captured))
+
+    def derived(self, function: Value) -> Value:
+        if not isinstance(function, Closure):
+            raise errors.wrong_call("`deriv` needs a function", "write the integral as a function of its parameters")
+        return Derivative(function)
+
+    def project(self, value: Value, index: int) -> Value:
+        if isinstance(value, (tuple, list)) and index < len(value):
+            return value[index]
+        raise errors.wrong_call(f"this value has no component {index + 1}")
+
+    def fail(self, term: Hole | DeltaTerm) -> Value:
+        if isinstance(term, Hole):
+            raise PottoError([errors.BROKEN(errors.NOWHERE, term.reason)])
+        raise PottoError([errors.NO_MEANING(errors.NOWHERE, "a delta has a meaning only under an integral over its variables")])
+
+    # Calls
+
+    def enter(self) -> None:
+        self.books.depth += 1
+        if self.books.depth > DEEPEST_CALLS:
+            self.books.depth = 0
+            raise PottoError([errors.TOO_DEEP(
+                errors.NOWHERE, f"more than {DEEPEST_CALLS:,} calls inside each other",
+                help="make sure that the condition that ends the recursion becomes true",
+            )])  # fmt: skip
+
+    def call(self, function: Value, groups: tuple[tuple[Value, ...], ...], trace: Trace | None) -> Value:
+        if not isinstance(function, Closure):
+            if not groups:
+                return function
+            raise errors.wrong_call("this is called, but it is not a function", "to multiply, write `*`")
+        if isinstance(function, Derivative):
+            from potto.runtime.duals import call_derivative
+
+            return call_derivative(self, function, groups, trace)
+        if isinstance(function, Paired):
+            from potto.runtime.duals import call_paired
+
+            return call_paired(self, function, groups, trace)
+        self.enter()
+        whole, arities = self.linker_shape(function.lam, len(groups))
+        args = list(function.captured[n] for n in sorted(function.captured))
+        for group, arity in zip(groups, arities):
+            args.extend(fit(group, arity))
+        value = self.run(whole, args, trace)
+        self.books.depth -= 1
+        rest = groups[len(arities) :]
+        return self.call(value, rest, None) if rest else value
+
+    def linker_shape(self, function: Lam, groups: int) -> tuple[Lam, tuple[int, ...]]:
+        """The function with captured names and as many groups of parameters as are given at once."""
+        key = (function, groups)
+        found = _shapes.get(key)
+        if found is None:
+            params, body = uncurry(function, groups)
+            arities, inner = [], function
+            while isinstance(inner, Lam) and len(arities) < groups:
+                arities.append(len(inner.params))
+                inner = inner.body  # type: ignore[assignment]
+            captured = tuple(sorted(function.free))
+            found = (lam(captured + params, body), tuple(arities))
+            if len(_shapes) > 10_000:
+                _shapes.clear()
+            _shapes[key] = found
+        return found
+
+    # Branches, sums
+
+    def falls(self, surface: Number, strict: bool) -> tuple[Any, Any]:
+        """Which side a surface falls on, and nan wherever it is nan."""
+        mask = surface > 0 if strict else surface >= 0
+        if surface.__class__ is float:
+            return mask, (surface if surface != surface else None)
+        bad = np.isnan(surface)
+        return mask, (np.where(bad, np.nan, 0.0) if bad.any() else None)
+
+    def lazy(self, mask: Any, term: If | Branch, env: dict[str, Value], traces: tuple[Any, Any]) -> Value:
+        from potto.runtime.selection import lazy
+
+        return lazy(self, mask, term, env, traces)
+
+    def sum(self, term: Sum, lo: Value, hi: Value, env: dict[str, Value], trace: Trace | None) -> Value:
+        from potto.runtime.sums import total
+
+        return total(self, term, lo, hi, env, trace)
+
+    # Integrals
+
+    def integral(self, term: Integral, env: dict[str, Value]) -> Value:
+        from potto.runtime.integrals import integrate
+
+        return integrate(self, term, env)
+
+
+_shapes: dict[tuple[Lam, int], tuple[Lam, tuple[int, ...]]] = {}
+
+
+def _any_inexact(values: dict[str, Value]) -> bool:
+    def inexact(value: Value) -> bool:
+        if isinstance(value, Cell):
+            return value.e is not None
+        if isinstance(value, (tuple, list)):
+            return any(map(inexact, value))
+        return isinstance(value, Closure) and value.inexact
+
+    return any(map(inexact, values.values()))
+
+
+def fit(group: tuple[Value, ...], arity: int) -> tuple[Value, ...]:
+    """A group of arguments as the parameters take it: a tuple spread out, or several made into one tuple."""
+    if len(group) == arity:
+        return group
+    if len(group) == 1 and isinstance(group[0], tuple) and len(group[0]) == arity:
+        return group[0]
+    if arity == 1 and len(group) > 1:
+        return (tuple(group),)
+    raise errors.wrong_call(f"{len(group)} argument(s) given to a function that takes {arity}")
+
+
+__all__ = ["Books", "Linker", "Machine", "fit"]
