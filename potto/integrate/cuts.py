@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from potto.integrate.maps import Segments, choose
+from potto.integrate.maps import Ints, Segments, choose
 from potto.integrate.plan import LevelPlan
 from potto.integrate.rules import EPS
 from potto.kernels.cells import Array, Cell, Value
@@ -37,7 +37,7 @@ class Edge:
     """A surface that lies on a bound, for some of the batch: `owner` (m,), at the upper bound or not, its speeds."""
 
     cut: int
-    owner: npt.NDArray[np.int64]
+    owner: Ints
     upper: bool
     x: Array
     root_t: Array
@@ -46,7 +46,10 @@ class Edge:
 
 @dataclass
 class Cuts:
-    """The outcome for one variable: orientation (B,), segments, whether anything moves, edges, bounds' errors."""
+    """The outcome for one variable: orientation (B,), segments, whether anything moves, edges, bounds' errors.
+
+    conflict: cuts that coincide move differently, which is harmless only where the integrand does not jump there.
+    """
 
     sign: Array
     segments: Segments
@@ -54,6 +57,7 @@ class Cuts:
     edges: list[Edge]
     bound_error: Array | None
     bound_nan: Bools | None
+    conflict: bool = False
 
 
 def as_array(x: Any, batch: int) -> Array:
@@ -74,7 +78,9 @@ def frame_rows(plan: LevelPlan, values: tuple[Value, ...]) -> tuple[Cell, Cell, 
     return cells[0], cells[1], rows
 
 
-def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, directions: int) -> Cuts:
+def segments(
+    plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, directions: int, nested: bool
+) -> Cuts:
     """Cut [lo, hi] at the rows; reversed bounds are turned round and counted negative."""
     low, high = as_array(lo.v, batch), as_array(hi.v, batch)
     tl, th = _tangents(lo.t, batch, directions), _tangents(hi.t, batch, directions)
@@ -94,6 +100,10 @@ def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, d
     for i, row in enumerate(rows, 1):
         root = as_array(row.x, batch)
         inner = (root > low) & (root < high)
+        if nested:  # roots that merge just here move infinitely fast; a single node of the variables further out
+            for speed in row.t:
+                if isinstance(speed, np.ndarray):
+                    inner &= np.isfinite(speed)
         inside[i] = inner
         x[i] = np.where(inner, root, high)
         for d in range(directions):
@@ -103,9 +113,13 @@ def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, d
             beyond.append((root, True))
         if directions and row.cut >= 0 and plan.level.cuts[row.cut].jumps:
             edges.extend(_edges(row, root, low, high, tl, th, directions, batch))
+    rank = np.zeros((count + 2, batch), dtype=np.int64)
+    conflict = False
     if count:
-        x, t, inside = _sorted(plan, rows, x, t, inside)
-    return _pieces(x, t, sign, beyond, edges, lo, hi, batch)
+        x, t, rank, conflict = _sorted(plan, rows, x, t, inside)
+    cuts = _pieces(x, t, rank, sign, beyond, edges, lo, hi, batch)
+    cuts.conflict = conflict
+    return cuts
 
 
 def _any_turning(plan: LevelPlan, row: Row) -> bool:
@@ -136,20 +150,21 @@ def _edges(
     return out
 
 
-def _sorted(
-    plan: LevelPlan, rows: list[Row], x: Array, t: Array, inside: Bools
-) -> tuple[Array, Array, Bools]:
+def _sorted(plan: LevelPlan, rows: list[Row], x: Array, t: Array, inside: Bools) -> tuple[Array, Array, Ints, bool]:
+    conflict = False
     order = np.argsort(x, axis=0, kind="stable")
     # the bounds stay first and last even among equals: candidates were clipped to the upper bound
     x = np.take_along_axis(x, order, axis=0)
+    inside = np.take_along_axis(inside, order, axis=0)
+    rank: Ints = np.where(inside, np.array([0, *(_rank(plan, r) for r in rows), 0])[order], 0)
     if t.shape[0]:
         t = np.take_along_axis(t, np.broadcast_to(order, t.shape), axis=1)
-        inside = np.take_along_axis(inside, order, axis=0)
         same = (x[1:] == x[:-1]) & inside[1:] & inside[:-1]
         if same.any():
-            rank = np.array([0, *(_rank(plan, r) for r in rows), 0])[order]
+            apart = np.abs(t[:, 1:] - t[:, :-1]) > 1e-9 * (np.abs(t[:, 1:]) + np.abs(t[:, :-1]))
+            conflict = bool((same & apart.any(axis=0)).any())
             _agree(t, same, rank)
-    return x, t, inside
+    return x, t, rank, conflict
 
 
 def _rank(plan: LevelPlan, row: Row) -> int:
@@ -158,7 +173,7 @@ def _rank(plan: LevelPlan, row: Row) -> int:
     return 2 if plan.level.cuts[row.cut].jumps else 1
 
 
-def _agree(t: Array, same: Bools, rank: npt.NDArray[np.int64]) -> None:
+def _agree(t: Array, same: Bools, rank: Ints) -> None:
     """Coinciding cuts move as one, as the one that jumps does: the empty stretch between them is left out."""
     count = same.shape[0]
     for i in [*range(count), *reversed(range(count))]:
@@ -171,7 +186,7 @@ def _agree(t: Array, same: Bools, rank: npt.NDArray[np.int64]) -> None:
 
 
 def _pieces(
-    x: Array, t: Array, sign: Array, beyond: list[tuple[Array, bool]], edges: list[Edge], lo: Cell, hi: Cell, batch: int
+    x: Array, t: Array, rank: Ints, sign: Array, beyond: list[tuple[Array, bool]], edges: list[Edge], lo: Cell, hi: Cell, batch: int
 ) -> Cuts:
     a, b = x[:-1], x[1:]
     full = b > a
@@ -190,5 +205,5 @@ def _pieces(
             error = np.zeros(batch) if error is None else error
             error = error + bound.e
     bad = np.isnan(x[0]) | np.isnan(x[-1])
-    made = Segments(owner, a, b, ta, tb, choose(a, b, left, right), left, right)
+    made = Segments(owner, a, b, ta, tb, choose(a, b, left, right), left, right, rank[place, owner])
     return Cuts(sign, made, moving, edges, error, bad if bad.any() else None)

@@ -29,6 +29,13 @@ from potto.kernels.cells import Array, Cell, Mask, Number, Trace, Value, map_arr
 CHUNK = 1 << 15  # points per kernel call: a few buffers of this length fit the second-level cache
 # The rounding of a node, in units of the last place, that noise in a steep integrand is blamed on.
 NODE_ROUNDING = 0.5
+MOST_HALVINGS = 64
+DOUBTFUL_HALVINGS = 24
+# How much larger than at the nodes an integrand must be at an end of a segment to be taken for a peak.
+PEAK = 8.0
+# A relative jump of an inner integral where only kinks are expected: a surface there runs along the inner variable.
+DISCONTINUITY = 1e-6
+BESIDE = 1e-9
 
 
 class Evaluator(Protocol):
@@ -45,6 +52,7 @@ class Evaluator(Protocol):
     def exhausted(self) -> bool: ...
     def note_edge(self, variable: str, surface: Any, backward: Array, forward: Array) -> None: ...
     def note_unfinished(self, reason: str) -> None: ...
+    def note_degenerate(self, variable: str) -> None: ...
 
 
 @dataclass
@@ -69,13 +77,14 @@ class Pieces:
     error: Array = field(default_factory=lambda: np.zeros((0, 0)))
     floor: Array = field(default_factory=lambda: np.zeros((0, 0)))
     size: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    most: Array = field(default_factory=lambda: np.zeros((0, 0)))
     left: Any = field(default_factory=lambda: np.zeros(0, dtype=bool))
     right: Any = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
     def pick(self, index: Any) -> Pieces:
         return Pieces(self.segment[index], self.u0[index], self.u1[index], self.end[index],
                       self.integral[:, index], self.error[:, index], self.floor[:, index],
-                      self.size[:, index], self.left[index], self.right[index])  # fmt: skip
+                      self.size[:, index], self.most[:, index], self.left[index], self.right[index])  # fmt: skip
 
     def join(self, other: Pieces) -> Pieces:
         return Pieces(
@@ -87,6 +96,7 @@ class Pieces:
             np.concatenate((self.error, other.error), axis=1),
             np.concatenate((self.floor, other.floor), axis=1),
             np.concatenate((self.size, other.size), axis=1),
+            np.concatenate((self.most, other.most), axis=1),
             np.concatenate((self.left, other.left)),
             np.concatenate((self.right, other.right)),
         )
@@ -126,7 +136,7 @@ class Iteration:
         keep = self.alive(sides, seg)
         if keep is not None:
             seg, sides = seg.pick(keep), {g: _take(m, keep) for g, m in sides.items()}
-        work = _Work(self, number, level, env, seg, sides, machine, cuts.moving and k > 0, batch, root)
+        work = _Work(self, number, level, env, seg, sides, machine, cuts.moving and k > 0, batch, root, cuts.conflict)
         sums = work.integrate()
         if cuts.edges and k:
             self.report_edges(number, level, cuts, env, seg, sides, sums, machine)
@@ -149,7 +159,7 @@ class Iteration:
         assert isinstance(values, tuple)
         lo, hi, rows = frame_rows(level, values)
         rows += searched_rows(level, env, lo, hi, batch, machine)
-        return segments(level, lo, hi, rows, batch, machine.directions)
+        return segments(level, lo, hi, rows, batch, machine.directions, level is not self.plan.levels[0])
 
     def sides_of(
         self, level: LevelPlan, env: dict[str, Value], seg: Segments, sides: dict[int, Mask], machine: Evaluator
@@ -183,6 +193,8 @@ class Iteration:
     ) -> None:  # fmt: skip
         """Say of surfaces on a bound what the derivative is on either side of the present parameters."""
         for edge in cuts.edges:
+            if number and 2 * edge.owner.size < cuts.sign.size:
+                continue  # single nodes of the variables further out: of measure zero
             found = self.across(number, level, edge, env, seg, sides, machine)
             if found is None:
                 continue
@@ -290,6 +302,7 @@ class _Work:
     moving: bool
     batch: int
     root: Ints | None = None
+    conflict: bool = False
     width: int = 1
 
     def __post_init__(self) -> None:
@@ -309,15 +322,18 @@ class _Work:
         fresh = Pieces(np.arange(count), zero, one, np.zeros(count, dtype=np.int64))
         pieces = self.measure(fresh)
         ends = self.end_values()
-        for _ in range(60):
+        if self.conflict and not self.last:
+            self.look_for_steps()
+        for turn in range(MOST_HALVINGS):
             bad = self.too_coarse(pieces, ends)
+            if bad is None and turn < DOUBTFUL_HALVINGS:
+                bad = self.doubtful(pieces, ends)
             if bad is None:
                 break
             if self.machine.exhausted():
                 self.machine.note_unfinished("the budget of evaluations is spent")
                 break
             pieces = pieces.pick(~bad).join(self.measure(self.halve(pieces.pick(bad))))
-            ends = None if ends is None else ends
         return self.total(pieces, ends)
 
     def halve(self, p: Pieces) -> Pieces:
@@ -360,8 +376,11 @@ class _Work:
         with np.errstate(invalid="ignore", over="ignore"):
             shake = NODE_ROUNDING * EPS * np.max(np.abs(x), axis=-1) / np.abs(weight).mean(axis=-1)
         shake = np.where(np.isfinite(shake), np.minimum(shake, 1.0), 0.0)
-        p.size = np.abs(h) @ rule.weights
-        p.floor = 2 * EPS * p.size + spread * shake
+        height = np.abs(h)
+        p.size = height @ rule.weights
+        p.most = height[:: height.shape[0] // self.width].max(axis=-1)
+        p.floor = 4 * EPS * p.size + spread * shake
+        p.floor[np.arange(p.floor.shape[0]) % (p.floor.shape[0] // self.width) > 0] *= 3  # speeds are rounded too
         if inner is not None:
             p.floor = p.floor + np.abs(inner) @ rule.weights
         broken = ~np.isfinite(p.integral)
@@ -447,6 +466,27 @@ class _Work:
             out.append(self.parent.inside(self.number, here, end.size, self.sides, still))
         return out[0], out[1]
 
+    def look_for_steps(self) -> None:
+        """Whether the integral further in jumps where only its kinks were expected, which move in different ways.
+
+        A surface that runs along the innermost variable leaves such a step. Looked at just beside the cut, since on
+        the cut itself the sides are a matter of rounding.
+        """
+        seg, still = self.seg, self.machine.with_directions(0)
+        follows = np.nonzero((seg.owner[1:] == seg.owner[:-1]) & (seg.a[1:] == seg.b[:-1]) & (seg.rank[1:] == 1))[0] + 1
+        if not follows.size:
+            return
+        width = np.minimum(np.abs(seg.b - seg.a)[follows], np.abs(seg.b - seg.a)[follows - 1])
+        values = []
+        for side, index in ((1.0, follows), (-1.0, follows - 1)):
+            here = gather({n: _still(v) for n, v in self.env.items()}, seg.owner[index])
+            here[self.level.variable] = Cell(seg.a[follows] + side * BESIDE * np.minimum(width, 1e300))
+            sides = {g: _take(m, index) for g, m in self.sides.items()}
+            values.append(self.parent.inside(self.number, here, index.size, sides, still))
+        apart = np.abs(values[0] - values[1])
+        if (apart > DISCONTINUITY * (np.abs(values[0]) + np.abs(values[1]))).any():
+            self.machine.note_degenerate(self.level.variable)
+
     def too_coarse(self, p: Pieces, ends: Any) -> Any:
         """A mask of the pieces to halve, None if there are none."""
         owner = self.seg.owner[p.segment]
@@ -470,42 +510,71 @@ class _Work:
                 tolerance = np.maximum(self.machine.atol, self.machine.rtol * scale)
                 share = (tolerance / (2 * np.maximum(count, 1)))[owner]
                 bad |= (error[c, r] > share) & (error[c, r] > 8 * floor[c, r])
+        if ends is not None:
+            bad |= self.missed_peak(p, ends)
         narrow = (p.u1 - p.u0) < 1e-14
         bad &= ~narrow
         return bad if bad.any() else None
 
+    def missed_peak(self, p: Pieces, ends: tuple[Array, Array]) -> Any:
+        """Pieces at an end of their segment where the integrand is far larger than at any of their nodes."""
+        seg = self.seg
+        with np.errstate(invalid="ignore"):
+            width = (seg.b - seg.a)[p.segment] * (p.u1 - p.u0)
+        bad = np.zeros(p.segment.size, dtype=bool)
+        for f, touches in ((ends[0], p.u0 == 0), (ends[1], p.u1 == 1)):
+            for c in range(self.width):
+                at_end = np.abs(f[c][p.segment]) * width
+                bad |= touches & np.isfinite(at_end) & (at_end > PEAK * p.most[c])
+        return bad
+
+    def doubtful(self, p: Pieces, ends: tuple[Array, Array] | None) -> Any:
+        """All pieces of the integrals whose two derivatives do not agree: something between the nodes was missed."""
+        if not self.moving or ends is None:
+            return None
+        moving, fixed, apart = self.two_forms(p, ends)
+        doubt = (apart > 4 * (moving[1] + fixed[1])) & (apart > 1e-9 * np.abs(moving[0]))
+        owners = doubt.any(axis=(0, 1))
+        bad = owners[self.seg.owner[p.segment]] & (p.u1 - p.u0 > 1e-14)
+        return bad if bad.any() else None
+
+    def two_forms(
+        self, p: Pieces, ends: tuple[Array, Array]
+    ) -> tuple[tuple[Array, Array], tuple[Array, Array], Array]:
+        """(value, bound) of the tangents in the moving and in the fixed form, and how far they are apart."""
+        k = self.k
+        integral, error = self.added(p.integral, p), self.added(p.error + p.floor, p)
+        boundary, rounding = self.boundary(ends)
+        moving = integral[:, 1 : 1 + k], error[:, 1 : 1 + k]
+        fixed = integral[:, 1 + k :] + boundary, error[:, 1 + k :] + rounding
+        with np.errstate(invalid="ignore"):
+            apart = np.abs(moving[0] - fixed[0])
+        return moving, fixed, np.where(np.isfinite(apart), apart, 0.0)
+
+    def added(self, x: Array, p: Pieces) -> Array:
+        """Channels of pieces (C, P) added up per integral: (m, channels, B)."""
+        owner = self.seg.owner[p.segment]
+        rows = [np.bincount(owner, row, minlength=self.batch) for row in x]
+        return np.stack(rows).reshape(self.width, -1, self.batch)
+
     def total(self, p: Pieces, ends: tuple[Array, Array] | None) -> Sums:
         """Add up the pieces; choose per direction between the moving and the fixed form."""
-        owner, m, k = self.seg.owner[p.segment], self.width, self.k
-
-        def add(x: Array) -> Array:
-            flat = x.reshape(-1, x.shape[-1])
-            return np.stack([np.bincount(owner, row, minlength=self.batch) for row in flat]).reshape(
-                *x.shape[:-1], self.batch
-            )
-
-        rows = p.integral.shape[0] // m
-        integral = add(p.integral.reshape(m, rows, -1))
-        error = add((p.error + p.floor).reshape(m, rows, -1))
+        k = self.k
+        integral, error = self.added(p.integral, p), self.added(p.error + p.floor, p)
         v, e = integral[:, 0], error[:, 0]
         if ends is not None:
             e = e + self.cut_rounding(ends)
         if not k:
-            none = np.zeros((m, 0, self.batch))
+            none = np.zeros((self.width, 0, self.batch))
             return Sums(v, e, none, none)
         t, et = integral[:, 1 : 1 + k], error[:, 1 : 1 + k]
         if self.moving and ends is not None:
-            fixed = integral[:, 1 + k :]
-            bound = error[:, 1 + k :]
-            boundary, rounding = self.boundary(ends)
-            fixed, bound = fixed + boundary, bound + rounding
-            with np.errstate(invalid="ignore"):
-                apart = np.abs(fixed - t)
-                better = bound < et
-                # two independent values that differ by more than they admit: neither estimate is believed
-                doubt = np.where(np.isfinite(apart) & (apart > 4 * (et + bound)), apart, 0.0)
-            t = np.where(better, fixed, t)
-            et = np.where(better, bound, et) + doubt
+            moving, fixed, apart = self.two_forms(p, ends)
+            better = fixed[1] < moving[1]
+            # two independent values that differ by more than they admit: neither estimate is believed
+            doubt = np.where(apart > 4 * (moving[1] + fixed[1]), apart, 0.0)
+            t = np.where(better, fixed[0], moving[0])
+            et = np.where(better, fixed[1], moving[1]) + doubt
         return Sums(v, e, t, et)
 
     def boundary(self, ends: tuple[Array, Array]) -> tuple[Array, Array]:
@@ -521,20 +590,23 @@ class _Work:
                 for c in range(self.width):
                     out[c, d] += np.bincount(seg.owner, term[c], minlength=self.batch)
                     size[c, d] += np.bincount(seg.owner, np.abs(term[c]), minlength=self.batch)
-        bound = np.where(np.isfinite(out), 8 * EPS * size, np.inf)
+        bound = np.where(np.isfinite(out), 32 * EPS * size, np.inf)
         return np.where(np.isfinite(out), out, 0.0), bound
 
     def cut_rounding(self, ends: tuple[Array, Array]) -> Array:
         """What a cut misplaced by rounding costs: the integrand's jump times the rounding of the cut's place."""
         seg, out = self.seg, np.zeros((self.width, self.batch))
-        if seg.a.size < 1:
+        if not seg.a.size:
             return out
-        for f, end in ((ends[0], seg.a), (ends[1], seg.b)):
+        follows = np.zeros(seg.a.size, dtype=bool)
+        follows[1:] = (seg.owner[1:] == seg.owner[:-1]) & (seg.a[1:] == seg.b[:-1])
+        last = ~np.append(follows[1:], False)
+        for c in range(self.width):
+            low, high = ends[0][c], ends[1][c]
             with np.errstate(invalid="ignore", over="ignore"):
-                cost = np.abs(f) * np.abs(end) * EPS
-            cost = np.where(np.isfinite(cost), cost, 0.0)
-            for c in range(self.width):
-                out[c] += np.bincount(seg.owner, cost[c], minlength=self.batch)
+                jump = np.where(follows, np.abs(low - np.append(0.0, high[:-1])), np.abs(low))
+                cost = 2 * EPS * (jump * np.abs(seg.a) + np.where(last, np.abs(high * seg.b), 0.0))
+            out[c] = np.bincount(seg.owner, np.where(np.isfinite(cost), cost, 0.0), minlength=self.batch)
         return out
 
 

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from potto.calculus.surfaces import TooDeep
-from potto.core.terms import Global, Integral, Lam, Sum, Term, Var, postorder, substitute, var
+from potto.core.terms import Global, Integral, Lam, Sum, Term, Var, integral, postorder, substitute, var
 from potto.diagnostics import PottoError
 from potto.integrate.levels import Iteration, Sums
 from potto.integrate.plan import Plan, make
@@ -83,15 +84,49 @@ def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermos
 def solve(
     machine: Machine, term: Integral, linked: Linked, env: dict[str, Value], batch: int, outermost: bool
 ) -> Sums:
-    plan = plan_for(machine, term, linked)
     method = machine.settings.method
     if outermost and (method in ("mc", "qmc") or (method == "auto" and len(term.variables) > MOST_LEVELS)):
         from potto.integrate.sampling import sample
 
-        sums = sample(plan, machine, env, batch, method)
+        sums = sample(plan_for(machine, term, linked), machine, env, batch, method)
         machine.books.methods.add("mc" if method == "mc" else "qmc")
         return sums
     machine.books.methods.add("quadrature")
+    for order in orders(term):
+        machine.books.degenerate.clear()
+        sums = in_parts(plan_for(machine, order, linked), machine, env, batch)
+        if not machine.books.degenerate:
+            return sums
+    machine.note_unfinished(
+        "surfaces run along the axes of several variables of integration at once: "
+        "their boundary terms are not all counted"
+    )
+    sums.et = np.full_like(sums.et, np.inf)
+    return sums
+
+
+def orders(term: Integral) -> Iterator[Integral]:
+    """The integral as it is written, then with other variables innermost, where the bounds allow it.
+
+    A surface that runs along the innermost variable has no section in it; another variable then takes its place.
+    """
+    yield term
+    names = set(term.variables)
+    if any((lo.free | hi.free) & names for lo, hi in term.bounds):
+        return
+    count = len(term.variables)
+    for last in range(count - 1):
+        index = [i for i in range(count) if i != last] + [last]
+        yield integral(
+            tuple(term.variables[i] for i in index),
+            tuple(term.bounds[i] for i in index),
+            term.body,
+            tuple(term.hints[i] for i in index),
+        )
+
+
+def in_parts(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> Sums:
+    """Quadrature, a bounded number of members of the batch at a time."""
     if batch <= BATCH:
         return Iteration(plan, machine, START_ORDER if batch <= 64 else BATCH_ORDER).run(0, env, batch, {}, machine)
     parts = []

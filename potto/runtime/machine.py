@@ -39,6 +39,7 @@ class Books:
     unfinished: list[str] = field(default_factory=list)
     edges: list[tuple[str, Term, Array, Array]] = field(default_factory=list)
     methods: set[str] = field(default_factory=set)
+    degenerate: set[str] = field(default_factory=set)
     integrals: int = 0
     pieces: int = 0
 
@@ -134,6 +135,9 @@ class Machine:
     def note_unfinished(self, reason: str) -> None:
         if reason not in self.books.unfinished:
             self.books.unfinished.append(reason)
+
+    def note_degenerate(self, variable: str) -> None:
+        self.books.degenerate.add(variable)
 
     # Terms over batches
 
