@@ -1,0 +1,214 @@
+"""Core terms as text that reads like Potto.
+
+Owns `format_term`. The text has the parentheses that its meaning needs and no others; a branch between 1 and 0 is an
+Iverson bracket, its surface turned so that it reads as a comparison (`[x < t]` for t - x).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from potto.core.terms import (
+    ONE,
+    ZERO,
+    App,
+    Branch,
+    Const,
+    Delta,
+    Deriv,
+    Global,
+    Hole,
+    If,
+    Integral,
+    Lam,
+    ListOf,
+    Prim,
+    Proj,
+    Sum,
+    Term,
+    Tuple,
+    Var,
+    postorder,
+)
+
+# How tightly a text holds together; an operand looser than its place needs parentheses.
+_OPEN, _OR, _AND, _NOT, _COMPARE, _ADD, _SIGN, _MUL, _POW, _ATOM = range(10)
+_COMPARISONS = {"lt": "<", "le": "<=", "eq": "==", "ne": "!="}
+_LOGIC = {"and": _AND, "or": _OR}
+
+
+@dataclass(frozen=True, slots=True)
+class _Text:
+    """A printed term, and if it is 1 or 0 by a condition, that condition."""
+
+    text: str
+    holds: int
+    condition: _Text | None = None
+
+    def at(self, place: int) -> str:
+        return self.text if self.holds >= place else f"({self.text})"
+
+
+_Texts = dict[Term, _Text]
+
+
+def format_term(term: Term, limit: int = 20_000) -> str:
+    """A term as Potto source on one line. Parts longer than `limit` characters are left out as `...`."""
+    texts: _Texts = {}
+    for node in postorder(term):
+        text = _node(node, texts)
+        texts[node] = text if len(text.text) <= limit else _Text("...", _ATOM)
+    return texts[term].text
+
+
+def _node(node: Term, texts: _Texts) -> _Text:
+    match node:
+        case Const(name=name, value=value):
+            return _Text(name, _ATOM) if name is not None else _number(value)
+        case Var(name=name) | Global(name=name):
+            return _Text(name, _ATOM)
+        case Prim():
+            return _builtin(node, texts)
+        case If():
+            text = f"if {texts[node.condition].text} then {texts[node.then].text} else {texts[node.orelse].text}"
+            return _Text(text, _OPEN)
+        case Branch():
+            return _branch(node, texts)
+        case Tuple(items=items):
+            comma = "," if len(items) == 1 else ""
+            return _Text(f"({_list(items, texts)}{comma})", _ATOM)
+        case ListOf(items=items):
+            return _Text(f"[{_list(items, texts)}]", _ATOM)
+        case Proj():
+            return _projection(node, texts)
+        case Delta(coordinates=coordinates):
+            return _Text(f"delta({_list(coordinates, texts)})", _ATOM)
+        case Deriv(function=function):
+            return _Text(f"deriv({texts[function].text})", _ATOM)
+        case Hole():
+            return _Text("?", _ATOM)
+        case Lam() | App() | Integral() | Sum():
+            return _binder(node, texts)
+
+
+def _binder(node: Lam | App | Integral | Sum, texts: _Texts) -> _Text:
+    match node:
+        case Lam(params=params):
+            group = params[0] if len(params) == 1 else f"({', '.join(params)})"
+            return _Text(f"\\{group} . {texts[node.body].text}", _OPEN)
+        case App(function=function, args=args):
+            return _Text(f"{texts[function].at(_ATOM)}({_list(args, texts)})", _ATOM)
+        case Integral():
+            pairs = ", ".join(f"[{texts[lo].text}, {texts[hi].text}]" for lo, hi in node.bounds)
+            bounds = pairs if len(node.bounds) == 1 else f"({pairs})"
+            return _Text(f"integral {bounds} {texts[node.body].text} d({', '.join(node.variables)})", _SIGN)
+        case Sum():
+            limits = f"{texts[node.lo].at(_ADD)}..{texts[node.hi].at(_ADD)}"
+            return _Text(f"sum {node.variable} in {limits} ({texts[node.body].text})", _SIGN)
+
+
+def _list(items: tuple[Term, ...], texts: _Texts) -> str:
+    return ", ".join(texts[item].text for item in items)
+
+
+def _number(value: float) -> _Text:
+    text = repr(value).removesuffix(".0")
+    return _Text(text, _SIGN if math.copysign(1.0, value) < 0 else _ATOM)
+
+
+def _projection(node: Proj, texts: _Texts) -> _Text:
+    inner = texts[node.term]
+    if node.index < 2:
+        return _Text(f"{('fst', 'snd')[node.index]}({inner.text})", _ATOM)
+    return _Text(f"{inner.at(_ATOM)}[{node.index}]", _ATOM)
+
+
+def _builtin(node: Prim, texts: _Texts) -> _Text:
+    parts = [texts[a] for a in node.args]
+    match node.op:
+        case "add":
+            return _Text(_sum(parts), _ADD)
+        case "neg":
+            return _Text(f"-{parts[0].at(_MUL)}", _SIGN)
+        case "mul":
+            return _Text("*".join([parts[0].at(_MUL), *(p.at(_POW) for p in parts[1:])]), _MUL)
+        case "div":
+            return _Text(f"{parts[0].at(_MUL)}/{parts[1].at(_POW)}", _MUL)
+        case "pow":
+            return _Text(f"{parts[0].at(_ATOM)}^{parts[1].at(_POW)}", _POW)
+        case "not":
+            return _Text(f"not {parts[0].at(_NOT)}", _NOT)
+        case "and" | "or":
+            place = _LOGIC[node.op]
+            return _Text(f" {node.op} ".join(p.at(place) for p in parts), place)
+        case op if op in _COMPARISONS:
+            return _Text(f"{parts[0].at(_ADD)} {_COMPARISONS[op]} {parts[1].at(_ADD)}", _COMPARE)
+        case op:
+            return _Text(f"{op}({_list(node.args, texts)})", _ATOM)
+
+
+def _sum(parts: list[_Text]) -> str:
+    pieces = [parts[0].at(_ADD)]
+    for part in parts[1:]:
+        text = part.at(_SIGN)
+        # What starts with a minus sign is a number or a product, so that the sign belongs to all of it.
+        pieces.append(f" - {text[1:]}" if text.startswith("-") else f" + {text}")
+    return "".join(pieces)
+
+
+# Conditions
+
+
+def _branch(node: Branch, texts: _Texts) -> _Text:
+    then, orelse = texts[node.then], texts[node.orelse]
+    condition = _combined(node, then, orelse, texts)
+    if condition is not None:
+        return _Text(f"[{condition.text}]", _ATOM, condition)
+    if len(node.coordinates) > 1 and not node.strict:
+        test = f"diffeo({_list(node.coordinates, texts)})"
+    else:
+        test = f"[{_comparison(node, True, texts).text}]"
+    return _Text(f"if {test} then {then.text} else {orelse.text}", _OPEN)
+
+
+def _combined(node: Branch, then: _Text, orelse: _Text, texts: _Texts) -> _Text | None:
+    """The condition under which a branch is 1, if it is 0 elsewhere."""
+    if node.then is ONE and node.orelse is ZERO:
+        return _comparison(node, True, texts)
+    if node.then is ZERO and node.orelse is ONE:
+        return _comparison(node, False, texts)
+    if node.orelse is ZERO and then.condition is not None:
+        return _joined("and", _comparison(node, True, texts), then.condition)
+    if node.then is ONE and orelse.condition is not None:
+        return _joined("or", _comparison(node, True, texts), orelse.condition)
+    if node.then is ZERO and orelse.condition is not None:
+        return _joined("and", _comparison(node, False, texts), orelse.condition)
+    if node.orelse is ONE and then.condition is not None:
+        return _joined("or", _comparison(node, False, texts), then.condition)
+    return None
+
+
+def _joined(word: str, first: _Text, second: _Text) -> _Text:
+    place = _LOGIC[word]
+    return _Text(f"{first.at(place)} {word} {second.at(place)}", place)
+
+
+def _comparison(node: Branch, holds: bool, texts: _Texts) -> _Text:
+    """That a branch's surface is on the side of `then` (or of `orelse`), as a comparison."""
+    less, more, greater_first = _sides(node.surface, texts)
+    equals = "" if node.strict == holds else "="
+    if greater_first:
+        return _Text(f"{more} {'>' if holds else '<'}{equals} {less}", _COMPARE)
+    return _Text(f"{less} {'<' if holds else '>'}{equals} {more}", _COMPARE)
+
+
+def _sides(surface: Term, texts: _Texts) -> tuple[str, str, bool]:
+    """less, more with surface = more - less, and whether to write the greater one first."""
+    match surface:
+        case Prim(op="add", args=(Prim(op="neg", args=(a,)), b)) | Prim(op="add", args=(b, Prim(op="neg", args=(a,)))):
+            return texts[a].at(_ADD), texts[b].at(_ADD), False
+        case Prim(op="add", args=(a, Const(value=value, name=None))) if value < 0:
+            return _number(-value).text, texts[a].at(_ADD), True
+        case _:
+            return "0", texts[surface].at(_ADD), True
