@@ -16,7 +16,19 @@ from potto.calculus.surfaces import Decide, Resolve, findings
 from potto.calculus.sweep import Cut, Level, sweep
 from potto.calculus.trace import layout
 from potto.core.terms import (
-    Branch, Const, If, Integral, Lam, ListOf, Prim, Proj, Term, Tuple, lam, postorder, tuple_,
+    Branch,
+    Const,
+    If,
+    Integral,
+    Lam,
+    ListOf,
+    Prim,
+    Proj,
+    Term,
+    Tuple,
+    lam,
+    postorder,
+    tuple_,
 )  # fmt: skip
 from potto.kernels.cells import Mask, Trace
 

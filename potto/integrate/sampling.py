@@ -20,11 +20,11 @@ from typing import Any
 import numpy as np
 
 from potto.integrate.cuts import as_array, frame_rows
-from potto.integrate.levels import Iteration, Sums, components
+from potto.integrate.levels import Iteration
+from potto.integrate.pieces import Sums, components, still
 from potto.integrate.plan import Group, LevelPlan, Plan
 from potto.integrate.roots import searched_rows
 from potto.kernels.cells import Array, Cell, Mask, Number, Value, map_arrays, pad
-
 
 SIGMAS = 4.0  # reported error in standard errors
 REPLICATES = 16
@@ -161,11 +161,11 @@ class _Run:
         env = {name: v for name, v in env.items()}
         point = self.place(u[:, number:], len(self.plan.levels) - (1 if self.exact_inner else 0), n,
                            _Point(env, before.volume), number + 1)  # fmt: skip
-        still = _Run(self.plan, self.machine.with_directions(0), self.env, self.points, self.exact_inner)
-        frozen = _Point({name: _freeze(v) for name, v in point.env.items()}, Cell(point.volume.v))
+        frozen_run = _Run(self.plan, self.machine.with_directions(0), self.env, self.points, self.exact_inner)
+        frozen = _Point({name: still(v) for name, v in point.env.items()}, Cell(point.volume.v))
         one = np.ones(n, dtype=bool)
-        above, _ = still.integrand(frozen, {group.number: one}, n)
-        below, _ = still.integrand(frozen, {group.number: ~one}, n)
+        above, _ = frozen_run.integrand(frozen, {group.number: one}, n)
+        below, _ = frozen_run.integrand(frozen, {group.number: ~one}, n)
         jump = np.where(inside, above - below, 0.0)
         with np.errstate(invalid="ignore", divide="ignore"):
             rates = np.stack([np.where(inside, sign * m / np.abs(slope), 0.0) for m in moves])
@@ -281,16 +281,3 @@ def _times(a: Cell, b: Cell) -> Cell:
 
     k = max(len(a.t), len(b.t))
     return Cell(a.v * b.v, None, tuple(map(part, a.t or (None,) * k, b.t or (None,) * k)))
-
-
-def _freeze(value: Value) -> Value:
-    if isinstance(value, Cell):
-        return Cell(value.v)
-    if isinstance(value, tuple):
-        return tuple(_freeze(v) for v in value)
-    if isinstance(value, list):
-        return [_freeze(v) for v in value]
-    return value.still()  # type: ignore[attr-defined, no-any-return]
-
-
-

@@ -17,7 +17,8 @@ import numpy as np
 from potto.calculus.surfaces import TooDeep
 from potto.core.terms import Global, Integral, Lam, Sum, Term, Var, integral, postorder, substitute, var
 from potto.diagnostics import PottoError
-from potto.integrate.levels import Iteration, Sums
+from potto.integrate.levels import Iteration
+from potto.integrate.pieces import Sums
 from potto.integrate.plan import Plan, make
 from potto.kernels import errors
 from potto.kernels.cells import Array, Cell, Number, Value, all_arrays, map_arrays

@@ -15,7 +15,17 @@ import numpy as np
 
 from potto.calculus.surfaces import uncurry
 from potto.core.terms import (
-    Branch, Deriv, Global, Hole, If, Integral, Lam, Sum, Term, lam, postorder,
+    Branch,
+    Deriv,
+    Global,
+    Hole,
+    If,
+    Integral,
+    Lam,
+    Sum,
+    Term,
+    lam,
+    postorder,
 )  # fmt: skip
 from potto.core.terms import Delta as DeltaTerm
 from potto.diagnostics import PottoError

@@ -1,0 +1,71 @@
+"""Surfaces that lie on a bound: the derivative there is one-sided.
+
+Owns `report_edges`. A cut counts only strictly inside the bounds, so a jump on a bound gives no boundary term; what
+the derivative is on either side of the present parameters follows from the integrand with that surface flipped.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from potto.integrate.cuts import Cuts, Edge, as_array
+from potto.integrate.pieces import Evaluator, Sums, gather, still, take
+from potto.integrate.plan import LevelPlan
+from potto.kernels.cells import Array, Cell, Mask, Value
+
+if TYPE_CHECKING:
+    from potto.integrate.levels import Iteration
+
+
+def report_edges(
+    parent: Iteration, number: int, level: LevelPlan, cuts: Cuts, env: dict[str, Value], sides: dict[int, Mask],
+    sums: Sums, machine: Evaluator,
+) -> None:  # fmt: skip
+    """Say of surfaces on a bound what the derivative is on either side of the present parameters."""
+    for edge in cuts.edges:
+        if number and 2 * edge.owner.size < cuts.sign.size:
+            continue  # single nodes of the variables further out: of measure zero
+        found = across(parent, number, level, edge, env, sides, machine)
+        if found is None:
+            continue
+        flip, scale = found
+        speed = edge.bound_t - edge.root_t if edge.upper else edge.root_t - edge.bound_t
+        # where the surface comes in as the parameters grow, the growing side has the extra stretch
+        change = flip[:, None, :] * speed[None]
+        matters = np.abs(change) > 1e-12 * (np.abs(sums.t[:, :, edge.owner]) + scale[:, None, :] + 1e-300)
+        if not matters.any():
+            continue
+        inward = speed[None] > 0
+        base = sums.t[:, :, edge.owner]
+        forward = np.where(inward, base + change, base)
+        backward = np.where(inward, base, base + change)
+        machine.note_edge(level.variable, level.level.cuts[edge.cut].surface, backward, forward)
+
+
+def across(
+    parent: Iteration, number: int, level: LevelPlan, edge: Edge, env: dict[str, Value],
+    sides: dict[int, Mask], machine: Evaluator,
+) -> tuple[Array, Array] | None:  # fmt: skip
+    """(F with the edge's surface flipped minus F as it is) at the bound, per component, and its size."""
+    group = level.decided[[i for i, c in enumerate(level.level.cuts) if c.jumps].index(edge.cut)]
+    frozen = machine.with_directions(0)
+    here = gather({n: still(v) for n, v in env.items()}, edge.owner)
+    here[level.variable] = Cell(edge.x)
+    step = 1e-7 * (1 + np.abs(edge.x)) * (-1 if edge.upper else 1)
+    beside = dict(here)
+    beside[level.variable] = Cell(edge.x + step)
+    inner: dict[int, Mask] = {g: take(m, edge.owner) for g, m in sides.items()}
+    if level.decided:
+        values = frozen.evaluate(level.surfaces, {n: beside[n] for n in level.surfaces.params}, None)
+        assert isinstance(values, tuple)
+        for g, value in zip(level.decided, values, strict=True):
+            assert isinstance(value, Cell)
+            inner[g] = as_array(value.v, edge.owner.size) >= 0
+    actual = parent.inside(number, here, edge.owner.size, inner, frozen)
+    flipped = parent.inside(number, here, edge.owner.size, {**inner, group: ~np.asarray(inner[group])}, frozen)
+    if not (np.isfinite(actual).all() and np.isfinite(flipped).all()):
+        return None
+    return flipped - actual, np.abs(actual) + np.abs(flipped)
+

@@ -1,0 +1,134 @@
+"""What passes between the parts of the integrator: sums over a batch, pieces under refinement, environments.
+
+Owns `Sums`, `Pieces` and `Evaluator`, the integrator's view of the machine.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+
+from potto.core.terms import Lam
+from potto.integrate.maps import Ints
+from potto.kernels.cells import Array, Cell, Mask, Trace, Value, map_arrays
+from potto.kernels.errors import not_a_number
+
+
+class Evaluator(Protocol):
+    """What integration asks of the machine: terms evaluated over batches, and the books."""
+
+    rtol: float
+    atol: float
+    max_evaluations: int
+    directions: int
+
+    def with_directions(self, directions: int) -> Evaluator: ...
+    def evaluate(self, lam: Lam, env: dict[str, Value], trace: Trace | None) -> Value: ...
+    def count(self, evaluations: int) -> None: ...
+    def exhausted(self) -> bool: ...
+    def note_edge(self, variable: str, surface: Any, backward: Array, forward: Array) -> None: ...
+    def note_unfinished(self, reason: str) -> None: ...
+    def note_degenerate(self, variable: str) -> None: ...
+
+
+@dataclass
+class Sums:
+    """Integrals of a batch: value (m, B) and tangents (m, k, B) with their error bounds; m components."""
+
+    v: Array
+    e: Array
+    t: Array
+    et: Array
+
+
+@dataclass
+class Pieces:
+    """Pieces of segments under refinement, and what is known of each: integrals and errors per channel (C, P)."""
+
+    segment: Ints
+    u0: Array
+    u1: Array
+    end: Ints
+    integral: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    error: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    floor: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    size: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    most: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    left: Any = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    right: Any = field(default_factory=lambda: np.zeros(0, dtype=bool))
+
+    def pick(self, index: Any) -> Pieces:
+        return Pieces(self.segment[index], self.u0[index], self.u1[index], self.end[index],
+                      self.integral[:, index], self.error[:, index], self.floor[:, index],
+                      self.size[:, index], self.most[:, index], self.left[index], self.right[index])  # fmt: skip
+
+    def join(self, other: Pieces) -> Pieces:
+        return Pieces(
+            np.concatenate((self.segment, other.segment)),
+            np.concatenate((self.u0, other.u0)),
+            np.concatenate((self.u1, other.u1)),
+            np.concatenate((self.end, other.end)),
+            np.concatenate((self.integral, other.integral), axis=1),
+            np.concatenate((self.error, other.error), axis=1),
+            np.concatenate((self.floor, other.floor), axis=1),
+            np.concatenate((self.size, other.size), axis=1),
+            np.concatenate((self.most, other.most), axis=1),
+            np.concatenate((self.left, other.left)),
+            np.concatenate((self.right, other.right)),
+        )
+
+
+def gather(env: dict[str, Value], index: Ints) -> dict[str, Value]:
+    """The environment at some members of its batch."""
+    return {name: map_arrays(value, lambda a: a[index]) for name, value in env.items()}
+
+
+def column(env: dict[str, Value]) -> dict[str, Value]:
+    """The environment as columns, to stand beside rows of nodes."""
+    return {name: map_arrays(value, lambda a: a[:, None]) for name, value in env.items()}
+
+
+def components(value: Value) -> list[Cell]:
+    """The numbers in the value of an integrand: one, or a tuple's."""
+    if isinstance(value, Cell):
+        return [value]
+    if isinstance(value, tuple):
+        return [c for item in value for c in components(item)]
+    raise not_a_number(value)
+
+
+def still(value: Value) -> Value:
+    """The value with its tangents and errors left out."""
+    if isinstance(value, Cell):
+        return Cell(value.v)
+    if isinstance(value, tuple):
+        return tuple(still(v) for v in value)
+    if isinstance(value, list):
+        return [still(v) for v in value]
+    return value.still()  # type: ignore[attr-defined, no-any-return]
+
+
+def take(mask: Mask, index: Ints) -> Mask:
+    return mask[index] if isinstance(mask, np.ndarray) else mask
+
+
+def spread(
+    value: Value, shape: tuple[int, ...], k: int, moving: bool
+) -> tuple[Array, Any, Any, Array | None, Array | None]:
+    """The parts of an integrand's value as full arrays, components first."""
+    cells = components(value)
+
+    def full(x: Any) -> Array:
+        return np.broadcast_to(0.0 if x is None else x, shape)
+
+    f = np.stack([full(c.v) for c in cells])
+    tangents = [c.t or (None,) * (k + 1) for c in cells]
+    fx = np.stack([full(t[k]) for t in tangents]) if moving else None
+    ft = np.stack([np.stack([full(x) for x in t[:k]]) for t in tangents]) if k else None
+    if all(c.e is None for c in cells):
+        return f, fx, ft, None, None
+    e = np.stack([full(c.e) for c in cells])
+    et = np.stack([np.stack([full(x) for x in (c.et or (None,) * (k + 1))[: k + 1]]) for c in cells]) if k else None
+    return f, fx, ft, e, et

@@ -1,0 +1,170 @@
+"""Scripts: the top-level statements of a file, run in order.
+
+Owns `Script`. What a statement prints comes out one by one as `Shown`; what is wrong, as a diagnostic with its place:
+an error ends the run, a warning does not. Names of loops and of local assignments are values in an environment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from potto.core.terms import Lam
+from potto.diagnostics import Diagnostic, PottoError, declare
+from potto.elaborate import elaborate_expression
+from potto.kernels.cells import Value
+from potto.modules import statements
+from potto.query import Database
+from potto.render import Located
+from potto.runtime.estimate import Estimate
+from potto.runtime.evaluate import Clock, Program, report
+from potto.runtime.functions import Closure
+from potto.runtime.machine import Machine
+from potto.runtime.shown import format_value
+from potto.settings import Settings
+from potto.source import Span
+from potto.syntax import nodes
+
+NOT_CONVERGED = declare("P0501", "an estimate that is not as accurate as was asked", "warning")
+NOT_A_LIST = declare("P0521", "a loop over something that is not a list")
+ONE_SIDED = declare("P0522", "a derivative that differs on the two sides of the parameters", "info")
+
+Environment = dict[str, Value]
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """What one statement printed: its text, and the numbers behind it."""
+
+    span: Span
+    text: str
+    estimates: tuple[Estimate, ...]
+
+
+class Script:
+    """One run of a file's statements."""
+
+    def __init__(self, db: Database, file: str, program: Program, settings: Settings) -> None:
+        self.db = db
+        self.file = file
+        self.program = program
+        self.settings = settings
+        self.start = 0
+
+    def run(self) -> Iterator[Shown | Located]:
+        """Run all statements; the last thing that comes out is the error, if there was one."""
+        for reference in statements(self.db, self.file):
+            self.start = reference.start
+            try:
+                yield from self.statement(reference.statement, {})
+            except _Failed as failure:
+                yield failure.located
+                return
+
+    def statement(self, statement: nodes.Statement, env: Environment) -> Iterator[Shown | Located]:
+        match statement:
+            case nodes.Print(arguments=arguments, span=span):
+                yield from self.show(span, arguments, env)
+            case nodes.ExpressionStatement(value=value, span=span):
+                yield from self.show(span, (value,), env)
+            case nodes.For(variable=variable, iterable=iterable, body=body):
+                for item in self.items(iterable, env):
+                    inner = {**env, variable.name: item}
+                    for inside in body:
+                        yield from self.statement(inside, inner)
+            case nodes.Binding():
+                self.bind(statement, env)
+
+    def show(self, span: Span, arguments: tuple[nodes.Expr, ...], env: Environment) -> Iterator[Shown | Located]:
+        texts: list[str] = []
+        estimates: list[Estimate] = []
+        for argument in arguments:
+            value, estimate = self.value(argument, env)
+            texts.append(format_value(value))
+            if estimate is not None:
+                estimates.append(estimate)
+                yield from (Located(self.file, d) for d in remarks(estimate, argument.span.shift(self.start)))
+        yield Shown(span.shift(self.start), " ".join(texts), tuple(estimates))
+
+    def items(self, iterable: nodes.Expr, env: Environment) -> list[Value]:
+        value, _ = self.value(iterable, env)
+        if isinstance(value, list):
+            return value
+        complaint = NOT_A_LIST(iterable.span.shift(self.start), "a loop goes over a list", help="write `[a, b, c]`")
+        raise _Failed(Located(self.file, complaint))
+
+    def bind(self, binding: nodes.Binding, env: Environment) -> None:
+        value, _ = self.value(binding.value, env)
+        targets = binding.targets
+        if len(targets) == 1:
+            env[targets[0].name] = value
+            return
+        parts = value if isinstance(value, tuple | list) else ()
+        if len(parts) != len(targets):
+            message = f"{len(targets)} names are given to a value of {len(parts) or 1}"
+            raise _Failed(Located(self.file, NOT_A_LIST(binding.span.shift(self.start), message)))
+        env.update({target.name: part for target, part in zip(targets, parts, strict=True)})
+
+    def value(self, expr: nodes.Expr, env: Environment) -> tuple[Value, Estimate | None]:
+        """The value of an expression, with what it cost; None for what is no number."""
+        machine = self.program.machine(self.settings)
+        place = expr.span
+        try:
+            with Clock() as clock:
+                value = evaluate_in(self.db, self.file, expr, env, self.program, machine)
+            return value, (report(value, machine, clock) if not _has_functions(value) else None)
+        except PottoError as error:
+            first = error.diagnostics[0]
+            raise _Failed(Located(self.file, placed(first, place.shift(self.start), self.start))) from None
+
+
+def evaluate_in(
+    db: Database, file: str, expr: nodes.Expr, env: Environment, program: Program, machine: Machine
+) -> Value:
+    """The value of an expression that may use the file's names and those of an environment. Raises PottoError."""
+    names = tuple(env)
+    if names:  # the environment's names are bound around the expression, so that they are locals of it
+        parameters = tuple(nodes.Parameter(expr.span, name) for name in names)
+        expr = nodes.Lambda(expr.span, (parameters,), expr)
+    elaborated = elaborate_expression(db, file, expr)
+    wrong = [d for d in elaborated.diagnostics if d.severity == "error"]
+    if wrong:
+        raise PottoError(wrong)
+    term = elaborated.term
+    if not names:
+        return program.value(machine, term)
+    assert isinstance(term, Lam)
+    return program.value(machine, term.body, dict(zip(term.params, env.values(), strict=True)))
+
+
+def placed(diagnostic: Diagnostic, place: Span, start: int) -> Diagnostic:
+    """A diagnostic of an evaluation with a place: its own, or that of the expression that was evaluated."""
+    if len(diagnostic.span):
+        return replace(diagnostic, span=diagnostic.span.shift(start))
+    return replace(diagnostic, span=place)
+
+
+def remarks(estimate: Estimate, place: Span) -> Iterator[Diagnostic]:
+    """What a reader of a number should know: that it is not accurate enough, that its derivative is one-sided."""
+    if not estimate.converged:
+        reason = "; ".join(estimate.reasons)
+        yield NOT_CONVERGED(
+            place,
+            f"this estimate did not reach the accuracy asked for: {reason}",
+            help="allow more evaluations (`--max-evals`) or ask for less accuracy (`--rtol`)",
+        )
+    for note in estimate.notes:
+        yield ONE_SIDED(place, str(note))
+
+
+def _has_functions(value: Value) -> bool:
+    if isinstance(value, tuple | list):
+        return any(map(_has_functions, value))
+    return isinstance(value, Closure)
+
+
+class _Failed(Exception):
+    """Ends a run: carries the diagnostic that says why."""
+
+    def __init__(self, located: Located) -> None:
+        self.located = located
