@@ -5,17 +5,33 @@ of lark.
 """
 
 from potto.syntax.chunks import Chunk, split
-from potto.syntax.parser import ParsedChunk, ParsedExpression, parse_chunk, parse_expression
+from potto.syntax.dump import dump_tree
+from potto.syntax.live import Live, live_expressions
+from potto.syntax.parser import ParsedChunk, ParsedExpression, completeness, parse_chunk, parse_expression
+from potto.syntax.printer import print_expression, print_item, print_type
 from potto.syntax.tokens import RESERVED, Comment, Token
+from potto.syntax.walk import children, extent, node_at, walk, without_spans
 
 __all__ = [
     "RESERVED",
     "Chunk",
     "Comment",
+    "Live",
     "ParsedChunk",
     "ParsedExpression",
     "Token",
+    "children",
+    "completeness",
+    "dump_tree",
+    "extent",
+    "live_expressions",
+    "node_at",
     "parse_chunk",
     "parse_expression",
+    "print_expression",
+    "print_item",
+    "print_type",
     "split",
+    "walk",
+    "without_spans",
 ]

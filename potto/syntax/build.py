@@ -44,7 +44,7 @@ from potto.syntax.nodes import (
     Unary,
 )
 from potto.syntax.operators import Item, Prefix, climb
-from potto.syntax.tokens import Token
+from potto.syntax.tokens import RESERVED, Token
 
 Values = list[Any]
 
@@ -121,10 +121,10 @@ def separator(_: Context, v: Values) -> None:
 
 
 def name(_: Context, v: Values) -> Expr:
-    token = v[0]
-    if not token.text:
-        return ErrorExpr(Span(token.start, token.end), "")
-    return Name(Span(token.start, token.end), token.text)
+    _kind, text, start, end = v[0]
+    if not text or text in RESERVED:
+        return ErrorExpr(Span(start, end), text)
+    return Name(Span(start, end), text)
 
 
 def number(_: Context, v: Values) -> Number:
@@ -200,6 +200,8 @@ def as_expr(context: Context, value: Any) -> Expr:
     if not isinstance(value, Group):
         return value  # type: ignore[no-any-return]
     items = [plain(context, written) for written in value.written]
+    if not items and value.virtual:
+        return ErrorExpr(value.span, "")
     if not items:
         context.report(kinds.MISSING_EXPRESSION(value.span, "there is nothing between these parentheses"))
         return ErrorExpr(value.span, context.text[value.span.start : value.span.end])
@@ -294,7 +296,9 @@ def as_parameters(context: Context, value: Any, what: str = "parameter") -> tupl
 def _not_a_name(context: Context, written: Written, what: str) -> None:
     if written.name is not None:
         span = written.name.span.cover(written.value.span)
-        context.report(kinds.NOT_A_NAME(span, f"a {what} can't have a default value", help="pass it where it is called"))
+        context.report(
+            kinds.NOT_A_NAME(span, f"a {what} can't have a default value", help="pass it where it is called")
+        )
         return
     span = written.value.span
     shown = context.text[span.start : span.end]
@@ -323,41 +327,49 @@ def application(context: Context, v: Values) -> Expr:
     return Apply(Span(function.span.start, value.span.end), function, (Argument(value.span, None, None, value),), False)
 
 
-def operand(context: Context, v: Values) -> Expr:
-    return as_expr(context, v[0])
+class Prefixed(list[Any]):
+    """Prefix operators and their operand, in reverse: so that a row of them is gathered in linear time."""
 
 
-def prefixed(_: Context, v: Values) -> list[Item]:
-    """A prefix and its operand, in reverse: so that a row of them is gathered in linear time."""
-    out: list[Item] = v[1] if isinstance(v[1], list) else [v[1]]
+def prefixed(context: Context, v: Values) -> Prefixed:
+    out = v[1] if isinstance(v[1], Prefixed) else Prefixed([as_expr(context, v[1])])
     out.append(Prefix(v[0]))
     return out
 
 
-def operators(_: Context, v: Values) -> list[Item]:
-    if isinstance(v[0], list):
-        v[0].reverse()
-        return v[0]
-    return [v[0]]
+def operand(context: Context, v: Values) -> Expr:
+    """An expression without binary operators."""
+    value = v[0]
+    return climb(value[::-1]) if isinstance(value, Prefixed) else as_expr(context, value)
 
 
-def more_operators(_: Context, v: Values) -> list[Item]:
+def operators(context: Context, v: Values) -> list[Item]:
+    items: list[Item] = []
+    _add_operand(context, items, v[0])
+    return more_operators(context, [items, v[1], v[2]])
+
+
+def more_operators(context: Context, v: Values) -> list[Item]:
     items: list[Item] = v[0]
     items.append(v[1])
-    if isinstance(v[2], list):
-        items.extend(reversed(v[2]))
-    else:
-        items.append(v[2])
+    _add_operand(context, items, v[2])
     return items
 
 
+def _add_operand(context: Context, items: list[Item], value: Any) -> None:
+    if isinstance(value, Prefixed):
+        items.extend(reversed(value))
+    else:
+        items.append(as_expr(context, value))
+
+
 def climbed(_: Context, v: Values) -> Expr:
-    items: list[Item] = v[0]
-    return items[0] if len(items) == 1 else climb(items)  # type: ignore[return-value]
+    return climb(v[0])
 
 
 def ternary(context: Context, v: Values) -> If:
-    condition = climbed(context, v)
+    flat = type(v[0]) is list
+    condition = climb(v[0]) if flat else operand(context, v)
     return If(Span(condition.span.start, v[4].span.end), condition, v[2], v[4], "?:")
 
 
@@ -394,7 +406,9 @@ def _targets(context: Context, target: Expr) -> tuple[Binder, ...]:
             help = "a local function is written `name = \\(x) . e`"
         else:
             help = "write `name = e` or `(a, b) = e`; to compare, write `==`"
-        context.report(kinds.NOT_A_NAME(item.span, "only a name, or names in parentheses, can stand before `=`", help=help))
+        context.report(
+            kinds.NOT_A_NAME(item.span, "only a name, or names in parentheses, can stand before `=`", help=help)
+        )
     return tuple(out)
 
 
@@ -427,7 +441,7 @@ def sum(context: Context, v: Values) -> Sum:
     body = as_expr(context, v[7])
     if isinstance(body, Paren):
         body = body.inner
-    return Sum(Span(v[0].start, v[7].span.end), variable, climbed(context, [v[3]]), climbed(context, [v[5]]), body)
+    return Sum(Span(v[0].start, v[7].span.end), variable, v[3], v[5], body)
 
 
 # Integrals
@@ -454,6 +468,12 @@ def integral(context: Context, v: Values) -> Integral:
     variables = as_binders(context, group, "variable of integration")
     _match_bounds(context, bounds, variables, Span(d.start, group.span.end))
     return Integral(span, tuple(bounds), body, variables)
+
+
+def integral_unbounded(context: Context, v: Values) -> Integral:
+    """An integral whose bounds are missing, as the lexer has said."""
+    variables = as_binders(context, v[4], "variable of integration")
+    return Integral(Span(v[0].start, v[4].span.end), (), v[2], variables)
 
 
 def _match_bounds(context: Context, bounds: Values, variables: tuple[Binder, ...], place: Span) -> None:

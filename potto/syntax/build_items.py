@@ -32,7 +32,6 @@ from potto.syntax.nodes import (
     Print,
     Statement,
     Tuple,
-    TypeExpr,
 )
 from potto.syntax.tokens import Token
 
@@ -134,7 +133,9 @@ def equation(context: Context, v: Values) -> Item:
     if isinstance(function, Name) and groups is not None:
         shown = context.text[left.span.start : left.span.end]
         context.report(
-            kinds.DEFINITION_HEAD(left.span, "a function with parameters is defined with `def`", help=f"write `def {shown} …`")
+            kinds.DEFINITION_HEAD(
+                left.span, "a function with parameters is defined with `def`", help=f"write `def {shown} …`"
+            )
         )
         return Definition(span, function.id, function.span, groups, None, (), body, True)
     if not isinstance(left, ErrorExpr):
@@ -204,7 +205,8 @@ def _split_semicolon(group: Group) -> list[Group]:
 def _diffeo_equation(context: Context, left: Name, body: Expr, clauses: Values, span: Span) -> Item:
     """A definition of a `.diffeo` file: lambdas for the variables and the parameters around the components."""
     inverse, where = _clauses(context, clauses)
-    inner, groups = body, []
+    inner = body
+    groups: list[tuple[Parameter, ...]] = []
     while isinstance(inner, (Lambda, Paren)):
         if isinstance(inner, Paren):
             inner = inner.inner
@@ -340,5 +342,3 @@ def for_inline(_: Context, v: Values) -> For:
 
 def _for(v: Values, body: list[Statement]) -> For:
     return For(Span(v[0].start, body[-1].span.end), Binder(v[1].span, v[1].text), v[3], tuple(body))
-
-

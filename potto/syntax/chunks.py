@@ -27,7 +27,7 @@ class Chunk:
 def split(text: str) -> tuple[Chunk, ...]:
     """The chunks of a file, in order."""
     starts = _starts(text)
-    ends = starts[1:] + [len(text)]
+    ends = [*starts[1:], len(text)]
     return tuple(Chunk(start, text[start:end].rstrip()) for start, end in zip(starts, ends))
 
 

@@ -77,6 +77,31 @@ class Engine:
             index += 1
         return index
 
+    def possible(self) -> frozenset[str]:
+        """The kinds of tokens that can come next."""
+        rules = self.tables.rules
+
+        def goes(kind: str) -> bool:
+            pending = list(self.states[-1:])
+            height = len(self.states) - 1  # how much of the real stack stands under `pending`
+            while True:
+                action = self.rows[pending[-1]].get(kind)
+                if action is None:
+                    return False
+                if action >= 0:
+                    return True
+                rule = rules[~action]
+                for _ in range(rule.size):
+                    pending.pop()
+                    if not pending:
+                        height -= 1
+                        pending.append(self.states[height])
+                pending.append(self.rows[pending[-1]][rule.origin])
+                if kind == "$END" and pending[-1] == self.end:
+                    return True
+
+        return frozenset(kind for kind in self.rows[self.states[-1]] if kind.isupper() and goes(kind))
+
     @property
     def result(self) -> Any:
         """The value of the whole, once `run` has gone past the end."""

@@ -25,14 +25,17 @@ from potto.syntax.tokens import (
     Token,
     normalized,
 )
-from potto.syntax.unknown import foreign_operator, string_literal, unknown_character
+from potto.syntax.unknown import foreign_operator, no_return, string_literal, unknown_character
 
+_new = tuple.__new__  # a token without the detour over NamedTuple's own `__new__`, which costs as much again
 MAX_NESTING = 200
 MAX_LENGTH = 1_000_000
 _CLOSER = {"LPAR": "RPAR", "LSQB": "RSQB"}
 _CHARACTER = {"LPAR": "(", "RPAR": ")", "LSQB": "[", "RSQB": "]"}
 _BINDING = re.compile(rf"(?:{FIRST_NAME.pattern}|\([^()\n]*\))[ \t]*=(?!=)")
 _D = re.compile(r"[ \t]*\(")
+_BOUNDS = re.compile(r"[ \t\n]*[\[(]")
+_RETURNED = re.compile(r"[ \t]+[^\s=]")
 _CONTINUES = re.compile(r"(?:then|else|in|and|or)\b|[*/^?:,)\].=<>≤≥≠+]|!=|->")
 _CLAUSE = re.compile(r"(?:inverse|where)\b")
 _LINE = re.compile(r"([ \t\f\v]*)([^\n]?)")
@@ -46,6 +49,7 @@ class Lexed:
     comments: list[Comment]
     diagnostics: list[Diagnostic]
     too_deep: bool = False
+    never_closed: frozenset[int] = frozenset()
 
 
 @dataclass(slots=True)
@@ -92,8 +96,8 @@ class _Lexer:
                 if self.too_deep:
                     return
             elif kind == "NUMBER":
-                add(Token("NUMBER", word, start, position))
-                if not self.brackets:
+                add(_new(Token, ("NUMBER", word, start, position)))
+                if not self.brackets and self.blocks.state != "body":
                     self.blocks.see(self.tokens[-1])
             elif kind == "NEWLINE":
                 position = self._newline(start)
@@ -110,13 +114,16 @@ class _Lexer:
     def _name(self, word: str, start: int, end: int) -> int:
         """A name, a keyword or a member; gives where to go on."""
         tokens = self.tokens
-        if "." in word and (tokens and tokens[-1].kind == "LAMBDA" or word.partition(".")[0] in KEYWORDS):
+        if "." in word and ((tokens and tokens[-1].kind == "LAMBDA") or word.partition(".")[0] in KEYWORDS):
             # In `\x.x` the dot is the lambda's.
             word = word.partition(".")[0]
             end = start + len(word)
         kind = KEYWORDS.get(word)
         if kind is None:
             kind = "MEMBER" if "." in word else "NAME"
+            if word == "return" and self._returns(end):
+                self.diagnostics.append(no_return(Span(start, end)))
+                return end
             if word == "d" and self.openers and _D.match(self.text, end) and self._close_integral():
                 kind = "D"
             elif self.clauses and not self.brackets and word in ("inverse", "where"):
@@ -128,11 +135,28 @@ class _Lexer:
             self._close_in()
         elif kind == "DIFFEO" and not tokens and re.match(rf"[ \t]+{FIRST_NAME.pattern}", self.text[end : end + 200]):
             kind, self.clauses = "DIFFEODEF", True
-        token = Token(kind, word, start, end)
+        token = _new(Token, (kind, word, start, end))
         tokens.append(token)
-        if not self.brackets:
+        if not self.brackets and self.blocks.state != "body":
             self.blocks.see(token)
+        if kind == "INTEGRAL":
+            self._expect_bounds(word, start, end)
         return end
+
+    def _returns(self, end: int) -> bool:
+        """Whether `return` starts a line or a body, as it does in other languages."""
+        return not self.brackets and self.blocks.state != "body" and _RETURNED.match(self.text, end) is not None
+
+    def _expect_bounds(self, word: str, start: int, end: int) -> None:
+        """Where no bracket follows `integral`, its bounds are missing."""
+        if _BOUNDS.match(self.text, end):
+            return
+        self.diagnostics.append(
+            kinds.UNFINISHED(
+                Span(start, end), f"expected the bounds after `{word}`", help="write `integral [lo, hi] body d(x)`"
+            )
+        )
+        self.tokens.append(Token("NOBOUNDS", "", end, end))
 
     def _close_integral(self) -> bool:
         """Close the innermost integral that is open at this depth of brackets, if there is one."""
@@ -167,10 +191,12 @@ class _Lexer:
             self._unfinished_integrals(start, len(self.brackets))
         elif word == "∫":
             self.openers.append(_Open(kind, start, len(self.brackets)))
-        token = Token(kind, word, start, end)
+        token = _new(Token, (kind, word, start, end))
         self.tokens.append(token)
-        if not self.brackets:
+        if not self.brackets and self.blocks.state != "body":
             self.blocks.see(token)
+        if kind == "INTEGRAL":
+            self._expect_bounds(word, start, end)
 
     def _odd(self, kind: str, word: str, start: int, end: int) -> int:
         """What is no word of the language; gives where to go on."""
@@ -257,7 +283,9 @@ class _Lexer:
             kinds.BRACKETS(
                 Span(opener.start, opener.start + 1),
                 f"this `{character}` is never closed",
-                related=(Related(Span(last, max(last, at)), f"a `{_CHARACTER[_CLOSER[opener.kind]]}` is missing here"),),
+                related=(
+                    Related(Span(last, max(last, at)), f"a `{_CHARACTER[_CLOSER[opener.kind]]}` is missing here"),
+                ),
                 help=f"write `{_CHARACTER[_CLOSER[opener.kind]]}`",
             )
         )
@@ -419,4 +447,5 @@ def lex(text: str, diffeo: bool = False) -> Lexed:
         # Read again, knowing which brackets have no end: they end where the indentation says that they must have.
         lexer = _Lexer(text, diffeo, frozenset(lexer.never_closed), clauses=diffeo)
         lexer.run()
-    return Lexed(lexer.tokens, lexer.comments, lexer.diagnostics, lexer.too_deep)
+    never_closed = frozenset(lexer.never_closed)
+    return Lexed(lexer.tokens, lexer.comments, lexer.diagnostics, lexer.too_deep, never_closed)

@@ -30,7 +30,6 @@ LEVEL: dict[str, int] = {
 NOT_LEVEL, UNARY_LEVEL, POWER_LEVEL = 3, 7, 8
 
 
-
 class Prefix(NamedTuple):
     """A prefix operator in the flat list."""
 

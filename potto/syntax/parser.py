@@ -1,19 +1,32 @@
 """Text to syntax trees.
 
-Owns `parse_chunk` and `parse_expression`. Every text gives a tree: mistakes are diagnostics beside it.
+Owns `parse_chunk`, `parse_expression` and `completeness`. Every text gives a tree: mistakes are diagnostics beside it,
+and holes or `ErrorExpr`s in it.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, Literal
 
 from potto.diagnostics import Diagnostic
 from potto.source import Span
+from potto.syntax import kinds
 from potto.syntax.build import Context
+from potto.syntax.chunks import split
 from potto.syntax.engine import Engine
-from potto.syntax.lexer import lex
-from potto.syntax.nodes import BrokenItem, ErrorExpr, Expr, Item
-from potto.syntax.tokens import Comment
+from potto.syntax.lexer import MAX_LENGTH, MAX_NESTING, Lexed, lex
+from potto.syntax.messages import Stop, describe
+from potto.syntax.nodes import BrokenItem, Definition, ErrorExpr, Expr, Item
+from potto.syntax.repair import Edit, find_repair
+from potto.syntax.tokens import Comment, Token
+from potto.syntax.walk import deeper_than, extent
+
+MOST_ERRORS = 16
+"""Errors of one chunk that are repaired one by one; beyond them its body is given up."""
+
+LONG = 20_000
+"""Tokens beyond which a chunk is not read again to find a better repair."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,32 +46,203 @@ class ParsedExpression:
     diagnostics: tuple[Diagnostic, ...]
 
 
+@dataclass(slots=True)
+class _Parse:
+    """What came of a chunk's tokens, with the repairs made in them. `value` is None where it had to be given up."""
+
+    value: Any
+    tokens: list[Token]
+    diagnostics: list[Diagnostic]
+    first_stop: Stop | None
+    stops: list[Diagnostic]
+
+
 def parse_chunk(text: str, diffeo: bool = False) -> ParsedChunk:
     """Parse one chunk of a file; `diffeo`: of a `.diffeo` file."""
+    if len(text) > MAX_LENGTH:
+        return ParsedChunk(BrokenItem(Span(0, len(text)), guess_name(text)), (_too_long(text),), ())
     lexed = lex(text, diffeo)
     comments = tuple(lexed.comments)
-    if len(lexed.tokens) <= 1:
+    if len(lexed.tokens) <= 1 and not lexed.too_deep:
         return ParsedChunk(None, tuple(lexed.diagnostics), comments)
-    context = Context(text, diffeo, lexed.diagnostics)
-    engine = Engine(context, "chunk")
-    stopped = engine.run(lexed.tokens, 0)
-    if stopped < len(lexed.tokens):
-        from potto.syntax import kinds
-        tok = lexed.tokens[stopped]
-        context.report(kinds.UNEXPECTED(tok.span, f"unexpected `{tok.text}`"))
-        return ParsedChunk(BrokenItem(Span(0, len(text)), None), tuple(context.diagnostics), comments)
-    return ParsedChunk(engine.result, tuple(context.diagnostics), comments)
+    item, diagnostics = None, lexed.diagnostics
+    if not lexed.too_deep:
+        item, diagnostics = _bounded(_parse(lexed, text, "chunk", diffeo))
+    if item is None:
+        item = _salvage(text, lexed.tokens, diffeo)
+    return ParsedChunk(item, _sorted(diagnostics), comments)
 
 
 def parse_expression(text: str) -> ParsedExpression:
     """Parse a single expression."""
+    broken = ErrorExpr(Span(0, len(text)), text[:200])
+    if len(text) > MAX_LENGTH:
+        return ParsedExpression(broken, (_too_long(text),))
     lexed = lex(text)
-    context = Context(text, False, lexed.diagnostics)
-    engine = Engine(context, "expression")
-    stopped = engine.run(lexed.tokens, 0)
-    if stopped < len(lexed.tokens):
-        from potto.syntax import kinds
-        tok = lexed.tokens[stopped]
-        context.report(kinds.UNEXPECTED(tok.span, f"unexpected `{tok.text}`"))
-        return ParsedExpression(ErrorExpr(Span(0, len(text)), text), tuple(context.diagnostics))
-    return ParsedExpression(engine.result, tuple(context.diagnostics))
+    expr, diagnostics = None, lexed.diagnostics
+    if not lexed.too_deep:
+        expr, diagnostics = _bounded(_parse(lexed, text, "expression"))
+    return ParsedExpression(expr if expr is not None else broken, _sorted(diagnostics))
+
+
+def completeness(text: str, diffeo: bool = False) -> Literal["complete", "incomplete", "wrong"]:
+    """Whether a prompt can take the text: `incomplete` if only more lines could make it right."""
+    chunks = split(text)
+    for chunk in chunks[:-1]:
+        if any(diagnostic.severity == "error" for diagnostic in parse_chunk(chunk.text, diffeo).diagnostics):
+            return "wrong"
+    return _completeness(chunks[-1].text, diffeo) if chunks else "complete"
+
+
+def _completeness(text: str, diffeo: bool) -> Literal["complete", "incomplete", "wrong"]:
+    if len(text) > MAX_LENGTH:
+        return "wrong"
+    lexed = lex(text, diffeo)
+    if len(lexed.tokens) <= 1:
+        return "wrong" if lexed.diagnostics else "complete"
+    parse = _parse(lexed, text, "chunk", diffeo)
+    if parse.first_stop is not None and not parse.first_stop.ended:
+        return "wrong"
+    end = lexed.tokens[-1].end
+    unfinished = [diagnostic in parse.stops or _goes_on(diagnostic, end) for diagnostic in parse.diagnostics]
+    if not all(unfinished):
+        return "wrong"
+    return "incomplete" if unfinished else "complete"
+
+
+def _goes_on(diagnostic: Diagnostic, end: int) -> bool:
+    """Whether more lines could do away with a message: what it misses is missing at the very end."""
+    if diagnostic.code in (kinds.LAST_LINE.code, kinds.UNFINISHED.code):
+        return diagnostic.span.end == end
+    return bool(diagnostic.related) and diagnostic.related[0].span.start == end
+
+
+def _too_long(text: str) -> Diagnostic:
+    shown = text.find("\n")
+    place = Span(0, min(shown if shown >= 0 else len(text), 80))
+    message = f"this definition is too long: {len(text):,} characters, and the most is {MAX_LENGTH:,}"
+    return kinds.TOO_DEEP(place, message, help="is this a Potto program? If so, cut it into several definitions")
+
+
+def _sorted(diagnostics: list[Diagnostic]) -> tuple[Diagnostic, ...]:
+    return tuple(sorted(diagnostics, key=lambda diagnostic: diagnostic.span.start))
+
+
+def _parse(lexed: Lexed, text: str, start: str, diffeo: bool = False) -> _Parse:
+    """Run the automaton to the end, repairing as it goes; None as value if it had to give up."""
+    tokens, found = lexed.tokens, list(lexed.diagnostics)
+    engine = Engine(Context(text, diffeo), start)
+    index = engine.run(tokens, 0)
+    first_stop: Stop | None = None
+    stops: list[Diagnostic] = []
+    for _ in range(MOST_ERRORS):
+        if index >= len(tokens):
+            found += stops + _causes(engine.context.diagnostics, stops)
+            return _Parse(engine.result, tokens, found, first_stop, stops)
+        if engine.values and engine.values[-1] is not tokens[index - 1] and len(tokens) <= LONG:
+            # The token that has no action has already led to reductions, after which less can follow than before.
+            # Go back to where it had not been seen.
+            engine = Engine(Context(text, diffeo), start)
+            engine.run(tokens[:index], 0)
+        stop = Stop(engine.values[:], engine.possible(), tokens, index)
+        first_stop = first_stop or stop
+        edits = find_repair(engine.tables, engine.end, engine.states, tokens, index)
+        if not stop.at.text:
+            found = _without_doubled(found, stop)
+        stops.append(describe(stop, edits or []))
+        if edits is None:
+            break
+        tokens = _patched(tokens, index, edits)
+        index = engine.run(tokens, index)
+    return _Parse(None, tokens, found + stops, first_stop, stops)
+
+
+def _without_doubled(found: list[Diagnostic], stop: Stop) -> list[Diagnostic]:
+    """Where an integral breaks off, that its `d(...)` is missing too is no news."""
+    at = stop.at.start
+    code = kinds.NO_DIFFERENTIAL.code
+    return [d for d in found if d.code != code or all(related.span.start != at for related in d.related)]
+
+
+def _causes(found: list[Diagnostic], stops: list[Diagnostic]) -> list[Diagnostic]:
+    """A line that is no result because it was not understood has its message already."""
+    code = kinds.LAST_LINE.code
+    places = [stop.span for stop in stops]
+    return [d for d in found if d.code != code or not any(d.span.start <= p.start < d.span.end for p in places)]
+
+
+def _patched(tokens: list[Token], index: int, edits: list[Edit]) -> list[Token]:
+    """The tokens with a repair at `index` made in them."""
+    out = tokens[:index]
+    for edit in edits:
+        token = tokens[index]
+        if edit.action == "insert":
+            at = out[-1].end if out else token.start
+            out.append(Token(edit.kind, "+" if edit.kind == "BINOP" else "", at, at))
+            continue
+        index += 1
+        if edit.action == "replace":
+            out.append(token._replace(kind=edit.kind, text="==" if edit.kind == "BINOP" else token.text))
+        elif edit.action == "shift":
+            out.append(token)
+    return out + tokens[index:]
+
+
+def _bounded(parse: _Parse) -> tuple[Any, list[Diagnostic]]:
+    """The value of a parse, unless it is nested more deeply than those who read trees can bear."""
+    value, found = parse.value, parse.diagnostics
+    if value is None or len(parse.tokens) <= MAX_NESTING:
+        return value, found
+    deep = deeper_than(value, MAX_NESTING)
+    if deep is None:
+        return value, found
+    message = kinds.TOO_DEEP(extent(deep), "this is nested too deeply", help="name the inner parts with `let`")
+    return None, [*found, message]
+
+
+def _salvage(text: str, tokens: list[Token], diffeo: bool) -> Item:
+    """What can be kept of a chunk that could not be parsed: a definition's head and name, with a hole for its body."""
+    end = len(text)
+    hole = ErrorExpr(Span(end, end), "")
+    name = guess_name(text)
+    if name is None:
+        return BrokenItem(Span(0, end), None)
+    if len(tokens) > 1 and tokens[0].kind == "NAME" and tokens[1].kind == "EQ" and not diffeo:
+        return Definition(Span(tokens[0].start, end), name, tokens[0].span, (), None, (), hole, False)
+    head = _head(tokens)
+    if head:
+        engine = Engine(Context(text, diffeo), "chunk")
+        tail = [Token("NAME", "", end, end), Token("$END", "", end, end)]
+        if engine.run(head + tail, 0) == len(head) + 2 and isinstance(engine.result, Definition):
+            return engine.result
+    return BrokenItem(Span(0, end), name)
+
+
+def _head(tokens: list[Token]) -> list[Token]:
+    """`def name` and its groups of parameters."""
+    if len(tokens) < 3 or tokens[0].kind != "DEF":
+        return []
+    depth, end = 0, 2
+    for index in range(2, len(tokens)):
+        kind = tokens[index].kind
+        if depth == 0 and kind != "LPAR":
+            break
+        depth += {"LPAR": 1, "RPAR": -1}.get(kind, 0)
+        if depth == 0:
+            end = index + 1
+    return tokens[:end]
+
+
+def guess_name(text: str) -> str | None:
+    """What a chunk was to define, if its start says so."""
+    import re
+
+    from potto.syntax.tokens import FIRST_NAME, RESERVED
+
+    found = re.match(
+        rf"(?:\s|#[^\n]*\n)*(?:(?:def|diffeo)[ \t]+({FIRST_NAME.pattern})|({FIRST_NAME.pattern})\s*[=:(])", text
+    )
+    if found is None:
+        return None
+    name = found.group(1) or found.group(2)
+    return name if name not in RESERVED else None

@@ -10,7 +10,22 @@ from potto.syntax.tokens import Token
 
 _ENDS_OPERAND = frozenset({"NAME", "NUMBER", "MEMBER", "RPAR", "RSQB"})
 _STOPS = frozenset(
-    {"COMMA", "SEMI", "NEWLINE", "INDENT", "DEDENT", "THEN", "ELSE", "IN", "QMARK", "COLON", "D", "EQ", "DOTDOT", "$END"}
+    {
+        "COMMA",
+        "SEMI",
+        "NEWLINE",
+        "INDENT",
+        "DEDENT",
+        "THEN",
+        "ELSE",
+        "IN",
+        "QMARK",
+        "COLON",
+        "D",
+        "EQ",
+        "DOTDOT",
+        "$END",
+    }
 )
 
 

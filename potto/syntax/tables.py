@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 STARTS = ("chunk", "expression")
-_FORMAT = 1
+_FORMAT = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +82,25 @@ def compute(grammar: str) -> Tables:
         for symbol, (action, target) in actions.items():
             rows[state][symbol] = target if action.name == "Shift" else ~rules.setdefault(target, len(rules))
     known = tuple(Rule(rule.origin.name, len(rule.expansion), _action(rule)) for rule in rules)
+    _skip_units(rows, known)
     return Tables(known, tuple(rows), dict(table.start_states), dict(table.end_states))
+
+
+def _skip_units(rows: list[dict[str, int]], rules: tuple[Rule, ...]) -> None:
+    """Go at once to where a state leads that does nothing but pass a value on, whatever comes next."""
+    passes: dict[int, str] = {}
+    for state, row in enumerate(rows):
+        actions = set(row.values())
+        if len(actions) == 1:
+            rule = rules[~action] if (action := actions.pop()) < 0 else None
+            if rule is not None and rule.size == 1 and rule.action is None:
+                passes[state] = rule.origin
+    for row in rows:
+        for symbol, target in row.items():
+            # Not after a token: a value is passed on only where there is one already.
+            while symbol.islower() and target in passes:
+                target = row[passes[target]]
+            row[symbol] = target
 
 
 def lark_parser(grammar: str) -> Any:

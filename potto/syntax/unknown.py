@@ -47,6 +47,12 @@ def string_literal(word: str, span: Span) -> Diagnostic:
     return kinds.OTHER_LANGUAGE(span, "Potto has no text strings", help="take the quotes out to use a name")
 
 
+def no_return(span: Span) -> Diagnostic:
+    """The message for `return`."""
+    message = "Potto has no `return`: the last line of a definition is its result"
+    return kinds.OTHER_LANGUAGE(span, message, help="take `return` out")
+
+
 def unknown_character(text: str, start: int) -> tuple[int, Diagnostic | None]:
     """The end of a run of one unknown character, and the message for it (blanks of other scripts are let pass)."""
     char, end = text[start], start + 1
@@ -59,6 +65,8 @@ def unknown_character(text: str, start: int) -> tuple[int, Diagnostic | None]:
     else:
         name = unicodedata.name(char, "")
         shown = f"`{char}`" if char.isprintable() else f"U+{ord(char):04X}"
-        message = f"Potto does not know the character {shown}" + (f" ({name.lower()})" if ord(char) > 126 and name else "")
+        message = f"Potto does not know the character {shown}" + (
+            f" ({name.lower()})" if ord(char) > 126 and name else ""
+        )
         help = _MEANT.get(char, "take it out")
     return end, kinds.UNKNOWN_CHARACTER(Span(start, end), message, help=help)

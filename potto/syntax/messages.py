@@ -1,0 +1,260 @@
+"""What to tell the user where the grammar has no action.
+
+Owns `describe`: from where the parse stopped, what was open there and how it was repaired, to one diagnostic in the
+user's words.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from potto.diagnostics import Diagnostic, Related
+from potto.source import Span
+from potto.syntax import kinds
+from potto.syntax.repair import Edit
+from potto.syntax.tokens import RESERVED, Token
+
+_OPENING = frozenset(
+    [
+        "IF",
+        "THEN",
+        "ELSE",
+        "LET",
+        "IN",
+        "QMARK",
+        "LAMBDA",
+        "INTEGRAL",
+        "SUM",
+        "FOR",
+        "DEF",
+        "DIFFEODEF",
+        "FROM",
+        "IMPORT",
+        "LPAR",
+        "LSQB",
+        "ARROW",
+        "INVERSE",
+        "WHERE",
+    ]
+)
+_WORDS = {"RPAR": ")", "RSQB": "]", "LPAR": "(", "LSQB": "[", "COMMA": ",", "EQ": "=", "DOT": ".", "DOTDOT": ".."}
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """Where a parse stopped: the values on the stack, the kinds of tokens that could follow, and the tokens."""
+
+    values: list[Any]
+    possible: frozenset[str]
+    tokens: list[Token]
+    index: int
+
+    @property
+    def at(self) -> Token:
+        return self.tokens[self.index]
+
+    @property
+    def before(self) -> Token | None:
+        """The last written token before the stop."""
+        return next((token for token in reversed(self.tokens[: self.index]) if token.text), None)
+
+    @property
+    def after(self) -> Token | None:
+        """The token after the one it stopped at."""
+        return self.tokens[self.index + 1] if self.index + 1 < len(self.tokens) else None
+
+    @property
+    def place(self) -> Span:
+        """The token it stopped at; where that is empty (the end of a line, of the definition), the one before."""
+        token = self.at if self.at.text else self.before
+        return Span(0, 0) if token is None else token.span
+
+    @property
+    def opened(self) -> Token | None:
+        """The innermost construct that is still open."""
+        found = (value for value in reversed(self.values) if isinstance(value, Token) and value.kind in _OPENING)
+        return next(found, None)
+
+    def last(self, *kinds: str) -> Token | None:
+        """The innermost open token of these kinds."""
+        return next((v for v in reversed(self.values) if isinstance(v, Token) and v.kind in kinds), None)
+
+    @property
+    def ended(self) -> bool:
+        """Whether nothing more is written from here on."""
+        return not any(token.text for token in self.tokens[self.index :])
+
+
+_SUM_HELP = "write `sum i in 1..n (body)`"
+_PARTS: tuple[tuple[str, tuple[str, ...], str, str], ...] = (
+    ("THEN", ("IF",), "expected `then` after the condition of `if`", "write `if p then a else b`"),
+    ("ELSE", ("IF",), "expected `else` after the first choice of `if`", "an `if` has a value either way"),
+    ("COLON", ("QMARK",), "expected `:` after the first choice of `? :`", "write `p ? a : b`"),
+    ("SUMBODY", ("SUM",), "expected the body of `sum` in parentheses", _SUM_HELP),
+    ("DOTDOT", ("SUM",), "expected `..` and the last value of the variable of `sum`", _SUM_HELP),
+    ("IN", ("SUM",), "expected `in` after the variable of `sum`", _SUM_HELP),
+    ("IN", ("FOR",), "expected `in` after the variable of `for`", "write `for v in list:`"),
+    ("IN", ("LET",), "expected `in` after the names of `let`", "write `let a = 1 in a + 2`"),
+    ("DOT", ("LAMBDA",), "expected `.` after the parameters of a lambda", "write `\\x . e`"),
+)
+"""What is missing, within which construct, and what to say of it."""
+
+
+def describe(stop: Stop, edits: list[Edit]) -> Diagnostic:
+    """The message for a stop that was repaired by `edits` (empty if it could not be)."""
+    special = _special(stop)
+    if special is not None:
+        return special
+    edit = edits[0] if edits else Edit("delete", stop.at.kind)
+    if edit.action == "replace":
+        return _replaced(stop, edit)
+    if edit.action == "insert":
+        return _inserted(stop, edit.kind)
+    return _unexpected(stop)
+
+
+def _special(stop: Stop) -> Diagnostic | None:
+    """Stops whose cause shows without the repair."""
+    opened, at, before = stop.opened, stop.at, stop.before
+    if at.kind == "DOT" and stop.after is not None and stop.after.kind == "NUMBER" and stop.after.start == at.end:
+        number = at.text + stop.after.text
+        return kinds.BAD_NUMBER(
+            Span(at.start, stop.after.end), "a number starts with a digit", help=f"write `0{number}`"
+        )
+    if at.kind == "DOT" and before is not None and before.end == at.start and before.kind in ("NAME", "MEMBER"):
+        return kinds.NOT_A_NAME(before.span.cover(at.span), f"expected a name after `{_shown(before)}.`")
+    if at.kind == "COLON" and opened is not None and opened.kind == "IF":
+        return kinds.UNFINISHED(
+            at.span, "expected `then` after the condition of `if`", related=_from(opened), help="write `then`, not `:`"
+        )
+    if at.kind == "STAR" and opened is not None and opened.kind == "IMPORT":
+        return kinds.BAD_IMPORT(at.span, "an import says which names it takes", help="list the names instead of `*`")
+    if opened is not None and opened.kind == "LSQB" and _is_interval(stop, opened):
+        return kinds.UNFINISHED(opened.span.cover(stop.place), "an interval has two ends", help="write `[lo, hi]`")
+    loop = stop.last("FOR")
+    if loop is not None and "INDENT" in stop.possible and not at.text:
+        return kinds.UNFINISHED(
+            loop.span,
+            "this `for` has no statements",
+            help="write them on the lines below, indented; or on the same line after a `:`",
+        )
+    return None
+
+
+def _is_interval(stop: Stop, opened: Token) -> bool:
+    """Whether the open bracket is a bound of an integral that lacks its other end."""
+    return "RSQB" not in stop.possible and "COMMA" in stop.possible and stop.at.kind == "RSQB"
+
+
+def _from(opened: Token) -> tuple[Related, ...]:
+    return (Related(opened.span, f"this `{opened.text}`"),)
+
+
+def _replaced(stop: Stop, edit: Edit) -> Diagnostic:
+    at = stop.at
+    if at.kind == "EQ":
+        return kinds.EQUALS(at.span, "`=` names a value; it does not compare", help="to compare, write `==`")
+    if at.kind == "BINOP":
+        return _missing_expression(stop)
+    named = stop.after is not None and stop.after.kind in ("EQ", "COMMA", "RPAR", "DOT")
+    if "NUMBER" in stop.possible and not named:
+        return _unexpected(stop)
+    return kinds.RESERVED_WORD(
+        at.span,
+        f"`{at.text}` is a reserved word and can't be a name",
+        help=f"choose another name, such as `{at.text}_`",
+    )
+
+
+def _inserted(stop: Stop, kind: str) -> Diagnostic:
+    if kind == "NAME":
+        return _missing_expression(stop) if "NUMBER" in stop.possible else _missing_name(stop)
+    if kind == "IMPORT":
+        return kinds.BAD_IMPORT(stop.place, "expected `import` after the module", help="write `from m import a, b`")
+    for wanted, openers, message, help in _PARTS:
+        opened = stop.last(*openers)
+        if kind == wanted and opened is not None:
+            return kinds.UNFINISHED(stop.place, message, related=_from(opened), help=help)
+    word = _WORDS.get(kind)
+    if stop.before is None or word is None:
+        return _unexpected(stop)
+    return kinds.UNEXPECTED(stop.place, f"expected `{word}` after `{_shown(stop.before)}`", related=_open_bracket(stop))
+
+
+def _open_bracket(stop: Stop) -> tuple[Related, ...]:
+    opened = stop.opened
+    return (Related(opened.span, "opened here"),) if opened is not None and opened.kind in ("LPAR", "LSQB") else ()
+
+
+def _missing_expression(stop: Stop) -> Diagnostic:
+    before, at = stop.before, stop.at
+    if "INDENT" in stop.possible and not (before is not None and before.kind in ("BINOP", "STAR", "SIGN")):
+        return _no_body(stop)
+    if at.kind == "D" and at.text:
+        return kinds.MISSING_EXPRESSION(at.span, "expected what is integrated before `d(...)`")
+    if before is None:
+        return kinds.MISSING_EXPRESSION(stop.place, f"expected an expression before `{_shown(at)}`")
+    if at.text and at.text in RESERVED and at.kind not in ("BINOP", "NOT"):
+        return kinds.MISSING_EXPRESSION(
+            before.span, f"expected an expression after `{_shown(before)}`, before `{at.text}`"
+        )
+    return kinds.MISSING_EXPRESSION(before.span, f"expected an expression after `{_shown(before)}`")
+
+
+def _no_body(stop: Stop) -> Diagnostic:
+    head = next((v for v in stop.values if isinstance(v, Token) and v.kind in ("DEF", "DIFFEODEF")), None)
+    name = next((v for v in stop.values if isinstance(v, Token) and v.kind == "NAME"), None)
+    if head is None or name is None or not name.text:
+        return kinds.MISSING_EXPRESSION(stop.place, "expected an expression")
+    return kinds.MISSING_EXPRESSION(
+        name.span,
+        f"`{name.text}` has no body",
+        help="write what it gives after its head, or on the lines below, indented",
+    )
+
+
+def _missing_name(stop: Stop) -> Diagnostic:
+    before, opened = stop.before, stop.opened
+    if before is None:
+        return _unexpected(stop)
+    if before.kind in ("FROM", "IMPORT") or (opened is not None and opened.kind in ("FROM", "IMPORT")):
+        what = "a module" if before.kind == "FROM" or (len(stop.values) == 1 and before.kind == "IMPORT") else "a name"
+        return kinds.BAD_IMPORT(
+            before.span, f"expected {what} after `{before.text}`", help="write `from m import a, b`"
+        )
+    if stop.at.text:
+        return kinds.NOT_A_NAME(stop.at.span, f"expected a name after `{_shown(before)}`, not `{_shown(stop.at)}`")
+    return kinds.NOT_A_NAME(before.span, f"expected a name after `{_shown(before)}`")
+
+
+def _unexpected(stop: Stop) -> Diagnostic:
+    at, opened = stop.at, stop.opened
+    if not at.text:
+        before = stop.before
+        what = f"something is missing after `{_shown(before)}`" if before is not None else "something is missing"
+        return kinds.UNFINISHED(stop.place, what)
+    hint = {
+        "THEN": "`then` goes with an `if` before it",
+        "ELSE": "`else` goes with an `if` before it",
+        "IN": "`in` goes with `let`, `for` or `sum`",
+        "DEF": "a `def` starts in the first column",
+        "FROM": "an import starts in the first column",
+        "IMPORT": "an import starts in the first column",
+        "FOR": "a `for` starts a line of its own",
+        "COMMA": "to make a tuple, write parentheses around it",
+        "TILDE": "`x ~ normal(m, s)` goes among the bounds of an integral",
+        "DOTDOT": "`1..n` goes with `sum`",
+        "DOT": "a lambda starts with `\\`",
+        "COLON": "a choice is written `p ? a : b`",
+        "AS": "`as` goes with an import",
+        "ARROW": "`->` goes before the type of a definition's result",
+    }.get(at.kind, "")
+    if at.kind in ("NAME", "NUMBER", "MEMBER") and stop.before is not None:
+        return kinds.UNEXPECTED(at.span, f"`{_shown(at)}` does not belong after `{_shown(stop.before)}`", help=hint)
+    related = _from(opened) if opened is not None and at.kind in ("NEWLINE", "RPAR", "RSQB") else ()
+    return kinds.UNEXPECTED(at.span, f"unexpected `{_shown(at)}`", help=hint, related=related)
+
+
+def _shown(token: Token) -> str:
+    return token.text if len(token.text) <= 40 else token.text[:39] + "…"
