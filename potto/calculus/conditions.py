@@ -46,6 +46,8 @@ from potto.core.terms import (
 
 # The term of another definition: its skeleton, or all of it.
 Resolve = Callable[[Global], "Term | None"]
+# The dual of a function.
+Derive = Callable[[Lam], Lam]
 
 DEEPEST = 60  # calls inside calls
 _TWICE = 2  # how often one definition may stand on the path of calls: a recursion repeats its conditions
@@ -310,22 +312,33 @@ def _number(term: Term, otherwise: float) -> float:
     return value if value == value else otherwise
 
 
-def expanded(term: Term, resolve: Resolve, depth: int = 0) -> Term:
-    """The term with calls of known functions carried out."""
+def expanded(term: Term, resolve: Resolve, derive: Derive | None = None, depth: int = 0) -> Term:
+    """The term with calls of known functions carried out; of derivatives too, if it is said how."""
     memo: dict[Term, Term] = {}
     for node in postorder(term):
         if isinstance(node, Proj):
             memo[node] = proj(memo[node.term], node.index)
             continue
         new = rebuild(node, tuple(memo[c] for c in children(node)))
-        memo[node] = _applied(new, resolve, depth) if isinstance(new, App) else new
+        memo[node] = _applied(new, resolve, derive, depth) if isinstance(new, App) else new
     return memo[term]
 
 
-def _applied(call: App, resolve: Resolve, depth: int) -> Term:
+def known_function(head: Term, resolve: Resolve, derive: Derive | None) -> Lam | None:
+    """The function that the head of a call is, if it is known."""
+    if isinstance(head, Global):
+        found = resolve(head)
+        return found if isinstance(found, Lam) else None
+    if isinstance(head, Deriv) and derive is not None:
+        inner = known_function(head.function, resolve, derive)
+        return None if inner is None else derive(inner)
+    return head if isinstance(head, Lam) else None
+
+
+def _applied(call: App, resolve: Resolve, derive: Derive | None, depth: int) -> Term:
     head, groups = spine(call)
-    function = resolve(head) if isinstance(head, Global) else head
-    if not isinstance(function, Lam) or depth > DEEPEST:
+    function = known_function(head, resolve, derive)
+    if function is None or depth > DEEPEST:
         return call
     params, body = uncurry(function, len(groups))
     args: list[Term] = []
@@ -337,4 +350,4 @@ def _applied(call: App, resolve: Resolve, depth: int) -> Term:
         shape = shape.body
     if len(args) != len(params):
         return call
-    return expanded(substitute(body, dict(zip(params, args, strict=True))), resolve, depth + 1)
+    return expanded(substitute(body, dict(zip(params, args, strict=True))), resolve, derive, depth + 1)

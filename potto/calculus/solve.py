@@ -123,6 +123,29 @@ def sections(surface: Term, name: str) -> Sections | Unsolvable:
     )
 
 
+def factors(surface: Term) -> tuple[Term, ...]:
+    """Terms where a surface changes its sign: of (x - t)/(y - s) both x - t and y - s.
+
+    Along y the first of them is no root, so whoever looks for roots in one variable after the other asks for each.
+    """
+    found: dict[Term, None] = {}
+    waiting = [surface]
+    while waiting:
+        item = waiting.pop()
+        match item:
+            case Prim(op="mul" | "div", args=args):
+                waiting.extend(reversed(args))
+            case Prim(op="neg", args=(inner,)):
+                waiting.append(inner)
+            case Prim(op="pow", args=(base, Const())):
+                waiting.append(base)
+            case _ if item.free and not positive(item):
+                found[item] = None
+            case _:
+                pass
+    return tuple(found)
+
+
 class _Search:
     """The goals for one variable and what has come of them."""
 

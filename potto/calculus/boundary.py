@@ -1,0 +1,418 @@
+"""What an integral gains as its surfaces and bounds move, in closed form.
+
+Owns `at_surfaces`, `at_bounds` and `jumps`. At a root r of a surface in one variable of integration the integral
+gains (F left of r - F right of r) dr: the whole integrand, with every branch that flips at r forced to its side and
+every other one as it falls there; no product rule, no value of a bracket on its own edge. A bound gains the integrand
+just inside it. The terms are integrals over the variables that remain, with the bounds of the eliminated one as
+brackets, so that they can be differentiated again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from potto.calculus.derivative import partial, zero_like
+from potto.calculus.isolate import NAN
+from potto.calculus.normal import as_term, normal
+from potto.calculus.ranges import range_of
+from potto.calculus.solve import Family, Sections, factors, sections
+from potto.core.simplify import is_zero, normalized_surface
+from potto.core.terms import (
+    ONE,
+    ZERO,
+    Branch,
+    Const,
+    If,
+    Integral,
+    Lam,
+    Sum,
+    Term,
+    Tuple,
+    branch,
+    children,
+    fresh,
+    if_,
+    integral,
+    mul,
+    neg,
+    postorder,
+    prim,
+    proj,
+    rebuild,
+    sub,
+    substitute,
+    sum_,
+    tuple_,
+    var,
+)
+
+Rate = Callable[[Term], Term]
+Flips = Sequence[tuple[Branch, Term]]
+Box = Mapping[str, tuple[float, float]]
+NOWHERE: Box = {}
+
+
+class NoClosedForm(Exception):
+    """A boundary that cannot be written with the builtins; evaluation finds it by numbers."""
+
+
+@dataclass(frozen=True, slots=True)
+class Root:
+    """A root of a surface in a variable of integration; `index` and `counts` when it is one of a periodic family."""
+
+    variable: str
+    at: Term
+    index: str | None = None
+    counts: tuple[Term, Term] | None = None
+
+
+# Which branches there are
+
+
+def branches_of(body: Term, variables: Iterable[str]) -> list[Branch]:
+    """The branches of an integrand that vary with the variables and with nothing bound further in."""
+    names = frozenset(variables)
+    inside: set[str] = set()
+    for node in postorder(body):
+        if isinstance(node, Integral):
+            inside.update(node.variables)
+        elif isinstance(node, Lam):
+            inside.update(node.params)
+    return [
+        node
+        for node in postorder(body)
+        if isinstance(node, Branch) and node.surface.free & names and not node.surface.free & inside
+    ]
+
+
+def summed_over(body: Term, branch_: Branch) -> list[Sum]:
+    """The sums whose index a branch's surface uses: it is one surface for each value."""
+    return [node for node in postorder(body) if isinstance(node, Sum) and node.variable in branch_.surface.free]
+
+
+# Sides
+
+
+def forced(body: Term, flips: Flips, right: bool, box: Box = NOWHERE) -> Term:
+    """The integrand just right (or left) of where the branches flip; each with the slope of its surface there."""
+    if not flips:
+        return body
+    slopes = dict(flips)
+    memo: dict[Term, Term] = {}
+    for node in postorder(body):
+        new = rebuild(node, tuple(memo[c] for c in children(node)))
+        if isinstance(node, Branch) and node in slopes and isinstance(new, Branch):
+            new = _side(slopes[node] if right else neg(slopes[node]), new.then, new.orelse, box)
+        memo[node] = new
+    return memo[body]
+
+
+def _side(slope: Term, then: Term, orelse: Term, box: Box = NOWHERE) -> Term:
+    """`then` where the slope is positive. One that is 0 only here and there may count as either."""
+    bounds = range_of(slope, box)
+    if then is orelse or bounds.hi <= 0:
+        return orelse
+    return then if bounds.lo >= 0 else branch((slope,), True, then, orelse)
+
+
+def box_of(node: Integral) -> dict[str, tuple[float, float]]:
+    """The bounds of the variables of integration, as far as the form of the bounds shows them."""
+    box: dict[str, tuple[float, float]] = {}
+    for name, (lo, hi) in zip(node.variables, node.bounds, strict=True):
+        a, b = range_of(lo, box), range_of(hi, box)
+        box[name] = min(a.lo, b.lo), max(a.hi, b.hi)
+    return box
+
+
+def flipping(
+    branches: Iterable[Branch], variable: str, at: Term, known: Sequence[Branch] = ()
+) -> list[tuple[Branch, Term]]:
+    """The branches whose surface is 0 where `variable = at` (`known` ones surely are), each with its slope there."""
+    bare = unguarded(at)
+    found: list[tuple[Branch, Term]] = []
+    for item in branches:
+        if variable in item.surface.free:
+            surface = without_poles(item.surface)
+            if item in known or is_zero(substitute(surface, {variable: bare})):
+                found.append((item, substitute(partial(surface, variable), {variable: at})))
+    return found
+
+
+def unguarded(root: Term) -> Term:
+    """A root as it is where it exists."""
+    memo: dict[Term, Term] = {}
+    for node in postorder(root):
+        new = rebuild(node, tuple(memo[c] for c in children(node)))
+        memo[node] = new.then if isinstance(new, Branch) and new.orelse is NAN else new
+    return memo[root]
+
+
+def without_poles(surface: Term) -> Term:
+    """A surface with the same sign and no divisors: a/b as a*b."""
+    if not any(getattr(n, "op", "") == "div" and n.free for n in postorder(surface)):
+        return surface
+    found = normal(surface)
+    if found is None or found.whole:
+        return surface
+    top, below = as_term(found.top), as_term(found.below)
+    return surface if top is None or below is None else mul(top, below)
+
+
+# Roots
+
+
+def roots_of(node: Integral, surface: Term) -> list[Root]:
+    """Where a surface cuts the integral: its roots in the innermost variable that it can be solved for."""
+    reasons: list[str] = []
+    for position in reversed(range(len(node.variables))):
+        name = node.variables[position]
+        if name not in surface.free:
+            continue
+        found = sections(surface, name)
+        if isinstance(found, Sections) and found.complete:
+            roots = [Root(name, r) for r in (*found.roots, *found.poles)]
+            return roots + [_family(node, position, f) for f in (*found.families, *found.pole_families)]
+        reasons.append(found.reason)
+    raise NoClosedForm(reasons[0] if reasons else "the surface varies with no variable of integration")
+
+
+def _family(node: Integral, position: int, family: Family) -> Root:
+    name, (lo, hi) = node.variables[position], node.bounds[position]
+    ends = [substitute(family.inner, {name: end}) for end in (lo, hi)]
+    if family.stops:
+        ends += [substitute(family.inner, {name: _within(stop, lo, hi)}) for stop in family.stops]
+    counts = (prim("ceil", _extreme("min", ends)), prim("floor", _extreme("max", ends)))
+    return Root(name, family.root, family.index, counts)
+
+
+def _within(stop: Term, lo: Term, hi: Term) -> Term:
+    return prim("clamp", stop, prim("min", lo, hi), prim("max", lo, hi))
+
+
+def _extreme(op: str, ends: list[Term]) -> Term:
+    result = ends[0]
+    for end in ends[1:]:
+        result = prim(op, result, end)
+    return result
+
+
+# Terms of the derivative
+
+
+def at_surfaces(node: Integral, moving: frozenset[str], rate: Rate) -> list[Term]:
+    """The boundary terms of an integral, one for each root of each surface that moves."""
+    branches = branches_of(node.body, node.variables)
+    surfaces: dict[Term, list[Branch]] = {}
+    for item in branches:
+        for factor in factors(item.surface):
+            if factor.free & frozenset(node.variables) and factor.free & moving:
+                surfaces.setdefault(normalized_surface(factor)[0], []).append(item)
+    terms: list[Term] = []
+    met: list[Root] = []
+    for surface, members in surfaces.items():
+        for root in roots_of(node, surface):
+            if not any(_same(root, other) for other in met):
+                met.append(root)
+                flips = flipping(branches, root.variable, root.at, members)
+                terms += _at_root(node, flips, root, rate, summed_over(node.body, members[0]))
+    return terms
+
+
+def _same(root: Root, other: Root) -> bool:
+    if root.variable != other.variable or (root.index is None) != (other.index is None):
+        return False
+    return is_zero(sub(unguarded(root.at), unguarded(other.at)))
+
+
+def _at_root(node: Integral, flips: Flips, root: Root, rate: Rate, sums: list[Sum]) -> Iterator[Term]:
+    speed = rate(root.at)
+    if speed is ZERO:
+        return
+    body, instances = _instances(node.body, flips, sums, box_of(node))
+    left, right = (substitute(f, {root.variable: root.at}) for f in (body(False), body(True)))
+    if left is right:
+        return
+    gain = scaled(difference(left, right), speed)
+    lo, hi = node.bounds[node.variables.index(root.variable)]
+    gain = substitute(between(root.at, lo, hi, gain), instances)
+    for old in sums:
+        new = instances[old.variable]
+        gain = sum_(_name(new), old.lo, old.hi, gain)
+    if root.index is not None and root.counts is not None:
+        lowest, highest = root.counts
+        gain = sum_(root.index, lowest, highest, gain)
+    yield remaining(node, root.variable, root.at, gain)
+
+
+def _name(term: Term) -> str:
+    (name,) = term.free
+    return name
+
+
+def _instances(
+    body: Term, flips: Flips, sums: list[Sum], box: Box
+) -> tuple[Callable[[bool], Term], dict[str, Term]]:
+    """The forced integrand; under sums only the instance of a branch that flips is forced, the others fall."""
+    if not sums:
+        return (lambda right: forced(body, flips, right, box)), {}
+    taken = {n for t in postorder(body) for n in t.free} | {s.variable for s in sums}
+    names: dict[str, Term] = {}
+    for item in sums:
+        name = fresh(item.variable, taken)
+        taken.add(name)
+        names[item.variable] = var(name)
+    here = _all(prim("eq", var(s.variable), names[s.variable]) for s in sums)
+
+    def run(right: bool) -> Term:
+        memo: dict[Term, Term] = {}
+        slopes = dict(flips)
+        for node in postorder(body):
+            new = rebuild(node, tuple(memo[c] for c in children(node)))
+            if isinstance(node, Branch) and node in slopes and isinstance(new, Branch):
+                slope = substitute(slopes[node], names)
+                new = if_(here, _side(slope if right else neg(slope), new.then, new.orelse, box), new)
+            memo[node] = new
+        return memo[body]
+
+    return run, names
+
+
+def _all(conditions: Iterable[Term]) -> Term:
+    result: Term | None = None
+    for condition in conditions:
+        result = condition if result is None else prim("and", result, condition)
+    assert result is not None
+    return result
+
+
+def at_bounds(node: Integral, rate: Rate) -> list[Term]:
+    """Leibniz's rule: what enters or leaves at bounds that move, taken just inside them."""
+    terms: list[Term] = []
+    branches = branches_of(node.body, node.variables)
+    for name, (lo, hi) in zip(node.variables, node.bounds, strict=True):
+        for bound, other, upper in ((hi, lo, True), (lo, hi, False)):
+            speed = rate(bound)
+            if speed is ZERO:
+                continue
+            # Inside is left of an upper bound that is above the lower one, and of a lower bound that is above.
+            flips = flipping(branches, name, bound)
+            left, right = (forced(node.body, flips, side) for side in (False, True))
+            inside = left if left is right else _side(sub(bound, other), left, right)
+            gain = scaled(substitute(inside, {name: bound}), speed if upper else neg(speed))
+            terms.append(remaining(node, name, bound, gain))
+    return terms
+
+
+# Building
+
+
+def between(at: Term, lo: Term, hi: Term, value: Term) -> Term:
+    """`value` where lo < at < hi, minus it where hi < at < lo, 0 elsewhere and where `at` is nan."""
+    upward = above(sub(at, lo), above(sub(hi, at), value)) if _finite(lo) or _finite(hi) else value
+    if not _finite(lo):
+        upward = above(sub(hi, at), value) if _finite(hi) else exists(at, value)
+    elif not _finite(hi):
+        upward = above(sub(at, lo), value)
+    if not (_finite(lo) and _finite(hi)) or range_of(sub(hi, lo)).lo >= 0:
+        return upward
+    downward = above(sub(lo, at), above(sub(at, hi), scaled(value, neg(ONE))))
+    return branch((sub(hi, lo),), False, upward, downward)
+
+
+def exists(at: Term, value: Term) -> Term:
+    """`value` where `at` is a number: over the whole line that is the only condition."""
+    guards = [n.surface for n in postorder(at) if isinstance(n, Branch) and n.orelse is NAN]
+    for surface in guards:
+        value = branch((surface,), False, value, zero_like(value))
+    radicands = [n.args[0] for n in postorder(at) if getattr(n, "op", "") in ("sqrt", "log")]  # type: ignore[union-attr]
+    for radicand in radicands:
+        if not range_of(radicand).positive:
+            value = branch((radicand,), False, value, zero_like(value))
+    return value
+
+
+def above(surface: Term, value: Term) -> Term:
+    """`value` where the surface is positive, else 0."""
+    bounds = range_of(surface)
+    if bounds.positive:
+        return value
+    if bounds.hi <= 0:
+        return zero_like(value)
+    return branch((surface,), True, value, zero_like(value))
+
+
+def _finite(bound: Term) -> bool:
+    bounds = range_of(bound)
+    return not (bounds.lo == bounds.hi and abs(bounds.lo) == float("inf"))
+
+
+def remaining(node: Integral, name: str, at: Term, body: Term) -> Term:
+    """The integral over the other variables, with this one put at a place."""
+    position = node.variables.index(name)
+    later = frozenset(node.variables[position + 1 :])
+    names, bounds, hints = [], [], []
+    for k, (v, (lo, hi), points) in enumerate(zip(node.variables, node.bounds, node.hints, strict=True)):
+        if k == position:
+            continue
+        if k > position and any(name in t.free for t in (lo, hi)) and at.free & later:
+            raise NoClosedForm(f"the bounds of `{v}` depend on `{name}`, and where it is depends on `{v}`")
+        place = {name: at} if k > position else {}
+        names.append(v)
+        bounds.append((substitute(lo, place), substitute(hi, place)))
+        hints.append(tuple(substitute(p, place) for p in points))
+    if isinstance(body, Const) and body.value == 0:
+        return ZERO
+    return integral(tuple(names), tuple(bounds), body, tuple(hints)) if names else body
+
+
+def difference(a: Term, b: Term) -> Term:
+    """a - b, for numbers and for tuples."""
+    zero = zero_like(a)
+    if isinstance(zero, Tuple):
+        return tuple_(difference(proj(a, i), proj(b, i)) for i in range(len(zero.items)))
+    return sub(a, b)
+
+
+def scaled(value: Term, factor: Term) -> Term:
+    """A number or a tuple of numbers times a factor; a side that is 0 stays 0 where the factor is not a number."""
+    match value:
+        case Tuple(items=items):
+            return tuple_(scaled(item, factor) for item in items)
+        case Branch():
+            return branch(value.coordinates, value.strict, scaled(value.then, factor), scaled(value.orelse, factor))
+        case If():
+            return if_(value.condition, scaled(value.then, factor), scaled(value.orelse, factor))
+        case _:
+            return mul(value, factor)
+
+
+# Without an integral
+
+
+@dataclass(frozen=True, slots=True)
+class JumpTerm:
+    """What a surface contributes to the derivative of an integrand: jump * rate * delta(surface)."""
+
+    surface: Term
+    jump: Term
+    rate: Term
+
+
+def jumps(body: Term, variables: Iterable[str], rate: Rate) -> list[JumpTerm]:
+    """The distribution part of the derivative of an integrand, surface by surface; coincident ones as one."""
+    groups: dict[Term, list[tuple[Branch, int]]] = {}
+    for item in branches_of(body, variables):
+        canonical, orientation = normalized_surface(item.surface)
+        groups.setdefault(canonical, []).append((item, orientation))
+    found: list[JumpTerm] = []
+    for members in groups.values():
+        first, side = members[0]
+        speed = rate(first.surface)
+        if speed is ZERO:
+            continue
+        flips: list[tuple[Branch, Term]] = [(b, ONE if o == side else neg(ONE)) for b, o in members]
+        positive, negative = forced(body, flips, True), forced(body, flips, False)
+        if positive is not negative:
+            found.append(JumpTerm(first.surface, difference(positive, negative), speed))
+    return found

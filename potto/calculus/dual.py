@@ -1,0 +1,384 @@
+"""The symbolic dual: a term's value and tangent as core terms.
+
+Owns `dual`. Builtins come from the registry's partials; conditionals go side by side, because a condition that varies
+with no variable of integration only chooses; an integral adds what its moving surfaces and bounds sweep (`boundary`).
+Functions become functions over pairs `(value, tangent)`. The result holds no `Deriv` of a known function, so it can be
+evaluated and differentiated again: an independent check of the numeric derivative, and the text of `potto deriv`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from potto.calculus.boundary import at_bounds, at_surfaces, jumps, scaled
+from potto.calculus.conditions import Resolve, expanded, known_function
+from potto.calculus.deltas import without_deltas
+from potto.calculus.derivative import partial, zero_like
+from potto.calculus.trace import spine
+from potto.core.terms import (
+    ZERO,
+    App,
+    Branch,
+    Const,
+    Delta,
+    Deriv,
+    Global,
+    Hole,
+    If,
+    Integral,
+    Lam,
+    ListOf,
+    Prim,
+    Proj,
+    Sum,
+    Term,
+    Tuple,
+    Var,
+    add,
+    app,
+    branch,
+    children,
+    delta,
+    deriv,
+    fresh,
+    if_,
+    integral,
+    lam,
+    list_of,
+    mul,
+    postorder,
+    proj,
+    rebuild,
+    substitute,
+    sum_,
+    tuple_,
+    var,
+)
+from potto.primitives import PRIMITIVES
+
+Dual = tuple[Term, Term]
+
+
+def nothing_known(name: Global) -> Term | None:
+    """Resolves no definition."""
+    return None
+
+
+def dual(term: Term, tangents: Mapping[str, Term], resolve: Resolve = nothing_known) -> Dual:
+    """Value and tangent of a term.
+
+    tangents: for each perturbed variable its tangent; for a variable that is a function, its dual function. What is
+        not mentioned stands still.
+    resolve: the terms of other definitions; those that are not known stay calls of `Deriv(definition)`.
+    Raises PottoError (P0502, P0505) where the derivative has no meaning or no closed form.
+    """
+    return Differentiator(resolve).dual(term, tangents)
+
+
+def dual_function(function: Lam, resolve: Resolve = nothing_known) -> Lam:
+    """The function over duals: each parameter becomes a pair, or a dual function where it is applied; so the result."""
+    return Differentiator(resolve).function(function)
+
+
+def split_pairs(value: Term, tangent: Term) -> Term:
+    return tuple_((value, tangent))
+
+
+class Differentiator:
+    """One derivation. `singular`: a jump becomes a delta, because an integral is around it."""
+
+    def __init__(self, resolve: Resolve, singular: bool = False, pairs: Callable[[Term, Term], Term] | None = None):
+        self.resolve = resolve
+        self.singular = singular
+        self.pair = pairs or split_pairs
+
+    def dual(self, term: Term, tangents: Mapping[str, Term]) -> Dual:
+        return _Pass(self, tangents).run(term)
+
+    def function(self, function: Lam) -> Lam:
+        """Over duals, group by group."""
+        taken = set(function.free) | {n for t in postorder(function) for n in t.free}
+        tangents: dict[str, Term] = {}
+        values: dict[str, Term] = {}
+        groups: list[tuple[str, ...]] = []
+        body: Term = function
+        heads = _heads(function)
+        while isinstance(body, Lam):
+            names: list[str] = []
+            for param in body.params:
+                name = fresh(f"d{param}", taken)
+                taken.add(name)
+                names.append(name)
+                if param in heads:
+                    tangents[param] = var(name)
+                    values[param] = var(name)
+                else:
+                    values[param], tangents[param] = proj(var(name), 0), proj(var(name), 1)
+            groups.append(tuple(names))
+            body = body.body
+        value, tangent = self.dual(body, tangents)
+        if self.singular:
+            tangent = self.with_deltas(body, tangent, tangents)
+        result: Term = substitute(self.pair(value, tangent), values)
+        for params in reversed(groups):
+            result = lam(params, result)
+        assert isinstance(result, Lam)
+        return result
+
+    def with_deltas(self, body: Term, tangent: Term, tangents: Mapping[str, Term]) -> Term:
+        """The tangent of an integrand: where a surface moves, its jump as a delta."""
+        names = {n for t in postorder(body) for n in t.free}
+        parts = [tangent]
+        for item in jumps(body, names, lambda t: self.dual(t, tangents)[1]):
+            parts.append(scaled(item.jump, mul(item.rate, delta((item.surface,)))))
+        return total([p for p in parts if p is not ZERO], zero_like(body))
+
+    def carried_out(self, term: Term) -> Term:
+        """Calls of known functions carried out, derivatives of known functions too, with deltas for jumps."""
+        inside = Differentiator(self.resolve, True)
+        return expanded(term, self.resolve, inside.function)
+
+
+def _heads(term: Term) -> frozenset[str]:
+    """The variables that are functions: they are applied."""
+    found: set[str] = set()
+    for node in postorder(term):
+        if isinstance(node, App):
+            head = node.function
+            while isinstance(head, Deriv):
+                head = head.function
+            if isinstance(head, Var):
+                found.add(head.name)
+    return frozenset(found)
+
+
+def _outside(root: Term) -> list[Term]:
+    """Every subterm under no binder, children first; of a sum the limits."""
+    seen: set[Term] = set()
+    order: list[Term] = []
+    stack: list[tuple[Term, bool]] = [(root, False)]
+    while stack:
+        node, done = stack.pop()
+        if done:
+            order.append(node)
+        elif node not in seen:
+            seen.add(node)
+            stack.append((node, True))
+            if isinstance(node, Sum):
+                stack.extend(((node.hi, False), (node.lo, False)))
+            elif not isinstance(node, Integral | Lam):
+                stack.extend((child, False) for child in reversed(children(node)))
+    return order
+
+
+class _Pass:
+    """The duals of all subterms under one set of tangents."""
+
+    def __init__(self, owner: Differentiator, tangents: Mapping[str, Term]) -> None:
+        self.owner = owner
+        self.tangents = tangents
+        self.found: dict[Term, Dual] = {}
+        self.heads: frozenset[str] = frozenset()
+
+    def run(self, term: Term) -> Dual:
+        self.heads = _heads(term) | {n for n, t in self.tangents.items() if isinstance(t, Lam | Global | Deriv)}
+        for node in _outside(term):
+            if node not in self.found:
+                self.found[node] = self.node(node)
+        return self.found[term]
+
+    def node(self, node: Term) -> Dual:
+        parts = children(node)
+        still = not any(n in self.tangents for n in node.free) and not isinstance(node, App | Integral | Proj)
+        if still and all(self.found[p][0] is p and self.found[p][1] is ZERO for p in parts if p in self.found):
+            return node, zero_like(node)
+        match node:
+            case Var(name=name):
+                return node, self.tangents.get(name, ZERO)
+            case Prim():
+                return self.builtin(node)
+            case If():
+                (c, _), (a, da), (b, db) = (self.found[p] for p in parts)
+                return if_(c, a, b), if_(c, da, db)
+            case Branch():
+                return self.branch(node)
+            case Tuple() | ListOf():
+                duals = [self.found[p] for p in parts]
+                make = tuple_ if isinstance(node, Tuple) else list_of
+                return make(d[0] for d in duals), make(d[1] for d in duals)
+            case Proj():
+                value, tangent = self.found[node.term]
+                return proj(value, node.index), ZERO if tangent is ZERO else proj(tangent, node.index)
+            case App():
+                return self.call(node)
+            case Sum():
+                return self.sum(node)
+            case Integral():
+                return self.integral(node)
+            case Const() | Global() | Lam() | Deriv() | Hole():
+                return node, ZERO
+            case _:
+                return rebuild(node, tuple(self.found[p][0] for p in parts)), ZERO
+
+    def builtin(self, node: Prim) -> Dual:
+        duals = [self.found[a] for a in node.args]
+        values, slopes = tuple(d[0] for d in duals), [d[1] for d in duals]
+        value = rebuild(node, values)
+        entry = PRIMITIVES[node.op]
+        if entry.truth or entry.partials is None or all(s is ZERO for s in slopes):
+            return value, ZERO
+        if node.op in ("add", "neg"):
+            return value, rebuild(node, tuple(slopes))
+        moving = [i for i, s in enumerate(slopes) if s is not ZERO]
+        names = {i: fresh(f"z{i}", value.free) for i in moving}
+        opened = rebuild(node, tuple(var(names[i]) if i in names else v for i, v in enumerate(values)))
+        back = {names[i]: values[i] for i in moving}
+        return value, add(*(scaled(substitute(partial(opened, names[i]), back), slopes[i]) for i in moving))
+
+    def branch(self, node: Branch) -> Dual:
+        duals = [self.found[p] for p in children(node)]
+        coordinates = tuple(d[0] for d in duals[:-2])
+        (a, da), (b, db) = duals[-2:]
+        value = branch(coordinates, node.strict, a, b)
+        return value, da if da is db else branch(coordinates, node.strict, da, db)
+
+    # Functions
+
+    def call(self, node: App) -> Dual:
+        head, groups = spine(node)
+        if isinstance(head, Lam):
+            whole = expanded(node, nothing_known)
+            if whole is not node:
+                return _Pass(self.owner, self.tangents).run(whole)
+        function = self.function(head)
+        result: Term = function
+        for group in groups:
+            result = app(result, tuple(self.argument(a) for a in group))
+        result = expanded(result, nothing_known)
+        return proj(result, 0), proj(result, 1)
+
+    def argument(self, arg: Term) -> Term:
+        """An argument as its dual function takes it."""
+        if self.is_function(arg):
+            return self.function(arg)
+        value, tangent = self.found[arg]
+        return self.owner.pair(value, tangent)
+
+    def is_function(self, term: Term) -> bool:
+        match term:
+            case Lam() | Deriv():
+                return True
+            case Var(name=name):
+                return name in self.heads
+            case Global():
+                found = self.owner.resolve(term)
+                return found is None or isinstance(found, Lam)
+            case _:
+                return False
+
+    def function(self, term: Term) -> Term:
+        """The dual of a function."""
+        match term:
+            case Lam():
+                return self.closed(term)
+            case Var(name=name) if name in self.tangents:
+                return self.tangents[name]
+            case Deriv(function=inner):
+                known = known_function(inner, self.owner.resolve, self.owner.function)
+                return deriv(term) if known is None else self.owner.function(self.owner.function(known))
+            case App():
+                head, groups = spine(term)
+                result = self.function(head)
+                for group in groups:
+                    result = app(result, tuple(self.argument(a) for a in group))
+                return result
+            case _:
+                return deriv(term)
+
+    def closed(self, function: Lam) -> Lam:
+        """The dual of a function that may use variables from around it."""
+        outside = {n: t for n, t in self.tangents.items() if n in function.free}
+        if not outside:
+            return self.owner.function(function)
+        names = set(function.params)
+        taken = set(function.free) | names | {n for t in outside.values() for n in t.free}
+        stand_ins = {n: fresh(f"{n}'tangent", taken) for n in outside}
+        taken |= set(stand_ins.values())
+        params: list[str] = []
+        values: dict[str, Term] = {}
+        tangents = {n: var(s) for n, s in stand_ins.items()}
+        inner_tangents: dict[str, Term] = dict(tangents)
+        heads = _heads(function)
+        for param in function.params:
+            name = fresh(f"d{param}", taken)
+            taken.add(name)
+            params.append(name)
+            if param in heads:
+                inner_tangents[param] = values[param] = var(name)
+            else:
+                values[param], inner_tangents[param] = proj(var(name), 0), proj(var(name), 1)
+        inner = _Pass(self.owner, inner_tangents)
+        body = inner.closed(function.body) if isinstance(function.body, Lam) else None
+        result = body if body is not None else self.owner.pair(*inner.run(function.body))
+        opened = substitute(result, values)
+        made = lam(tuple(params), substitute(opened, {s: outside[n] for n, s in stand_ins.items()}))
+        assert isinstance(made, Lam)
+        return made
+
+    # Binders
+
+    def sum(self, node: Sum) -> Dual:
+        body, tangent = self.under(node.body, (node.variable,))
+        lo, hi = self.found[node.lo][0], self.found[node.hi][0]
+        return sum_(node.variable, lo, hi, body), ZERO if tangent is ZERO else sum_(node.variable, lo, hi, tangent)
+
+    def under(self, body: Term, bound: tuple[str, ...]) -> Dual:
+        return _Pass(self.owner, {n: t for n, t in self.tangents.items() if n not in bound}).run(body)
+
+    def integral(self, node: Integral) -> Dual:
+        whole = self.owner.carried_out(node)
+        if not isinstance(whole, Integral):
+            return _Pass(self.owner, self.tangents).run(whole)
+        plain = _without(without_deltas(whole), Delta)
+        if not isinstance(plain, Integral):
+            return _Pass(self.owner, self.tangents).run(plain)
+        moving = {n: t for n, t in self.tangents.items() if n not in plain.variables}
+        if not any(n in plain.free for n in moving):
+            return plain, zero_like(plain.body)
+
+        def rate(term: Term) -> Term:
+            """The tangent of a term as the parameters move; the variables of integration stand still."""
+            return _Pass(self.owner, moving).run(term)[1]
+
+        parts = [
+            _over(plain, rate(plain.body)),
+            *at_bounds(plain, rate),
+            *at_surfaces(plain, frozenset(moving), rate),
+        ]
+        return plain, total([p for p in parts if p is not ZERO], zero_like(plain.body))
+
+
+def _without(term: Term, kind: type[Delta]) -> Term:
+    """Deltas that are left vary with no variable of integration: they stand for a jump that nothing sweeps."""
+    memo: dict[Term, Term] = {}
+    for node in postorder(term):
+        memo[node] = ZERO if isinstance(node, kind) else rebuild(node, tuple(memo[c] for c in children(node)))
+    return memo[term]
+
+
+def _over(node: Integral, body: Term) -> Term:
+    if body is ZERO or (isinstance(body, Tuple) and all(i is ZERO for i in body.items)):
+        return ZERO
+    return integral(node.variables, node.bounds, body, node.hints)
+
+
+def total(parts: list[Term], zero: Term) -> Term:
+    """The sum of numbers, or of tuples shaped like `zero`."""
+    if len(parts) <= 1:
+        return parts[0] if parts else zero
+    if isinstance(zero, Tuple):
+        return tuple_(total([proj(p, i) for p in parts], item) for i, item in enumerate(zero.items))
+    return add(*parts)
+
+
+
