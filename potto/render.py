@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from potto.diagnostics import Diagnostic, Related
+from potto.diagnostics import Diagnostic, PottoError, Related
 from potto.excerpt import Mark, excerpt, printable
 from potto.source import Position, SourceText, Span
 
@@ -184,3 +184,15 @@ def summary(diagnostics: Sequence[Located]) -> str:
         if count:
             parts.append(f"{count} {severity}{'' if count == 1 else 's'}")
     return ", ".join(parts)
+
+
+class ProgramError(PottoError):
+    """A PottoError that knows the files its diagnostics are about; as text it shows the source."""
+
+    def __init__(self, located: Sequence[Located], sources: Sources) -> None:
+        super().__init__([item.diagnostic for item in located])
+        self.located = tuple(located)
+        self.sources = sources
+
+    def __str__(self) -> str:
+        return "\n" + "\n".join(render(item, self.sources) for item in self.located)

@@ -35,7 +35,7 @@ class Settings:
 
     method: Method = "auto"
     rtol: float = 1e-10
-    atol: float = 1e-14
+    atol: float = 0.0
     samples: int = 100_000
     seed: int = 0
     max_evals: int = 20_000_000

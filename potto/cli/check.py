@@ -1,0 +1,73 @@
+"""`potto check`: what is wrong with programs."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from typing import TYPE_CHECKING
+
+from potto.cli.console import Console
+
+if TYPE_CHECKING:
+    from potto.render import Located
+    from potto.world import World
+
+SUMMARY = "say what is wrong with programs, where, and what to do"
+EXAMPLE = "  potto check examples/ --watch"
+PAUSE = 0.2  # seconds between two looks at the files
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("paths", nargs="+", metavar="PATH", help="files, or folders to walk; `-` is standard input")
+    parser.add_argument("--watch", action="store_true", help="check again whenever a file changes, until interrupted")
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    from potto.world import World
+
+    world = World(["."])
+    status = _look(world, options, console)
+    while options.watch:
+        console.out.flush()
+        _wait(world, options.paths)
+        console.complain(f"-- {time.strftime('%H:%M:%S')}")
+        status = _look(world, options, console)
+    return status
+
+
+def _look(world: World, options: argparse.Namespace, console: Console) -> int:
+    """Check all files once and say what was found."""
+    from potto.render import all_to_json, summary
+
+    found, files = gather(world, options.paths)
+    if options.json:
+        console.answer_json(all_to_json(found, world.source))
+    else:
+        console.diagnostics(found, world.source, to_answer=True, inline_header=True)
+        count = f"{files} file{'' if files == 1 else 's'}"
+        console.complain(f"{count}: {summary(found) or 'no problems'}")
+    return int(any(located.diagnostic.severity == "error" for located in found))
+
+
+def gather(world: World, paths: list[str]) -> tuple[list[Located], int]:
+    """The diagnostics of all files that the paths name, and how many files there are."""
+    from potto.cli.files import expand
+    from potto.cli.opening import opened
+    from potto.render import ProgramError
+
+    files, found = expand(paths)
+    for path in files:
+        try:
+            found += world.diagnostics(opened(world, path))
+        except ProgramError as error:
+            found += error.located
+    return found, len(files)
+
+
+def _wait(world: World, paths: list[str]) -> None:
+    """Come back when a file has changed, appeared or gone."""
+    from potto.cli.files import expand
+
+    before = expand(paths)[0]
+    while not world.refresh() and expand(paths)[0] == before:
+        time.sleep(PAUSE)

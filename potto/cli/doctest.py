@@ -1,0 +1,61 @@
+"""`potto test`: live expressions as tests."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+from potto.cli.console import Console
+
+if TYPE_CHECKING:
+    from potto.live import Outcome
+
+SUMMARY = "run the live expressions of programs (`#> e`, `#= v`) as tests"
+EXAMPLE = "  potto test examples/"
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("paths", nargs="+", metavar="PATH", help="files, or folders to walk; `-` is standard input")
+    parser.add_argument("-v", "--verbose", action="store_true", help="show what passes as well")
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    from potto.cli.files import expand
+    from potto.cli.opening import opened
+    from potto.live import outcomes_of
+    from potto.render import ProgramError, all_to_json
+    from potto.world import World
+
+    world = World(["."])
+    files, problems = expand(options.paths)
+    outcomes: list[Outcome] = []
+    for path in files:
+        try:
+            outcomes += outcomes_of(world, opened(world, path))
+        except ProgramError as error:
+            problems += error.located
+    if options.json:
+        console.answer_json({"tests": [asdict(o) for o in outcomes], **all_to_json(problems, world.source)})
+    else:
+        console.diagnostics(problems, world.source)
+        _show(outcomes, len(files), options.verbose, console)
+    return int(bool(problems) or not all(outcome.passed for outcome in outcomes))
+
+
+def _show(outcomes: list[Outcome], files: int, verbose: bool, console: Console) -> None:
+    from potto.render import display_name
+
+    for outcome in outcomes:
+        head = f"{display_name(outcome.file)}:{outcome.line}: {outcome.expression}"
+        if not outcome.passed:
+            console.complain(f"{head}\n    {outcome.message}")
+        elif verbose:
+            console.answer(f"{head}\n    {outcome.value}")
+    failed = sum(not outcome.passed for outcome in outcomes)
+    count = f"{_count(len(outcomes), 'live expression')} in {_count(files, 'file')}"
+    console.answer(f"{count}: {failed} failed" if failed else f"{count}: all hold")
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"

@@ -1,0 +1,47 @@
+"""`potto eval`: the value of an expression."""
+
+from __future__ import annotations
+
+import argparse
+
+from potto.cli.console import Console
+from potto.cli.numbers import add_options, settings_of, show_stats
+
+SUMMARY = "evaluate an expression with a file's names in scope"
+EXAMPLE = "  potto eval examples/paper/renderer.po 'deriv(renderer)((-0.7, 1), \\(x, y) . c . 1)'"
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", metavar="FILE", help="the program; `-` reads it from standard input")
+    parser.add_argument("expression", metavar="EXPR", help="the expression")
+    add_options(parser)
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    from potto.cli.opening import fail, opened
+
+    settings = settings_of(options, console)
+    if settings is None:
+        return 2
+    from potto.render import ProgramError
+    from potto.runtime.shown import estimate_json, format_bounds, format_estimate
+    from potto.world import World
+
+    world = World(["."])
+    try:
+        file = opened(world, options.file)
+        world.require(file)
+        answer = world.evaluate(file, options.expression, settings)
+    except ProgramError as error:
+        return fail(error, options, console)
+    estimate = answer.estimate
+    if options.json:
+        console.answer_json(estimate_json(estimate, answer.type))
+    else:
+        console.answer(format_estimate(estimate))
+        if estimate.text is None and options.stats:
+            console.complain(f"error: {format_bounds(estimate.error)}")
+        console.diagnostics(answer.remarks, world.sources(options.expression))
+    if options.stats:
+        show_stats([estimate], console)
+    return 0

@@ -1,0 +1,64 @@
+"""From the paths of a command line to files, and to diagnostics for those that are none."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator, Sequence
+
+from potto.diagnostics import Diagnostic, declare
+from potto.render import Located
+from potto.source import Span
+
+NO_FILE = declare("P0230", "a file that does not exist")
+NOT_READABLE = declare("P0231", "a file that cannot be read as a program")
+
+SUFFIXES = (".po", ".diffeo")
+STDIN = "<stdin>"
+SKIPPED = {"__pycache__", "node_modules", "build", "dist"}
+
+
+def expand(paths: Sequence[str]) -> tuple[list[str], list[Located]]:
+    """The files that paths name, folders walked, each file once; and what is wrong with the paths that name none."""
+    files: dict[str, None] = {}
+    problems: list[Located] = []
+    for path in paths:
+        if path == "-" or os.path.isfile(path):
+            files[path] = None
+        elif os.path.isdir(path):
+            inside = list(walk(path))
+            files.update(dict.fromkeys(inside))
+            if not inside:
+                problems.append(located(path, NO_FILE(Span(0, 0), f"no {' or '.join(SUFFIXES)} file in this folder")))
+        else:
+            problems.append(missing(path))
+    return list(files), problems
+
+
+def walk(folder: str) -> Iterator[str]:
+    """The programs in a folder and below, in order; hidden folders and environments are left out."""
+    for where, folders, names in os.walk(folder):
+        folders[:] = sorted(f for f in folders if not f.startswith(".") and f not in SKIPPED)
+        for name in sorted(names):
+            if name.endswith(SUFFIXES):
+                yield os.path.join(where, name)
+
+
+def missing(path: str) -> Located:
+    """The diagnostic for a path that names nothing, with a near one if there is one."""
+    import difflib
+
+    folder = os.path.dirname(path) or "."
+    there = sorted(os.listdir(folder)) if os.path.isdir(folder) else []
+    near = difflib.get_close_matches(os.path.basename(path), [n for n in there if n.endswith(SUFFIXES)], 1)
+    help = f"did you mean `{os.path.join(os.path.dirname(path), near[0])}`?" if near else ""
+    return located(path, NO_FILE(Span(0, 0), "there is no such file", help=help))
+
+
+def located(path: str, diagnostic: Diagnostic) -> Located:
+    return Located(path, diagnostic)
+
+
+def read_stdin() -> bytes:
+    """Standard input as it is."""
+    return sys.stdin.buffer.read() if hasattr(sys.stdin, "buffer") else sys.stdin.read().encode()

@@ -1,0 +1,66 @@
+"""The options of commands that evaluate: method, accuracy, limits."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import fields
+from typing import TYPE_CHECKING
+
+from potto.cli.console import Console
+from potto.settings import DEFAULTS, METHODS, Settings, problem
+
+if TYPE_CHECKING:
+    from potto.runtime.estimate import Estimate
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("numbers")
+    group.add_argument("--method", choices=METHODS, default=DEFAULTS.method, help="how integrals are estimated")
+    group.add_argument("--rtol", type=_number, default=DEFAULTS.rtol, help="relative accuracy asked for")
+    group.add_argument("--atol", type=_number, default=DEFAULTS.atol, help="absolute accuracy asked for")
+    group.add_argument("--samples", type=_whole, default=DEFAULTS.samples, help="points of a Monte Carlo estimate")
+    group.add_argument("--seed", type=_whole, default=DEFAULTS.seed, help="where its random numbers start")
+    group.add_argument("--max-evals", type=_whole, default=DEFAULTS.max_evals, help="the most evaluations of an integrand")
+    group.add_argument("--stats", action="store_true", help="say what the evaluation cost")
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+
+
+def _whole(text: str) -> int:
+    try:
+        value = float(text)
+        if value == int(value):
+            return int(value)
+    except (ValueError, OverflowError):
+        pass
+    raise argparse.ArgumentTypeError(f"{text!r} is not a whole number")
+
+
+def settings_of(options: argparse.Namespace, console: Console) -> Settings | None:
+    """The settings that the options ask for; None after a complaint."""
+    chosen = {field.name: getattr(options, field.name) for field in fields(Settings)}
+    for name, value in chosen.items():
+        complaint = problem(name, value)
+        if complaint is not None:
+            console.complain(f"potto: --{name.replace('_', '-')}: {complaint}")
+            return None
+    return Settings(**chosen)
+
+
+def show_stats(estimates: list[Estimate], console: Console) -> None:
+    """What evaluations cost, all together, for the person."""
+    seconds = sum(estimate.seconds for estimate in estimates)
+    compiling = sum(estimate.compile_seconds for estimate in estimates)
+    totals: dict[str, float] = {}
+    for estimate in estimates:
+        for name, value in estimate.stats.items():
+            if isinstance(value, int | float):
+                totals[name] = totals.get(name, 0) + value
+    console.complain(f"time: {seconds * 1e3:.2f} ms, {compiling * 1e3:.2f} ms of it making kernels")
+    for name, total in totals.items():
+        console.complain(f"{name}: {total:,}")

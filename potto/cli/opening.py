@@ -1,0 +1,54 @@
+"""Opening the files of a command in a world, and what a command says when its program is wrong."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from typing import TYPE_CHECKING
+
+from potto.cli.console import Console
+from potto.cli.files import NO_FILE, STDIN, missing, read_stdin
+from potto.render import Located, ProgramError, all_to_json
+from potto.source import SourceText, Span
+
+if TYPE_CHECKING:
+    from potto.world import World
+
+
+def opened(world: World, path: str) -> str:
+    """The key of a file that a command works on. Raises ProgramError if there is no program there."""
+    if path == "-":
+        return open_stdin(world)
+    if os.path.isdir(path):
+        problem = NO_FILE(Span(0, 0), "this is a folder, and a file is needed here")
+        raise ProgramError([Located(path, problem)], no_sources)
+    if not os.path.exists(path):
+        raise ProgramError([missing(path)], no_sources)
+    key = world.key(path)
+    unreadable = world.unreadable(key)
+    if unreadable is not None:
+        raise ProgramError([unreadable], no_sources)
+    return key
+
+
+def open_stdin(world: World) -> str:
+    """Standard input as a file of the working folder, so that its imports are found there."""
+    key = os.path.join(os.getcwd(), STDIN)
+    problem = world.put_bytes(key, read_stdin())
+    if problem is not None:
+        raise ProgramError([problem], no_sources)
+    return key
+
+
+def no_sources(file: str) -> SourceText | None:
+    """For diagnostics about files that have no text."""
+    return None
+
+
+def fail(error: ProgramError, options: argparse.Namespace, console: Console) -> int:
+    """Show what is wrong with the program; the exit status."""
+    if options.json:
+        console.answer_json(all_to_json(error.located, error.sources))
+    else:
+        console.diagnostics(error.located, error.sources)
+    return 1

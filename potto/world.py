@@ -1,0 +1,168 @@
+"""A world of programs: one database, the files that it reads, and what evaluates them.
+
+Owns `World`, which the command line and the Python interface share. Everything may be called from several threads: the
+database lets one thread in at a time, and each thread evaluates with a `Program` of its own.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from potto.check import absolute, definition_diagnostics, diagnostics, errors_of, has_errors
+from potto.core.terms import Term
+from potto.diagnostics import Diagnostic, PottoError
+from potto.elaborate import core, elaborate_expression
+from potto.modules import chunk_start, open_files, source
+from potto.query import Database
+from potto.render import Located, ProgramError
+from potto.runtime.estimate import Estimate
+from potto.runtime.evaluate import Program
+from potto.runtime.script import Script, Shown, placed, remarks
+from potto.runtime.shown import as_dual
+from potto.settings import Settings, current
+from potto.source import SourceText, Span
+from potto.syntax import parse_expression
+from potto.syntax.nodes import Expr
+from potto.types import format_type, infer_expression
+from potto.types.types import TupleOf, Type, result_of
+
+EXPRESSION = "<expression>"
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What an expression evaluates to, its type, and what a reader should know about the number."""
+
+    estimate: Estimate
+    type: str
+    remarks: tuple[Located, ...] = ()
+
+
+class World:
+    """Programs from disk and from memory, checked and evaluated."""
+
+    def __init__(self, roots: Sequence[str | os.PathLike[str]] = ()) -> None:
+        self.db = Database()
+        open_files(self.db, [os.path.abspath(root) for root in roots])
+        self._local = threading.local()
+
+    # Files
+
+    def key(self, path: str | os.PathLike[str]) -> str:
+        """How the database calls a file."""
+        return os.path.normpath(os.path.abspath(path))
+
+    def put(self, key: str, text: str) -> str:
+        """Give a file, or a pseudo file such as `<text>`, a text that counts instead of what is on disk."""
+        self.db.set_input(("overlay", key), text)
+        return key
+
+    def source(self, file: str) -> SourceText | None:
+        """The text of a file."""
+        return source(self.db, file)
+
+    def diagnostics(self, file: str) -> tuple[Located, ...]:
+        """Everything there is to say about a file."""
+        return diagnostics(self.db, file)
+
+    def require(self, file: str) -> None:
+        """Raise ProgramError if there is an error in a file."""
+        wrong = errors_of(self.diagnostics(file))
+        if wrong:
+            raise ProgramError(wrong, self.source)
+
+    # Evaluating
+
+    @property
+    def program(self) -> Program:
+        """What evaluates in this thread, for the present texts of all files."""
+        self._forget_old()
+        program: Program = self._local.program
+        return program
+
+    def remember(self, key: Hashable, make: Callable[[], T]) -> T:
+        """What `make` gives, once in each thread for the present texts of all files."""
+        self._forget_old()
+        memory: dict[Hashable, Any] = self._local.memory
+        if key not in memory:
+            memory[key] = make()
+        found: T = memory[key]
+        return found
+
+    def _forget_old(self) -> None:
+        revision = self.db.revision
+        if getattr(self._local, "revision", None) != revision:
+            self._local.revision = revision
+            self._local.memory = {}
+            self._local.program = Program(self.lookup)
+
+    def lookup(self, file: str, name: str) -> Term:
+        """The term of a definition. Raises ProgramError if it has errors."""
+        with self.db.evaluating():
+            found = definition_diagnostics(self.db, file, name)
+            if has_errors(found):
+                start = chunk_start(self.db, file, name)
+                wrong = [Located(file, absolute(self.db, file, d, start)) for d in found if d.severity == "error"]
+                raise ProgramError(wrong, self.source)
+            return core(self.db, file, name).term
+
+    def run(self, file: str, settings: Settings | None = None) -> Iterator[Shown | Located]:
+        """Run a script's statements. Raises ProgramError if the file has errors."""
+        self.require(file)
+        return Script(self.db, file, self.program, settings or current()).run()
+
+    def evaluate(self, file: str, text: str, settings: Settings | None = None) -> Answer:
+        """The value of an expression with a file's names in scope. Raises ProgramError."""
+        sources = self.sources(text)
+        parsed = parse_expression(text)
+        self._stop(parsed.diagnostics, sources)
+        inferred = infer_expression(self.db, file, parsed.expr)
+        self._stop(inferred.diagnostics, sources)
+        elaborated = elaborate_expression(self.db, file, parsed.expr)
+        self._stop(elaborated.diagnostics, sources)
+        try:
+            estimate = self.program.evaluate(elaborated.term, settings or current())
+            if is_dual(inferred.type):
+                estimate = as_dual(estimate)
+        except ProgramError:
+            raise
+        except PottoError as error:
+            whole = Span(0, len(text))
+            raise ProgramError([Located(EXPRESSION, placed(d, whole, 0)) for d in error.diagnostics], sources) from None
+        said = tuple(Located(EXPRESSION, d) for d in remarks(estimate, Span(0, len(text))))
+        return Answer(estimate, format_type(inferred.type), said)
+
+    def parse(self, text: str) -> Expr:
+        """The tree of an expression. Raises ProgramError."""
+        parsed = parse_expression(text)
+        self._stop(parsed.diagnostics, self.sources(text))
+        return parsed.expr
+
+    def sources(self, expression: str) -> _Sources:
+        """The texts of files, and an expression as a file of its own."""
+        return _Sources(self, SourceText(EXPRESSION, expression))
+
+    def _stop(self, found: Iterable[Diagnostic], sources: _Sources) -> None:
+        wrong = [Located(EXPRESSION, absolute(self.db, EXPRESSION, d, 0)) for d in found if d.severity == "error"]
+        if wrong:
+            raise ProgramError(wrong, sources)
+
+
+def is_dual(type: Type) -> bool:
+    """Whether values of a type are duals: the second half is a tangent, not a second number."""
+    result = result_of(type)
+    return isinstance(result, TupleOf) and result.dual
+
+
+@dataclass(frozen=True)
+class _Sources:
+    world: World
+    expression: SourceText
+
+    def __call__(self, file: str) -> SourceText | None:
+        return self.expression if file == EXPRESSION else self.world.source(file)
