@@ -1,0 +1,62 @@
+"""Types: what every value is, what it varies with, and the rule that no variable of integration decides a plain
+condition.
+
+Owns types and their printing, inference, the abstract walk over dependence, and interfaces. Knows syntax and modules,
+no core terms. See docs/types.md.
+"""
+
+from potto.types.analysis import Typed
+from potto.types.format import format_type
+from potto.types.interface import Interface
+from potto.types.queries import (
+    Inferred,
+    check_definition,
+    check_statement,
+    infer_expression,
+    interface,
+    plain_reasons,
+    typed_names,
+)
+from potto.types.types import (
+    Diffeo,
+    Dist,
+    Function,
+    ListOf,
+    Parameter,
+    Real,
+    Truth,
+    TupleOf,
+    Type,
+    Unknown,
+    Var,
+    derivative_type,
+    groups_of,
+    result_of,
+)
+
+__all__ = [
+    "Diffeo",
+    "Dist",
+    "Function",
+    "Inferred",
+    "Interface",
+    "ListOf",
+    "Parameter",
+    "Real",
+    "Truth",
+    "TupleOf",
+    "Type",
+    "Typed",
+    "Unknown",
+    "Var",
+    "check_definition",
+    "check_statement",
+    "derivative_type",
+    "format_type",
+    "groups_of",
+    "infer_expression",
+    "interface",
+    "plain_reasons",
+    "result_of",
+    "typed_names",
+]

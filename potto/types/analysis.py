@@ -1,0 +1,227 @@
+"""Everything about one definition, or about several that need each other: types, then dependence, then the interface.
+
+Owns `Analysis`. Pure functions of trees and of what the definitions around provide (`Outside`); the queries are in
+`queries`. Recursive definitions have one type each while they are inferred; their flows start from nothing and are
+walked again until they stand still (they only grow, and there are finitely many).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from potto.diagnostics import Diagnostic
+from potto.modules.lookup import DefinitionTarget
+from potto.source import Span
+from potto.syntax import nodes
+from potto.types import calls, flow_binders, flow_calls, integrals  # noqa: F401  (imported for their rules)
+from potto.types.annotations import written_type
+from potto.types.closing import declared, reasons_of
+from potto.types.context import Inference, ensure_stack, mismatch
+from potto.types.flow import Walk
+from potto.types.infer import bindings, returned
+from potto.types.interface import Closing, Decorating, Interface, chain_of
+from potto.types.lints import lints
+from potto.types.reasons import Reasons
+from potto.types.recursion import endless
+from potto.types.scope import Outside
+from potto.types.types import Diffeo, Function, Meta, Parameter, Real, Type, groups_of, resolve
+from potto.types.unify import close_type, unify
+from potto.types.values import STILL, Closure, Scalar, TupleValue, Value, flat, inputs_of, symbolic
+
+MAX_ROUNDS = 20
+
+Written = nodes.Definition | nodes.DiffeoDefinition
+
+
+@dataclass(frozen=True, slots=True)
+class Typed:
+    """A name where it is bound or used inside a definition, with its type there."""
+
+    span: Span
+    name: str
+    type: Type
+
+
+@dataclass(frozen=True, slots=True)
+class Analysis:
+    """What is known about one definition. Its parts are read through queries, which stand still when they do."""
+
+    interface: Interface
+    diagnostics: tuple[Diagnostic, ...]
+    reasons: Reasons
+    names: tuple[Typed, ...]
+
+
+def analyse(
+    items: Mapping[DefinitionTarget, Written], outsides: Mapping[DefinitionTarget, Outside]
+) -> dict[DefinitionTarget, Analysis]:
+    """Analyse definitions that need each other (mostly one)."""
+    ensure_stack()
+    skeletons = {target: _skeleton(item) for target, item in items.items()}
+    inferences = {}
+    for target, item in items.items():
+        inference = inferences[target] = Inference(outsides[target], skeletons)
+        _infer(inference, item, skeletons[target])
+    for inference in inferences.values():
+        inference.finish()
+    flows: dict[DefinitionTarget, Value] = {target: _nothing(skeletons[target]) for target in items}
+    recursive = len(items) > 1 or any(inference.recursive() for inference in inferences.values())
+    for _ in range(MAX_ROUNDS if recursive else 1):
+        walked = {target: _walk(inferences[target], item, flows) for target, item in items.items()}
+        closed = {target: Closing(value).value(value) for target, (_, value) in walked.items()}
+        if closed == flows:
+            break
+        flows = closed
+    unended = endless(items, inferences) if recursive else {}
+    return {
+        target: _conclude(target, item, inferences[target], *walked[target], skeletons[target], unended.get(target, ()))
+        for target, item in items.items()
+    }
+
+
+def _skeleton(item: Written) -> Type:
+    """The type of a definition before anything is known, with the names of its parameters."""
+    groups = (item.variables, *item.groups) if isinstance(item, nodes.DiffeoDefinition) else item.groups
+    result: Type = Meta(1)
+    for group in reversed(groups):
+        result = Function(tuple(Parameter(parameter.name, Meta(1)) for parameter in group), result)
+    return result
+
+
+def _nothing(type: Type) -> Value:
+    """The flow of which nothing is known yet: varies with nothing, demands nothing."""
+    type = resolve(type)
+    if isinstance(type, Function):
+        from potto.types.values import Port, Source
+
+        inputs = tuple(symbolic(p.type, lambda: Source("input", ""), lambda: Port("")) for p in type.parameters)
+        return Closing(Closure(inputs, _nothing(type.result))).value(Closure(inputs, _nothing(type.result)))
+    return STILL
+
+
+def _infer(inference: Inference, item: Written, skeleton: Type) -> None:
+    groups = (item.variables, *item.groups) if isinstance(item, nodes.DiffeoDefinition) else item.groups
+    for group, expected in zip(groups, groups_of(skeleton)):
+        found = inference.bind_group(group, lambda a: written_type(inference, a))
+        for local, parameter in zip(found, expected):
+            unify(local.type, parameter.type)
+    bindings(inference, item.bindings)
+    result = skeleton
+    for _ in groups:
+        result = resolve(result)
+        assert isinstance(result, Function)
+        result = result.result
+    if isinstance(item, nodes.DiffeoDefinition):
+        _infer_diffeo(inference, item, result)
+    else:
+        _infer_body(inference, item, result)
+
+
+def _infer_body(inference: Inference, item: nodes.Definition, result: Type) -> None:
+    body = inference.infer(item.body)
+    returned(inference, body, item.body)
+    if item.result is not None:
+        written = written_type(inference, item.result)
+        if not unify(body, written):
+            inference.report(mismatch(body, written, item.body, f"the result of `{item.name}`"))
+    if not unify(result, body):
+        inference.report(mismatch(body, result, item.body, f"the result of `{item.name}`, as it is used in it,"))
+
+
+def _infer_diffeo(inference: Inference, item: nodes.DiffeoDefinition, result: Type) -> None:
+    for variable in item.variables:
+        inference.need_number(inference.binders[id(variable)].type, nodes.Name(variable.span, variable.name), "a variable")
+    for component in item.components:
+        inference.number(component, "a coordinate of a diffeomorphism")
+    unify(result, Diffeo(len(item.components)))
+    for condition in item.where:
+        inference.infer(condition)
+    if item.inverse is not None:
+        with inference.scope.inside():
+            for variable in item.variables:
+                inference.scope.unbind(variable.name)
+            inference.bind_group(item.inverse.parameters, lambda a: written_type(inference, a))
+            for component in item.inverse.components:
+                inference.number(component, "a coordinate of an inverse")
+
+
+def _walk(
+    inference: Inference, item: Written, flows: dict[DefinitionTarget, Value]
+) -> tuple[Walk, Value]:
+    walk = Walk(inference, flows)
+
+    def body() -> Value:
+        walk.bindings(item.bindings)
+        if isinstance(item, nodes.Definition):
+            return walk.value(item.body)
+        for condition in item.where:
+            walk.value(condition)
+        components = TupleValue(tuple(Scalar(flat(walk.value(component))) for component in item.components))
+        if item.inverse is not None:
+            walk.inputs(item.inverse.parameters)
+            for component in item.inverse.components:
+                walk.value(component)
+        return components
+
+    groups = (item.variables, *item.groups) if isinstance(item, nodes.DiffeoDefinition) else item.groups
+    return walk, declared(walk, groups, walk.function(groups, body))
+
+
+def _conclude(
+    target: DefinitionTarget,
+    item: Written,
+    inference: Inference,
+    walk: Walk,
+    value: Value,
+    skeleton: Type,
+    unended: tuple[Diagnostic, ...],
+) -> Analysis:
+    closing = Closing(value)
+    decorating = Decorating(value)
+    type = decorating.type(close_type(skeleton), value)
+    interface = Interface(
+        target.name,
+        type,
+        closing.value(value),
+        plain=_named(decorating.plain, decorating),
+        varies=_named(_varying(value), decorating),
+        diffeo=isinstance(item, nodes.DiffeoDefinition),
+    )
+    found = [*inference.diagnostics, *walk.diagnostics, *unended, *lints(inference, walk, item)]
+    found.sort(key=lambda diagnostic: (diagnostic.span, diagnostic.code))
+    return Analysis(interface, tuple(found), reasons_of(value, closing, decorating), _typed(inference, walk))
+
+
+def _named(sources: object, decorating: Decorating) -> tuple[str, ...]:
+    assert isinstance(sources, set)
+    return tuple(dict.fromkeys(name for source, name in decorating.names.items() if source in sources))
+
+
+def _varying(value: Value) -> set[object]:
+    """The inputs that the final result varies with."""
+    chain = chain_of(value)
+    return set(flat(chain[-1].result)) if chain else set()
+
+
+def _typed(inference: Inference, walk: Walk) -> tuple[Typed, ...]:
+    """The names that are bound in a definition, with the types they have there."""
+    return tuple(
+        Typed(local.span, local.name, local_type(local.type, walk.locals.get(local))) for local in inference.locals
+    )
+
+
+def local_type(type: Type, value: Value | None) -> Type:
+    """A type inside a definition: a number says which variables of integration it varies with."""
+    type = resolve(type)
+    if isinstance(type, Real) and isinstance(value, Scalar):
+        from potto.types.types import Dist
+
+        names = tuple(dict.fromkeys(source.name for source in value.sources if source.kind == "variable"))
+        return Dist(names) if value.spikes else Real(variables=names)
+    if isinstance(value, Closure):
+        return Decorating(value).type(close_type(type), value)
+    return close_type(type)
+
+
+__all__ = ["Analysis", "Typed", "analyse", "inputs_of", "local_type"]

@@ -1,0 +1,357 @@
+"""Calls: which arguments fill which parameters, and what is said when they do not.
+
+Owns `Plan`'s making. A function that is known has named groups: keywords bind by name in any group, the others fill the
+parameters that are left, in order. A group that gets nothing stays open (partial application); one that gets
+something must get all. A group of n also takes one tuple of n, and one parameter that is a tuple takes its n parts. Of
+a function that is a parameter only the present group is known, and no names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from potto.diagnostics import Diagnostic
+from potto.primitives import PRIMITIVES
+from potto.syntax import nodes
+from potto.types import kinds
+from potto.types.context import Inference, Plan, comparison, describe, near_names, rule
+from potto.types.infer import deriv_argument, is_known, special, strip
+from potto.types.scope import Builtin, Local
+from potto.types.types import (
+    REAL,
+    UNKNOWN,
+    Diffeo,
+    Function,
+    Meta,
+    Parameter,
+    Real,
+    Truth,
+    TupleOf,
+    Type,
+    Unknown,
+    function,
+    groups_of,
+    resolve,
+)
+from potto.types.unify import settle, unify
+
+
+@rule(nodes.Apply)
+def _apply(inference: Inference, node: nodes.Apply) -> Type:
+    form = special(inference, node.function)
+    if form is not None:
+        inference.meanings[id(strip(node.function))] = Builtin(form)
+        return _deriv(inference, node) if form == "deriv" else _delta(inference, node)
+    callee = resolve(inference.infer(node.function))
+    types = [inference.infer(argument.value) for argument in node.arguments]
+    _no_comparisons(inference, node, types)
+    if isinstance(callee, Meta):
+        return _apply_unknown(inference, node, callee, types)
+    if isinstance(callee, Unknown):
+        return UNKNOWN
+    if not isinstance(callee, Function):
+        inference.report(_not_a_function(inference, node, callee))
+        return UNKNOWN
+    variadic = _variadic(inference, node, types)
+    if variadic is not None:
+        return variadic
+    groups = groups_of(callee) if is_known(inference, node.function) else (callee.parameters,)
+    filling = _Filling(inference, node, groups, types)
+    return filling.result(callee) if filling.fill() else UNKNOWN
+
+
+def _no_comparisons(inference: Inference, node: nodes.Apply, types: list[Type]) -> None:
+    for place, argument in enumerate(node.arguments):
+        if isinstance(resolve(types[place]), Truth):
+            inference.report(comparison(argument.value, "an argument is a number, a tuple or a function"))
+            types[place] = UNKNOWN
+
+
+def _apply_unknown(inference: Inference, node: nodes.Apply, callee: Meta, types: list[Type]) -> Type:
+    """A parameter is applied: it is a function of such arguments."""
+    for argument in node.arguments:
+        if argument.name is not None:
+            inference.report(_no_names(argument, node))
+            return UNKNOWN
+    inference.settle_duals()
+    known = resolve(callee)
+    if isinstance(known, Function):
+        filling = _Filling(inference, node, (known.parameters,), types)
+        return filling.result(known) if filling.fill() else UNKNOWN
+    primal = inference.primal_of(known)
+    if isinstance(primal, Meta):  # the derivative of a parameter: a function of numbers
+        unify(primal, Function(tuple(Parameter(None, REAL) for _ in types), Meta(primal.level)))
+        return _apply_unknown(inference, node, callee, types)
+    result = inference.fresh()
+    made = Function(tuple(Parameter(None, type) for type in types), result)
+    if not unify(known, made):
+        message = "a function cannot be applied to itself"
+        inference.report(kinds.MISMATCH(node.function.span, message, label="its type would contain itself"))
+        return UNKNOWN
+    inference.plans[id(node)] = Plan((tuple((place,) for place in range(len(types))),))
+    return result
+
+
+def _variadic(inference: Inference, node: nodes.Apply, types: Sequence[Type]) -> Type | None:
+    """`min` and `max` take any number of arguments from two."""
+    meaning = inference.meanings.get(id(strip(node.function)))
+    primitive = PRIMITIVES.get(meaning.name) if isinstance(meaning, Builtin) else None
+    if primitive is None or primitive.arity is not None or len(types) <= 2:
+        return None
+    for argument, type in zip(node.arguments, types):
+        if argument.name is not None:
+            inference.report(_no_names(argument, node))
+        inference.need_number(type, argument.value, f"an argument of `{primitive.name}`")
+    inference.plans[id(node)] = Plan((tuple((place,) for place in range(len(types))),))
+    return REAL
+
+
+def _not_a_function(inference: Inference, node: nodes.Apply, callee: Type) -> Diagnostic:
+    after = node.arguments[0].value if node.arguments else None
+    is_number = isinstance(callee, Real)
+    help = ""
+    if is_number and after is not None:
+        help = "to multiply, write `*` between the two"
+    elif isinstance(callee, TupleOf | Diffeo):
+        help = "a call binds to what stands before it: write the operator between the two, or a comma"
+    label = "a number" if is_number else describe(callee)
+    message = f"this is {describe(callee)}, not a function, so it cannot be applied"
+    return kinds.NOT_A_FUNCTION(node.function.span, message, label=label, help=help)
+
+
+def _no_names(argument: nodes.Argument, node: nodes.Apply) -> Diagnostic:
+    return kinds.UNKNOWN_KEYWORD(
+        argument.name_span or argument.span,
+        f"{callee_name(node)} has no parameters with names",
+        label="no such name",
+        help="give the arguments in order, without names",
+    )
+
+
+def callee_name(node: nodes.Apply) -> str:
+    """What a call applies, in the middle of a sentence."""
+    target = strip(node.function)
+    while isinstance(target, nodes.Apply):
+        target = strip(target.function)
+    if isinstance(target, nodes.Name):
+        return f"`{target.id}`"
+    return f"`{target.path}.{target.name}`" if isinstance(target, nodes.Member) else "this function"
+
+
+class _Filling:
+    """One call being planned: what each parameter gets."""
+
+    def __init__(
+        self,
+        inference: Inference,
+        node: nodes.Apply,
+        groups: tuple[tuple[Parameter, ...], ...],
+        types: Sequence[Type],
+    ) -> None:
+        self.inference, self.node, self.groups, self.types = inference, node, groups, types
+        self.parameters = [parameter for group in groups for parameter in group]
+        self.slots: list[tuple[int, ...]] = [()] * len(self.parameters)
+        self.positional = [place for place, argument in enumerate(node.arguments) if argument.name is None]
+        self.spread = False
+
+    def fill(self) -> bool:
+        """Fill the parameters; False if that was reported to be impossible."""
+        if not self._keywords():
+            return False
+        if not self._pack() and not self._positions():
+            return False
+        return self._complete()
+
+    def _keywords(self) -> bool:
+        names = {parameter.name: place for place, parameter in enumerate(self.parameters) if parameter.name}
+        fine = True
+        for place, argument in enumerate(self.node.arguments):
+            if argument.name is None:
+                continue
+            if argument.name not in names:
+                self.inference.report(self._unknown_keyword(argument, tuple(names)))
+                fine = False
+            elif self.slots[names[argument.name]]:
+                self.inference.report(self._twice(argument))
+                fine = False
+            else:
+                self.slots[names[argument.name]] = (place,)
+        return fine
+
+    def _unknown_keyword(self, argument: nodes.Argument, names: tuple[str, ...]) -> Diagnostic:
+        if not names:
+            return _no_names(argument, self.node)
+        near = near_names(argument.name or "", names)
+        choice = near or names
+        head = "did you mean " if near else "it has "
+        return kinds.UNKNOWN_KEYWORD(
+            argument.name_span or argument.span,
+            f"{callee_name(self.node)} has no parameter `{argument.name}`",
+            label="no such parameter",
+            help=head + (" or " if near else ", ").join(f"`{name}`" for name in choice) + ("?" if near else ""),
+        )
+
+    def _twice(self, argument: nodes.Argument) -> Diagnostic:
+        return kinds.TWICE(
+            argument.name_span or argument.span,
+            f"the parameter `{argument.name}` of {callee_name(self.node)} is given twice",
+            label="given before",
+            help="leave one of them out",
+        )
+
+    def _pack(self) -> bool:
+        """Several arguments for one parameter that is a tuple, or one tuple for a group."""
+        first, given = len(self.groups[0]), self.positional
+        if len(given) != len(self.node.arguments):
+            return False
+        if first == 1 and len(given) > len(self.parameters):
+            only = resolve(self.parameters[0].type)
+            if isinstance(only, TupleOf) and len(only.items) == len(given):
+                self.slots[0] = tuple(given)
+                return True
+        if first > 1 and len(given) == 1:
+            type = resolve(self.types[0])
+            dims = len(type.items) if isinstance(type, TupleOf) else type.dims if isinstance(type, Diffeo) else None
+            if dims == first or isinstance(type, Meta) or (isinstance(type, Diffeo) and dims is None):
+                self.slots[:first] = [(given[0],)] * first
+                self.spread = True
+                return True
+        return False
+
+    def _positions(self) -> bool:
+        places = [place for place, slot in enumerate(self.slots) if not slot]
+        if len(self.positional) > len(places):
+            self.inference.report(self._too_many(len(places)))
+            return False
+        for place, argument in zip(places, self.positional):
+            self.slots[place] = (argument,)
+        return True
+
+    def _too_many(self, room: int) -> Diagnostic:
+        extra = self.node.arguments[self.positional[room]]
+        total = len(self.parameters)
+        takes = "takes no argument" if total == 0 else f"takes {total} argument{'s' if total > 1 else ''}"
+        arguments = self.node.arguments
+        return kinds.TOO_MANY(
+            extra.span,
+            f"{callee_name(self.node)} {takes}, but is given {len(arguments)}",
+            label="one too many" if len(self.positional) - room == 1 else "too many from here on",
+            help=self._signature(),
+        )
+
+    def _complete(self) -> bool:
+        """Check that no group is filled in part."""
+        fine, start = True, 0
+        nothing = not self.node.arguments
+        for number, group in enumerate(self.groups):
+            slots = self.slots[start : start + len(group)]
+            empty = [parameter for parameter, slot in zip(group, slots) if not slot]
+            if empty and (len(empty) < len(group) or (nothing and number == 0)):
+                self.inference.report(self._missing(empty))
+                fine = False
+            start += len(group)
+        return fine
+
+    def _missing(self, empty: Sequence[Parameter]) -> Diagnostic:
+        names = [f"`{parameter.name}`" for parameter in empty if parameter.name]
+        count = len(empty)
+        what = f"the argument{'s' if count > 1 else ''} " + " and ".join(names) if names else f"{count} more"
+        end = self.node.span.end
+        at = self.node.arguments[-1].span if self.node.arguments else self.node.function.span
+        if not names:
+            what += f" argument{'s' if count > 1 else ''}"
+        return kinds.MISSING(
+            at if at.end <= end else self.node.span,
+            f"{callee_name(self.node)} needs {what}",
+            label="not enough",
+            help=self._signature(),
+        )
+
+    def _signature(self) -> str:
+        if not any(parameter.name for parameter in self.parameters):
+            return ""
+        groups = "".join(f"({', '.join(p.name or '_' for p in group)})" for group in self.groups)
+        return f"its parameters are {groups}"
+
+    def result(self, callee: Function) -> Type:
+        """Check the arguments, note the plan, and give the type of the call."""
+        self._check()
+        plan: list[tuple[tuple[int, ...], ...] | None] = []
+        left: list[tuple[Parameter, ...]] = []
+        start = 0
+        for group in self.groups:
+            slots = tuple(self.slots[start : start + len(group)])
+            filled = all(slots)
+            plan.append(slots if filled else None)
+            if not filled:
+                left.append(group)
+            start += len(group)
+        self.inference.plans[id(self.node)] = Plan(tuple(plan), self.spread)
+        rest: Type = callee
+        for _ in self.groups:
+            rest = resolve(rest)
+            assert isinstance(rest, Function)
+            rest = rest.result
+        return function(left, rest)
+
+    def _check(self) -> None:
+        inference, arguments = self.inference, self.node.arguments
+        if self.spread:
+            group = TupleOf(tuple(parameter.type for parameter in self.groups[0]))
+            what = f"the argument of {callee_name(self.node)}"
+            inference.give(self.types[0], group, arguments[0].value, what)
+            return
+        for parameter, slot in zip(self.parameters, self.slots):
+            what = f"`{parameter.name}`" if parameter.name else "the argument"
+            what += f" of {callee_name(self.node)}"
+            if len(slot) == 1:
+                inference.give(self.types[slot[0]], parameter.type, arguments[slot[0]].value, what)
+            elif slot:
+                whole = resolve(parameter.type)
+                assert isinstance(whole, TupleOf)
+                for place, item in zip(slot, whole.items):
+                    inference.give(self.types[place], item, arguments[place].value, what)
+
+
+# Special forms
+
+
+def _deriv(inference: Inference, node: nodes.Apply) -> Type:
+    if len(node.arguments) != 1 or node.arguments[0].name is not None:
+        types = [inference.infer(argument.value) for argument in node.arguments]
+        wrong = kinds.TOO_MANY if len(types) > 1 else kinds.MISSING
+        message = "`deriv` takes one function"
+        inference.report(wrong(node.span, message, label="one function", help="write `deriv(f)`, then apply it"))
+        return UNKNOWN
+    inner = node.arguments[0].value
+    found = resolve(inference.infer(inner))
+    if isinstance(found, Unknown):
+        return UNKNOWN
+    if not isinstance(found, Function | Meta):
+        help = "derive the function and apply the result: `deriv(f)(…)`" if isinstance(strip(inner), nodes.Apply) else ""
+        if isinstance(found, Real) and not help:
+            help = "write it as a function of what it depends on: `deriv(\\t . …)`"
+        message = f"`deriv` takes a function, but this is {describe(found)}"
+        inference.report(kinds.NOT_A_FUNCTION(inner.span, message, label=describe(found), help=help))
+        return UNKNOWN
+    if is_known(inference, inner):
+        settle(found)
+    return inference.dual(found)
+
+
+def _delta(inference: Inference, node: nodes.Apply) -> Type:
+    if not node.arguments:
+        inference.report(
+            kinds.MISSING(node.span, "`delta` needs a surface", label="nothing given", help="write `delta(x - t)`")
+        )
+    for argument in node.arguments:
+        type = resolve(inference.infer(argument.value))
+        if len(node.arguments) == 1 and isinstance(type, Diffeo):
+            continue
+        if len(node.arguments) == 1 and isinstance(type, TupleOf) and unify(type, Diffeo(len(type.items))):
+            continue
+        inference.need_number(type, argument.value, "what `delta` is of")
+    return REAL
+
+
+__all__ = ["Local", "callee_name", "deriv_argument"]

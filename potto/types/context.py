@@ -1,0 +1,363 @@
+"""The state of inferring one definition's types, and the rules by node.
+
+Owns `Inference`: what was found out per node (for the walk over dependence that follows, and for editors), the local
+names in scope, what is to be looked at once everything else is known, and the diagnostics. The rules themselves are in
+`infer`, `calls` and `integrals`, registered by `rule`.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal, TypeVar
+
+from potto.diagnostics import Diagnostic
+from potto.modules.lookup import DefinitionTarget
+from potto.source import Span
+from potto.syntax import nodes
+from potto.types import kinds
+from potto.types.format import format_type, format_types
+from potto.types.scope import Local, LocalKind, Meaning, Member, Outside, Scope, near_names
+from potto.types.types import (
+    REAL,
+    UNKNOWN,
+    Diffeo,
+    Dist,
+    Function,
+    ListOf,
+    Meta,
+    Parameter,
+    Real,
+    Truth,
+    TupleOf,
+    Type,
+    Unknown,
+    Var,
+    dual_name,
+    resolve,
+)
+from potto.types.unify import unify
+
+STACK = 8000  # frames: two per node, for 200 levels of nesting and what is written between them
+
+Condition = Literal["plain", "bracket", "diffeo"]
+Rule = Callable[["Inference", Any], Type]
+RULES: dict[type, Rule] = {}
+F = TypeVar("F", bound=Callable[..., Type])
+
+
+def rule(*node_types: type) -> Callable[[F], F]:
+    """Register the rule that infers nodes of these types."""
+
+    def register(function: F) -> F:
+        for node_type in node_types:
+            RULES[node_type] = function
+        return function
+
+    return register
+
+
+def ensure_stack() -> None:
+    """Python's own limit is too low for 200 levels of nesting; frames of Python functions live on the heap."""
+    if sys.getrecursionlimit() < STACK:
+        sys.setrecursionlimit(STACK)
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Which arguments fill which parameters. Per group of the function: its slots, or None if it stays open.
+
+    A slot lists the arguments that fill the parameter: one, or several that make up its tuple. `spread`: the only
+    argument is a tuple that fills the whole group.
+    """
+
+    groups: tuple[tuple[tuple[int, ...], ...] | None, ...]
+    spread: bool = False
+
+
+class Inference:
+    """Infers the types in one definition (or statement, or expression)."""
+
+    def __init__(self, outside: Outside, members: dict[DefinitionTarget, Type]) -> None:
+        self.outside, self.members = outside, members
+        self.scope = Scope()
+        self.level = 1
+        self.diagnostics: list[Diagnostic] = []
+        self.types: dict[int, Type] = {}
+        self.meanings: dict[int, Meaning] = {}
+        self.binders: dict[int, Local] = {}
+        self.locals: list[Local] = []
+        self.plans: dict[int, Plan] = {}
+        self.conditions: dict[int, Condition] = {}
+        self.brackets: set[int] = set()
+        self.integrals = 0  # how many integrals are around the place that is looked at
+        self._late: list[Callable[[], None]] = []
+        self._duals: list[tuple[Meta, Meta]] = []
+
+    # Expressions
+
+    def infer(self, expr: nodes.Expr) -> Type:
+        """The type of an expression."""
+        inferred = RULES[expr.__class__](self, expr)
+        self.types[id(expr)] = inferred
+        return inferred
+
+    def number(self, expr: nodes.Expr, where: str) -> None:
+        """Infer an expression that must be a number; `where` says what needs it ("the left of `+`")."""
+        self.need_number(self.infer(expr), expr, where)
+
+    def need_number(self, type: Type, expr: nodes.Expr, where: str) -> None:
+        found = resolve(type)
+        if isinstance(found, Real | Unknown | Dist) or (isinstance(found, Meta) and unify(found, REAL)):
+            return
+        self.report(_not_a_number(found, expr, where))
+
+    def fresh(self) -> Meta:
+        return Meta(self.level)
+
+    def report(self, diagnostic: Diagnostic) -> None:
+        self.diagnostics.append(diagnostic)
+
+    def later(self, check: Callable[[], None]) -> None:
+        """Do a check when all types are known."""
+        self._late.append(check)
+
+    # Names
+
+    def bind(self, node: object, local: Local) -> Local:
+        """Bring a name into scope."""
+        before = self.scope.find(local.name)
+        if before is not None and not local.name.startswith("_"):
+            self.report(_shadowing(local, before))
+        self.scope.bind(local)
+        self.binders[id(node)] = local
+        self.locals.append(local)
+        return local
+
+    def bind_group(self, parameters: tuple[nodes.Parameter, ...], annotated: Callable[[Any], Type]) -> list[Local]:
+        """Bring a group of parameters into scope."""
+        seen: set[str] = set()
+        found = []
+        for parameter in parameters:
+            if parameter.name in seen:
+                self.report(twice_bound(parameter.name, parameter.span))
+            seen.add(parameter.name)
+            type = self.fresh() if parameter.annotation is None else annotated(parameter.annotation)
+            found.append(self.bind(parameter, Local(parameter.name, parameter.span, "parameter", type)))
+        return found
+
+    def local(self, node: object, name: str, span: Span, kind: LocalKind, type: Type) -> Local:
+        return self.bind(node, Local(name, span, kind, type))
+
+    def recursive(self) -> bool:
+        """Whether the definition refers to one of its own group."""
+        return any(isinstance(meaning, Member) for meaning in self.meanings.values())
+
+    # Fitting
+
+    def expect(self, actual: Type, expected: Type, expr: nodes.Expr, what: str) -> None:
+        """Report `what` if the types do not fit."""
+        if not unify(actual, expected):
+            self.report(mismatch(actual, expected, expr, what))
+
+    def give(self, actual: Type, expected: Type, expr: nodes.Expr, what: str) -> None:
+        """Like `expect`, for an argument: a plain number may be given where a dual is expected."""
+        if not self._fits(actual, expected):
+            self.report(mismatch(actual, expected, expr, what))
+
+    def _fits(self, actual: Type, expected: Type) -> bool:
+        actual, expected = resolve(actual), resolve(expected)
+        if not isinstance(expected, TupleOf):
+            return unify(actual, expected)
+        if expected.dual and isinstance(actual, Real | Dist):
+            return True
+        if expected.dual and isinstance(actual, Meta):
+            self.later(lambda: self._fit_late(actual, expected))
+            return True
+        if isinstance(actual, TupleOf) and len(actual.items) == len(expected.items):
+            fits = [self._fits(item, other) for item, other in zip(actual.items, expected.items)]
+            return all(fits)
+        return unify(actual, expected)
+
+    def _fit_late(self, actual: Type, expected: Type) -> None:
+        """What nothing else made a number is a dual."""
+        if isinstance(resolve(actual), Meta):
+            unify(actual, expected)
+
+    # Duals
+
+    def dual(self, type: Type) -> Type:
+        """D of a type, as far as it is known: what is not known yet follows when it is."""
+        type = resolve(type)
+        match type:
+            case Real() | Dist() | Var():
+                return TupleOf((REAL, REAL), dual=True)
+            case TupleOf(items, dual):
+                return TupleOf(tuple(map(self.dual, items)), dual)
+            case ListOf(item):
+                return ListOf(self.dual(item))
+            case Function(group, result):
+                duals = (Parameter(None if p.name is None else dual_name(p.name), self.dual(p.type)) for p in group)
+                return Function(tuple(duals), self.dual(result))
+            case Diffeo(dims):
+                return UNKNOWN if dims is None else TupleOf((TupleOf((REAL, REAL), dual=True),) * dims)
+            case Meta():
+                derived = Meta(type.level)
+                self._duals.append((type, derived))
+                return derived
+            case _:
+                return UNKNOWN
+
+    def settle_duals(self, force: bool = False) -> None:
+        """Derive the types that are known by now; `force`: what is not known at the end is a number."""
+        pending, self._duals = self._duals, []
+        while pending:
+            primal, derived = pending.pop()
+            if isinstance(resolve(primal), Meta):
+                if not force:
+                    self._duals.append((primal, derived))
+                    continue
+                unify(primal, REAL)
+            unify(derived, self.dual(primal))
+            pending += self._duals
+            self._duals = []
+
+    def primal_of(self, derived: Type) -> Type | None:
+        """The type whose dual `derived` is to be, if that is known no better yet."""
+        derived = resolve(derived)
+        for primal, dual in self._duals:
+            if resolve(dual) is derived:
+                return resolve(primal)
+        return None
+
+    # The end
+
+    def finish(self) -> None:
+        """Do what had to wait until all is known."""
+        self.settle_duals()
+        checks, self._late = self._late, []
+        for check in checks:
+            check()
+        self.settle_duals(force=True)
+        checks, self._late = self._late, []
+        for check in checks:
+            check()
+
+
+def describe(type: Type) -> str:
+    """A type in the middle of a sentence."""
+    found = resolve(type)
+    match found:
+        case Real() | Dist():
+            return "a number"
+        case Function():
+            return f"a function `{format_type(found)}`"
+        case TupleOf(items):
+            return f"a tuple of {len(items)}"
+        case ListOf():
+            return "a list"
+        case Truth():
+            return "a comparison"
+        case Diffeo():
+            return "a diffeomorphism's result"
+        case _:
+            return f"`{format_type(found)}`"
+
+
+def mismatch(actual: Type, expected: Type, expr: nodes.Expr, what: str) -> Diagnostic:
+    """`what` is the sentence's head: "the argument `x` of `f`"."""
+    if isinstance(resolve(actual), Truth):
+        return comparison(expr, f"{what} must be {describe(expected)}")
+    shown, wanted = format_types((actual, expected))
+    help = ""
+    if isinstance(resolve(actual), Function) and isinstance(resolve(expected), Function):
+        undone = _needs_deriv(actual, expected)
+        help = "give the derivative of the function: `deriv(…)`" if undone else ""
+    elif isinstance(resolve(actual), Function):
+        help = "apply the function to arguments"
+    return kinds.MISMATCH(
+        expr.span, f"{what} must be `{wanted}`, but this is `{shown}`", label=f"this is `{shown}`", help=help
+    )
+
+
+def _needs_deriv(actual: Type, expected: Type) -> bool:
+    """Whether a function was given where the derivative of one is expected."""
+    given, wanted = resolve(actual), resolve(expected)
+    while isinstance(given, Function) and isinstance(wanted, Function):
+        if len(given.parameters) != len(wanted.parameters):
+            return False
+        for mine, theirs in zip(given.parameters, wanted.parameters):
+            expects = resolve(theirs.type)
+            if isinstance(expects, TupleOf) and expects.dual and isinstance(resolve(mine.type), Real):
+                return True
+        given, wanted = resolve(given.result), resolve(wanted.result)
+    return False
+
+
+def comparison(expr: nodes.Expr, what: str) -> Diagnostic:
+    """A comparison stands where it cannot."""
+    return kinds.TRUTH_ESCAPES(
+        expr.span,
+        f"{what}, but this is a comparison",
+        label="neither true nor false is a value",
+        help="put it in brackets, `[x < t]`, for 1 where it holds and 0 elsewhere",
+    )
+
+
+def _not_a_number(found: Type, expr: nodes.Expr, where: str) -> Diagnostic:
+    match found:
+        case TupleOf(items):
+            return kinds.TUPLE_ARITHMETIC(
+                expr.span,
+                f"{where} must be a number, but this is a tuple of {len(items)}",
+                label="tuples have no arithmetic",
+                help="take it apart, `(a, b) = …`, and compute with its parts",
+            )
+        case Diffeo():
+            return kinds.TUPLE_ARITHMETIC(
+                expr.span,
+                f"{where} must be a number, but this is a diffeomorphism's result",
+                label="a tuple of coordinates",
+                help="use it as a condition, `… ? a : b`, or take it apart, `(u, v) = …`",
+            )
+        case ListOf():
+            return kinds.LIST_INSIDE(
+                expr.span,
+                f"{where} must be a number, but this is a list",
+                label="a list",
+                help="go through a list in a script: `for v in list: print(…)`",
+            )
+        case Function():
+            return kinds.ESCAPES(
+                expr.span,
+                f"{where} must be a number, but this is a function",
+                label=f"this is `{format_type(found)}`",
+                help="apply it to arguments",
+            )
+        case Truth():
+            return comparison(expr, f"{where} must be a number")
+        case _:
+            return mismatch(found, REAL, expr, where)
+
+
+def _shadowing(local: Local, before: Local) -> Diagnostic:
+    from potto.diagnostics import Related
+
+    what = {"parameter": "parameter", "variable": "variable of integration"}.get(before.kind, "local name")
+    return kinds.SHADOWED(
+        local.span,
+        f"`{local.name}` hides the {what} of the same name",
+        label="hides it from here on",
+        related=(Related(before.span, f"the {what} `{before.name}` is bound here"),),
+        help="give one of them another name",
+    )
+
+
+def twice_bound(name: str, span: Span) -> Diagnostic:
+    return kinds.DUPLICATE_BINDER(
+        span, f"`{name}` is bound twice here", label="already bound beside it", help="give each its own name"
+    )
+
+
+__all__ = ["RULES", "Inference", "Plan", "comparison", "describe", "ensure_stack", "mismatch", "near_names", "rule"]

@@ -1,0 +1,147 @@
+"""The derivative of abstract values: a pair, value and tangent, at each number.
+
+The tangent of a result varies with all that the result varies with and with the tangents of that; where the result
+jumps, its tangent has deltas. What must be plain is the values alone: a tangent decides nothing.
+"""
+
+from __future__ import annotations
+
+from potto.types.values import (
+    Abstract,
+    Choice,
+    Closure,
+    Effect,
+    ListValue,
+    NoPort,
+    Port,
+    PortFunction,
+    PortTree,
+    PortTuple,
+    Scalar,
+    Sink,
+    Source,
+    Sources,
+    Spike,
+    TupleValue,
+    Value,
+    flat,
+    inputs_of,
+    merge,
+    ports_in,
+)
+
+
+def dual(value: Value) -> Value:
+    """What `deriv` makes of a function."""
+    match value:
+        case Closure():
+            return _Dual({}, {}).closure(value)
+        case Abstract():
+            return _dual_of_input(value)
+        case Choice(options):
+            return Choice(tuple(dual(option) for option in options))
+        case _:
+            return value
+
+
+class _Dual:
+    """One function being derived: the tangents of its inputs and the ports for tangents."""
+
+    def __init__(self, tangents: dict[Source, Source], ports: dict[Port, Port]) -> None:
+        self.tangents, self.ports = tangents, ports
+
+    def closure(self, value: Closure) -> Closure:
+        for source in inputs_of(value.inputs):
+            self.tangents[source] = Source("input", "d" + source.name, source.span)
+        for port in ports_in(value.inputs):
+            self.ports[port] = Port("d" + port.name)
+        inputs = tuple(map(self.input, value.inputs))
+        result = self.closure(value.result) if isinstance(value.result, Closure) else self.result(value.result)
+        return Closure(inputs, result, tuple(e for effect in value.effects for e in self.effect(effect)))
+
+    def input(self, symbol: Value) -> Value:
+        match symbol:
+            case Scalar(sources):
+                tangents: Sources = {self.tangents[source]: None for source in sources}
+                return TupleValue((Scalar(sources), Scalar(tangents)))
+            case TupleValue(items):
+                return TupleValue(tuple(map(self.input, items)))
+            case ListValue(item):
+                return ListValue(self.input(item))
+            case Abstract(ports, result, taint):
+                return Abstract(tuple(map(self.port, ports)), self.input(result), taint)
+            case _:
+                return symbol
+
+    def port(self, tree: PortTree) -> PortTree:
+        match tree:
+            case Port():
+                return PortTuple((tree, self.ports[tree]))
+            case PortTuple(items):
+                return PortTuple(tuple(map(self.port, items)))
+            case PortFunction(inputs, result):
+                return PortFunction(tuple(map(self.input, inputs)), self.port(result))
+            case NoPort():
+                return tree
+
+    def result(self, value: Value) -> Value:
+        match value:
+            case Scalar():
+                return TupleValue((value, self.tangent(value)))
+            case TupleValue(items):
+                return TupleValue(tuple(map(self.result, items)))
+            case ListValue(item):
+                return ListValue(self.result(item))
+            case Closure():
+                return self.closure(value)
+            case Abstract():
+                return _dual_of_input(value)
+            case Choice(options):
+                return Choice(tuple(map(self.result, options)))
+
+    def tangent(self, value: Scalar) -> Scalar:
+        own = {self.tangents[source]: trail for source, trail in value.sources.items() if source in self.tangents}
+        spikes = value.spikes | {Spike(surface, "") for surface in value.jumps}
+        return Scalar(merge(value.sources, own), frozenset(), spikes)
+
+    def effect(self, effect: Effect) -> list[Effect]:
+        """What is passed to a function among the inputs now has a tangent; what must be plain has none."""
+        value = effect.value
+        if isinstance(effect.to, Sink):
+            own = {self.tangents[source]: None for source in flat(value) if source in self.tangents}
+            return [effect, Effect(Sink("integral"), Scalar(own))] if own else [effect]  # D Real = (Real, Real)
+        if effect.to not in self.ports:
+            return [effect]
+        tangent = self.tangent(value) if isinstance(value, Scalar) else value
+        return [effect, Effect(self.ports[effect.to], tangent)]
+
+
+def _dual_of_input(value: Abstract) -> Abstract:
+    """The derivative of a function that is an input itself: it is given duals, and the values go to its ports."""
+    return Abstract(tuple(map(_values_only, value.ports)), _doubled(value.result), value.taint)
+
+
+def _values_only(tree: PortTree) -> PortTree:
+    match tree:
+        case Port():
+            return PortTuple((tree, NoPort()))
+        case PortTuple(items):
+            return PortTuple(tuple(map(_values_only, items)))
+        case PortFunction(inputs, result):
+            return PortFunction(tuple(map(_doubled, inputs)), _values_only(result))
+        case NoPort():
+            return tree
+
+
+def _doubled(value: Value) -> Value:
+    match value:
+        case Scalar(sources):
+            return TupleValue((value, Scalar(sources)))
+        case TupleValue(items):
+            return TupleValue(tuple(map(_doubled, items)))
+        case ListValue(item):
+            return ListValue(_doubled(item))
+        case Abstract():
+            return _dual_of_input(value)
+        case _:
+            return value

@@ -1,0 +1,85 @@
+"""The walk over integrals and sums, and over the statements of scripts."""
+
+from __future__ import annotations
+
+from potto.syntax import nodes
+from potto.types.flow import Walk, walks
+from potto.types.rules import shown_delta
+from potto.types.values import (
+    HAZY,
+    NONE,
+    ListValue,
+    Scalar,
+    Source,
+    Sources,
+    TupleValue,
+    Value,
+    flat,
+    merge,
+    taint,
+    without,
+)
+
+
+@walks(nodes.Integral)
+def _integral(walk: Walk, node: nodes.Integral) -> Value:
+    variables: list[Source] = []
+    bounds: Sources = NONE
+    for place, bound in enumerate(node.bounds):
+        parts = (bound.lo, bound.hi) if isinstance(bound, nodes.Interval) else bound.arguments
+        for part in parts:
+            bounds = merge(bounds, flat(walk.value(part)))
+        if place < len(node.variables):
+            variables.append(_variable(walk, node.variables[place]))
+    for binder in node.variables[len(node.bounds) :]:
+        variables.append(_variable(walk, binder))
+    body = walk.value(node.body)
+    own = frozenset(variables)
+    result = taint(without(body, own), flat(without(Scalar(bounds), own)))
+    walk.sink("integral", node.span, Scalar(flat(result)))
+    return result
+
+
+def _variable(walk: Walk, binder: nodes.Binder) -> Source:
+    local = walk.inference.binders[id(binder)]
+    source = Source("variable", binder.name, binder.span)
+    value = Scalar({source: None})
+    walk.locals[local] = value
+    walk.places[id(binder)] = value
+    return source
+
+
+@walks(nodes.Sum)
+def _sum(walk: Walk, node: nodes.Sum) -> Value:
+    lo, hi = walk.value(node.lo), walk.value(node.hi)
+    walk.sink("sum", node.lo.span, lo)
+    walk.sink("sum", node.hi.span, hi)
+    index = Source("other", node.variable.name, node.variable.span)
+    walk.locals[walk.inference.binders[id(node.variable)]] = Scalar({index: None})
+    body = without(walk.value(node.body), frozenset((index,)))
+    return taint(body, merge(flat(lo), flat(hi)))
+
+
+def walk_statement(walk: Walk, statement: nodes.Statement) -> None:
+    """Walk a statement of a script."""
+    match statement:
+        case nodes.Print(arguments=arguments):
+            for argument in arguments:
+                _shown(walk, argument)
+        case nodes.ExpressionStatement(value=value):
+            _shown(walk, value)
+        case nodes.Binding():
+            walk.bindings((statement,))
+        case nodes.For(variable=variable, iterable=iterable, body=body):
+            items = walk.value(iterable)
+            local = walk.inference.binders[id(variable)]
+            walk.locals[local] = items.item if isinstance(items, ListValue) else HAZY
+            for inner in body:
+                walk_statement(walk, inner)
+
+
+def _shown(walk: Walk, expr: nodes.Expr) -> None:
+    value = walk.value(expr)
+    parts = value.items if isinstance(value, TupleValue) else (value,)
+    if any(isinstance(part, Scalar) and part.spikes for part in parts):
+        walk.report(shown_delta(expr))

@@ -1,0 +1,161 @@
+"""The walk over calls: arguments by plan, builtins, and the special forms `deriv` and `delta`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from potto.primitives import PRIMITIVES
+from potto.syntax import nodes
+from potto.syntax.printer import print_expression
+from potto.types.apply import call
+from potto.types.calls import callee_name
+from potto.types.context import Plan
+from potto.types.dualize import dual
+from potto.types.flow import Walk, walks
+from potto.types.infer import strip
+from potto.types.rules import lone_delta, nonlinear
+from potto.types.scope import Builtin
+from potto.types.types import Parameter, groups_of
+from potto.types.values import (
+    HAZY,
+    STILL,
+    Closure,
+    Effect,
+    Port,
+    Scalar,
+    Sink,
+    Source,
+    Spike,
+    Step,
+    TupleValue,
+    Value,
+    flat,
+    jumps_of,
+    merge,
+    noted,
+)
+
+
+@walks(nodes.Apply)
+def _apply(walk: Walk, node: nodes.Apply) -> Value:
+    meaning = walk.inference.meanings.get(id(strip(node.function)))
+    name = meaning.name if isinstance(meaning, Builtin) else ""
+    if name == "delta":
+        return _delta(walk, node)
+    arguments = [walk.value(argument.value) for argument in node.arguments]
+    if name == "deriv":
+        return dual(arguments[0]) if len(arguments) == 1 else HAZY
+    plan = walk.inference.plans.get(id(node))
+    if plan is None:
+        return HAZY
+    if name in PRIMITIVES:
+        return _builtin(walk, node, name, arguments)
+    function = walk.value(node.function)
+    groups = groups_of(walk.inference.types[id(node.function)])
+    return _Calling(walk, node, plan, groups, arguments).result(function)
+
+
+def _builtin(walk: Walk, node: nodes.Apply, name: str, arguments: Sequence[Value]) -> Value:
+    """A builtin of numbers; one that jumps takes what does not vary."""
+    sources, jumps = STILL.sources, jumps_of(STILL)
+    for argument, value in zip(node.arguments, arguments):
+        sources, jumps = merge(sources, flat(value)), jumps | jumps_of(value)
+        if isinstance(value, Scalar) and value.spikes:
+            walk.report(nonlinear(argument.value, f"take its `{name}`"))
+        if PRIMITIVES[name].plain:
+            walk.sink("jump", argument.value.span, value, node=name)
+    return Scalar(sources, jumps)
+
+
+def builtin_value(name: str) -> Value:
+    """A builtin as a value: passed to a function, or given another name."""
+    if name in ("pi", "inf"):
+        return STILL
+    if name in ("fst", "snd"):
+        parts = [Source("input", "pair"), Source("input", "pair")]
+        pair = TupleValue(tuple(Scalar({part: None}, carriers=frozenset((part,))) for part in parts))
+        return Closure((pair,), pair.items[name == "snd"])
+    primitive = PRIMITIVES.get(name)
+    if primitive is None:
+        return HAZY
+    inputs = [Source("input", "x") for _ in range(primitive.arity or 2)]
+    everything = Scalar(dict.fromkeys(inputs))
+    effects = (Effect(Sink("jump", node=name), everything),) if primitive.plain else ()
+    return Closure(tuple(Scalar({source: None}) for source in inputs), everything, effects)
+
+
+def _delta(walk: Walk, node: nodes.Apply) -> Value:
+    """A delta of a diffeomorphism: a spike over all that its first component varies with."""
+    values = [walk.value(argument.value) for argument in node.arguments]
+    if not values:
+        return HAZY
+    first = values[0]
+    if isinstance(first, TupleValue) and first.items:
+        first = first.items[0]
+    over = frozenset(source for source in flat(first))
+    if not over:
+        walk.report(lone_delta(node))
+        return HAZY
+    key = print_expression(node.arguments[0].value)
+    return Scalar(flat(TupleValue(tuple(values))), frozenset(), frozenset((Spike(over, key),)))
+
+
+class _Calling:
+    """One call whose plan is known."""
+
+    def __init__(
+        self,
+        walk: Walk,
+        node: nodes.Apply,
+        plan: Plan,
+        groups: tuple[tuple[Parameter, ...], ...],
+        arguments: list[Value],
+    ) -> None:
+        self.walk, self.node, self.plan, self.groups, self.arguments = walk, node, plan, groups, arguments
+
+    def result(self, function: Value) -> Value:
+        """What the call gives; what happens on the way is looked at."""
+        value, effects = self._groups(function, 0)
+        self.walk.emit(effects, self.node.function.span)
+        return value
+
+    def _groups(self, function: Value, number: int) -> tuple[Value, list[Effect]]:
+        """Give the groups from `number` on their arguments; one that gets none stays open."""
+        if number == len(self.plan.groups):
+            return function, []
+        slots = self.plan.groups[number]
+        if slots is None:
+            if not isinstance(function, Closure) or all(group is None for group in self.plan.groups[number:]):
+                return function, []
+            inner, effects = self._groups(function.result, number + 1)
+            return Closure(function.inputs, inner, (*function.effects, *effects)), []
+        values, notes = self._arguments(slots, number)
+        value, effects = call(function, values, notes)
+        further, more = self._groups(value, number + 1)
+        return further, effects + more
+
+    def _arguments(self, slots: tuple[tuple[int, ...], ...], number: int) -> tuple[list[Value], list[Step | None]]:
+        if self.plan.spread and number == 0:
+            place = slots[0][0]
+            whole = self.arguments[place]
+            if isinstance(whole, TupleValue) and len(whole.items) == len(slots):
+                return self._noted(list(whole.items), [place] * len(slots), number)
+            return self._noted([whole] * len(slots), [place] * len(slots), number)
+        values = [
+            self.arguments[slot[0]] if len(slot) == 1 else TupleValue(tuple(self.arguments[place] for place in slot))
+            for slot in slots
+        ]
+        return self._noted(values, [slot[0] for slot in slots], number)
+
+    def _noted(self, values: list[Value], places: list[int], number: int) -> tuple[list[Value], list[Step | None]]:
+        """With each argument, the step that giving it is."""
+        names = [p.name for p in self.groups[number]] if number < len(self.groups) else []
+        notes: list[Step | None] = []
+        for index, place in enumerate(places):
+            name = names[index] if index < len(names) else None
+            passed = f"passed as `{name}` here" if name else f"passed to {callee_name(self.node)} here"
+            notes.append(Step(self.node.arguments[place].value.span, passed, argument=True))
+        return values, notes
+
+
+__all__ = ["Port", "builtin_value", "noted"]

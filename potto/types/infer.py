@@ -1,0 +1,440 @@
+"""The type of each kind of expression: names, arithmetic, conditions, functions, local names.
+
+Types only: which variables a value depends on is the business of `flow`, which walks the same tree once the types are
+known. Calls are in `calls`, binders of numbers (integrals, sums) in `integrals`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from potto.diagnostics import Diagnostic
+from potto.primitives import PRIMITIVES
+from potto.syntax import nodes
+from potto.types import kinds
+from potto.types.annotations import written_type
+from potto.types.context import Inference, comparison, describe, mismatch, rule
+from potto.types.scope import Builtin, Global, Local, Meaning, Member, Module, undefined, undefined_member
+from potto.types.types import (
+    REAL,
+    TRUTH,
+    UNKNOWN,
+    Diffeo,
+    Dist,
+    Function,
+    ListOf,
+    Meta,
+    Parameter,
+    Real,
+    Truth,
+    TupleOf,
+    Type,
+    Unknown,
+    resolve,
+)
+from potto.types.unify import MAX_LEAVES, free_metas, instantiate, leaves, open_type, unify
+
+
+@rule(nodes.Number)
+def _number(inference: Inference, node: nodes.Number) -> Type:
+    return REAL
+
+
+@rule(nodes.ErrorExpr)
+def _error(inference: Inference, node: nodes.ErrorExpr) -> Type:
+    return UNKNOWN
+
+
+@rule(nodes.Paren)
+def _paren(inference: Inference, node: nodes.Paren) -> Type:
+    return inference.infer(strip(node))
+
+
+def strip(expr: nodes.Expr) -> nodes.Expr:
+    """An expression without the parentheses around it."""
+    while isinstance(expr, nodes.Paren):
+        expr = expr.inner
+    return expr
+
+
+# Names
+
+
+@rule(nodes.Name)
+def _name(inference: Inference, node: nodes.Name) -> Type:
+    meaning = inference.scope.find(node.id) or inference.outside.find(None, node.id)
+    if meaning is None:
+        inference.report(undefined(inference.outside, inference.scope, node))
+        return UNKNOWN
+    inference.meanings[id(node)] = meaning
+    return _meant(inference, node, meaning)
+
+
+@rule(nodes.Member)
+def _member(inference: Inference, node: nodes.Member) -> Type:
+    hidden = inference.scope.find(node.path.partition(".")[0]) is not None
+    meaning = None if hidden else inference.outside.find(node.path, node.name)
+    if meaning is None:
+        inference.report(undefined_member(inference.outside, inference.scope, node))
+        return UNKNOWN
+    inference.meanings[id(node)] = meaning
+    return _meant(inference, node, meaning)
+
+
+def _meant(inference: Inference, node: nodes.Name | nodes.Member, meaning: Meaning) -> Type:
+    match meaning:
+        case Local():
+            meaning.used = True
+            return instantiate(meaning.type, meaning.generic, inference.level)
+        case Global(_, interface):
+            return open_type(interface.type, inference.level)
+        case Member(target):
+            return inference.members[target]
+        case Module(name):
+            message = f"`{name}` is a module, not a value"
+            inference.report(kinds.MISMATCH(node.span, message, label="a module", help=f"write `{name}.something`"))
+            return UNKNOWN
+        case Builtin(name):
+            return _builtin(inference, node, name)
+
+
+def _builtin(inference: Inference, node: nodes.Name | nodes.Member, name: str) -> Type:
+    if name in ("pi", "inf"):
+        return REAL
+    if name in ("fst", "snd"):
+        pair = (inference.fresh(), inference.fresh())
+        return Function((Parameter(None, TupleOf(pair)),), pair[name == "snd"])
+    if name in ("deriv", "delta"):
+        what = "a function, `deriv(f)`" if name == "deriv" else "a diffeomorphism's result, `delta(x - t)`"
+        inference.report(
+            kinds.SPECIAL(
+                node.span,
+                f"`{name}` is not a function that can be passed on: it is applied to {what}",
+                label="not applied",
+                help=f"apply it here: `{name}(…)`",
+            )
+        )
+        return UNKNOWN
+    primitive = PRIMITIVES[name]
+    return Function(tuple(Parameter(None, REAL) for _ in range(primitive.arity or 2)), REAL)
+
+
+# Arithmetic
+
+
+@rule(nodes.Unary)
+def _unary(inference: Inference, node: nodes.Unary) -> Type:
+    if node.op == "not":
+        _truth(inference, node.operand, "`not`")
+        return TRUTH
+    inference.number(node.operand, f"what stands behind `{node.op}`")
+    return REAL
+
+
+@rule(nodes.Chain)
+def _chain(inference: Inference, node: nodes.Chain) -> Type:
+    inference.number(node.first, f"the left of `{node.rest[0].op}`")
+    for operand in node.rest:
+        inference.number(operand.value, f"the right of `{operand.op}`")
+    return REAL
+
+
+@rule(nodes.Power)
+def _power(inference: Inference, node: nodes.Power) -> Type:
+    inference.number(node.base, "the left of `^`")
+    inference.number(node.exponent, "the right of `^`")
+    return REAL
+
+
+# Conditions
+
+
+@rule(nodes.Compare)
+def _compare(inference: Inference, node: nodes.Compare) -> Type:
+    inference.number(node.first, f"the left of `{node.rest[0].op}`")
+    for operand in node.rest:
+        inference.number(operand.value, f"the right of `{operand.op}`")
+    return TRUTH
+
+
+@rule(nodes.Logic)
+def _logic(inference: Inference, node: nodes.Logic) -> Type:
+    for operand in node.operands:
+        _truth(inference, operand, f"`{node.op}`")
+    return TRUTH
+
+
+@rule(nodes.Bracket)
+def _bracket(inference: Inference, node: nodes.Bracket) -> Type:
+    _truth(inference, node.condition, "the bracket")
+    return REAL
+
+
+def _truth(inference: Inference, expr: nodes.Expr, where: str) -> None:
+    found = resolve(inference.infer(expr))
+    if isinstance(found, Truth | Unknown):
+        return
+    bracket = isinstance(strip(expr), nodes.Bracket | nodes.ListLiteral)
+    inference.report(
+        kinds.NOT_A_CONDITION(
+            expr.span,
+            f"{where} needs a comparison, but this is {describe(found)}",
+            label="1 or 0, a number" if bracket else "not a comparison",
+            help="put the brackets around all of it: `[p and q]`" if bracket else "compare it: `… > 0`",
+        )
+    )
+
+
+@rule(nodes.If)
+def _if(inference: Inference, node: nodes.If) -> Type:
+    _condition(inference, node)
+    then, orelse = inference.infer(node.then), inference.infer(node.orelse)
+    if not unify(then, orelse):
+        inference.report(mismatch(orelse, then, node.orelse, "both branches must be of one type: the second one"))
+    for branch, type in ((node.then, then), (node.orelse, orelse)):
+        value_only(inference, type, branch, "a conditional chooses between numbers")
+    return UNKNOWN if isinstance(resolve(then), Function | Truth) else then
+
+
+def _condition(inference: Inference, node: nodes.If) -> None:
+    """Infer a condition and find out of which kind it is."""
+    expr = strip(node.condition)
+    found = resolve(inference.infer(node.condition))
+    kind = "plain"
+    if isinstance(found, Meta):
+        unify(found, Diffeo(None))
+    if is_bracket(inference, expr):
+        kind = "bracket"
+    elif isinstance(found, Diffeo | Meta) or (isinstance(found, TupleOf) and not isinstance(expr, nodes.Tuple) and unify(found, Diffeo(len(found.items)))):
+        kind = "diffeo"
+    elif not isinstance(found, Truth | Unknown):
+        inference.report(_no_condition(found, node.condition))
+    inference.conditions[id(node)] = kind  # type: ignore[assignment]
+
+
+def is_bracket(inference: Inference, expr: nodes.Expr) -> bool:
+    """Whether an expression is an Iverson bracket, or a local name for one."""
+    for _ in range(len(inference.locals) + 1):
+        expr = strip(expr)
+        if isinstance(expr, nodes.Bracket) or id(expr) in inference.brackets:
+            return True
+        meaning = inference.meanings.get(id(expr))
+        if not isinstance(meaning, Local) or meaning.kind != "local" or meaning.value is None:
+            return False
+        expr = meaning.value
+    return False
+
+
+def _no_condition(found: Type, expr: nodes.Expr) -> Diagnostic:
+    if isinstance(found, TupleOf):
+        help = "write `diffeo(…)` for a diffeomorphism that is stated in place"
+    elif isinstance(found, Function):
+        help = "apply it: `if cond (x, y) c then …`"
+    else:
+        help = "compare it, `… > 0`, or in brackets where variables of integration take part, `[… > 0]`"
+    return kinds.NOT_A_CONDITION(
+        expr.span,
+        f"a condition is a comparison or a diffeomorphism's result, but this is {describe(found)}",
+        label="not a condition",
+        help=help,
+    )
+
+
+@rule(nodes.InlineDiffeo)
+def _inline(inference: Inference, node: nodes.InlineDiffeo) -> Type:
+    for component in node.components:
+        inference.number(component, "a coordinate of a diffeomorphism")
+    return Diffeo(None if len(node.components) == 1 else len(node.components))
+
+
+# Composites
+
+
+@rule(nodes.Tuple)
+def _tuple(inference: Inference, node: nodes.Tuple) -> Type:
+    items = tuple(inference.infer(item) for item in node.items)
+    if sum(leaves(item) for item in items) > MAX_LEAVES:
+        message = f"this tuple is made of more than {MAX_LEAVES} numbers"
+        inference.report(kinds.TOO_LARGE(node.span, message, label="too large", help="use an integral or a sum"))
+        return UNKNOWN
+    for item, type in zip(node.items, items):
+        value_only(inference, type, item, "a tuple holds numbers")
+    return TupleOf(items)
+
+
+@rule(nodes.ListLiteral)
+def _list(inference: Inference, node: nodes.ListLiteral) -> Type:
+    types = [inference.infer(item) for item in node.items]
+    if len(types) == 1 and isinstance(resolve(types[0]), Truth):
+        inference.brackets.add(id(node))  # `[p]` with a local name p for a comparison
+        return REAL
+    item: Type = inference.fresh()
+    for expr, type in zip(node.items, types):
+        if isinstance(resolve(type), Truth):
+            inference.report(comparison(expr, "a list holds numbers, tuples or functions"))
+        elif not unify(item, type):
+            inference.report(mismatch(type, item, expr, "all items of a list must be of one type: this one"))
+    if inference.integrals:
+        inference.report(
+            kinds.LIST_INSIDE(
+                node.span,
+                "a list cannot stand under an integral",
+                label="inside the integral",
+                help="use a tuple, `(a, b)`, or for a condition the comparison in brackets, `[x < t]`",
+            )
+        )
+        return UNKNOWN
+    return ListOf(item)
+
+
+def value_only(inference: Inference, type: Type, expr: nodes.Expr, what: str) -> None:
+    """Check, now or when the type is known, that this is no function and no comparison."""
+    if isinstance(resolve(type), Truth):
+        inference.report(comparison(expr, what))
+    elif not isinstance(resolve(type), Real):
+        inference.later(lambda: _no_function(inference, type, expr, what))
+
+
+def _no_function(inference: Inference, type: Type, expr: nodes.Expr, what: str) -> None:
+    if isinstance(resolve(type), Function):
+        inference.report(escape(expr, f"{what}, not functions"))
+
+
+def escape(expr: nodes.Expr, message: str) -> Diagnostic:
+    """A function stands where it cannot."""
+    return kinds.ESCAPES(
+        expr.span,
+        message,
+        label="this is a function",
+        help="apply it to arguments here; functions are passed as arguments and made by currying, `\\x . \\y . …`",
+    )
+
+
+# Functions and local names
+
+
+@rule(nodes.Lambda)
+def _lambda(inference: Inference, node: nodes.Lambda) -> Type:
+    with inference.scope.inside():
+        groups = [inference.bind_group(group, lambda a: written_type(inference, a)) for group in node.groups]
+        result = inference.infer(node.body)
+    returned(inference, result, node.body)
+    for group in reversed(groups):
+        result = Function(tuple(Parameter(local.name, local.type) for local in group), result)
+    return result
+
+
+def returned(inference: Inference, result: Type, body: nodes.Expr) -> None:
+    """Check what a function gives: no comparison, and a function only by currying."""
+    if isinstance(resolve(result), Truth):
+        inference.report(comparison(body, "a function gives a number"))
+    elif not isinstance(resolve(result), Real):
+        inference.later(lambda: _returned_late(inference, result, body))
+
+
+def _returned_late(inference: Inference, result: Type, body: nodes.Expr) -> None:
+    if isinstance(resolve(result), Function) and not _curries(inference, body):
+        inference.report(escape(body, "a function cannot be the result of a function"))
+
+
+def _curries(inference: Inference, body: nodes.Expr) -> bool:
+    """Whether a function as a result is only one more group of parameters."""
+    body = strip(body)
+    while isinstance(body, nodes.Let):
+        body = strip(body.body)
+    match body:
+        case nodes.Name():
+            meaning = inference.meanings.get(id(body))
+            return not (isinstance(meaning, Local) and meaning.kind != "local")
+        case nodes.If() | nodes.Tuple() | nodes.ListLiteral():
+            return True  # reported where it chooses between functions
+        case _:
+            return True
+
+
+@rule(nodes.Let)
+def _let(inference: Inference, node: nodes.Let) -> Type:
+    with inference.scope.inside():
+        bindings(inference, node.bindings)
+        return inference.infer(node.body)
+
+
+def bindings(inference: Inference, block: Sequence[nodes.Binding]) -> None:
+    """Bring the names of a block into scope, one after the other."""
+    for binding in block:
+        inference.level += 1
+        type = inference.infer(binding.value)
+        inference.level -= 1
+        if len(binding.targets) == 1:
+            _bind_one(inference, binding, type)
+        else:
+            _bind_parts(inference, binding, type)
+
+
+def _bind_one(inference: Inference, binding: nodes.Binding, type: Type) -> None:
+    target, found = binding.targets[0], resolve(type)
+    generic = free_metas(found, inference.level) if isinstance(found, Function) else ()
+    if not generic:
+        unify_levels(found, inference.level)
+    known = isinstance(found, Function) and is_known(inference, binding.value)
+    local = Local(target.name, target.span, "local", found, generic, known, binding.value)
+    inference.bind(target, local)
+
+
+def unify_levels(type: Type, level: int) -> None:
+    """What a binding found out is not to be generalised by another one further in."""
+    for meta in free_metas(type, level):
+        meta.level = level
+
+
+def _bind_parts(inference: Inference, binding: nodes.Binding, type: Type) -> None:
+    parts = tuple(inference.fresh() for _ in binding.targets)
+    if not unify(type, TupleOf(parts)):
+        found = resolve(type)
+        count = len(found.items) if isinstance(found, TupleOf) else None
+        message = f"{len(parts)} names are bound here, but this is {describe(found)}"
+        help = "" if count is None else f"bind {count} names"
+        inference.report(kinds.MISMATCH(binding.value.span, message, label=describe(found), help=help))
+    seen: set[str] = set()
+    for target, part in zip(binding.targets, parts):
+        if target.name in seen:
+            from potto.types.context import twice_bound
+
+            inference.report(twice_bound(target.name, target.span))
+        seen.add(target.name)
+        inference.bind(target, Local(target.name, target.span, "local", part))
+
+
+def is_known(inference: Inference, expr: nodes.Expr) -> bool:
+    """Whether it is known which function this is, so that its parameters have names."""
+    while True:
+        match expr:
+            case nodes.Paren(inner=expr) | nodes.Let(body=expr):
+                continue
+            case nodes.Apply(function=function):
+                expr = deriv_argument(inference, expr) or function
+            case nodes.Name() | nodes.Member():
+                meaning = inference.meanings.get(id(expr))
+                return meaning.known if isinstance(meaning, Local) else meaning is not None
+            case nodes.Lambda():
+                return True
+            case _:
+                return False
+
+
+def special(inference: Inference, expr: nodes.Expr) -> str | None:
+    """`deriv` or `delta` if that is what a function's name means here."""
+    expr = strip(expr)
+    if not isinstance(expr, nodes.Name) or expr.id not in ("deriv", "delta") or inference.scope.find(expr.id):
+        return None
+    return expr.id if isinstance(inference.outside.find(None, expr.id), Builtin) else None
+
+
+def deriv_argument(inference: Inference, node: nodes.Apply) -> nodes.Expr | None:
+    """The function that is derived, if this is `deriv(f)`."""
+    if special(inference, node.function) != "deriv" or len(node.arguments) != 1:
+        return None
+    return node.arguments[0].value
+
+
+__all__ = ["Dist", "bindings", "is_known", "returned"]

@@ -1,0 +1,199 @@
+"""Binders of numbers: integrals, sums, and the statements of scripts.
+
+Owns the scoping of bounds: the first variable is the outermost, a bound sees the variables before its own, a measure
+names its variable itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from potto.diagnostics import Diagnostic
+from potto.measures import MEASURES
+from potto.syntax import nodes
+from potto.types import kinds
+from potto.types.context import Inference, comparison, describe, near_names, rule, twice_bound
+from potto.types.infer import bindings, escape
+from potto.types.scope import Local
+from potto.types.types import REAL, Dist, Function, ListOf, Meta, Real, Truth, TupleOf, Type, Unknown, resolve
+from potto.types.unify import unify
+
+
+@rule(nodes.Integral)
+def _integral(inference: Inference, node: nodes.Integral) -> Type:
+    _matching(inference, node)
+    with inference.scope.inside():
+        for place, bounds in enumerate(node.bounds):
+            _bounds(inference, node, place, bounds)
+        for variable in node.variables[len(node.bounds) :]:
+            inference.local(variable, variable.name, variable.span, "variable", REAL)
+        inference.integrals += 1
+        body = inference.infer(node.body)
+        inference.integrals -= 1
+    _summed(inference, body, node.body, "the integrand")
+    return body
+
+
+def _bounds(inference: Inference, node: nodes.Integral, place: int, bounds: nodes.Interval | nodes.MeasureBound) -> None:
+    later = [variable.name for variable in node.variables[place:]]
+    inside = [name for name in later if not (inference.scope.find(name) or inference.outside.find(None, name))]
+    parts = (bounds.lo, bounds.hi) if isinstance(bounds, nodes.Interval) else bounds.arguments
+    for part in parts:
+        inner = _inner_name(part, inside)
+        if inner is not None:
+            inference.report(_inner_bound(inner, node))
+            continue
+        what = "a bound of an integral" if isinstance(bounds, nodes.Interval) else f"a parameter of `{bounds.measure}`"
+        inference.number(part, what)
+    if isinstance(bounds, nodes.MeasureBound):
+        _measure(inference, bounds)
+    if place < len(node.variables):
+        variable = node.variables[place]
+        if variable.name in [earlier.name for earlier in node.variables[:place]]:
+            inference.report(twice_bound(variable.name, variable.span))
+        inference.local(variable, variable.name, variable.span, "variable", REAL)
+
+
+def _inner_name(part: nodes.Expr, inside: Sequence[str]) -> nodes.Name | None:
+    """The first use of a variable that is bound only further in."""
+    from potto.modules.free import free_references
+
+    for reference in free_references(part):
+        if isinstance(reference, nodes.Name) and reference.id in inside:
+            return reference
+    return None
+
+
+def _inner_bound(name: nodes.Name, node: nodes.Integral) -> Diagnostic:
+    order = ", ".join(variable.name for variable in node.variables)
+    return kinds.INNER_BOUND(
+        name.span,
+        f"this bound depends on `{name.id}`, which is bound further in",
+        label="not known here",
+        notes=(f"in `d({order})` the first variable is the outermost; a bound sees only the variables before its own",),
+        help="change the order of the bounds and variables, or give the outer name another name",
+    )
+
+
+def _matching(inference: Inference, node: nodes.Integral) -> None:
+    """Check that there are as many bounds as variables, and that measures name theirs in the same order."""
+    bounds, variables = len(node.bounds), len(node.variables)
+    if bounds != variables:
+        has = f"{bounds} bound{'s' if bounds != 1 else ''} but {variables} variable{'s' if variables != 1 else ''}"
+        inference.report(
+            kinds.BOUNDS(
+                node.variables[-1].span if node.variables else node.span,
+                f"this integral has {has} of integration",
+                label="one interval for each variable",
+                help="write for example `integral ([0, 1], [0, 1]) … d(x, y)`",
+            )
+        )
+    for bound, variable in zip(node.bounds, node.variables):
+        if isinstance(bound, nodes.MeasureBound) and bound.variable != variable.name:
+            inference.report(
+                kinds.BOUNDS(
+                    bound.variable_span,
+                    f"`{bound.variable}` stands where the integral is over `{variable.name}`",
+                    label=f"not `{variable.name}`",
+                    help="list the variables after `d` in the order of their bounds",
+                )
+            )
+
+
+def _measure(inference: Inference, bounds: nodes.MeasureBound) -> None:
+    """Check that a measure exists and has all its parameters."""
+    measure = MEASURES.get(bounds.measure)
+    if measure is None:
+        near = near_names(bounds.measure, MEASURES)
+        help = "did you mean " + " or ".join(f"`{name}`" for name in near) + "?" if near else ""
+        message = f"there is no measure `{bounds.measure}`"
+        known = f"the measures are {', '.join(f'`{name}`' for name in MEASURES)}"
+        inference.report(kinds.MEASURE(bounds.measure_span, message, label="not a measure", help=help or known))
+        return
+    wanted, given = len(measure.parameters), len(bounds.arguments)
+    if wanted != given:
+        names = ", ".join(measure.parameters)
+        plural = "s" if wanted != 1 else ""
+        message = f"`{bounds.measure}` takes {wanted} parameter{plural}, but is given {given}"
+        help = f"write `{bounds.variable} ~ {bounds.measure}({names})`"
+        inference.report(kinds.MEASURE(bounds.measure_span, message, label=f"{given} given", help=help))
+
+
+@rule(nodes.Sum)
+def _sum(inference: Inference, node: nodes.Sum) -> Type:
+    inference.number(node.lo, "the first value of a sum")
+    inference.number(node.hi, "the last value of a sum")
+    with inference.scope.inside():
+        inference.local(node.variable, node.variable.name, node.variable.span, "index", REAL)
+        body = inference.infer(node.body)
+    _summed(inference, body, node.body, "what is summed")
+    return body
+
+
+def _summed(inference: Inference, type: Type, expr: nodes.Expr, what: str) -> None:
+    """What is integrated or summed is a number or a tuple of such."""
+    found = resolve(type)
+    if isinstance(found, Truth):
+        inference.report(comparison(expr, f"{what} must be a number"))
+    elif isinstance(found, Meta):
+        inference.later(lambda: _summed_late(inference, found, expr, what))
+    else:
+        _summed_late(inference, found, expr, what)
+
+
+def _summed_late(inference: Inference, type: Type, expr: nodes.Expr, what: str) -> None:
+    found = resolve(type)
+    if isinstance(found, Meta):
+        unify(found, REAL)
+    elif isinstance(found, Function):
+        inference.report(escape(expr, f"{what} must be a number, but this is a function"))
+    elif isinstance(found, TupleOf):
+        for item in found.items:
+            _summed_late(inference, item, expr, what)
+    elif not isinstance(found, Real | Dist | Unknown):
+        inference.report(
+            kinds.LIST_INSIDE(
+                expr.span,
+                f"{what} must be a number, but this is {describe(found)}",
+                label=describe(found),
+                help="take it apart first" if not isinstance(found, ListOf) else "a list has no integral",
+            )
+        )
+
+
+# Scripts
+
+
+def statement(inference: Inference, node: nodes.Statement) -> None:
+    """Infer a statement of a script."""
+    match node:
+        case nodes.Print(arguments=arguments):
+            for argument in arguments:
+                _shown(inference, inference.infer(argument), argument)
+        case nodes.ExpressionStatement(value=value):
+            _shown(inference, inference.infer(value), value)
+        case nodes.Binding():
+            bindings(inference, (node,))
+        case nodes.For():
+            _for(inference, node)
+
+
+def _shown(inference: Inference, type: Type, expr: nodes.Expr) -> None:
+    if isinstance(resolve(type), Truth):
+        inference.report(comparison(expr, "what is shown is a number, a tuple, a list or a function"))
+
+
+def _for(inference: Inference, node: nodes.For) -> None:
+    item: Type = inference.fresh()
+    iterable = inference.infer(node.iterable)
+    if not unify(iterable, ListOf(item)):
+        found = resolve(iterable)
+        message = f"`for` goes through a list, but this is {describe(found)}"
+        help = "put the items in a list: `for v in [a, b]:`"
+        inference.report(kinds.MISMATCH(node.iterable.span, message, label=describe(found), help=help))
+        item = Unknown()
+    with inference.scope.inside():
+        variable = node.variable
+        inference.bind(variable, Local(variable.name, variable.span, "loop", item))
+        for inner in node.body:
+            statement(inference, inner)

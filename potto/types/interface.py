@@ -1,0 +1,320 @@
+"""What others read of a definition: its type and its flow, and nothing that a body edit moves.
+
+Owns `Interface` and its closing: sources, ports and sinks are replaced by interned ones with numbers, ways are dropped,
+so that an edit which changes neither type nor dependence gives an equal interface. Why a parameter must be plain is a
+question of its own (`queries.plain_reasons`), asked only when a message is built.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
+
+from potto.modules.lookup import DefinitionTarget
+from potto.types.types import (
+    UNKNOWN,
+    Diffeo,
+    Dist,
+    Function,
+    ListOf,
+    Parameter,
+    Real,
+    TupleOf,
+    Type,
+    groups_of,
+    result_of,
+)
+from potto.types.values import (
+    HAZY,
+    NONE,
+    Abstract,
+    Choice,
+    Closure,
+    Effect,
+    ListValue,
+    NoPort,
+    Port,
+    PortFunction,
+    PortTree,
+    PortTuple,
+    Scalar,
+    Sink,
+    SinkKind,
+    Source,
+    Spike,
+    Surface,
+    TupleValue,
+    Value,
+    flat,
+    inputs_of,
+    ports_in,
+)
+
+PLAIN_KINDS: tuple[SinkKind, ...] = ("condition", "jump", "sum", "equality", "declared")
+
+
+@dataclass(frozen=True, slots=True)
+class Interface:
+    """A definition as others see it.
+
+    `plain`: the names of the parameters that must not vary. `varies`: those that the result varies with. `flow` is for
+    the checker: what goes where. `diffeo`: declared a diffeomorphism.
+    """
+
+    name: str
+    type: Type
+    flow: Value = field(default=HAZY, hash=False, repr=False)
+    plain: tuple[str, ...] = ()
+    varies: tuple[str, ...] = ()
+    diffeo: bool = False
+
+    @property
+    def groups(self) -> tuple[tuple[str | None, ...], ...]:
+        """The names of the parameters, group by group; None where they have no names."""
+        return tuple(tuple(parameter.name for parameter in group) for group in groups_of(self.type))
+
+    @property
+    def result(self) -> Type:
+        """What the definition gives when it has all its arguments; of a value, its type."""
+        return result_of(self.type)
+
+
+def unknown_interface(name: str) -> Interface:
+    """The interface of what is broken beyond reading: fits everywhere."""
+    return Interface(name, UNKNOWN)
+
+
+@cache
+def _source(number: int) -> Source:
+    return Source("input", f"#{number}", number=number)
+
+
+@cache
+def _port(number: int) -> Port:
+    return Port(f"#{number}", number=number)
+
+
+@cache
+def _sink(kind: SinkKind, number: int) -> Sink:
+    return Sink(kind, number=number)
+
+
+VARYING = Source("variable", "", number=-2)
+
+
+def chain_of(value: Value) -> list[Closure]:
+    """The groups of a function that is known."""
+    found: list[Closure] = []
+    while isinstance(value, Closure):
+        found.append(value)
+        value = value.result
+    return found
+
+
+class Closing:
+    """Numbers the inputs and ports of a flow, and rewrites it with the interned ones."""
+
+    def __init__(self, value: Value) -> None:
+        inputs = [symbol for closure in chain_of(value) for symbol in closure.inputs]
+        self.sources: dict[Source, Source] = {s: _source(n) for n, s in enumerate(inputs_of(inputs))}
+        self.ports: dict[Port, Port] = {p: _port(n) for n, p in enumerate(ports_in(inputs))}
+        self._trees: dict[int, tuple[PortTree, ...]] = {}
+
+    def value(self, value: Value) -> Value:
+        match value:
+            case Scalar():
+                return self._scalar(value)
+            case TupleValue(items):
+                return TupleValue(tuple(map(self.value, items)))
+            case ListValue(item):
+                return ListValue(self.value(item))
+            case Closure(inputs, result, effects):
+                own = {**self.sources, **{s: s for s in inputs_of(inputs) if s not in self.sources}}
+                self.sources = own
+                return Closure(tuple(map(self.value, inputs)), self.value(result), self._effects(effects))
+            case Abstract(ports, result, taint):
+                trees = tuple(map(self._tree, ports))
+                trees = self._trees.setdefault(id(ports), trees)  # the identity of ports is that of the function
+                known = {self.sources[source]: None for source in taint if source in self.sources}
+                return Abstract(trees, self.value(result), known)
+            case Choice(options):
+                return Choice(tuple(map(self.value, options)))
+
+    def _scalar(self, value: Scalar, variables: bool = False) -> Scalar:
+        numbered = sorted((self.sources[s] for s in value.sources if s in self.sources), key=lambda s: s.number)
+        sources = dict.fromkeys(numbered)
+        if variables and any(source.kind == "variable" for source in value.sources):
+            sources[VARYING] = None
+        jumps = frozenset(filter(None, map(self._surface, value.jumps)))
+        spikes = frozenset(Spike(over, "") for spike in value.spikes if (over := self._surface(spike.over)))
+        carriers = frozenset(self.sources[s] for s in value.carriers if s in self.sources)
+        return Scalar(sources or NONE, jumps, spikes, carriers)
+
+    def _surface(self, surface: Surface) -> Surface:
+        return frozenset(self.sources[source] for source in surface if source in self.sources)
+
+    def _effects(self, effects: Sequence[Effect]) -> tuple[Effect, ...]:
+        """One effect for each kind of sink and source, and one for each port, in the order of numbers."""
+        sinks: dict[tuple[SinkKind, int], Effect] = {}
+        ports: dict[int, Effect] = {}
+        for effect in effects:
+            if isinstance(effect.to, Sink):
+                for source in flat(effect.value):
+                    if source in self.sources:
+                        own = self.sources[source]
+                        key = (effect.to.kind, own.number)
+                        sinks[key] = Effect(_sink(*key), Scalar({own: None}))
+            else:
+                port = self.ports.get(effect.to)
+                if port is not None:
+                    value = self._payload(effect.value)
+                    before = ports.get(port.number)
+                    ports[port.number] = Effect(port, value if before is None else _both(before.value, value))
+        return (*(sinks[key] for key in sorted(sinks)), *(ports[number] for number in sorted(ports)))
+
+    def _payload(self, value: Value) -> Value:
+        return self._scalar(value, variables=True) if isinstance(value, Scalar) else self.value(value)
+
+    def _tree(self, tree: PortTree) -> PortTree:
+        match tree:
+            case Port():
+                return self.ports.get(tree, tree)
+            case PortTuple(items):
+                return PortTuple(tuple(map(self._tree, items)))
+            case PortFunction(inputs, result):
+                return PortFunction(tuple(map(self.value, inputs)), self._tree(result))
+            case NoPort():
+                return tree
+
+
+def _both(a: Value, b: Value) -> Value:
+    from potto.types.values import join
+
+    both = join(a, b)
+    if isinstance(both, Scalar):
+        return replace(both, sources=dict(sorted(both.sources.items(), key=lambda item: item[0].number)))
+    return both
+
+
+# Another definition's flow, in the one that uses it
+
+
+def localized(value: Value, target: DefinitionTarget) -> Value:
+    """An interface's flow with its sinks and its variables of integration marked as those of `target`."""
+    match value:
+        case Closure(inputs, result, effects):
+            moved = tuple(_localized_effect(effect, target) for effect in effects)
+            return Closure(inputs, localized(result, target), moved)
+        case Choice(options):
+            return Choice(tuple(localized(option, target) for option in options))
+        case ListValue(item):
+            return ListValue(localized(item, target))
+        case _:
+            return value
+
+
+def _localized_effect(effect: Effect, target: DefinitionTarget) -> Effect:
+    if isinstance(effect.to, Sink):
+        if effect.to.origin is not None:
+            return effect
+        return Effect(Sink(effect.to.kind, number=effect.to.number, origin=target), effect.value)
+    value = effect.value
+    if isinstance(value, Scalar) and VARYING in value.sources:
+        theirs = Source("variable", "", number=effect.to.number, origin=target)
+        sources = {theirs if source is VARYING else source: trail for source, trail in value.sources.items()}
+        return Effect(effect.to, replace(value, sources=sources))
+    return effect
+
+
+# The type as it is printed
+
+
+class Decorating:
+    """Puts into a type what the flow says of variation: `Real*`, `Dist`, where a result jumps."""
+
+    def __init__(self, value: Value) -> None:
+        closures = chain_of(value)
+        effects = [effect for closure in closures for effect in closure.effects]
+        self.settled = {s for e in effects if isinstance(e.to, Sink) for s in flat(e.value)}
+        self.plain = {
+            s for e in effects if isinstance(e.to, Sink) and e.to.kind in PLAIN_KINDS for s in flat(e.value)
+        }
+        self.given: dict[Port, set[Source]] = {}
+        for effect in effects:
+            if isinstance(effect.to, Port):
+                self.given.setdefault(effect.to, set()).update(flat(effect.value))
+        self.inputs = set(inputs_of([symbol for closure in closures for symbol in closure.inputs]))
+        self.names: dict[Source, str] = {}
+
+    def type(self, type: Type, value: Value) -> Type:
+        if isinstance(type, Function) and isinstance(value, Choice):
+            value = value.options[0]
+        match type, value:
+            case Function(group, result), Closure(inputs, answer):
+                regrouped = inputs if len(inputs) == len(group) else ()
+                for parameter, symbol in zip(group, regrouped):
+                    self.names.update((source, parameter.name or "_") for source in inputs_of((symbol,)))
+                parameters = self._parameters(group, regrouped)
+                return Function(parameters, self.type(result, answer))
+            case Function(), Abstract():
+                return self._input(type, value, star=True)
+            case ListOf(item), ListValue(inner):
+                return ListOf(self.type(item, inner))
+            case TupleOf(items, dual), TupleValue(parts) if len(items) == len(parts):
+                return TupleOf(tuple(map(self.type, items, parts)), dual)
+            case Real(), Scalar():
+                return self._result(value)
+            case _:
+                return type
+
+    def _parameters(self, group: tuple[Parameter, ...], inputs: Sequence[Value]) -> tuple[Parameter, ...]:
+        if not inputs:
+            return group
+        return tuple(Parameter(p.name, self._input(p.type, symbol, True)) for p, symbol in zip(group, inputs))
+
+    def _result(self, value: Scalar) -> Type:
+        if value.spikes:
+            return Dist(self._over(spike.over for spike in value.spikes))
+        return Real(jumps=self._over(value.jumps)) if value.jumps else Real()
+
+    def _over(self, surfaces: object) -> tuple[str, ...]:
+        assert hasattr(surfaces, "__iter__")
+        found = {source for surface in surfaces for source in surface}
+        order = {source: place for place, source in enumerate(self.names)}
+        known = sorted((source for source in found if source in order), key=order.__getitem__)
+        return tuple(dict.fromkeys(self.names[source] for source in known if source not in self.plain))
+
+    def _input(self, type: Type, value: Value, star: bool) -> Type:
+        match type, value:
+            case Real(), Scalar(sources):
+                return Real(star=star and not any(source in self.settled for source in sources))
+            case TupleOf(items, dual), TupleValue(parts) if len(items) == len(parts):
+                inner = tuple(self._input(item, part, star) for item, part in zip(items, parts))
+                return TupleOf(inner, dual)
+            case Function(group, result), Abstract(ports, answer) if len(group) == len(ports):
+                parameters = (Parameter(p.name, self._given(p.type, tree)) for p, tree in zip(group, ports))
+                return Function(tuple(parameters), self._input(result, answer, star=isinstance(result, Function)))
+            case _:
+                return type
+
+    def _given(self, type: Type, tree: PortTree) -> Type:
+        match type, tree:
+            case Real(), Port():
+                return Real(star=any(self._varies(source) for source in self.given.get(tree, ())))
+            case TupleOf(items, dual), PortTuple(parts) if len(items) == len(parts):
+                return TupleOf(tuple(self._given(item, part) for item, part in zip(items, parts)), dual)
+            case Function(group, result), PortFunction(inputs) if len(group) == len(inputs):
+                parameters = (Parameter(p.name, self._input(p.type, s, True)) for p, s in zip(group, inputs))
+                return Function(tuple(parameters), result)
+            case _:
+                return type
+
+    def _varies(self, source: Source) -> bool:
+        return source.kind == "variable" or (source in self.inputs and source not in self.settled)
+
+
+def diffeo_dims(type: Type) -> int | None:
+    """The dimension of a diffeomorphism's result."""
+    result = result_of(type)
+    return result.dims if isinstance(result, Diffeo) else None

@@ -1,0 +1,74 @@
+"""What is not wrong but probably not meant: names that are not used, conditions that never change, still surfaces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from potto.diagnostics import Diagnostic
+from potto.modules.free import free_references
+from potto.syntax import nodes
+from potto.syntax.nodes import Node
+from potto.syntax.walk import walk as walk_tree
+from potto.types import kinds
+from potto.types.context import Inference
+from potto.types.flow import Walk
+
+
+def lints(inference: Inference, walk: Walk, item: Node) -> Iterator[Diagnostic]:
+    """The warnings about one definition, statement or expression."""
+    yield from _unused(inference)
+    if isinstance(item, nodes.Definition | nodes.DiffeoDefinition):
+        yield from _constant_conditions(item)
+    if isinstance(item, nodes.Definition) and (item.groups or isinstance(item.body, nodes.Lambda)):
+        yield from _still_surfaces(walk)
+
+
+def _unused(inference: Inference) -> Iterator[Diagnostic]:
+    for local in inference.locals:
+        if local.used or local.name.startswith("_"):
+            continue
+        if local.kind == "local":
+            yield kinds.UNUSED_LOCAL(
+                local.span,
+                f"`{local.name}` is not used",
+                label="never used",
+                help="leave it out, or begin its name with `_`",
+                tags=("unnecessary",),
+            )
+        elif local.kind == "variable":
+            yield kinds.UNUSED_VARIABLE(
+                local.span,
+                f"the variable of integration `{local.name}` is not used",
+                label="the integrand does not vary with it",
+                help="begin its name with `_` if that is meant",
+                tags=("unnecessary",),
+            )
+
+
+def _constant_conditions(item: Node) -> Iterator[Diagnostic]:
+    for node in walk_tree(item):
+        if isinstance(node, nodes.Compare) and next(free_references(node), None) is None:
+            yield kinds.CONSTANT_CONDITION(
+                node.span,
+                "this condition never changes: it has no variables",
+                label="always true or always false",
+                help="leave the condition out",
+            )
+
+
+def _still_surfaces(walk: Walk) -> Iterator[Diagnostic]:
+    """Surfaces over variables of integration alone. What is wrong or comes from elsewhere is left alone."""
+    seen = set()
+    for surface in walk.surfaces:
+        kinds_of = {source.kind for source in surface.sources}
+        if kinds_of != {"variable"} or surface.span in seen:
+            continue
+        if any(source.origin is not None for source in surface.sources):
+            continue
+        seen.add(surface.span)
+        yield kinds.STILL_SURFACE(
+            surface.span,
+            "no parameter moves this surface",
+            label="has no boundary term",
+            notes=("it depends on variables of integration only, so it contributes nothing to a derivative",),
+        )

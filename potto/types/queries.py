@@ -1,0 +1,161 @@
+"""The questions about types, memoized: interfaces, diagnostics, expressions and statements.
+
+What a definition needs is fetched before it is analysed, so that no inference runs inside another one. Its analysis is
+one query; `interface`, `check_definition`, `plain_reasons` and `typed_names` are its parts, each of which stands still
+when an edit does not change it: whoever uses a definition reads its `interface` only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from potto.diagnostics import Diagnostic
+from potto.modules.free import free_references
+from potto.modules.graph import refer, references, strongly_connected
+from potto.modules.lookup import DefinitionTarget, ModuleTarget
+from potto.modules.texts import definition
+from potto.query import Database, query
+from potto.syntax import nodes
+from potto.types.analysis import Analysis, Typed, analyse, local_type
+from potto.types.context import Inference, ensure_stack
+from potto.types.flow import Walk
+from potto.types.flow_binders import walk_statement
+from potto.types.integrals import statement as infer_statement
+from potto.types.interface import Interface, unknown_interface
+from potto.types.lints import lints
+from potto.types.reasons import Reasons
+from potto.types.scope import Global, Local, Meaning, Member, Module, Outside
+from potto.types.types import UNKNOWN, Type
+from potto.types.unify import open_type
+from potto.types.values import HAZY, Port, Source, Value, symbolic
+
+NOTHING = Analysis(unknown_interface("?"), (), Reasons(), ())
+
+
+@dataclass(frozen=True, slots=True)
+class Inferred:
+    """The type of an expression (or of none), and what is wrong with it. Spans are the expression's."""
+
+    type: Type
+    diagnostics: tuple[Diagnostic, ...]
+
+
+@query
+def interface(db: Database, file: str, name: str) -> Interface:
+    """What others may know of a definition: its type, and what flows where. Broken ones have one too."""
+    found = db.entry(_analyses, (_group(db, file, name),), DefinitionTarget(file, name))
+    return unknown_interface(name) if found is None else found.interface
+
+
+@query
+def check_definition(db: Database, file: str, name: str) -> tuple[Diagnostic, ...]:
+    """What is wrong with a definition. Spans are relative to its chunk."""
+    found = db.entry(_analyses, (_group(db, file, name),), DefinitionTarget(file, name))
+    return () if found is None else found.diagnostics
+
+
+@query
+def plain_reasons(db: Database, file: str, name: str) -> Reasons:
+    """Why which parameters of a definition must not vary: places in it, for messages about its callers."""
+    found = db.entry(_analyses, (_group(db, file, name),), DefinitionTarget(file, name))
+    return Reasons() if found is None else found.reasons
+
+
+@query
+def typed_names(db: Database, file: str, name: str) -> tuple[Typed, ...]:
+    """The names that a definition binds, with their types there: `Real[x]` inside an integral over x."""
+    found = db.entry(_analyses, (_group(db, file, name),), DefinitionTarget(file, name))
+    return () if found is None else found.names
+
+
+def _group(db: Database, file: str, name: str) -> tuple[DefinitionTarget, ...]:
+    return strongly_connected(db, file, name)
+
+
+def _nothing(db: Database, group: tuple[DefinitionTarget, ...]) -> dict[DefinitionTarget, Analysis]:
+    """In a cycle that the graph of definitions does not show there is nothing to be known."""
+    return {}
+
+
+@query(cycle=_nothing)
+def _analyses(db: Database, group: tuple[DefinitionTarget, ...]) -> dict[DefinitionTarget, Analysis]:
+    """The analyses of definitions that need each other."""
+    items = {}
+    for target in group:
+        item = definition(db, target.file, target.name)
+        if item is not None:
+            items[target] = item
+    outsides = {target: _outside(db, target.file, references(db, target.file, target.name), items) for target in items}
+    return analyse(items, outsides)
+
+
+def _outside(
+    db: Database, file: str, used: Sequence[tuple[str | None, str]], group: Sequence[DefinitionTarget] | object = ()
+) -> Outside:
+    """What a file provides under the names that are used."""
+    known: dict[tuple[str | None, str], Meaning] = {}
+    for path, name in used:
+        target = refer(db, file, path, name)
+        if isinstance(target, ModuleTarget):
+            known[path, name] = Module(name)
+        elif target is not None:
+            inside = isinstance(group, dict) and target in group
+            known[path, name] = Member(target) if inside else Global(target, interface(db, target.file, target.name))
+    return Outside(db, file, lambda target: plain_reasons(db, target.file, target.name), known)
+
+
+def _used(node: nodes.Expr | nodes.Statement) -> tuple[tuple[str | None, str], ...]:
+    found = (
+        (reference.path, reference.name) if isinstance(reference, nodes.Member) else (None, reference.id)
+        for reference in free_references(node)
+    )
+    return tuple(dict.fromkeys(found))
+
+
+@query(keep=1024)
+def check_statement(db: Database, file: str, statement: nodes.Statement) -> tuple[Diagnostic, ...]:
+    """What is wrong with a statement of a script. Spans are the statement's."""
+    ensure_stack()
+    inference = Inference(_outside(db, file, _used(statement)), {})
+    infer_statement(inference, statement)
+    inference.finish()
+    walk = Walk(inference, {})
+    walk_statement(walk, statement)
+    found = [*inference.diagnostics, *walk.diagnostics, *lints(inference, walk, statement)]
+    return tuple(sorted(found, key=lambda diagnostic: (diagnostic.span, diagnostic.code)))
+
+
+@query(keep=1024)
+def infer_expression(
+    db: Database, file: str, expr: nodes.Expr, locals: tuple[tuple[str, Type], ...] = ()
+) -> Inferred:
+    """The type of an expression in a file's scope. `locals`: further names that have a type, innermost last."""
+    ensure_stack()
+    inference = Inference(_outside(db, file, _used(expr)), {})
+    given: dict[Local, Value] = {}
+    for name, type in locals:
+        opened = open_type(type, inference.level)
+        local = Local(name, expr.span, "loop", opened, used=True)
+        inference.scope.bind(local)
+        given[local] = symbolic(opened, lambda: Source("other", "?"), lambda: Port("?"))
+    type = inference.infer(expr)
+    inference.finish()
+    walk = Walk(inference, {})
+    walk.locals.update(given)
+    value = walk.value(expr)
+    found = (*inference.diagnostics, *walk.diagnostics)
+    return Inferred(local_type(type, value), tuple(sorted(found, key=lambda d: (d.span, d.code))))
+
+
+__all__ = [
+    "HAZY",
+    "UNKNOWN",
+    "Inferred",
+    "check_definition",
+    "check_statement",
+    "infer_expression",
+    "interface",
+    "plain_reasons",
+    "typed_names",
+]

@@ -1,0 +1,49 @@
+"""Why a definition's parameters must not vary, with places: what messages about its callers show.
+
+Not part of the interface, because edits move it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from potto.modules.lookup import DefinitionTarget
+from potto.source import Span
+from potto.types.values import SinkKind, Step
+
+
+@dataclass(frozen=True, slots=True)
+class Reason:
+    """Why a parameter must not vary: the place in the definition, and the way there. `further`: it is passed on."""
+
+    kind: SinkKind
+    number: int
+    parameter: str
+    span: Span
+    steps: tuple[Step, ...]
+    text: str
+    further: tuple[DefinitionTarget, int] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """Which variable of integration a definition gives to a function that is its parameter."""
+
+    number: int
+    variable: str
+    span: Span
+    further: tuple[DefinitionTarget, int] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Reasons:
+    """What a definition demands and why, with places. Not part of the interface: edits move it."""
+
+    plain: tuple[Reason, ...] = ()
+    given: tuple[Given, ...] = ()
+
+    def reason(self, kind: SinkKind, number: int) -> Reason | None:
+        return next((r for r in self.plain if r.kind == kind and r.number == number), None)
+
+    def given_at(self, number: int) -> Given | None:
+        return next((g for g in self.given if g.number == number), None)

@@ -1,0 +1,181 @@
+"""Types: what a value is and, for numbers, what they vary with.
+
+Owns the closed union `Type`. Inference works on the same classes, with `Meta` for what is not known yet; no `Meta`
+leaves it. What flows from which parameter to where is not in the type but in `values`; the types carry what is printed:
+`star` (accepts what varies), the variables of integration of a number inside an integral, and where a result jumps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import assert_never
+
+
+@dataclass(frozen=True, slots=True)
+class Real:
+    """A number. `star`: a parameter that accepts what varies. `variables`: the variables of integration it varies with.
+
+    `jumps` are the variables and parameters across whose surfaces it jumps: its derivative is a `Dist` over them.
+    It is not printed.
+    """
+
+    star: bool = False
+    variables: tuple[str, ...] = ()
+    jumps: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Dist:
+    """A distribution over variables (or parameters): only an integral over them makes a number of it."""
+
+    variables: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class TupleOf:
+    """A tuple. `dual`: a value and its tangent, for which a plain number may be given."""
+
+    items: tuple[Type, ...]
+    dual: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ListOf:
+    item: Type
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A parameter of a function type; the name is None where it is not known (a function that is a parameter)."""
+
+    name: str | None
+    type: Type
+
+
+@dataclass(frozen=True, slots=True)
+class Function:
+    """A function of one group of parameters. A group of n also accepts one tuple of n, and back."""
+
+    parameters: tuple[Parameter, ...]
+    result: Type
+
+
+@dataclass(frozen=True, slots=True)
+class Diffeo:
+    """What a diffeomorphism gives: a tuple of `dims` numbers that may stand as a condition. None: any number."""
+
+    dims: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """What a comparison gives. Local names may hold one; parameters and results may not."""
+
+
+@dataclass(frozen=True, slots=True)
+class Var:
+    """A type variable of a finished type: any type, the same wherever the name stands."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Unknown:
+    """The type of what is wrong. It fits everything, so that one mistake gives one message."""
+
+
+@dataclass(eq=False, slots=True)
+class Meta:
+    """A type that inference does not know yet. `level`: the depth of the binding that it belongs to."""
+
+    level: int
+    found: Type | None = None
+
+
+Type = Real | Dist | TupleOf | ListOf | Function | Diffeo | Truth | Var | Unknown | Meta
+
+REAL = Real()
+TRUTH = Truth()
+UNKNOWN = Unknown()
+
+
+def resolve(type: Type) -> Type:
+    """Follow what is known about a `Meta`, shortening the way."""
+    if not isinstance(type, Meta) or type.found is None:
+        return type
+    root: Type = type
+    while isinstance(root, Meta) and root.found is not None:
+        root = root.found
+    while isinstance(type, Meta) and type.found is not None:
+        type.found, type = root, type.found
+    return root
+
+
+def function(groups: Iterable[tuple[Parameter, ...]], result: Type) -> Type:
+    """The type of a function of several groups."""
+    for group in reversed(tuple(groups)):
+        result = Function(group, result)
+    return result
+
+
+def groups_of(type: Type) -> tuple[tuple[Parameter, ...], ...]:
+    """The groups of parameters of a function type, one per call."""
+    groups = []
+    type = resolve(type)
+    while isinstance(type, Function):
+        groups.append(type.parameters)
+        type = resolve(type.result)
+    return tuple(groups)
+
+
+def result_of(type: Type) -> Type:
+    """What a function gives when it has all its groups; any other type itself."""
+    type = resolve(type)
+    while isinstance(type, Function):
+        type = resolve(type.result)
+    return type
+
+
+def dual_name(name: str) -> str:
+    """The name that `deriv` gives to a parameter."""
+    return "d" + name
+
+
+def derivative_type(type: Type) -> Type:
+    """D of a type: `D Real = (Real, Real)`, or `(Real, Dist)` where it jumps, `D (A -> B) = D A -> D B`."""
+    return _derivative(resolve(type), frozenset())
+
+
+def _derivative(type: Type, parameters: frozenset[str]) -> Type:
+    """`parameters`: names of the enclosing groups, which get a `d`; variables of integration keep theirs."""
+
+    def renamed(names: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(dual_name(name) if name in parameters else name for name in names)
+
+    type = resolve(type)
+    match type:
+        case Real(star, variables, jumps):
+            primal = Real(star, variables, renamed(jumps))
+            return TupleOf((primal, Dist(renamed(jumps)) if jumps else Real(star, variables)), dual=True)
+        case Dist(variables):
+            return TupleOf((Dist(renamed(variables)), Dist(renamed(variables))), dual=True)
+        case TupleOf(items):
+            return TupleOf(tuple(_derivative(item, parameters) for item in items))
+        case ListOf(item):
+            return ListOf(_derivative(item, parameters))
+        case Function(group, result):
+            inner = parameters | {p.name for p in group if p.name is not None}
+            duals = tuple(
+                Parameter(None if p.name is None else dual_name(p.name), _derivative(p.type, frozenset()))
+                for p in group
+            )
+            return Function(duals, _derivative(result, inner))
+        case Diffeo(dims):
+            return UNKNOWN if dims is None else TupleOf((TupleOf((REAL, REAL), dual=True),) * dims)
+        case Var():  # a number, for want of better knowledge
+            return TupleOf((Real(star=True), Real(star=True)), dual=True)
+        case Truth() | Unknown() | Meta():
+            return UNKNOWN
+        case _:
+            assert_never(type)

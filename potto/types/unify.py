@@ -1,0 +1,200 @@
+"""Unification: making two types equal by finding out what is not known yet.
+
+Owns the levels of `Meta` that decide what a local name generalises over. A group of n parameters and one parameter that
+is a tuple of n are the same to it; names of parameters, and all that says what varies, are not its business. `Unknown`
+fits everything. Where two types do not fit it says so and leaves what it has found: the caller reports once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from potto.types.types import (
+    REAL,
+    UNKNOWN,
+    Diffeo,
+    Dist,
+    Function,
+    ListOf,
+    Meta,
+    Parameter,
+    Real,
+    Truth,
+    TupleOf,
+    Type,
+    Unknown,
+    Var,
+    resolve,
+)
+
+MAX_LEAVES = 4096  # numbers in one tuple: beyond it a program is wrong (or hostile)
+
+
+def unify(a: Type, b: Type) -> bool:
+    """Whether the types fit; makes them equal."""
+    a, b = resolve(a), resolve(b)
+    if a is b or isinstance(a, Unknown) or isinstance(b, Unknown):
+        return True
+    if isinstance(a, Meta):
+        return _bind(a, b)
+    if isinstance(b, Meta):
+        return _bind(b, a)
+    if isinstance(a, Real | Dist):
+        return isinstance(b, Real | Dist)
+    if isinstance(a, Function):
+        return isinstance(b, Function) and _unify_functions(a, b)
+    if isinstance(a, TupleOf | Diffeo) and isinstance(b, TupleOf | Diffeo):
+        return _unify_tuples(a, b)
+    if isinstance(a, ListOf) and isinstance(b, ListOf):
+        return unify(a.item, b.item)
+    if isinstance(a, Var) and isinstance(b, Var):
+        return a.name == b.name
+    return isinstance(a, Truth) and isinstance(b, Truth)
+
+
+def _unify_functions(a: Function, b: Function) -> bool:
+    mine, theirs = a.parameters, b.parameters
+    if len(mine) == len(theirs):
+        fits = [unify(p.type, q.type) for p, q in zip(mine, theirs)]
+        return all(fits) and unify(a.result, b.result)
+    if len(mine) != 1 and len(theirs) != 1:
+        return False
+    return unify(as_tuple(mine), as_tuple(theirs)) and unify(a.result, b.result)
+
+
+def as_tuple(parameters: tuple[Parameter, ...]) -> Type:
+    """A group of parameters as the one tuple that it also accepts."""
+    return parameters[0].type if len(parameters) == 1 else TupleOf(tuple(p.type for p in parameters))
+
+
+def _unify_tuples(a: TupleOf | Diffeo, b: TupleOf | Diffeo) -> bool:
+    if isinstance(a, TupleOf) and isinstance(b, TupleOf):
+        if len(a.items) != len(b.items):
+            return False
+        fits = [unify(item, other) for item, other in zip(a.items, b.items)]
+        return all(fits)
+    if isinstance(a, Diffeo) and isinstance(b, Diffeo):
+        return a.dims is None or b.dims is None or a.dims == b.dims
+    diffeo, plain = (a, b) if isinstance(a, Diffeo) else (b, a)
+    assert isinstance(diffeo, Diffeo) and isinstance(plain, TupleOf)
+    if diffeo.dims is not None and diffeo.dims != len(plain.items):
+        return False
+    fits = [unify(item, REAL) for item in plain.items]
+    return all(fits)
+
+
+def _bind(meta: Meta, type: Type) -> bool:
+    """Find `meta` to be `type`, unless that contains it; what `type` does not know yet sinks to the level of `meta`."""
+    stack: list[Type] = [type]
+    seen: set[int] = set()
+    while stack:
+        part = resolve(stack.pop())
+        if part is meta:
+            return False
+        if isinstance(part, Meta):
+            part.level = min(part.level, meta.level)
+        elif id(part) not in seen:
+            seen.add(id(part))
+            stack.extend(parts(part))
+    meta.found = type
+    return True
+
+
+def parts(type: Type) -> tuple[Type, ...]:
+    """The types that a type is made of."""
+    if isinstance(type, TupleOf):
+        return type.items
+    if isinstance(type, Function):
+        return (*(p.type for p in type.parameters), type.result)
+    return (type.item,) if isinstance(type, ListOf) else ()
+
+
+def rebuild(type: Type, leaf: Callable[[Type], Type]) -> Type:
+    """A type with every part that is no composite replaced by `leaf` of it."""
+    type = resolve(type)
+    match type:
+        case TupleOf(items, dual):
+            return TupleOf(tuple(rebuild(item, leaf) for item in items), dual)
+        case ListOf(item):
+            return ListOf(rebuild(item, leaf))
+        case Function(group, result):
+            parameters = tuple(Parameter(p.name, rebuild(p.type, leaf)) for p in group)
+            return Function(parameters, rebuild(result, leaf))
+        case _:
+            return leaf(type)
+
+
+def leaves(type: Type, limit: int = MAX_LEAVES) -> int:
+    """How many numbers a type is made of, counted up to `limit`."""
+    count, stack = 0, [type]
+    while stack and count < limit:
+        part = resolve(stack.pop())
+        below = parts(part)
+        count += not below
+        stack.extend(below)
+    return count
+
+
+def free_metas(type: Type, level: int) -> tuple[Meta, ...]:
+    """What a binding at `level` may generalise over: the unknown parts that belong to it alone."""
+    found: dict[Meta, None] = {}
+    stack = [type]
+    while stack:
+        part = resolve(stack.pop())
+        if isinstance(part, Meta):
+            if part.level > level:
+                found[part] = None
+        else:
+            stack.extend(parts(part))
+    return tuple(found)
+
+
+def instantiate(type: Type, generic: tuple[Meta, ...], level: int) -> Type:
+    """A fresh copy of a local name's type."""
+    if not generic:
+        return type
+    fresh: dict[Meta, Type] = {meta: Meta(level) for meta in generic}
+    return rebuild(type, lambda leaf: fresh.get(leaf, leaf) if isinstance(leaf, Meta) else leaf)
+
+
+def open_type(type: Type, level: int) -> Type:
+    """A fresh copy of another definition's type, for inference: variables become unknown, marks of variation go."""
+    fresh: dict[str, Type] = {}
+
+    def leaf(part: Type) -> Type:
+        if isinstance(part, Var):
+            return fresh.setdefault(part.name, Meta(level))
+        return REAL if isinstance(part, Real | Dist) else part
+
+    return rebuild(type, leaf)
+
+
+def close_type(type: Type) -> Type:
+    """A type without `Meta`: what is unknown at the end holds for all types, and gets a name."""
+    names: dict[Meta, Type] = {}
+
+    def leaf(part: Type) -> Type:
+        if isinstance(part, Meta):
+            return names.setdefault(part, Var(_variable_name(len(names))))
+        return part
+
+    return rebuild(type, leaf)
+
+
+def _variable_name(number: int) -> str:
+    return chr(ord("a") + number % 26) + (str(number // 26) if number >= 26 else "")
+
+
+def settle(type: Type) -> None:
+    """Take every unknown part to be a number (or Unknown if it cannot be)."""
+    stack = [type]
+    while stack:
+        part = resolve(stack.pop())
+        if isinstance(part, Meta):
+            part.found = REAL
+        else:
+            stack.extend(parts(part))
+
+
+__all__ = ["MAX_LEAVES", "UNKNOWN", "as_tuple", "close_type", "free_metas", "instantiate", "leaves", "open_type",
+           "parts", "rebuild", "settle", "unify"]  # fmt: skip
