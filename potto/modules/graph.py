@@ -1,0 +1,156 @@
+"""Who needs whom: files by their imports, definitions by their references.
+
+Owns the import graph (`imported_files`, `import_group`, `import_cycle`) and the graph of definitions (`dependencies`,
+`strongly_connected`, `is_recursive`). Definitions of different files can only need each other if the files import each
+other, so the groups of all definitions are found once for a group of files, and read by entry.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterable, Mapping
+from typing import TypeVar
+
+from potto.modules.free import free_references
+from potto.modules.lookup import DefinitionTarget, ModuleTarget, Target, bindings, find_module, resolve, resolve_member
+from potto.modules.texts import definition, imports, names
+from potto.query import Database, query
+from potto.syntax import nodes
+
+N = TypeVar("N", bound=Hashable)
+
+
+@query
+def imported_files(db: Database, file: str) -> tuple[str, ...]:
+    """The files that a file imports, in order, each once."""
+    found: dict[str, None] = {}
+    for item in imports(db, file):
+        target = find_module(db, file, item.module)
+        if target is not None:
+            found[target] = None
+        for name, imported in bindings(item):
+            module = resolve(db, file, name) if imported.name is not None else None
+            if isinstance(module, ModuleTarget):  # `from pkg import m`
+                found[module.file] = None
+    return tuple(found)
+
+
+@query
+def import_group(db: Database, file: str) -> tuple[str, ...]:
+    """The files that import each other, this one included, sorted; alone if it is in no cycle."""
+    for group in components((file,), lambda f: imported_files(db, f)):
+        if file in group:
+            return tuple(sorted(group))
+    raise AssertionError("a file is in the component that it starts")
+
+
+@query
+def import_cycle(db: Database, file: str) -> tuple[str, ...]:
+    """The shortest way from a file by imports back to itself, both ends included; empty if there is none."""
+    group = set(import_group(db, file))
+    before: dict[str, str] = {}
+    queue = [file]
+    for at in queue:
+        for target in imported_files(db, at):
+            if target == file and at != file:
+                path = [file, at]
+                while path[-1] != file:
+                    path.append(before[path[-1]])
+                return tuple(reversed(path))
+            if target in group and target not in before and target != file:
+                before[target] = at
+                queue.append(target)
+    return ()
+
+
+@query
+def references(db: Database, file: str, name: str) -> tuple[tuple[str | None, str], ...]:
+    """The names `(None, name)` and members `(path, name)` that a definition refers to, in order, each once."""
+    item = definition(db, file, name)
+    return () if item is None else tuple(dict.fromkeys(map(_reference, free_references(item))))
+
+
+@query
+def dependencies(db: Database, file: str, name: str) -> tuple[DefinitionTarget, ...]:
+    """The definitions that a definition refers to directly, in the order of the text."""
+    found = (refer(db, file, path, used) for path, used in references(db, file, name))
+    return tuple(dict.fromkeys(target for target in found if isinstance(target, DefinitionTarget)))
+
+
+def refer(db: Database, file: str, path: str | None, name: str) -> Target | None:
+    """What a reference in a file means, with or without a module in front."""
+    return resolve(db, file, name) if path is None else resolve_member(db, file, path, name)
+
+
+@query
+def strongly_connected(db: Database, file: str, name: str) -> tuple[DefinitionTarget, ...]:
+    """The definitions that need each other with this one, itself included; itself alone if there are no others."""
+    target = DefinitionTarget(file, name)
+    return db.entry(_definition_groups, (import_group(db, file),), target) or (target,)
+
+
+@query
+def is_recursive(db: Database, file: str, name: str) -> bool:
+    """Whether a definition needs itself, directly or through others."""
+    return len(strongly_connected(db, file, name)) > 1 or DefinitionTarget(file, name) in dependencies(db, file, name)
+
+
+@query
+def _definition_groups(
+    db: Database, files: tuple[str, ...]
+) -> Mapping[DefinitionTarget, tuple[DefinitionTarget, ...]]:
+    """The groups of two or more definitions of `files` that need each other, under each of their members."""
+    inside = set(files)
+
+    def needs(target: DefinitionTarget) -> Iterable[DefinitionTarget]:
+        return (needed for needed in dependencies(db, target.file, target.name) if needed.file in inside)
+
+    definitions = [DefinitionTarget(file, name) for file in files for name in names(db, file)]
+    place = {target: index for index, target in enumerate(definitions)}
+    table: dict[DefinitionTarget, tuple[DefinitionTarget, ...]] = {}
+    for group in components(definitions, needs):
+        if len(group) > 1:
+            ordered = tuple(sorted(group, key=place.__getitem__))
+            table.update(dict.fromkeys(group, ordered))
+    return table
+
+
+def components(starts: Iterable[N], needs: Callable[[N], Iterable[N]]) -> list[list[N]]:
+    """The strongly connected components of what is reached from `starts`, needed ones first (Tarjan, iterative)."""
+    number: dict[N, int] = {}
+    low: dict[N, int] = {}
+    open_: dict[N, None] = {}
+    found: list[list[N]] = []
+    for start in starts:
+        if start in number:
+            continue
+        number[start] = low[start] = len(number)
+        open_[start] = None
+        work = [(start, iter(needs(start)))]
+        while work:
+            node, rest = work[-1]
+            for target in rest:
+                if target not in number:
+                    number[target] = low[target] = len(number)
+                    open_[target] = None
+                    work.append((target, iter(needs(target))))
+                    break
+                if target in open_:
+                    low[node] = min(low[node], number[target])
+            else:
+                work.pop()
+                if work:
+                    low[work[-1][0]] = min(low[work[-1][0]], low[node])
+                if low[node] == number[node]:
+                    found.append(_close(open_, node))
+    return found
+
+
+def _close(open_: dict[N, None], node: N) -> list[N]:
+    group: list[N] = []
+    while not group or group[-1] != node:
+        group.append(open_.popitem()[0])
+    return group
+
+
+def _reference(node: nodes.Name | nodes.Member) -> tuple[str | None, str]:
+    return (node.path, node.name) if isinstance(node, nodes.Member) else (None, node.id)

@@ -1,0 +1,177 @@
+"""Names to definitions: modules to files, the scope of a file, and what a name means, through imports and re-exports.
+
+Owns `find_module`, `resolve` and `resolve_member`. A dotted module `pkg.m` is `pkg/m.po` or `pkg/m.diffeo` in the
+folder of the importing file, then in each of the workspace's roots (the input `("roots",)`); `.po` wins over
+`.diffeo`, and a file does not find itself where another one answers. Which candidates exist is asked of the inputs of
+their texts, one by one, so a file that appears, disappears or is opened unsaved changes just the lookups it concerns.
+"""
+
+from __future__ import annotations
+
+import os.path
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from potto.modules.texts import exists, imports, names
+from potto.query import Database, query
+from potto.syntax import nodes
+
+SUFFIXES = (".po", ".diffeo")
+
+
+@dataclass(frozen=True, slots=True)
+class DefinitionTarget:
+    """A definition of a file."""
+
+    file: str
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class ModuleTarget:
+    """A module: its file, and how it was written."""
+
+    file: str
+    dotted: str
+
+
+Target = DefinitionTarget | ModuleTarget
+
+
+@dataclass(frozen=True, slots=True)
+class Imported:
+    """What an import binds a name to: `name` of `module`, or the module itself."""
+
+    module: str
+    name: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Defined:
+    """What a definition of the file itself binds a name to."""
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """The file that a module name means, and another one that it could mean as well."""
+
+    file: str
+    other: str | None = None
+
+
+def folders(db: Database, file: str) -> tuple[str, ...]:
+    """Where modules that `file` imports are looked for, in order."""
+    roots: tuple[str, ...] = db.get_input(("roots",), ())
+    own = (os.path.dirname(file),) if os.path.isabs(file) else ()
+    return tuple(dict.fromkeys((*own, *roots)))
+
+
+@query
+def locate(db: Database, file: str, dotted: str) -> Found | None:
+    """The file that a module's name means in `file`, with the runner-up if `m.po` and `m.diffeo` are side by side."""
+    path, itself = dotted.replace(".", "/"), None
+    for folder in folders(db, file):
+        candidates = [os.path.join(folder, path + suffix) for suffix in SUFFIXES]
+        present = [candidate for candidate in candidates if exists(db, candidate)]
+        others = [candidate for candidate in present if candidate != file]
+        if others:
+            return Found(others[0], others[1] if len(others) > 1 else None)
+        itself = itself or (Found(file) if present else None)
+    return itself
+
+
+@query
+def find_module(db: Database, file: str, dotted: str) -> str | None:
+    """The key of the file that the module `dotted` means in `file`."""
+    found = locate(db, file, dotted)
+    return None if found is None else found.file
+
+
+@query
+def scope(db: Database, file: str) -> Mapping[str, Imported | Defined]:
+    """What each name (or dotted module) is bound to at the top of a file; a table, to be read by entry.
+
+    A definition wins over an import of the same name, and a later import over an earlier one.
+    """
+    table: dict[str, Imported | Defined] = {}
+    for item in imports(db, file):
+        table.update(bindings(item))
+    table.update(dict.fromkeys(names(db, file), Defined()))
+    return table
+
+
+def bindings(item: nodes.FromImport | nodes.Import) -> Iterator[tuple[str, Imported]]:
+    """The names that an import binds, and to what. `import pkg.m` binds `pkg.m`."""
+    if isinstance(item, nodes.Import):
+        yield item.alias or item.module, Imported(item.module, None)
+        return
+    for imported in item.names:
+        yield imported.alias or imported.name, Imported(item.module, imported.name)
+
+
+def meaning(db: Database, file: str, name: str) -> Imported | Defined | None:
+    """What a name is bound to at the top of a file, if to anything."""
+    return db.entry(scope, (file,), name)
+
+
+@dataclass(frozen=True, slots=True)
+class Trail:
+    """Where the search for a name went, file by file, and what it found. `circular`: it came back to where it was."""
+
+    target: Target | None
+    steps: tuple[DefinitionTarget, ...]
+    circular: bool = False
+
+
+@query
+def trail(db: Database, file: str, name: str) -> Trail:
+    """Follow a name through imports and re-exports to the file that defines it."""
+    steps: dict[DefinitionTarget, None] = {}
+    while True:
+        here = DefinitionTarget(file, name)
+        if here in steps:
+            return Trail(None, tuple(steps), circular=True)
+        steps[here] = None
+        bound = meaning(db, file, name)
+        if bound is None:
+            return Trail(None, tuple(steps))
+        if isinstance(bound, Defined):
+            return Trail(here, tuple(steps))
+        module, original = bound.module, bound.name
+        target = find_module(db, file, module)
+        if original is not None and (target is None or meaning(db, target, original) is None):
+            module, original = f"{module}.{original}", None  # `from pkg import m` of a module in a folder
+            target = find_module(db, file, module)
+        if target is None or original is None:
+            return Trail(None if target is None else ModuleTarget(target, module), tuple(steps))
+        file, name = target, original
+
+
+@query
+def resolve(db: Database, file: str, name: str) -> Target | None:
+    """What a name means at the top of a file: a definition, here or where it was imported from, or a module."""
+    return trail(db, file, name).target
+
+
+@query
+def resolve_member(db: Database, file: str, path: str, name: str) -> DefinitionTarget | None:
+    """The definition that `path.name` means in a file that imports the module `path` (or has it under that name)."""
+    module = resolve_module(db, file, path)
+    target = None if module is None else resolve(db, module, name)
+    return target if isinstance(target, DefinitionTarget) else None
+
+
+@query
+def resolve_module(db: Database, file: str, path: str) -> str | None:
+    """The file of the module that `path` (`k`, `pkg.m`, or `b.a` where b imports a) means in a file."""
+    parts = path.split(".")
+    at: str | None = file
+    while parts and at is not None:
+        for length in range(len(parts), 0, -1):
+            target = resolve(db, at, ".".join(parts[:length]))
+            if isinstance(target, ModuleTarget):
+                at, parts = target.file, parts[length:]
+                break
+        else:
+            return None
+    return at

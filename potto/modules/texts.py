@@ -1,0 +1,258 @@
+"""Files to chunks to definitions: what is where, at the grain of a definition.
+
+Inputs: `("file", key)`, the text on disk (None: no such file; an `Unreadable` otherwise), and `("overlay", key)`, the
+text of an open editor, which wins. A key is a normalized absolute path or a pseudo name such as `<In 3>`.
+
+`layout` runs at every edit of its file; what others read are projections of it that stand still: the tables `texts`
+and `starts`, read by entry, so that an edit of one definition is no change to what is read of another, and `outline`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from potto.diagnostics import Diagnostic
+from potto.query import Database, query
+from potto.source import SourceText, Span
+from potto.syntax import ParsedChunk, nodes, parse_chunk, split
+
+Importing = nodes.FromImport | nodes.Import
+
+
+@dataclass(frozen=True, slots=True)
+class Unreadable:
+    """A file that is there but has no text for us. `offset` counts bytes (for "not text")."""
+
+    reason: Literal["folder", "not a file", "not text", "too large", "no access"]
+    detail: str = ""
+    offset: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class ChunkRef:
+    """One chunk of a file: where it starts and its text."""
+
+    start: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class StatementRef:
+    """A top-level statement of a script; its spans are relative to `start`."""
+
+    start: int
+    statement: nodes.Print | nodes.For | nodes.ExpressionStatement
+
+
+@dataclass(frozen=True, slots=True)
+class Head:
+    """What others need to know of a chunk without its tree. `importing` has spans relative to the chunk."""
+
+    kind: Literal["blank", "import", "definition", "statement", "broken"]
+    name: str | None = None
+    name_span: Span | None = None
+    importing: Importing | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """The chunk that defines a name; `span` is the name's, relative to the chunk."""
+
+    start: int
+    span: Span
+
+
+def is_diffeo(file: str) -> bool:
+    """Whether the file's definitions are diffeomorphisms."""
+    return file.endswith(".diffeo")
+
+
+@query
+def content(db: Database, file: str) -> str | Unreadable | None:
+    """The text that counts: an open editor's, else that on disk."""
+    overlay: str | None = db.get_input(("overlay", file))
+    if overlay is not None:
+        return overlay
+    on_disk: str | Unreadable | None = db.get_input(("file", file))
+    return on_disk
+
+
+@query
+def source(db: Database, file: str) -> SourceText | None:
+    """The text of a file, or None if there is none to be had."""
+    text = content(db, file)
+    return SourceText(file, text) if isinstance(text, str) else None
+
+
+@query
+def exists(db: Database, file: str) -> bool:
+    """Whether there is such a file that an import could mean."""
+    text = content(db, file)
+    return isinstance(text, str) or (isinstance(text, Unreadable) and text.reason not in ("folder", "not a file"))
+
+
+@query
+def chunks(db: Database, file: str) -> tuple[ChunkRef, ...]:
+    """The chunks of a file, in order, with their absolute starts."""
+    text = content(db, file)
+    return tuple(ChunkRef(c.start, c.text) for c in split(text)) if isinstance(text, str) else ()
+
+
+@query(keep=4096)
+def parsed(db: Database, text: str, diffeo: bool) -> ParsedChunk:
+    """The tree of a chunk's text. Keyed by the text alone: an undo parses nothing."""
+    return parse_chunk(text, diffeo)
+
+
+@query(keep=16384)
+def head(db: Database, text: str, diffeo: bool) -> Head:
+    """What a chunk is and what it names. Small, so that more of them are kept than of trees."""
+    item = parsed(db, text, diffeo).item
+    match item:
+        case None:
+            return Head("blank")
+        case nodes.Definition() | nodes.DiffeoDefinition():
+            return Head("definition", item.name, item.name_span)
+        case nodes.FromImport() | nodes.Import():
+            return Head("import", importing=item)
+        case nodes.BrokenItem():
+            return Head("broken", item.name, item.span)
+        case _:
+            return Head("statement")
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """A file cut into chunks by what they are; all positions are absolute. Runs again at every edit."""
+
+    texts: Mapping[str, str]
+    starts: Mapping[str, int]
+    places: Mapping[str, tuple[Place, ...]]
+    imports: tuple[ChunkRef, ...]
+    statements: tuple[ChunkRef, ...]
+    nameless: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Outline:
+    """What of a file's layout no body edit and no move changes. `nameless`: a broken chunk might define anything."""
+
+    names: tuple[str, ...]
+    import_texts: tuple[str, ...]
+    nameless: bool
+
+
+@query
+def layout(db: Database, file: str) -> Layout:
+    """The chunks of a file by kind and by name. Read the projections below instead, they stand still."""
+    diffeo, nameless = is_diffeo(file), False
+    texts: dict[str, str] = {}
+    starts: dict[str, int] = {}
+    places: dict[str, tuple[Place, ...]] = {}
+    imports: list[ChunkRef] = []
+    statements: list[ChunkRef] = []
+    for chunk in chunks(db, file):
+        described = head(db, chunk.text, diffeo)
+        if described.name is not None and described.name_span is not None:
+            name = described.name
+            texts[name], starts[name] = chunk.text, chunk.start
+            places[name] = (*places.get(name, ()), Place(chunk.start, described.name_span))
+        elif described.kind == "import":
+            imports.append(chunk)
+        elif described.kind == "statement":
+            statements.append(chunk)
+        elif described.kind == "broken":
+            nameless = True
+    return Layout(texts, starts, places, tuple(imports), tuple(statements), nameless)
+
+
+@query
+def texts(db: Database, file: str) -> Mapping[str, str]:
+    """The chunk that defines each name; a table, to be read by entry."""
+    return layout(db, file).texts
+
+
+@query
+def starts(db: Database, file: str) -> Mapping[str, int]:
+    """The start of the chunk that defines each name; a table, to be read by entry."""
+    return layout(db, file).starts
+
+
+@query
+def outline(db: Database, file: str) -> Outline:
+    """What a file defines and imports, without places."""
+    found = layout(db, file)
+    return Outline(tuple(found.texts), tuple(chunk.text for chunk in found.imports), found.nameless)
+
+
+@query
+def names(db: Database, file: str) -> tuple[str, ...]:
+    """What the file defines, in order, also where the definition is broken."""
+    return outline(db, file).names
+
+
+def chunk_text(db: Database, file: str, name: str) -> str | None:
+    """The text of the chunk that defines `name`; the last one if there are several."""
+    return db.entry(texts, (file,), name)
+
+
+def chunk_start(db: Database, file: str, name: str) -> int:
+    """Where the chunk that defines `name` starts. Whoever shows spans adds it; no memoized value should read it."""
+    return db.entry(starts, (file,), name) or 0
+
+
+@query
+def definition(db: Database, file: str, name: str) -> nodes.Definition | nodes.DiffeoDefinition | None:
+    """The definition of a name in a file (the last one if there are several), its spans relative to its chunk.
+
+    None if there is none, and for one whose head cannot be read (`names` has it all the same).
+    """
+    text = chunk_text(db, file, name)
+    item = None if text is None else parsed(db, text, is_diffeo(file)).item
+    return item if isinstance(item, (nodes.Definition, nodes.DiffeoDefinition)) else None
+
+
+@query
+def statements(db: Database, file: str) -> tuple[StatementRef, ...]:
+    """The top-level statements of a script, in order."""
+    found: list[StatementRef] = []
+    for chunk in layout(db, file).statements:
+        item = parsed(db, chunk.text, is_diffeo(file)).item
+        if isinstance(item, (nodes.Print, nodes.For, nodes.ExpressionStatement)):
+            found.append(StatementRef(chunk.start, item))
+    return tuple(found)
+
+
+@query
+def imports(db: Database, file: str) -> tuple[Importing, ...]:
+    """The imports of a file in order, their spans relative to their chunks: moving them changes nothing."""
+    items = (head(db, text, is_diffeo(file)).importing for text in outline(db, file).import_texts)
+    return tuple(item for item in items if item is not None)
+
+
+def import_starts(db: Database, file: str) -> tuple[int, ...]:
+    """Where the chunks of `imports` start."""
+    return tuple(chunk.start for chunk in layout(db, file).imports)
+
+
+@query
+def syntax_diagnostics(db: Database, file: str) -> tuple[Diagnostic, ...]:
+    """What the parser has to say about a file, with absolute spans."""
+    diffeo = is_diffeo(file)
+    return tuple(
+        shift(diagnostic, chunk.start)
+        for chunk in chunks(db, file)
+        for diagnostic in parsed(db, chunk.text, diffeo).diagnostics
+    )
+
+
+def shift(diagnostic: Diagnostic, start: int) -> Diagnostic:
+    """A diagnostic of a chunk with absolute spans. Related places in other chunks are left to who knows them."""
+    related = tuple(
+        replace(place, span=place.span.shift(start), owner="") if place.file is None and place.owner is None else place
+        for place in diagnostic.related
+    )
+    return replace(diagnostic, span=diagnostic.span.shift(start), related=related)
+
