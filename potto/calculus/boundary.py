@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 from potto.calculus.derivative import partial, zero_like
 from potto.calculus.isolate import NAN
+from potto.calculus.linear import affine
 from potto.calculus.normal import as_term, normal
 from potto.calculus.ranges import range_of
 from potto.calculus.solve import Family, Sections, factors, sections
@@ -29,6 +30,7 @@ from potto.core.terms import (
     Sum,
     Term,
     Tuple,
+    add,
     branch,
     children,
     fresh,
@@ -162,19 +164,61 @@ def without_poles(surface: Term) -> Term:
 # Roots
 
 
-def roots_of(node: Integral, surface: Term) -> list[Root]:
-    """Where a surface cuts the integral: its roots in the innermost variable that it can be solved for."""
+@dataclass(frozen=True, slots=True)
+class Pivot:
+    """The roots of a surface in one variable of integration; taken where the plain `condition` holds."""
+
+    roots: list[Root]
+    condition: Term | None = None
+
+
+def pivots(node: Integral, surface: Term) -> list[Pivot]:
+    """Where a surface cuts the integral, solved for the innermost variable that it can be solved for.
+
+    An affine surface whose slopes are known only at run time is solved for the variable of the largest slope then:
+    the others may be 0. The pivots are tried in order, the last one has no condition.
+    """
+    slopes: dict[str, Term] = {}
+    for name in reversed(node.variables):
+        found = affine(surface, (name,)) if name in surface.free else None
+        if found is not None and not found.coefficients[0].free & frozenset(node.variables):
+            slopes[name] = found.coefficients[0]
+    order = [n for n in reversed(node.variables) if n in surface.free]
+    if len(slopes) < 2 or order[0] not in slopes:
+        return [Pivot(_solved(node, surface, order))]
+    if all(isinstance(c, Const) for c in slopes.values()):
+        sizes = {n: abs(c.value) for n, c in slopes.items() if isinstance(c, Const)}
+        largest = max(sizes.values())
+        name = next(n for n in order if sizes.get(n, 0.0) * _STEEP >= largest)
+        return [Pivot(_solved(node, surface, [name]))]
+    result: list[Pivot] = []
+    for name, slope in slopes.items():
+        others = [prim("le", prim("abs", c), prim("abs", slope)) for n, c in slopes.items() if n != name]
+        result.append(Pivot(_solved(node, surface, [name]), _all(others)))
+    return [*result[:-1], Pivot(result[-1].roots)]
+
+
+_STEEP = 8.0  # a slope this much smaller than the largest one is still fine to divide by
+
+
+def _solved(node: Integral, surface: Term, order: Sequence[str]) -> list[Root]:
     reasons: list[str] = []
-    for position in reversed(range(len(node.variables))):
-        name = node.variables[position]
-        if name not in surface.free:
-            continue
+    for name in order:
         found = sections(surface, name)
         if isinstance(found, Sections) and found.complete:
             roots = [Root(name, r) for r in (*found.roots, *found.poles)]
+            position = node.variables.index(name)
             return roots + [_family(node, position, f) for f in (*found.families, *found.pole_families)]
         reasons.append(found.reason)
     raise NoClosedForm(reasons[0] if reasons else "the surface varies with no variable of integration")
+
+
+def chosen(alternatives: Sequence[tuple[Term | None, Term]]) -> Term:
+    """The term of the first pivot whose condition holds."""
+    result = alternatives[-1][1]
+    for condition, term in reversed(alternatives[:-1]):
+        result = result if condition is None else if_(condition, term, result)
+    return result
 
 
 def _family(node: Integral, position: int, family: Family) -> Root:
@@ -210,13 +254,19 @@ def at_surfaces(node: Integral, moving: frozenset[str], rate: Rate) -> list[Term
                 surfaces.setdefault(normalized_surface(factor)[0], []).append(item)
     terms: list[Term] = []
     met: list[Root] = []
+    zero = zero_like(node.body)
     for surface, members in surfaces.items():
-        for root in roots_of(node, surface):
-            if not any(_same(root, other) for other in met):
-                met.append(root)
-                flips = flipping(branches, root.variable, root.at, members)
-                terms += _at_root(node, flips, root, rate, summed_over(node.body, members[0]))
-    return terms
+        sums = summed_over(node.body, members[0])
+        alternatives: list[tuple[Term | None, Term]] = []
+        for pivot in pivots(node, surface):
+            new = [r for r in pivot.roots if not any(_same(r, other) for other in met)]
+            met += new
+            gains: list[Term] = []
+            for root in new:
+                gains += _at_root(node, flipping(branches, root.variable, root.at, members), root, rate, sums)
+            alternatives.append((pivot.condition, total(gains, zero)))
+        terms.append(chosen(alternatives))
+    return [term for term in terms if not vanishes(term)]
 
 
 def _same(root: Root, other: Root) -> bool:
@@ -364,6 +414,19 @@ def remaining(node: Integral, name: str, at: Term, body: Term) -> Term:
     if isinstance(body, Const) and body.value == 0:
         return ZERO
     return integral(tuple(names), tuple(bounds), body, tuple(hints)) if names else body
+
+
+def vanishes(term: Term) -> bool:
+    return all(map(vanishes, term.items)) if isinstance(term, Tuple) else term is ZERO
+
+
+def total(parts: Sequence[Term], zero: Term) -> Term:
+    """The sum of numbers, or of tuples shaped like `zero`."""
+    if len(parts) <= 1:
+        return parts[0] if parts else zero
+    if isinstance(zero, Tuple):
+        return tuple_(total([proj(p, i) for p in parts], item) for i, item in enumerate(zero.items))
+    return add(*parts)
 
 
 def difference(a: Term, b: Term) -> Term:

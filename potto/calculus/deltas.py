@@ -11,12 +11,15 @@ from potto.calculus.boundary import (
     Root,
     between,
     branches_of,
+    chosen,
     flipping,
     forced,
+    pivots,
     remaining,
-    roots_of,
     scaled,
+    total,
     unguarded,
+    vanishes,
 )
 from potto.calculus.derivative import NotSmooth, partial, zero_like
 from potto.calculus.isolate import quotient
@@ -29,19 +32,15 @@ from potto.core.terms import (
     Delta,
     Integral,
     Term,
-    Tuple,
-    add,
     children,
     fresh,
     integral,
     neg,
     postorder,
     prim,
-    proj,
     rebuild,
     substitute,
     sum_,
-    tuple_,
     var,
 )
 from potto.diagnostics import PottoError, declare
@@ -70,7 +69,7 @@ def without_deltas(node: Integral) -> Term:
         else:
             assert isinstance(term, Integral)
             waiting.extend(_eliminated(term, found))
-    return _total(parts + waiting, zero_like(node.body))
+    return total(parts + waiting, zero_like(node.body))
 
 
 def _inner_first(body: Term) -> Term:
@@ -100,11 +99,16 @@ def _eliminated(node: Integral, what: Delta) -> list[Term]:
         raise _product(what)
     rest = substitute(opened, {hidden: ZERO})
     terms: list[Term] = []
-    if not _vanishes(rest):
+    if not vanishes(rest):
         terms.append(integral(node.variables, node.bounds, rest, node.hints))
-    for root in roots_of(node, what.coordinates[0]):
-        terms.append(_at_root(node, what, factor, root))
-    return terms
+    found = [
+        (pivot.condition, [_at_root(node, what, factor, root) for root in pivot.roots])
+        for pivot in pivots(node, what.coordinates[0])
+    ]
+    if len(found) == 1:
+        return [*terms, *found[0][1]]  # each of them may hold the next delta, so they stay apart
+    zero = zero_like(node.body)
+    return [*terms, chosen([(condition, total(gains, zero)) for condition, gains in found])]
 
 
 def _check_single(factor: Term, what: Delta, root: Root) -> None:
@@ -155,18 +159,6 @@ def _replaced(term: Term, old: Term, new: Term) -> Term:
         if node not in memo:
             memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
     return memo[term]
-
-
-def _vanishes(term: Term) -> bool:
-    return all(map(_vanishes, term.items)) if isinstance(term, Tuple) else term is ZERO
-
-
-def _total(parts: list[Term], zero: Term) -> Term:
-    if len(parts) <= 1:
-        return parts[0] if parts else zero
-    if isinstance(zero, Tuple):
-        return tuple_(_total([proj(p, i) for p in parts], item) for i, item in enumerate(zero.items))
-    return add(*parts)
 
 
 def _at_root(node: Integral, what: Delta, factor: Term, root: Root) -> Term:

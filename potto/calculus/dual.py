@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from potto.calculus.boundary import at_bounds, at_surfaces, jumps, scaled
+from potto.calculus.boundary import at_bounds, at_surfaces, jumps, scaled, total, vanishes
 from potto.calculus.conditions import Resolve, expanded, known_function
 from potto.calculus.deltas import without_deltas
 from potto.calculus.derivative import partial, zero_like
@@ -367,18 +367,6 @@ def _without(term: Term, kind: type[Delta]) -> Term:
 
 
 def _over(node: Integral, body: Term) -> Term:
-    if body is ZERO or (isinstance(body, Tuple) and all(i is ZERO for i in body.items)):
+    if vanishes(body):
         return ZERO
     return integral(node.variables, node.bounds, body, node.hints)
-
-
-def total(parts: list[Term], zero: Term) -> Term:
-    """The sum of numbers, or of tuples shaped like `zero`."""
-    if len(parts) <= 1:
-        return parts[0] if parts else zero
-    if isinstance(zero, Tuple):
-        return tuple_(total([proj(p, i) for p in parts], item) for i, item in enumerate(zero.items))
-    return add(*parts)
-
-
-

@@ -8,6 +8,7 @@ nothing here is checked against itself.
 from __future__ import annotations
 
 import ast
+import itertools
 from collections.abc import Mapping
 from typing import Any
 
@@ -80,6 +81,15 @@ def value(term: Term, env: Mapping[str, Any]) -> Any:
             return value(term.then if _truth(term.condition, env) else term.orelse, env)
         case t.Prim(op=op, args=args):
             return _builtin(op, [value(a, env) for a in args])
+        case t.Proj(term=inner, index=index):
+            return value(inner, env)[index]
+        case t.Tuple(items=items):
+            return tuple(value(i, env) for i in items)
+        case t.Sum():
+            lo, hi = int(value(term.lo, env)), int(value(term.hi, env))
+            return mpmath.fsum(value(term.body, {**env, term.variable: i}) for i in range(lo, hi + 1))
+        case t.Integral():
+            return _integral(term.variables, term.bounds, term.body, env)
         case _:
             raise ValueError(type(term).__name__)
 
@@ -93,6 +103,71 @@ def _truth(term: Term, env: Mapping[str, Any]) -> bool:
         return not _truth(term.args[0], env)
     a, b = (value(x, env) for x in term.args)
     return bool({"lt": a < b, "le": a <= b, "eq": a == b, "ne": a != b}[term.op])
+
+
+# Integrals: cut where a branch of the body changes its mind, then a rule on every piece
+
+
+def _integral(variables: tuple[str, ...], bounds: Any, body: Term, env: Mapping[str, Any]) -> Any:
+    name, (lo, hi) = variables[0], bounds[0]
+    a, b = value(lo, env), value(hi, env)
+
+    def inner(x: Any) -> Any:
+        here = {**env, name: x}
+        if len(variables) > 1:
+            return _integral(variables[1:], bounds[1:], body, here)
+        result = value(body, here)
+        return result if result == result else mpmath.mpf(0)
+
+    if mpmath.isinf(a) or mpmath.isinf(b):
+        return mpmath.quad(inner, [a, 0, b] if a < 0 < b else [a, b])
+    nested = len(variables) > 1 or any(isinstance(n, t.Integral) for n in t.postorder(body))
+    rule = "gauss-legendre" if nested else "tanh-sinh"
+    pieces = _pieces(name, a, b, body, env, 24 if nested else 60, variables[1:2], bounds[1:2])
+    total = mpmath.mpf(0)
+    for lower, upper in itertools.pairwise(pieces):
+        total += mpmath.quad(inner, [lower, upper], method=rule, maxdegree=4 if nested else 6)
+    return total
+
+
+def _pieces(
+    name: str,
+    a: Any,
+    b: Any,
+    body: Term,
+    env: Mapping[str, Any],
+    count: int,
+    further: tuple[str, ...] = (),
+    bounds: Any = (),
+) -> list[Any]:
+    branches = [n for n in t.postorder(body) if isinstance(n, t.Branch)]
+    nested = [n for n in t.postorder(body) if isinstance(n, t.Integral)]
+
+    def signature(x: Any) -> tuple[int, ...]:
+        """Which branches hold, and in how many pieces the integrals further in come."""
+        here = {**env, name: x}
+        known = [n for n in branches if n.surface.free <= here.keys()]
+        inner = [(n.variables[0], *n.bounds[0], n.body) for n in nested]
+        if further:
+            inner.append((further[0], *bounds[0], body))
+        counts = []
+        for other, lo, hi, within in inner:
+            if (lo.free | hi.free) <= here.keys():
+                ends = value(lo, here), value(hi, here)
+                counts.append(len(_pieces(other, *ends, within, here, 16)) if ends[0] != ends[1] else 0)
+        return (*(int(value(n.surface, here) > 0) for n in known), *counts)
+
+    grid = [a + (b - a) * mpmath.mpf(i) / count for i in range(count + 1)]
+    middles = [(x + y) / 2 for x, y in itertools.pairwise(grid)]
+    cuts = [a]
+    for x, y in itertools.pairwise([a + (b - a) / 10**9, *middles, b - (b - a) / 10**9]):
+        left = signature(x)
+        if left != signature(y):
+            for _ in range(30 if further or nested else 50):
+                m = (x + y) / 2
+                x, y = (m, y) if signature(m) == left else (x, m)
+            cuts.append((x + y) / 2)
+    return [*cuts, b]
 
 
 _NAMES = {"max": max, "min": min, "abs": abs, "clamp": lambda x, lo, hi: min(max(x, lo), hi)}
