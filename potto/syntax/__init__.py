@@ -6,11 +6,13 @@ of lark.
 
 from potto.syntax.chunks import Chunk, split
 from potto.syntax.dump import dump_tree
+from potto.syntax.formatter import format_source
 from potto.syntax.live import Live, live_expressions
 from potto.syntax.parser import ParsedChunk, ParsedExpression, completeness, parse_chunk, parse_expression
 from potto.syntax.printer import print_expression, print_item, print_type
 from potto.syntax.tokens import RESERVED, Comment, Token
 from potto.syntax.walk import children, extent, node_at, walk, without_spans
+from potto.syntax.words import tokenize
 
 __all__ = [
     "RESERVED",
@@ -24,6 +26,7 @@ __all__ = [
     "completeness",
     "dump_tree",
     "extent",
+    "format_source",
     "live_expressions",
     "node_at",
     "parse_chunk",
@@ -32,6 +35,7 @@ __all__ = [
     "print_item",
     "print_type",
     "split",
+    "tokenize",
     "walk",
     "without_spans",
 ]

@@ -1,19 +1,18 @@
 """Reductions of the grammar's expressions and lists to syntax nodes.
 
-Owns `Context` and the functions named by the aliases of `grammar.lark` (with `build_types` and `build_items`). Each takes
-the context and the values of its rule's symbols. What the grammar lets pass but the language does not mean (a named
-argument outside of a call, a parameter that is no name) is reported here, and mended so that a tree remains.
+Owns the functions named by the aliases of `grammar.lark`, with `build_integrals`, `build_types` and `build_items`. Each
+takes the context and the values of its rule's symbols. What the grammar lets pass but the language does not mean is
+reported, and mended so that a tree remains.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
-from potto.diagnostics import Diagnostic, Related
 from potto.source import Span
 from potto.syntax import kinds
+from potto.syntax.groups import Context, Group, Values, Written, as_arguments, as_expr, as_parameters, distinct, plain
 from potto.syntax.nodes import (
     Apply,
     Argument,
@@ -25,60 +24,21 @@ from potto.syntax.nodes import (
     Expr,
     If,
     InlineDiffeo,
-    Integral,
-    Interval,
     Lambda,
     Let,
     ListLiteral,
     Logic,
-    MeasureBound,
     Member,
     Name,
     Number,
-    Operand,
     Parameter,
     Paren,
     Sum,
     Tuple,
-    TypeExpr,
     Unary,
 )
 from potto.syntax.operators import Item, Prefix, climb
-from potto.syntax.tokens import RESERVED, Token
-
-Values = list[Any]
-
-
-@dataclass(slots=True)
-class Context:
-    """What the reductions share: the chunk's text and the messages so far."""
-
-    text: str
-    diffeo: bool
-    diagnostics: list[Diagnostic] = field(default_factory=list)
-
-    def report(self, diagnostic: Diagnostic) -> None:
-        self.diagnostics.append(diagnostic)
-
-
-class Written(NamedTuple):
-    """One thing between the commas of parentheses, before it is known what the parentheses are."""
-
-    name: Token | None
-    value: Any
-    annotation: TypeExpr | None
-    separator: str
-    """What stands before it: `,`, `;` or nothing."""
-
-
-class Group(NamedTuple):
-    """Parentheses: an expression, a tuple, arguments, parameters or variables."""
-
-    span: Span
-    written: tuple[Written, ...]
-    trailing: bool
-    virtual: bool
-
+from potto.syntax.tokens import RESERVED
 
 # Lists
 
@@ -193,127 +153,6 @@ def paren(_: Context, v: Values) -> Group:
 
 def paren_comma(_: Context, v: Values) -> Group:
     return Group(Span(v[0].start, v[3].end), tuple(v[1]), True, not v[0].text)
-
-
-def as_expr(context: Context, value: Any) -> Expr:
-    """Parentheses that stand for a value: `(e)` or a tuple; anything but parentheses as it is."""
-    if not isinstance(value, Group):
-        return value  # type: ignore[no-any-return]
-    items = [plain(context, written) for written in value.written]
-    if not items and value.virtual:
-        return ErrorExpr(value.span, "")
-    if not items:
-        context.report(kinds.MISSING_EXPRESSION(value.span, "there is nothing between these parentheses"))
-        return ErrorExpr(value.span, context.text[value.span.start : value.span.end])
-    if len(items) == 1:
-        return Paren(value.span, items[0])
-    return Tuple(value.span, tuple(items))
-
-
-def plain(context: Context, written: Written) -> Expr:
-    """A thing between commas where only an expression has a meaning."""
-    if written.separator == ";":
-        _semicolon(context, written)
-    if written.name is None:
-        return written.value  # type: ignore[no-any-return]
-    target = Name(written.name.span, written.name.text)
-    if written.annotation is not None:
-        span = written.name.span.cover(written.annotation.span)
-        context.report(
-            kinds.NOT_A_NAME(span, "only a parameter can be given a type", help="a choice is written `p ? a : b`")
-        )
-        return target
-    span = target.span.cover(written.value.span)
-    context.report(
-        kinds.EQUALS(
-            span,
-            f"`{target.id} = …` names an argument, but this is no call",
-            help=f"to compare, write `{target.id} == …`",
-        )
-    )
-    op = Operand("==", Span(target.span.end, target.span.end), written.value)
-    return Compare(span, target, (op,))
-
-
-def _semicolon(context: Context, written: Written) -> None:
-    value = written.name if written.name is not None else written.value
-    context.report(
-        kinds.UNEXPECTED(
-            value.span,
-            "a `;` separates bindings of a `let`, or the variables of a `diffeo` from its parameters",
-            help="write `,` here",
-        )
-    )
-
-
-def as_arguments(context: Context, group: Group) -> tuple[Argument, ...]:
-    """Parentheses that hold the arguments of a call."""
-    out: list[Argument] = []
-    seen: dict[str, Span] = {}
-    for written in group.written:
-        if written.name is None or written.annotation is not None:
-            value = plain(context, written)
-            out.append(Argument(value.span, None, None, value))
-            continue
-        if written.separator == ";":
-            _semicolon(context, written)
-        key = written.name
-        distinct(context, seen, key.text, key.span, "argument")
-        out.append(Argument(key.span.cover(written.value.span), key.text, key.span, written.value))
-    return tuple(out)
-
-
-def distinct(context: Context, seen: dict[str, Span], id: str, span: Span, what: str) -> None:
-    """Report a name that `seen` has already; note it."""
-    if id in seen and id:
-        place = Related(seen[id], "first here")
-        context.report(kinds.DUPLICATE(span, f"the {what} `{id}` is here twice", related=(place,), help="rename one"))
-    seen.setdefault(id, span)
-
-
-def as_parameters(context: Context, value: Any, what: str = "parameter") -> tuple[Parameter, ...]:
-    """A name or parentheses that bind names: parameters of a function, of an inverse, of a diffeomorphism."""
-    if isinstance(value, Token):
-        return (Parameter(value.span, value.text),)
-    out: list[Parameter] = []
-    seen: dict[str, Span] = {}
-    for written in value.written:
-        if written.annotation is not None:
-            span = written.name.span.cover(written.annotation.span)
-            found = Parameter(span, written.name.text, written.annotation)
-        elif written.name is None and isinstance(written.value, Name):
-            found = Parameter(written.value.span, written.value.id)
-        else:
-            bad = written.value if written.name is None else written.name
-            if not isinstance(bad, ErrorExpr):
-                _not_a_name(context, written, what)
-            found = Parameter(bad.span, written.name.text if written.name is not None else "")
-        distinct(context, seen, found.name, found.span, what)
-        out.append(found)
-    return tuple(out)
-
-
-def _not_a_name(context: Context, written: Written, what: str) -> None:
-    if written.name is not None:
-        span = written.name.span.cover(written.value.span)
-        context.report(
-            kinds.NOT_A_NAME(span, f"a {what} can't have a default value", help="pass it where it is called")
-        )
-        return
-    span = written.value.span
-    shown = context.text[span.start : span.end]
-    message = f"`{shown}` is no name: a {what} must be one" if len(shown) < 40 else f"a {what} must be a name"
-    context.report(kinds.NOT_A_NAME(span, message))
-
-
-def as_binders(context: Context, group: Group, what: str) -> tuple[Binder, ...]:
-    """The variables in parentheses, without types."""
-    out: list[Binder] = []
-    for found in as_parameters(context, group, what):
-        if found.annotation is not None:
-            context.report(kinds.NOT_A_NAME(found.annotation.span, f"a {what} takes no type"))
-        out.append(Binder(found.span, found.name))
-    return tuple(out)
 
 
 # Expressions
@@ -442,63 +281,3 @@ def sum(context: Context, v: Values) -> Sum:
     if isinstance(body, Paren):
         body = body.inner
     return Sum(Span(v[0].start, v[7].span.end), variable, v[3], v[5], body)
-
-
-# Integrals
-
-
-def interval(_: Context, v: Values) -> Interval:
-    return Interval(Span(v[0].start, v[4].end), v[1], v[3])
-
-
-def measure(context: Context, v: Values) -> MeasureBound:
-    group: Group = v[3]
-    values = tuple(plain(context, written) for written in group.written)
-    span = Span(v[0].start, group.span.end)
-    return MeasureBound(span, v[0].text, v[0].span, v[2].text, v[2].span, values)
-
-
-def integral(context: Context, v: Values) -> Integral:
-    _word, bounds, body, d, group = v
-    span = Span(v[0].start, group.span.end)
-    if group.virtual:
-        end = Span(group.span.end, group.span.end)
-        named = [b.variable if isinstance(b, MeasureBound) else "" for b in bounds]
-        return Integral(span, tuple(bounds), body, tuple(Binder(end, id) for id in named))
-    variables = as_binders(context, group, "variable of integration")
-    _match_bounds(context, bounds, variables, Span(d.start, group.span.end))
-    return Integral(span, tuple(bounds), body, variables)
-
-
-def integral_unbounded(context: Context, v: Values) -> Integral:
-    """An integral whose bounds are missing, as the lexer has said."""
-    variables = as_binders(context, v[4], "variable of integration")
-    return Integral(Span(v[0].start, v[4].span.end), (), v[2], variables)
-
-
-def _match_bounds(context: Context, bounds: Values, variables: tuple[Binder, ...], place: Span) -> None:
-    if len(bounds) != len(variables):
-        over = Span(bounds[0].span.start, bounds[-1].span.end)
-        context.report(
-            kinds.BOUNDS(
-                place,
-                f"{_count(len(variables), 'variable')} of integration, but bounds for {len(bounds)}",
-                related=(Related(over, f"bounds for {len(bounds)}"),),
-                help="give one `[lo, hi]` (or `x ~ …`) for each variable, in the order of `d(...)`",
-            )
-        )
-        return
-    for bound, variable in zip(bounds, variables):
-        if isinstance(bound, MeasureBound) and bound.variable != variable.name and variable.name:
-            context.report(
-                kinds.BOUNDS(
-                    variable.span,
-                    f"this variable is `{variable.name}`, but its bound is for `{bound.variable}`",
-                    related=(Related(bound.variable_span, f"the bound for `{bound.variable}`"),),
-                    help="write the variables of `d(...)` in the order of the bounds",
-                )
-            )
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}" if number == 1 else f"{number} {what}s"

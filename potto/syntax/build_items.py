@@ -6,8 +6,8 @@ from typing import Any
 
 from potto.source import Span
 from potto.syntax import kinds
-from potto.syntax.build import Context, Group, Values, as_parameters, distinct
 from potto.syntax.build_types import as_type
+from potto.syntax.groups import Context, Group, Values, as_parameters, distinct
 from potto.syntax.nodes import (
     Apply,
     Binder,

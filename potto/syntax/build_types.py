@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from potto.source import Span
 from potto.syntax import kinds
-from potto.syntax.build import Context, Values, Written
+from potto.syntax.groups import Context, Values, Written
 from potto.syntax.nodes import DiffeoType, FunctionType, ListType, Parameter, RealType, TupleType, TypeExpr
 from potto.syntax.tokens import Token
 

@@ -10,8 +10,8 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
-from potto.syntax import build, build_items, build_types
-from potto.syntax.build import Context
+from potto.syntax import build, build_integrals, build_items, build_types
+from potto.syntax.groups import Context
 from potto.syntax.tables import Tables, tables
 from potto.syntax.tokens import Token
 
@@ -25,7 +25,9 @@ def _reductions() -> tuple[tuple[int, str, Action | None], ...]:
     for rule in tables().rules:
         action: Action | None = None
         if rule.action is not None:
-            home = next(home for home in (build, build_items, build_types) if hasattr(home, rule.action))
+            home = next(
+                home for home in (build, build_integrals, build_items, build_types) if hasattr(home, rule.action)
+            )
             action = getattr(home, rule.action)
         out.append((rule.size, rule.origin, action))
     return tuple(out)
@@ -45,7 +47,7 @@ class Engine:
         self.values: list[Any] = []
 
     def run(self, tokens: list[Token], index: int) -> int:
-        """Shift tokens from `index` on; gives the index of the token that has no action, or past the end if all went."""
+        """Shift tokens from `index` on; gives the index of the token without an action, or past the end."""
         rows, states, values, context = self.rows, self.states, self.values, self.context
         reductions, end = _reductions(), self.end
         count = len(tokens)

@@ -12,11 +12,12 @@ from typing import Any, Literal
 from potto.diagnostics import Diagnostic
 from potto.source import Span
 from potto.syntax import kinds
-from potto.syntax.build import Context
 from potto.syntax.chunks import split
 from potto.syntax.engine import Engine
-from potto.syntax.lexer import MAX_LENGTH, MAX_NESTING, Lexed, lex
+from potto.syntax.groups import Context
+from potto.syntax.lexer import MAX_LENGTH, Lexed, lex
 from potto.syntax.messages import Stop, describe
+from potto.syntax.nesting import MAX_NESTING
 from potto.syntax.nodes import BrokenItem, Definition, ErrorExpr, Expr, Item
 from potto.syntax.repair import Edit, find_repair
 from potto.syntax.tokens import Comment, Token

@@ -198,8 +198,8 @@ def _form(expr: Expr) -> tuple[int, str]:
             return _ATOM, f"{path}.{name}"
         case ErrorExpr(text=word):
             return _ATOM, word or "…"
-        case Paren(inner=inner):
-            return _ATOM, f"({_text(inner, _OPEN)})"
+        case Paren():
+            return _ATOM, f"({_text(expr.inner, _OPEN)})"
         case Tuple(items=items):
             return _ATOM, f"({_list(items)})"
         case Bracket(condition=condition):
@@ -213,10 +213,7 @@ def _form(expr: Expr) -> tuple[int, str]:
             names = ", ".join(variable.name for variable in variables)
             return _ATOM, f"integral {_bounds(bounds)} {_text(body, _OPEN)} d({names})"
         case Sum():
-            bounds_text = f"{_bound(expr.lo)}{'' if _bound(expr.lo)[-1] != '.' else ' '}..{_bound(expr.hi)}"
-            body_text = _text(expr.body, _OPEN)
-            inner = body_text if isinstance(expr.body, Tuple) else f"({body_text})"
-            return _ATOM, f"sum {expr.variable.name} in {bounds_text} {inner}"
+            return _ATOM, _sum(expr)
         case Apply():
             return _APPLY, _apply(expr)
         case _:
@@ -234,8 +231,7 @@ def _operator_form(expr: Power | Unary | Chain | Compare | Logic | If | Lambda |
             return _UNARY, f"{op}{_text(operand, _UNARY)}"
         case Chain(first=first, rest=rest):
             own = _SUM if rest[0].op in "+-" else _PRODUCT
-            gap = " " if own == _SUM else ""
-            return own, _text(first, own + 1) + "".join(f"{gap}{o.op}{gap}{_text(o.value, own + 1)}" for o in rest)
+            return own, _text(first, own + 1) + "".join(f" {o.op} {_text(o.value, own + 1)}" for o in rest)
         case Compare(first=first, rest=rest):
             return _COMPARE, _text(first, _SUM) + "".join(f" {o.op} {_text(o.value, _SUM)}" for o in rest)
         case Logic(op=word, operands=operands):
@@ -262,6 +258,14 @@ def _apply(expr: Apply) -> str:
         function = "(d)"
     blank = " " if isinstance(expr.function, Apply) and not expr.function.parenthesized else ""
     return f"{function}{blank}({', '.join(_argument(argument) for argument in expr.arguments)})"
+
+
+def _sum(expr: Sum) -> str:
+    lo, body = _bound(expr.lo), _text(expr.body, _OPEN)
+    blank = " " if lo.endswith(".") else ""
+    return f"sum {expr.variable.name} in {lo}{blank}..{_bound(expr.hi)} " + (
+        body if isinstance(expr.body, Tuple) else f"({body})"
+    )
 
 
 def _argument(argument: Argument) -> str:

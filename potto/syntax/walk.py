@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
-from functools import cache
 from typing import Any, TypeVar
 
 from potto.source import Span
@@ -21,7 +20,6 @@ _CLASSES: frozenset[type] = frozenset(
 NOWHERE = Span(0, 0)
 
 
-@cache
 def _inner_fields(kind: Any) -> tuple[str, ...]:
     """The fields of a kind of node that can hold nodes."""
     plain = ("Span", "str", "float", "int", "bool", "Span | None", "str | None")
@@ -32,10 +30,13 @@ def _inner_fields(kind: Any) -> tuple[str, ...]:
     )
 
 
+_INNER = {kind: _inner_fields(kind) for kind in _CLASSES}
+
+
 def children(node: Node) -> tuple[Node, ...]:
     """The nodes directly under one, in the order of the text."""
     out: list[Node] = []
-    for name in _inner_fields(type(node)):
+    for name in _INNER[type(node)]:
         _gather(getattr(node, name), out)
     return tuple(out)
 

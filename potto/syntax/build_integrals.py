@@ -1,0 +1,66 @@
+"""Reductions of integrals and their bounds. See `build` for the conventions."""
+
+from __future__ import annotations
+
+from potto.diagnostics import Related
+from potto.source import Span
+from potto.syntax import kinds
+from potto.syntax.groups import Context, Group, Values, as_binders, plain
+from potto.syntax.nodes import Binder, Integral, Interval, MeasureBound
+
+
+def interval(_: Context, v: Values) -> Interval:
+    return Interval(Span(v[0].start, v[4].end), v[1], v[3])
+
+
+def measure(context: Context, v: Values) -> MeasureBound:
+    group: Group = v[3]
+    values = tuple(plain(context, written) for written in group.written)
+    span = Span(v[0].start, group.span.end)
+    return MeasureBound(span, v[0].text, v[0].span, v[2].text, v[2].span, values)
+
+
+def integral(context: Context, v: Values) -> Integral:
+    _word, bounds, body, d, group = v
+    span = Span(v[0].start, group.span.end)
+    if group.virtual:
+        end = Span(group.span.end, group.span.end)
+        named = [b.variable if isinstance(b, MeasureBound) else "" for b in bounds]
+        return Integral(span, tuple(bounds), body, tuple(Binder(end, id) for id in named))
+    variables = as_binders(context, group, "variable of integration")
+    _match_bounds(context, bounds, variables, Span(d.start, group.span.end))
+    return Integral(span, tuple(bounds), body, variables)
+
+
+def integral_unbounded(context: Context, v: Values) -> Integral:
+    """An integral whose bounds are missing, as the lexer has said."""
+    variables = as_binders(context, v[4], "variable of integration")
+    return Integral(Span(v[0].start, v[4].span.end), (), v[2], variables)
+
+
+def _match_bounds(context: Context, bounds: Values, variables: tuple[Binder, ...], place: Span) -> None:
+    if len(bounds) != len(variables):
+        over = Span(bounds[0].span.start, bounds[-1].span.end)
+        context.report(
+            kinds.BOUNDS(
+                place,
+                f"{_count(len(variables), 'variable')} of integration, but bounds for {len(bounds)}",
+                related=(Related(over, f"bounds for {len(bounds)}"),),
+                help="give one `[lo, hi]` (or `x ~ …`) for each variable, in the order of `d(...)`",
+            )
+        )
+        return
+    for bound, variable in zip(bounds, variables):
+        if isinstance(bound, MeasureBound) and bound.variable != variable.name and variable.name:
+            context.report(
+                kinds.BOUNDS(
+                    variable.span,
+                    f"this variable is `{variable.name}`, but its bound is for `{bound.variable}`",
+                    related=(Related(bound.variable_span, f"the bound for `{bound.variable}`"),),
+                    help="write the variables of `d(...)` in the order of the bounds",
+                )
+            )
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"

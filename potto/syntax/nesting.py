@@ -1,0 +1,167 @@
+"""What is open while a chunk is read: brackets, and the `let`, `sum` and `integral` that wait for their ends.
+
+Owns `Nesting`. It closes what the text never closes, so that the tokens it leaves are always balanced and every
+integral has its `d(...)`: the parser need not guess at brackets.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from potto.diagnostics import Diagnostic, Related
+from potto.source import Span
+from potto.syntax import kinds
+from potto.syntax.tokens import Token
+
+MAX_NESTING = 200
+MOST_MESSAGES = 50
+_CLOSER = {"LPAR": "RPAR", "LSQB": "RSQB"}
+_CHARACTER = {"LPAR": "(", "RPAR": ")", "LSQB": "[", "RSQB": "]"}
+
+
+@dataclass(slots=True)
+class _Open:
+    """A bracket with the indentation of its line, or a `let`, `sum` or `integral` with its depth of brackets."""
+
+    kind: str
+    start: int
+    depth: int
+
+
+@dataclass(slots=True)
+class Nesting:
+    """`unclosed` are the brackets that are known to have no end, from a first reading."""
+
+    text: str
+    unclosed: frozenset[int]
+    tokens: list[Token] = field(default_factory=list)
+    diagnostics: list[Diagnostic] = field(default_factory=list)
+    brackets: list[_Open] = field(default_factory=list)
+    words: list[_Open] = field(default_factory=list)
+    never_closed: set[int] = field(default_factory=set)
+
+    def report(self, diagnostic: Diagnostic) -> None:
+        """Note a message, unless there are so many that one more helps nobody."""
+        if len(self.diagnostics) < MOST_MESSAGES:
+            self.diagnostics.append(diagnostic)
+
+    # Words
+
+    def open_word(self, kind: str, start: int) -> None:
+        """A `let`, `sum` or `integral` begins."""
+        self.words.append(_Open(kind, start, len(self.brackets)))
+
+    def close_integral(self) -> bool:
+        """Close the innermost integral that is open at this depth of brackets, if there is one."""
+        depth = len(self.brackets)
+        for index in range(len(self.words) - 1, max(-1, len(self.words) - MAX_NESTING), -1):
+            word = self.words[index]
+            if word.depth != depth:
+                return False
+            if word.kind == "INTEGRAL":
+                del self.words[index:]
+                return True
+        return False
+
+    def close_in(self) -> None:
+        """`in` belongs to the innermost `let` or `sum` at this depth."""
+        if self.words and self.words[-1].kind != "INTEGRAL" and self.words[-1].depth == len(self.brackets):
+            self.words.pop()
+
+    def in_let(self) -> bool:
+        """Whether what comes next at this depth could be a further binding of a `let`."""
+        return bool(self.words) and self.words[-1].kind == "LET" and self.words[-1].depth == len(self.brackets)
+
+    def in_integral(self) -> bool:
+        """Whether an integral waits for its `d(...)`."""
+        return any(word.kind == "INTEGRAL" for word in self.words[-MAX_NESTING:])
+
+    def end_words(self) -> None:
+        """Nothing at this depth goes on from here: integrals that have no `d(...)` get an empty one."""
+        words, depth = self.words, len(self.brackets)
+        while words and words[-1].depth >= depth:
+            word = words.pop()
+            if word.kind == "INTEGRAL":
+                self._end_integral(word)
+
+    def _end_integral(self, opener: _Open) -> None:
+        last = self.tokens[-1].end
+        word = "∫" if self.text[opener.start] == "∫" else "integral"
+        self.report(
+            kinds.NO_DIFFERENTIAL(
+                Span(opener.start, opener.start + len(word)),
+                f"this `{word}` has no `d(...)`",
+                label="which variables does it integrate over?",
+                related=(Related(Span(last, last), "the integral ends here"),),
+                help="end the integral with its variables: `d(x)`",
+            )
+        )
+        self.tokens += [Token(kind, "", last, last) for kind in ("D", "LPAR", "RPAR")]
+
+    # Brackets
+
+    def open_bracket(self, kind: str, start: int, indent: int) -> bool:
+        """A bracket opens, on a line indented so far; False if there are too many around it."""
+        if len(self.brackets) >= MAX_NESTING:
+            message = kinds.TOO_DEEP(
+                Span(start, start + 1), "this is nested too deeply", help="name the inner parts with `let`"
+            )
+            self.diagnostics.append(message)
+            return False
+        self.brackets.append(_Open(kind, start, indent))
+        return True
+
+    def close_bracket(self, kind: str, word: str, start: int, end: int) -> None:
+        """A closing bracket: adds its token, mended if it is the wrong one, or none if nothing is open."""
+        if not self.brackets:
+            self.report(
+                kinds.BRACKETS(Span(start, end), f"this `{word}` closes nothing", help=f"take the `{word}` out")
+            )
+            return
+        if any(_CLOSER[bracket.kind] == kind for bracket in self.brackets):
+            # What is open inside the bracket that is meant was never closed.
+            while _CLOSER[self.brackets[-1].kind] != kind:
+                self.close_unclosed(start)
+        opener = self.brackets[-1]
+        wanted = _CLOSER[opener.kind]
+        if wanted != kind:
+            self.report(
+                kinds.BRACKETS(
+                    Span(start, end),
+                    f"this `{word}` does not close the `{_CHARACTER[opener.kind]}`",
+                    related=(Related(Span(opener.start, opener.start + 1), "opened here"),),
+                    help=f"write `{_CHARACTER[wanted]}`",
+                )
+            )
+        self.end_words()
+        self.brackets.pop()
+        self.tokens.append(Token(wanted, word, start, end))
+
+    def close_unclosed(self, before: int) -> None:
+        """Close the innermost bracket ahead of `before`, since the text never does."""
+        opener = self.brackets[-1]
+        self.never_closed.add(opener.start)
+        self.end_words()
+        self.brackets.pop()
+        last = self.tokens[-1].end
+        closer = _CLOSER[opener.kind]
+        self.report(
+            kinds.BRACKETS(
+                Span(opener.start, opener.start + 1),
+                f"this `{_CHARACTER[opener.kind]}` is never closed",
+                related=(Related(Span(last, max(last, before)), f"a `{_CHARACTER[closer]}` is missing here"),),
+                help=f"write `{_CHARACTER[closer]}`",
+            )
+        )
+        self.tokens.append(Token(closer, "", last, last))
+
+    def close_by_indentation(self, at: int, indent: int) -> None:
+        """Before a line: close the brackets without an end that its indentation shows to be over."""
+        while self.brackets and self.brackets[-1].start in self.unclosed and indent <= self.brackets[-1].depth:
+            self.close_unclosed(at)
+
+    def close_all(self, at: int) -> None:
+        """At the end of the chunk."""
+        while self.brackets:
+            self.close_unclosed(at)
+        self.end_words()

@@ -1,0 +1,161 @@
+"""Which tokens stand apart: the formatter's rules for blanks within a line.
+
+Owns `Spaced` and `spaced`. The rules need little context (is this `-` a sign, does this `:` belong to a `?`, does this
+`=` name an argument), and it is gathered here in one pass over a chunk's tokens.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from potto.syntax.tokens import KEYWORDS, Token
+
+_ENDS_OPERAND = frozenset({"NAME", "NUMBER", "MEMBER", "RPAR", "RSQB"})
+_OPENERS = frozenset({"LPAR", "LSQB"})
+_CLOSERS = frozenset({"RPAR", "RSQB"})
+_TYPES = frozenset({"Real", "Dist", "Diffeo"})
+_BREAK_BEFORE = frozenset({"THEN", "ELSE", "QMARK", "D", "INVERSE", "WHERE"})
+
+
+@dataclass(slots=True)
+class Spaced:
+    """A written token, whether a blank stands before it, and what the layout must know of it."""
+
+    token: Token
+    blank: bool
+    depth: int
+    """How many brackets are open around it; a bracket itself counts among those outside."""
+    may_break: bool
+    """Whether a line that is too long may be broken before it."""
+    level: int
+    """How many blocks it stands in."""
+    starts: bool
+    """Whether it starts a line of its block."""
+
+
+@dataclass(slots=True)
+class _Bracket:
+    kind: str
+    bounds: bool
+    questions: int = 0
+    lets: int = 0
+
+
+class _Pass:
+    """One walk over the tokens of a chunk."""
+
+    def __init__(self, tokens: list[Token], text: str) -> None:
+        self.tokens, self.text = tokens, text
+        self.brackets = [_Bracket("", False)]
+        self.level = 0
+        self.starts = True
+        self.marked = False  # whether an empty token (the body of a sum or a def) stands directly before
+        self.bounds_closed = False
+        self.head = tokens[0].kind in ("DEF", "DIFFEODEF") if tokens else False
+        self.loop = False
+        self.out: list[Spaced] = []
+
+    def run(self) -> list[Spaced]:
+        for token in self.tokens:
+            if token.text:
+                self._written(token)
+            elif token.kind == "INDENT":
+                self.level, self.starts = self.level + 1, True
+            elif token.kind == "DEDENT":
+                self.level -= 1
+            elif token.kind == "NEWLINE":
+                self.starts = True
+            elif token.kind in ("SUMBODY", "COLON"):
+                self.marked = True
+        return self.out
+
+    def _written(self, token: Token) -> None:
+        before = self.out[-1].token if self.out else None
+        if self.starts:
+            self.loop = token.kind == "FOR"
+        kind = token.kind
+        if kind in _CLOSERS:
+            closed = self.brackets.pop()
+        blank = before is not None and not self.starts and self._blank(before, token)
+        depth = len(self.brackets) - 1
+        may_break = before is not None and self._may_break(before, token) and not (self.loop and depth == 0)
+        self.out.append(Spaced(token, blank, depth, may_break, self.level, self.starts))
+        self.starts = self.marked = self.bounds_closed = False
+        if kind in _OPENERS:
+            self.brackets.append(_Bracket(kind, before is not None and before.kind == "INTEGRAL"))
+        elif kind in _CLOSERS:
+            self.bounds_closed = closed.bounds
+        elif kind == "QMARK":
+            self.brackets[-1].questions += 1
+        elif kind == "COLON" and self.brackets[-1].questions:
+            self.brackets[-1].questions -= 1
+        elif kind == "LET":
+            self.brackets[-1].lets += 1
+        elif kind == "IN" and self.brackets[-1].lets:
+            self.brackets[-1].lets -= 1
+
+    def _is_prefix(self, index: int = -1) -> bool:
+        """Whether the sign that was written last (or would be next, at 0) has no operand before it."""
+        at = len(self.out) + index
+        return at < 1 or self.out[at].starts or self.out[at - 1].token.kind not in _ENDS_OPERAND
+
+    def _is_star_of_type(self, before: Token) -> bool:
+        return before.kind == "NAME" and before.text in _TYPES
+
+    def _may_break(self, before: Token, token: Token) -> bool:
+        kind = token.kind
+        if before.kind == "COMMA" or kind in _BREAK_BEFORE:
+            return True
+        if kind == "COLON":
+            return self.brackets[-1].questions > 0
+        if kind == "IN":
+            return self.brackets[-1].lets > 0
+        if kind in ("SIGN", "STAR", "BINOP"):
+            return before.kind in _ENDS_OPERAND and token.text != "^" and not self._is_star_of_type(before)
+        return before.kind == "DOT"
+
+    def _blank(self, before: Token, token: Token) -> bool:
+        """Whether a blank stands between two tokens of a line."""
+        kind, last = token.kind, before.kind
+        if last in _OPENERS or kind in _CLOSERS or kind in ("COMMA", "SEMI"):
+            return False
+        if last in ("COMMA", "SEMI"):
+            return True
+        if kind == "DOTDOT" or last == "DOTDOT":
+            return kind == "DOTDOT" and before.text.endswith(".")
+        if kind == "COLON":
+            return self.brackets[-1].questions > 0
+        if kind == "EQ" or last == "EQ":
+            return not self._names_argument()
+        if token.text == "^" or before.text == "^":
+            return False
+        if last == "LAMBDA":
+            return False
+        if last == "SIGN" and self._is_prefix():
+            return False
+        if kind == "STAR" and self._is_star_of_type(before):
+            return False
+        if kind in _OPENERS:
+            return self._blank_before_bracket(before, token)
+        return True
+
+    def _names_argument(self) -> bool:
+        """Whether an `=` here names an argument of a call."""
+        return self.brackets[-1].kind == "LPAR" and not self.brackets[-1].lets
+
+    def _blank_before_bracket(self, before: Token, token: Token) -> bool:
+        if before.kind in ("D", "DIFFEO"):
+            return False
+        if before.text in KEYWORDS or before.kind not in _ENDS_OPERAND or self.marked or self.bounds_closed:
+            return True
+        if token.kind == "LSQB":
+            return before.text not in _TYPES
+        if self.head and len(self.out) == 2:
+            return False
+        # `f(x)` and `f (x)` are both good style, for calls and for juxtaposition: the author's choice stands.
+        return token.start > before.end
+
+
+def spaced(tokens: list[Token], text: str) -> list[Spaced]:
+    """The written tokens of a chunk, each with what the layout must know of it."""
+    return _Pass(tokens, text).run()
