@@ -132,7 +132,9 @@ def _builtin(node: Prim, texts: _Texts) -> _Text:
         case "neg":
             return _Text(f"-{parts[0].at(_MUL)}", _SIGN)
         case "mul":
-            return _Text("*".join([parts[0].at(_MUL), *(p.at(_POW) for p in parts[1:])]), _MUL)
+            first = parts[0].at(_SIGN)
+            holds = _SIGN if first.startswith("-") else _MUL
+            return _Text("*".join([first, *(p.at(_POW) for p in parts[1:])]), holds)
         case "div":
             return _Text(f"{parts[0].at(_MUL)}/{parts[1].at(_POW)}", _MUL)
         case "pow":

@@ -1,0 +1,20 @@
+"""The oracle: core terms evaluated on mpmath numbers, as slowly and as simply as can be.
+
+Owns `evaluate`. It shares no code with the evaluator that people use: a tree walk, integrals by iterated tanh-sinh
+quadrature between the points where the integrand decides differently, derivatives by differences of the value. Only
+tests and checks import it; mpmath is an optional dependency.
+"""
+
+from potto.core.reference.functions import FUNCTIONS, clamp, erfcinv, function, maximum, minimum
+from potto.core.reference.walk import NotAccurate, evaluate
+
+__all__ = [
+    "FUNCTIONS",
+    "NotAccurate",
+    "clamp",
+    "erfcinv",
+    "evaluate",
+    "function",
+    "maximum",
+    "minimum",
+]

@@ -1,0 +1,226 @@
+"""The tree walk of the oracle: environments, calls, choices and what they decided.
+
+Owns `evaluate`. While an integrand is evaluated, every choice (a branch, a condition, the side of a kink, the sign
+under a delta) is noted in a trace; `integrals` cuts where the trace changes.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from mpmath import mp
+
+from potto.core.reference import differences, integrals
+from potto.core.reference.functions import FUNCTIONS
+from potto.core.terms import (
+    App,
+    Branch,
+    Const,
+    Delta,
+    Deriv,
+    Global,
+    Hole,
+    If,
+    Integral,
+    Lam,
+    ListOf,
+    Prim,
+    Proj,
+    Sum,
+    Term,
+    Tuple,
+    Var,
+)
+
+Value = Any  # an mpmath number, a tuple or list of values, a truth value, or a function of values
+Lookup = Callable[[str, str], Term]
+Environment = Mapping[str, Value]
+
+GUARD = 15  # digits beyond those asked for
+_NAMED = {"pi": lambda: +mp.pi, "inf": lambda: mp.inf}
+_DEEP = 60_000
+
+
+class NotAccurate(ArithmeticError):
+    """The oracle cannot vouch for the digits asked for."""
+
+
+def evaluate(
+    term: Term,
+    env: Mapping[str, Any] | None = None,
+    lookup: Lookup | None = None,
+    digits: int = 30,
+    samples: int = 64,
+) -> Value:
+    """The value of a term, to about `digits` digits: an mpmath number, a tuple, a list or a function.
+
+    `env` gives its free variables, `lookup` other definitions by module and name. `samples` is how many points of an
+    interval are looked at in search of places where the integrand jumps or bends.
+    """
+    with mp.workdps(digits + GUARD), _deep_recursion():
+        values = {name: as_value(value) for name, value in (env or {}).items()}
+        return Oracle(lookup, digits, samples).run(term, values)
+
+
+@contextlib.contextmanager
+def _deep_recursion() -> Iterator[None]:
+    """Walking recurses as deep as the term: Python's default limit is for programs that don't."""
+    before = sys.getrecursionlimit()
+    sys.setrecursionlimit(max(before, _DEEP))
+    try:
+        yield
+    finally:
+        sys.setrecursionlimit(before)
+
+
+def as_value(value: Any) -> Value:
+    """Host data as values: numbers become mpmath numbers, exactly."""
+    if isinstance(value, tuple):
+        return tuple(map(as_value, value))
+    if isinstance(value, list):
+        return list(map(as_value, value))
+    return value if callable(value) or isinstance(value, bool) else mp.mpf(value)
+
+
+@dataclass
+class Trace:
+    """What was decided in one evaluation, in order, and the numbers that decided."""
+
+    sides: list[object] = field(default_factory=list)
+    values: list[Any] = field(default_factory=list)
+
+
+class Oracle:
+    """One evaluation: how definitions are found, how exact it is, and the trace that is being written."""
+
+    def __init__(self, lookup: Lookup | None, digits: int, samples: int) -> None:
+        self.lookup = lookup
+        self.digits = digits
+        self.samples = samples
+        self.trace: Trace | None = None
+        self.deciding = 0
+        self.deltas = 0  # deltas met in this evaluation so far
+        self.forced: int | None = None  # the delta that counts as 1; others count as 0
+
+    def run(self, term: Term, env: Environment) -> Value:
+        match term:
+            case Const(name=str(name)) if name in _NAMED:
+                return _NAMED[name]()
+            case Const(value=value):
+                return mp.mpf(value)
+            case Var(name=name):
+                return env[name]
+            case Prim():
+                return self.builtin(term, env)
+            case If():
+                holds = self.decide(term.condition, env)
+                self.note(term, holds, None)
+                return self.run(term.then if holds else term.orelse, env)
+            case Branch():
+                side = self.decide(term.surface, env)
+                holds = side > 0 if term.strict else side >= 0
+                self.note(term, bool(holds), side)
+                return self.run(term.then if holds else term.orelse, env)
+            case Tuple(items=items):
+                return tuple(self.run(item, env) for item in items)
+            case ListOf(items=items):
+                return [self.run(item, env) for item in items]
+            case Proj():
+                return self.run(term.term, env)[term.index]
+            case Lam():
+                return _Closure(self, term, env)
+            case App(function=function, args=args):
+                return call(self.run(function, env), tuple(self.run(arg, env) for arg in args))
+            case Global(module=module, name=name):
+                if self.lookup is None:
+                    raise KeyError(f"{module}.{name}: there is no lookup")
+                return self.run(self.lookup(module, name), {})
+            case Integral():
+                return integrals.integrate(self, term, env)
+            case Delta():
+                return self.delta(term, env)
+            case Sum():
+                return self.sum(term, env)
+            case Deriv(function=inner):
+                return differences.derivative(self.run(inner, env), self.digits)
+            case Hole(reason=reason):
+                raise ValueError(f"the program is wrong here: {reason}")
+
+    def decide(self, term: Term, env: Environment) -> Value:
+        """What a choice depends on, worked out in full also while a trace is written."""
+        self.deciding += 1
+        try:
+            return self.run(term, env)
+        finally:
+            self.deciding -= 1
+
+    def note(self, term: Term, side: object, value: Any) -> None:
+        if self.trace is not None:
+            self.trace.sides.append((term, side))
+            self.trace.values.append(value)
+
+    def builtin(self, term: Prim, env: Environment) -> Value:
+        run = self.decide if term.op in _KINKS else self.run
+        args = [run(arg, env) for arg in term.args]
+        result = FUNCTIONS[term.op](*args)
+        if self.trace is not None and term.op in _KINKS:
+            for margin in _KINKS[term.op](*args):
+                self.note(term, bool(margin >= 0), margin)
+        return result
+
+    def delta(self, term: Delta, env: Environment) -> Value:
+        """0, or 1 for the one whose factor is asked for; its sign is noted, so that cuts lie where it counts."""
+        side = self.decide(term.coordinates[0], env)
+        self.note(term, bool(side >= 0), side)
+        self.deltas += 1
+        return mp.mpf(1 if self.forced == self.deltas - 1 else 0)
+
+    def sum(self, term: Sum, env: Environment) -> Value:
+        lo, hi = int(mp.ceil(self.run(term.lo, env))), int(mp.floor(self.run(term.hi, env)))
+        parts = [self.run(term.body, {**env, term.variable: mp.mpf(i)}) for i in range(lo, hi + 1)]
+        return plus(parts) if parts else mp.mpf(0)
+
+
+_KINKS: dict[str, Callable[..., list[Any]]] = {
+    "abs": lambda x: [x],
+    "min": lambda *args: [a - b for i, a in enumerate(args) for b in args[:i]],
+    "max": lambda *args: [a - b for i, a in enumerate(args) for b in args[:i]],
+    "clamp": lambda x, lo, hi: [x - lo, hi - x],
+    "hypot": lambda x, y: [x, y],
+    "atan2": lambda y, x: [y],
+}
+
+
+@dataclass(frozen=True)
+class _Closure:
+    oracle: Oracle
+    term: Lam
+    env: Environment
+
+    def __call__(self, *args: Value) -> Value:
+        return self.oracle.run(self.term.body, {**self.env, **dict(zip(self.term.params, args, strict=True))})
+
+    @property
+    def arity(self) -> int:
+        return len(self.term.params)
+
+
+def call(function: Value, args: tuple[Value, ...]) -> Value:
+    """One group of arguments; a group of n parameters also takes one tuple of n, and back."""
+    arity = getattr(function, "arity", len(args))
+    if arity != len(args) and len(args) == 1 and isinstance(args[0], tuple):
+        args = args[0]
+    elif arity != len(args) and arity == 1:
+        args = (args,)
+    return function(*args)
+
+
+def plus(parts: list[Value]) -> Value:
+    """The sum of numbers, or of tuples component by component."""
+    if isinstance(parts[0], tuple):
+        return tuple(plus(list(column)) for column in zip(*parts, strict=True))
+    return sum(parts, mp.mpf(0))
