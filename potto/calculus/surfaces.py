@@ -14,8 +14,25 @@ from typing import Literal
 
 from potto.calculus.trace import CallSite, Part, Side, layout
 from potto.core.terms import (
-    App, Const, Delta, Deriv, If, Integral, Lam, Prim, Proj, Sum, Term, Tuple, const, fresh,
-    postorder, proj, rename_bound, substitute, tuple_,
+    App,
+    Const,
+    Delta,
+    Deriv,
+    If,
+    Integral,
+    Lam,
+    Prim,
+    Proj,
+    Sum,
+    Term,
+    Tuple,
+    const,
+    fresh,
+    postorder,
+    proj,
+    rename_bound,
+    substitute,
+    tuple_,
 )  # fmt: skip
 from potto.primitives import PRIMITIVES
 
@@ -207,4 +224,3 @@ def conditions(term: Term, resolve: Resolve) -> tuple[Condition, ...]:
             if isinstance(inner, Delta) and inner.free & set(node.variables):
                 out.append(Condition(node, inner.coordinates, False, ()))
     return tuple(out)
-

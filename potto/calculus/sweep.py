@@ -114,9 +114,7 @@ def sweep(term: Integral, found: Iterable[Finding], resolve: Resolve, decide: De
         for bound in (lo, hi):
             for f in findings(bound, resolve, decide):
                 pool.put(f.surface, None, f.kind == "edge")
-    outer = tuple(
-        Finding("edge" if turning else "kink", surface) for surface, (_, turning) in pool.surfaces.items()
-    )
+    outer = tuple(Finding("edge" if turning else "kink", surface) for surface, (_, turning) in pool.surfaces.items())
     return Sweep(tuple(reversed(levels)), outer)
 
 

@@ -11,8 +11,17 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from potto.core.terms import (
-    App, Branch, Deriv, If, Integral, Lam, Sum, Term,
-    children, lam, postorder,
+    App,
+    Branch,
+    Deriv,
+    If,
+    Integral,
+    Lam,
+    Sum,
+    Term,
+    children,
+    lam,
+    postorder,
 )  # fmt: skip
 
 
@@ -136,5 +145,3 @@ def layout(term: Term) -> Layout:
         elif isinstance(node, App):
             site(node, 0, CallSite(node, *spine(node)))
     return Layout(tuple(sites), index, tuple(order))
-
-

@@ -169,7 +169,22 @@ class Hole(_Base):
 
 
 Term = (
-    Const | Var | Prim | If | Branch | Tuple | Proj | ListOf | Lam | App | Global | Integral | Delta | Sum | Deriv | Hole
+    Const
+    | Var
+    | Prim
+    | If
+    | Branch
+    | Tuple
+    | Proj
+    | ListOf
+    | Lam
+    | App
+    | Global
+    | Integral
+    | Delta
+    | Sum
+    | Deriv
+    | Hole
 )
 
 _FIELDS: dict[type, tuple[str, ...]] = {
@@ -415,7 +430,13 @@ def mul(*args: Term) -> Term:
 def div(a: Term, b: Term) -> Term:
     if b is ONE:
         return a
-    if isinstance(a, Const) and isinstance(b, Const) and _exact_integer(a.value) and _exact_integer(b.value) and b.value:
+    if (
+        isinstance(a, Const)
+        and isinstance(b, Const)
+        and _exact_integer(a.value)
+        and _exact_integer(b.value)
+        and b.value
+    ):
         quotient = a.value / b.value
         if math.frexp(b.value)[0] in (0.5, -0.5) or quotient.is_integer():
             return const(quotient)
@@ -425,8 +446,9 @@ def div(a: Term, b: Term) -> Term:
 def pow_(base: Term, exponent: Term) -> Term:
     if exponent is ONE:
         return base
-    if isinstance(base, Const) and isinstance(exponent, Const) and 0 <= exponent.value <= 64:
-        if _exact_integer(base.value) and exponent.value.is_integer() and abs(base.value) ** exponent.value < 2.0**53:
+    if isinstance(base, Const) and isinstance(exponent, Const):
+        whole = _exact_integer(base.value) and exponent.value.is_integer() and 0 <= exponent.value <= 64
+        if whole and abs(base.value) ** exponent.value < 2.0**53:
             return const(base.value**exponent.value)
     return prim("pow", base, exponent)
 
@@ -626,9 +648,7 @@ def rename_bound(term: Term, names: Mapping[str, str]) -> Term:
         case Lam():
             return lam(tuple(names.get(p, p) for p in term.params), substitute(term.body, renaming))
         case Sum():
-            return sum_(
-                names.get(term.variable, term.variable), term.lo, term.hi, substitute(term.body, renaming)
-            )
+            return sum_(names.get(term.variable, term.variable), term.lo, term.hi, substitute(term.body, renaming))
         case Integral():
             bounds, hints, seen = [], [], dict[str, Term]()
             for name, (lo, hi), points in zip(term.variables, term.bounds, term.hints, strict=True):

@@ -78,9 +78,7 @@ def frame_rows(plan: LevelPlan, values: tuple[Value, ...]) -> tuple[Cell, Cell, 
     return cells[0], cells[1], rows
 
 
-def segments(
-    plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, directions: int, nested: bool
-) -> Cuts:
+def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, directions: int, nested: bool) -> Cuts:
     """Cut [lo, hi] at the rows; reversed bounds are turned round and counted negative."""
     low, high = as_array(lo.v, batch), as_array(hi.v, batch)
     tl, th = _tangents(lo.t, batch, directions), _tangents(hi.t, batch, directions)
@@ -186,7 +184,15 @@ def _agree(t: Array, same: Bools, rank: Ints) -> None:
 
 
 def _pieces(
-    x: Array, t: Array, rank: Ints, sign: Array, beyond: list[tuple[Array, bool]], edges: list[Edge], lo: Cell, hi: Cell, batch: int
+    x: Array,
+    t: Array,
+    rank: Ints,
+    sign: Array,
+    beyond: list[tuple[Array, bool]],
+    edges: list[Edge],
+    lo: Cell,
+    hi: Cell,
+    batch: int,
 ) -> Cuts:
     a, b = x[:-1], x[1:]
     full = b > a

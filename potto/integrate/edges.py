@@ -68,4 +68,3 @@ def across(
     if not (np.isfinite(actual).all() and np.isfinite(flipped).all()):
         return None
     return flipped - actual, np.abs(actual) + np.abs(flipped)
-

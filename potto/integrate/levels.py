@@ -14,11 +14,11 @@ from potto.integrate import maps
 from potto.integrate.cuts import Cuts, as_array, frame_rows, segments
 from potto.integrate.edges import report_edges
 from potto.integrate.maps import Ints, Segments
-from potto.integrate.pieces import Evaluator, Sums, components, gather, take
+from potto.integrate.pieces import Evaluator, Sums, components, gather, still, take
 from potto.integrate.plan import LevelPlan, Plan, vanishes
 from potto.integrate.roots import searched_rows
 from potto.integrate.work import Work
-from potto.kernels.cells import Array, Cell, Mask, Value, pad
+from potto.kernels.cells import Array, Cell, Mask, Value
 
 
 @dataclass
@@ -79,7 +79,7 @@ class Iteration:
             return sides
         middle, _, _ = maps.points(seg, np.full((seg.a.size, 1), 0.5))
         here = {n: v for n, v in env.items() if n in level.surfaces.params}
-        at = {n: pad(v, 0) if not isinstance(v, Cell) else Cell(v.v) for n, v in gather(here, seg.owner).items()}
+        at = {n: still(v) for n, v in gather(here, seg.owner).items()}
         at[level.variable] = Cell(middle[:, 0])
         values = machine.with_directions(0).evaluate(level.surfaces, at, None)
         assert isinstance(values, tuple)

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from potto.calculus.surfaces import Decide, Resolve, findings
 from potto.calculus.sweep import Cut, Level, sweep
 from potto.calculus.trace import layout
@@ -87,7 +89,7 @@ class Plan:
                 continue
             for jump in group.cut.jumps:
                 if jump.path:
-                    _force(trace, jump.path, mask if jump.orientation > 0 else ~mask)  # type: ignore[operator]
+                    _force(trace, jump.path, mask if jump.orientation > 0 else np.logical_not(mask))
         return trace
 
 
@@ -212,10 +214,8 @@ def vanishes(test: Any, sides: Mapping[int, Mask]) -> Any:
             return a & b
         if orientation < 0:
             a, b = b, a
-        return (mask & a) | (~mask & b)  # type: ignore[operator]
+        return (mask & a) | (np.logical_not(mask) & b)
     result = vanishes(test[1], sides)
     for inner in test[2:]:
         result = result | vanishes(inner, sides) if test[0] == "or" else result & vanishes(inner, sides)
     return result
-
-

@@ -13,6 +13,7 @@ import numpy as np
 
 from potto.core.terms import Lam, Term, lam
 from potto.integrate.cuts import Row, as_array
+from potto.integrate.pieces import still
 from potto.integrate.plan import LevelPlan, function_of
 from potto.kernels.cells import Array, Cell, Value, pad
 
@@ -24,8 +25,8 @@ BISECTIONS = 64
 def searched_rows(level: LevelPlan, env: dict[str, Value], lo: Cell, hi: Cell, batch: int, machine: Any) -> list[Row]:
     """The candidate cuts of one variable beyond the closed-form ones."""
     rows: list[Row] = []
-    for cut, family in level.families:
-        rows += _family(level, cut, family, env, lo, hi, batch, machine)
+    for number, family in level.families:
+        rows += _family(level, number, family, env, lo, hi, batch, machine)
     for cut in level.searched:
         number = level.level.cuts.index(cut)
         rows += _search(number, cut.surface, level.variable, env, lo, hi, batch, machine)
@@ -41,7 +42,7 @@ def _call(function: Lam, env: dict[str, Value], machine: Any) -> Cell:
 def _at(term: Term, variable: str, x: Any, env: dict[str, Value], machine: Any) -> Any:
     """A term's value with the variable at x, by a machine without directions."""
     function = function_of(term)
-    here = {n: Cell(v.v) if isinstance(v, Cell) else v for n, v in env.items()}
+    here = {n: still(v) for n, v in env.items() if n in function.params}
     here[variable] = Cell(x)
     return _call(function, here, machine.with_directions(0)).v
 

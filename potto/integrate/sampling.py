@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -34,10 +35,7 @@ INNER_ORDER = 8
 
 def sample(plan: Plan, machine: Any, env: dict[str, Value], batch: int, method: str) -> Sums:
     """Estimate the integrals of a batch one after the other; each from the same seed."""
-    rows = [
-        _one(plan, machine, {n: map_arrays(v, lambda a, i=i: a[i : i + 1]) for n, v in env.items()}, method)  # type: ignore[misc]
-        for i in range(batch)
-    ]
+    rows = [_one(plan, machine, {n: map_arrays(v, _member(i)) for n, v in env.items()}, method) for i in range(batch)]
     return Sums(*(np.concatenate([getattr(r, name) for r in rows], axis=-1) for name in ("v", "e", "t", "et")))
 
 
@@ -47,8 +45,7 @@ def _one(plan: Plan, machine: Any, env: dict[str, Value], method: str) -> Sums:
     if quasi:
         count = 1 << max(4, int(np.log2(max(settings.samples // REPLICATES, 16))))
         means = [
-            _Run(plan, machine, env, lambda n, d, r=r: _sobol(n, d, settings.seed + 7919 * r), True).means(count)
-            for r in range(REPLICATES)
+            _Run(plan, machine, env, _scrambled(settings.seed + 7919 * r), True).means(count) for r in range(REPLICATES)
         ]
         values = np.stack([m[0] for m in means])
         tangents = np.stack([m[2] for m in means])
@@ -61,6 +58,14 @@ def _one(plan: Plan, machine: Any, env: dict[str, Value], method: str) -> Sums:
         v, se, t, set_ = run.means(settings.samples)
         e, et = SIGMAS * se, SIGMAS * set_
     return Sums(v[:, None], e[:, None], t[:, :, None], et[:, :, None])
+
+
+def _member(i: int) -> Callable[[Array], Array]:
+    return lambda a: a[i : i + 1]
+
+
+def _scrambled(seed: int) -> Callable[[int, int], Array]:
+    return lambda count, dims: _sobol(count, dims, seed)
 
 
 def _sobol(count: int, dims: int, seed: int) -> Array:
@@ -101,13 +106,13 @@ class _Run:
                 for group in level.decided:
                     surface = self.plan.groups[group]
                     other = dims - (0 if self.exact_inner and number == inner else 1)
-                    _, _, tb, sb = self.mean(
-                        count, other, lambda u, s=surface, n=number: self.boundary(u, n, s)  # type: ignore[misc]
-                    )
+                    _, _, tb, sb = self.mean(count, other, partial(self.boundary, number=number, group=surface))
                     t, set_ = t + tb, np.sqrt(set_**2 + sb**2)
         return v, se, t, set_
 
-    def mean(self, count: int, dims: int, f: Callable[[Array], tuple[Array, Array]]) -> tuple[Array, Array, Array, Array]:
+    def mean(
+        self, count: int, dims: int, f: Callable[[Array], tuple[Array, Array]]
+    ) -> tuple[Array, Array, Array, Array]:
         """Mean and standard error of (values, tangents) of f over the cube; with no dimension left, f at its point."""
         if dims == 0:
             v, t = f(np.zeros((1, 0)))
@@ -158,7 +163,7 @@ class _Run:
         env = {**before.env, level.variable: Cell(x, None, t)}
         slope, moves = self.slopes(group, level.variable, env, k)
         sign = np.where(high < low, -1.0, 1.0)
-        env = {name: v for name, v in env.items()}
+        env = dict(env)
         point = self.place(u[:, number:], len(self.plan.levels) - (1 if self.exact_inner else 0), n,
                            _Point(env, before.volume), number + 1)  # fmt: skip
         frozen_run = _Run(self.plan, self.machine.with_directions(0), self.env, self.points, self.exact_inner)
@@ -187,7 +192,9 @@ class _Run:
 
     # Points of the domain
 
-    def place(self, u: Array, stop: int, count: int | None = None, start: _Point | None = None, first: int = 0) -> _Point:
+    def place(
+        self, u: Array, stop: int, count: int | None = None, start: _Point | None = None, first: int = 0
+    ) -> _Point:
         """Variables first..stop-1 put at the labels u (n, stop - first)."""
         n = u.shape[0] if count is None else count
         env = dict(self.env) if start is None else dict(start.env)
@@ -250,7 +257,7 @@ def _mix(a: tuple[Any, ...], b: tuple[Any, ...], d: int, label: Array) -> Number
     p, q = (x[d] if d < len(x) else None for x in (a, b))
     if p is None and q is None:
         return None
-    return (0.0 if p is None else p) * (1 - label) + (0.0 if q is None else q) * label  # type: ignore[no-any-return]
+    return (0.0 if p is None else p) * (1 - label) + (0.0 if q is None else q) * label
 
 
 def _stretch(lo: Cell, hi: Cell, u: Array, k: int) -> tuple[Cell, Cell]:
@@ -262,14 +269,14 @@ def _stretch(lo: Cell, hi: Cell, u: Array, k: int) -> tuple[Cell, Cell]:
         t = tuple(_mix(lo.t, hi.t, d, u) for d in range(k))
         rate = tuple(_mix(tuple(None if x is None else -x for x in lo.t), hi.t, d, np.full(u.size, 0.5))
                      for d in range(k))  # fmt: skip
-        return Cell(low + (high - low) * u, None, t), Cell(high - low, None, tuple(None if r is None else 2 * r for r in rate))
+        return Cell(low + (high - low) * u, None, t), Cell(
+            high - low, None, tuple(None if r is None else 2 * r for r in rate)
+        )
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         w = 2 * u - 1
         up, down = np.isinf(b), np.isinf(a)
         x = np.where(up & down, w / (1 - w * w), np.where(up, a + u / (1 - u), b - (1 - u) / u))
-        slope = np.where(
-            up & down, 2 * (1 + w * w) / (1 - w * w) ** 2, np.where(up, 1 / (1 - u) ** 2, 1 / (u * u))
-        )
+        slope = np.where(up & down, 2 * (1 + w * w) / (1 - w * w) ** 2, np.where(up, 1 / (1 - u) ** 2, 1 / (u * u)))
     t = tuple(_mix(lo.t, hi.t, d, np.where(up, 0.0, 1.0)) for d in range(k))
     return Cell(x, None, t), Cell(sign * slope, None, (None,) * k)
 

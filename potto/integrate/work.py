@@ -104,7 +104,9 @@ class Work:
         rows = max(1, CHUNK // self.parent.order)
         if p.segment.size > rows:
             parts = [
-                self.measure(Pieces(p.segment[i : i + rows], p.u0[i : i + rows], p.u1[i : i + rows], p.end[i : i + rows]))
+                self.measure(
+                    Pieces(p.segment[i : i + rows], p.u0[i : i + rows], p.u1[i : i + rows], p.end[i : i + rows])
+                )
                 for i in range(0, p.segment.size, rows)
             ]
             joined = parts[0]
@@ -139,9 +141,7 @@ class Work:
             p.error = np.where(broken, np.inf, p.error)
         return p
 
-    def values(
-        self, seg: Segments, index: Ints, x: Array, label: Array, weight: Array
-    ) -> tuple[Array, Array | None]:
+    def values(self, seg: Segments, index: Ints, x: Array, label: Array, weight: Array) -> tuple[Array, Array | None]:
         """The channels at the nodes, times the weight: (C, P, n), and the errors that came with them."""
         f, fx, ft, e, et = self.integrand(index, x)
         m, k = f.shape[0], self.k
@@ -176,7 +176,7 @@ class Work:
         owner = self.seg.owner[index]
         k, name = self.k, self.level.variable
         tangent: tuple[Number | None, ...] = (None,) * k + ((1.0,) if self.moving else ())
-        names = (self.parent.plan.body.params if self.last else self.env)
+        names = self.parent.plan.body.params if self.last else self.env
         here = {n: pad(v, self.inner.directions) for n, v in self.env.items() if n in names}
         if self.last:
             env = column(gather(here, owner))
@@ -285,13 +285,11 @@ class Work:
             return None
         moving, fixed, apart = self.two_forms(p, ends)
         doubt = (apart > 4 * (moving[1] + fixed[1])) & (apart > 1e-9 * np.abs(moving[0]))
-        owners = doubt.any(axis=(0, 1))
+        owners = np.asarray(doubt.any(axis=(0, 1)))
         bad = owners[self.seg.owner[p.segment]] & (p.u1 - p.u0 > 1e-14)
         return bad if bad.any() else None
 
-    def two_forms(
-        self, p: Pieces, ends: tuple[Array, Array]
-    ) -> tuple[tuple[Array, Array], tuple[Array, Array], Array]:
+    def two_forms(self, p: Pieces, ends: tuple[Array, Array]) -> tuple[tuple[Array, Array], tuple[Array, Array], Array]:
         """(value, bound) of the tangents in the moving and in the fixed form, and how far they are apart."""
         k = self.k
         integral, error = self.added(p.integral, p), self.added(p.error + p.floor, p)
@@ -305,8 +303,10 @@ class Work:
     def added(self, x: Array, p: Pieces) -> Array:
         """Channels of pieces (C, P) added up per integral: (m, channels, B)."""
         owner = self.seg.owner[p.segment]
-        rows = [np.bincount(owner, row, minlength=self.batch) for row in x]
-        return np.stack(rows).reshape(self.width, -1, self.batch)
+        rows = np.empty((x.shape[0], self.batch))
+        for i, row in enumerate(x):
+            rows[i] = np.bincount(owner, row, minlength=self.batch)
+        return rows.reshape(self.width, -1, self.batch)
 
     def total(self, p: Pieces, ends: tuple[Array, Array] | None) -> Sums:
         """Add up the pieces; choose per direction between the moving and the fixed form."""

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from potto.core.terms import Lam
 
 Array = npt.NDArray[np.float64]
-Number = Union[float, Array]
-Mask = Union[bool, npt.NDArray[np.bool_]]
+Number = float | Array
+Mask = bool | npt.NDArray[np.bool_]
 # A trace: for a branching site of a kernel a mask (forced) or the trace of a callee; sites not named go as they fall.
 Trace = dict[int, Any]
 Pattern = Any

@@ -19,7 +19,23 @@ from typing import Any, Protocol
 
 from potto.calculus.trace import CallSite, Layout, is_lazy, layout
 from potto.core.terms import (
-    App, Branch, Const, Delta, Deriv, Global, Hole, If, Integral, Lam, ListOf, Prim, Proj, Sum, Term, Tuple, Var,
+    App,
+    Branch,
+    Const,
+    Delta,
+    Deriv,
+    Global,
+    Hole,
+    If,
+    Integral,
+    Lam,
+    ListOf,
+    Prim,
+    Proj,
+    Sum,
+    Term,
+    Tuple,
+    Var,
     postorder,
 )  # fmt: skip
 from potto.kernels import support

@@ -16,7 +16,7 @@ WRONG_CALL = declare("P0509", "a function called with values that do not fit it"
 
 
 def not_a_number(value: object) -> PottoError:
-    kind = {tuple: "a tuple", list: "a list"}.get(type(value), "a function")
+    kind = "a tuple" if isinstance(value, tuple) else "a list" if isinstance(value, list) else "a function"
     return PottoError([NOT_A_NUMBER(NOWHERE, f"{kind} stands where a number is needed")])
 
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from potto.core.terms import Lam
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Trace, Value
 from potto.runtime.functions import Closure, Derivative, Paired
@@ -23,15 +22,19 @@ def call_derivative(
     machine: Machine, function: Derivative, groups: tuple[tuple[Value, ...], ...], trace: Trace | None
 ) -> Value:
     from potto.runtime.machine import fit
+    from potto.runtime.second import dual_function
 
-    if machine.directions or isinstance(function.primal, (Derivative, Paired)):
-        return call_symbolic(machine, function, groups, trace)
-    _, arities = machine.linker_shape(function.lam, len(groups))
+    primal = function.primal
+    if isinstance(primal, Derivative):
+        primal = dual_function(machine, primal.primal)
+    if machine.directions or isinstance(primal, Paired):
+        return machine.call(dual_function(machine, primal), groups, None)
+    _, arities = machine.linker_shape(primal.lam, len(groups))
     carrying = machine.with_directions(1)
     dual_groups = tuple(
         tuple(merge(arg) for arg in fit(group, arity)) for group, arity in zip(groups, arities, strict=False)
     )
-    value = carrying.call(function.primal.padded(1), dual_groups, trace)
+    value = carrying.call(primal.padded(1), dual_groups, trace)
     return split(value)
 
 
@@ -45,6 +48,8 @@ def merge(arg: Value) -> Value:
         return Paired(arg.padded(1))
     if isinstance(arg, list):
         return [merge(item) for item in arg]
+    if not isinstance(arg, tuple):
+        raise errors.wrong_call("a derivative takes duals, pairs `(value, tangent)`")
     if len(arg) == 2 and all(isinstance(part, Cell) for part in arg):
         v, t = arg
         assert isinstance(v, Cell) and isinstance(t, Cell)
@@ -109,15 +114,3 @@ def _pair(arg: Value, d: int) -> Value:
     if isinstance(arg, Closure):
         return Derivative(arg)
     raise errors.wrong_call("a list has no derivative")
-
-
-def call_symbolic(
-    machine: Machine, function: Derivative, groups: tuple[tuple[Value, ...], ...], trace: Trace | None
-) -> Value:
-    """The derivative under a derivative: the dual as a term, called like any function."""
-    from potto.runtime.second import dual_function
-
-    primal = function.primal
-    dual = dual_function(machine, primal)
-    assert isinstance(dual.lam, Lam)
-    return machine.call(dual, groups, None)

@@ -40,18 +40,14 @@ class Program:
         """The value of a term, with every internal limit turned into a PottoError."""
         return guarded(lambda: machine.term(term, dict(env or {})))
 
-    def evaluate(
-        self, term: Term, settings: Settings = DEFAULTS, env: Mapping[str, Value] | None = None
-    ) -> Estimate:
+    def evaluate(self, term: Term, settings: Settings = DEFAULTS, env: Mapping[str, Value] | None = None) -> Estimate:
         """The estimate of a term. Raises PottoError where the program has no value."""
         machine = self.machine(settings)
         with Clock() as clock:
             value = self.value(machine, term, env)
         return report(value, machine, clock)
 
-    def call(
-        self, function: Value, groups: Sequence[Sequence[Value]], settings: Settings = DEFAULTS
-    ) -> Estimate:
+    def call(self, function: Value, groups: Sequence[Sequence[Value]], settings: Settings = DEFAULTS) -> Estimate:
         """The estimate of a function's value for arguments; `groups` as the function is curried."""
         machine = self.machine(settings)
         with Clock() as clock:
@@ -104,10 +100,10 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
         "evaluations": books.evaluations,
     }
     notes = tuple(_notes(books))
-    common = dict(
-        evals=books.evaluations, seconds=clock.seconds, compile_seconds=clock.spent, method=method, notes=notes,
-        stats=stats,
-    )  # fmt: skip
+    common = {
+        "evals": books.evaluations, "seconds": clock.seconds, "compile_seconds": clock.spent, "method": method, "notes": notes,
+        "stats": stats,
+    }  # fmt: skip
     if isinstance(value, Closure):
         kind = "derivative of a function" if isinstance(value, Derivative) else "function"
         return Estimate(None, None, text=f"<{kind}>", **common)  # type: ignore[arg-type]
@@ -121,7 +117,13 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
     if not reasons and any(missed):
         reasons.append(next(m for m in missed if m))
     return Estimate(
-        numbers, bounds, tangents, tangent_bounds, converged=not reasons, reasons=tuple(reasons), **common  # type: ignore[arg-type]
+        numbers,
+        bounds,
+        tangents,
+        tangent_bounds,
+        converged=not reasons,
+        reasons=tuple(reasons),
+        **common,  # type: ignore[arg-type]
     )
 
 

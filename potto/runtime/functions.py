@@ -19,7 +19,9 @@ class Closure:
 
     __slots__ = ("captured", "inexact", "lam", "origin")
 
-    def __init__(self, lam: Lam, captured: dict[str, Value], inexact: bool, origin: tuple[str, str] | None = None) -> None:
+    def __init__(
+        self, lam: Lam, captured: dict[str, Value], inexact: bool, origin: tuple[str, str] | None = None
+    ) -> None:
         self.lam = lam
         self.captured = captured
         self.inexact = inexact

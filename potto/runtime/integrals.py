@@ -71,7 +71,7 @@ def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermos
         return _shaped(solve(machine, term, linked, flat, batch, outermost), shape)
     result: Sums | None = None
     for index in groups:
-        here = {n: map_arrays(v, lambda a, index=index: a[index]) for n, v in flat.items()}  # type: ignore[misc]
+        here = {n: map_arrays(v, lambda a, index=index: a[index]) for n, v in flat.items()}
         part = solve(machine, term, link(here), here, index.size, outermost)
         if result is None:
             m, k = part.v.shape[0], part.t.shape[1]
@@ -82,9 +82,7 @@ def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermos
     return _shaped(result, shape)
 
 
-def solve(
-    machine: Machine, term: Integral, linked: Linked, env: dict[str, Value], batch: int, outermost: bool
-) -> Sums:
+def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value], batch: int, outermost: bool) -> Sums:
     method = machine.settings.method
     if outermost and (method in ("mc", "qmc") or (method == "auto" and len(term.variables) > MOST_LEVELS)):
         from potto.integrate.sampling import sample
@@ -132,7 +130,7 @@ def in_parts(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) ->
         return Iteration(plan, machine, START_ORDER if batch <= 64 else BATCH_ORDER).run(0, env, batch, {}, machine)
     parts = []
     for start in range(0, batch, BATCH):
-        here = {n: map_arrays(v, lambda a, s=start: a[s : s + BATCH]) for n, v in env.items()}  # type: ignore[misc]
+        here = {n: map_arrays(v, lambda a, s=start: a[s : s + BATCH]) for n, v in env.items()}
         size = min(BATCH, batch - start)
         parts.append(Iteration(plan, machine, BATCH_ORDER).run(0, here, size, {}, machine))
     m = max(p.v.shape[0] for p in parts)
@@ -275,5 +273,3 @@ def deciding_names(machine: Machine, term: Integral, linked: Linked) -> frozense
     if recursive:
         names |= {n for n in term.free if isinstance(linked.env.get(n), Cell)}
     return frozenset(names)
-
-

@@ -62,6 +62,7 @@ class Linker:
         self.terms: dict[tuple[str, str], Term] = {}
         self.exactness: dict[Term, bool] = {}
         self.constants: dict[tuple[str, str], Value] = {}
+        self.duals: dict[Lam, Lam] = {}
 
     def term(self, module: str, name: str) -> Term:
         key = (module, name)
@@ -117,10 +118,6 @@ class Machine:
     @property
     def atol(self) -> float:
         return self.settings.atol
-
-    @property
-    def max_evaluations(self) -> int:
-        return self.settings.max_evals
 
     def with_directions(self, directions: int) -> Machine:
         if directions == self.directions:
@@ -199,7 +196,8 @@ class Machine:
     def fail(self, term: Hole | DeltaTerm) -> Value:
         if isinstance(term, Hole):
             raise PottoError([errors.BROKEN(errors.NOWHERE, term.reason)])
-        raise PottoError([errors.NO_MEANING(errors.NOWHERE, "a delta has a meaning only under an integral over its variables")])
+        message = "a delta has a meaning only under an integral over its variables"
+        raise PottoError([errors.NO_MEANING(errors.NOWHERE, message)])
 
     # Calls
 
@@ -227,7 +225,7 @@ class Machine:
             return call_paired(self, function, groups, trace)
         self.enter()
         whole, arities = self.linker_shape(function.lam, len(groups))
-        args = list(function.captured[n] for n in sorted(function.captured))
+        args = [function.captured[n] for n in sorted(function.captured)]
         for group, arity in zip(groups, arities):
             args.extend(fit(group, arity))
         value = self.run(whole, args, trace)
@@ -241,10 +239,11 @@ class Machine:
         found = _shapes.get(key)
         if found is None:
             params, body = uncurry(function, groups)
-            arities, inner = [], function
+            arities: list[int] = []
+            inner: Term = function
             while isinstance(inner, Lam) and len(arities) < groups:
                 arities.append(len(inner.params))
-                inner = inner.body  # type: ignore[assignment]
+                inner = inner.body
             captured = tuple(sorted(function.free))
             found = (lam(captured + params, body), tuple(arities))
             if len(_shapes) > 10_000:
@@ -276,7 +275,11 @@ class Machine:
 
     def integral(self, term: Integral, env: dict[str, Value]) -> Value:
         from potto.runtime.integrals import integrate
+        from potto.runtime.prepare import prepared
 
+        ready = prepared(term)
+        if ready is not term:
+            return self.evaluate(lam(tuple(sorted(ready.free)), ready), {n: env[n] for n in ready.free}, None)
         return integrate(self, term, env)
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from potto.core.terms import Lam
 from potto.diagnostics import Diagnostic, PottoError, declare
 from potto.elaborate import elaborate_expression
 from potto.kernels.cells import Value
@@ -122,19 +121,11 @@ def evaluate_in(
     db: Database, file: str, expr: nodes.Expr, env: Environment, program: Program, machine: Machine
 ) -> Value:
     """The value of an expression that may use the file's names and those of an environment. Raises PottoError."""
-    names = tuple(env)
-    if names:  # the environment's names are bound around the expression, so that they are locals of it
-        parameters = tuple(nodes.Parameter(expr.span, name) for name in names)
-        expr = nodes.Lambda(expr.span, (parameters,), expr)
-    elaborated = elaborate_expression(db, file, expr)
+    elaborated = elaborate_expression(db, file, expr, tuple(env))
     wrong = [d for d in elaborated.diagnostics if d.severity == "error"]
     if wrong:
         raise PottoError(wrong)
-    term = elaborated.term
-    if not names:
-        return program.value(machine, term)
-    assert isinstance(term, Lam)
-    return program.value(machine, term.body, dict(zip(term.params, env.values(), strict=True)))
+    return program.value(machine, elaborated.term, {n: v for n, v in env.items() if n in elaborated.term.free})
 
 
 def placed(diagnostic: Diagnostic, place: Span, start: int) -> Diagnostic:

@@ -46,7 +46,8 @@ def split(machine: Machine, mask: Any, term: If | Branch, env: dict[str, Value],
     for which, where in ((0, full), (1, ~full)):
 
         def pick(a: Array, where: Any = where) -> Array:
-            return np.broadcast_to(a, shape)[where]
+            chosen: Array = np.broadcast_to(a, shape)[where]
+            return chosen
 
         here = {n: map_arrays(v, pick) for n, v in env.items()}
         results.append(side(machine, term, here, which, map_trace(traces[which], pick)))

@@ -88,7 +88,8 @@ def _grouped(machine: Machine, term: Sum, first: Number, last: Number, env: dict
         mask = (lo == a) & (hi == b)
 
         def pick(x: Array, mask: Any = mask) -> Array:
-            return np.broadcast_to(x, shape)[mask]
+            chosen: Array = np.broadcast_to(x, shape)[mask]
+            return chosen
 
         here = {n: map_arrays(v, pick) for n, v in env.items()}
         value = _full(total(machine, term, Cell(float(a)), Cell(float(b)), here, None), int(mask.sum()))

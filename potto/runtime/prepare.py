@@ -1,0 +1,53 @@
+"""Integrals made ready to be integrated.
+
+Owns `prepared`: deltas are integrated out, a sum under an integral becomes a sum of integrals, and an integrand that
+is a sum with many surfaces is taken apart, so that each part is cut along its own surfaces only. That keeps n
+conditions added up at a cost proportional to n.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+from potto.calculus.deltas import without_deltas
+from potto.core.terms import Branch, Delta, Integral, Prim, Sum, Term, add, integral, neg, postorder, sum_
+
+FEW = 4  # branches that one integrand may have before its summands are integrated apart
+
+
+@lru_cache(maxsize=4096)
+def prepared(term: Integral) -> Term:
+    """An equal term, or the same one where there is nothing to be done. Raises PottoError (a product of deltas)."""
+    if any(isinstance(node, Delta) for node in postorder(term.body)):
+        return without_deltas(term)
+    body = term.body
+    if isinstance(body, Sum) and not (body.lo.free | body.hi.free) & set(term.variables):
+        return sum_(body.variable, body.lo, body.hi, _over(term, body.body))
+    if isinstance(body, Prim) and body.op == "neg":
+        inner = _over(term, body.args[0])
+        ready = prepared(inner)
+        return neg(ready) if ready is not inner else term
+    if isinstance(body, Prim) and body.op == "add":
+        return _apart(term, body)
+    return term
+
+
+def _over(term: Integral, body: Term) -> Integral:
+    return integral(term.variables, term.bounds, body, term.hints)
+
+
+def _apart(term: Integral, body: Prim) -> Term:
+    """Summands with surfaces of their own integrated by themselves, the others together."""
+    counts = [_branches(arg, frozenset(term.variables)) for arg in body.args]
+    if sum(counts) <= FEW and not any(isinstance(arg, Sum) for arg in body.args):
+        return term
+    smooth = [arg for arg, count in zip(body.args, counts, strict=True) if not count and not isinstance(arg, Sum)]
+    rest = [arg for arg in body.args if arg not in smooth]
+    if len(rest) + bool(smooth) < 2:
+        return term
+    parts: list[Term] = [_over(term, add(*smooth))] if smooth else []
+    return add(*parts, *(_over(term, arg) for arg in rest))
+
+
+def _branches(term: Term, variables: frozenset[str]) -> int:
+    return sum(1 for node in postorder(term) if isinstance(node, Branch) and node.surface.free & variables)
