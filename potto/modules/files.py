@@ -11,6 +11,7 @@ Durability: texts on disk 1, open files 0, so that typing verifies nothing of fi
 
 from __future__ import annotations
 
+import itertools
 import os
 import stat
 from collections.abc import Hashable, Iterable, Sequence
@@ -21,7 +22,7 @@ from potto.modules.texts import Unreadable
 from potto.query import Database
 
 MAX_BYTES = 16_000_000
-MAX_FILES = 20_000
+MAX_FILES, MAX_FOLDERS = 20_000, 5_000  # a root may be somebody's home folder
 DISK, OPEN = 1, 0
 Stamp = tuple[int, int, int] | None
 
@@ -122,8 +123,8 @@ class Files:
     def refresh(self, keys: Iterable[str] | None = None) -> tuple[str, ...]:
         """Look at the disk again, at all that was ever asked for or just at `keys`; the files that changed.
 
-        The disk is read without holding the database. Of two threads that refresh at once the slower may bring the older
-        text; its stamp then tells the next refresh so.
+        The disk is read without holding the database. Of two threads that refresh at once the slower may bring the
+        older text; its stamp then tells the next refresh so.
         """
         seen = dict.fromkeys(self._seen())
         wanted = seen if keys is None else [key for key in dict.fromkeys(keys) if key in seen]
@@ -214,11 +215,12 @@ def list_folder(path: str) -> tuple[str, ...]:
 def walk_programs(roots: Sequence[str]) -> list[str]:
     """The programs under some folders; hidden folders and links to folders are passed by."""
     found: list[str] = []
+    visits = itertools.count()
     for root in roots:
         for folder, folders, names in os.walk(root):
             folders[:] = sorted(name for name in folders if not name.startswith("."))
             found += (os.path.join(folder, name) for name in sorted(names) if name.endswith(SUFFIXES))
-            if len(found) >= MAX_FILES:
+            if len(found) >= MAX_FILES or next(visits) >= MAX_FOLDERS:
                 return found[:MAX_FILES]
     return found
 

@@ -95,9 +95,7 @@ def is_recursive(db: Database, file: str, name: str) -> bool:
 
 
 @query
-def _definition_groups(
-    db: Database, files: tuple[str, ...]
-) -> Mapping[DefinitionTarget, tuple[DefinitionTarget, ...]]:
+def _definition_groups(db: Database, files: tuple[str, ...]) -> Mapping[DefinitionTarget, tuple[DefinitionTarget, ...]]:
     """The groups of two or more definitions of `files` that need each other, under each of their members."""
     inside = set(files)
 

@@ -255,4 +255,3 @@ def shift(diagnostic: Diagnostic, start: int) -> Diagnostic:
         for place in diagnostic.related
     )
     return replace(diagnostic, span=diagnostic.span.shift(start), related=related)
-

@@ -1,0 +1,17 @@
+"""The names that mean something where nothing else is in scope."""
+
+from __future__ import annotations
+
+from potto.primitives import PRIMITIVES
+
+CONSTANTS = ("pi", "inf")
+SPECIALS = ("deriv", "delta")
+PROJECTIONS = ("fst", "snd")
+
+
+def is_builtin(name: str) -> bool:
+    """Whether a program may write a name without defining or importing it."""
+    if name in CONSTANTS or name in SPECIALS or name in PROJECTIONS:
+        return True
+    primitive = PRIMITIVES.get(name)
+    return primitive is not None and primitive.surface

@@ -1,0 +1,67 @@
+"""What the user may have meant: near names, near modules, and modules that define a name."""
+
+from __future__ import annotations
+
+import difflib
+import os.path
+from collections.abc import Iterable
+
+from potto.modules.lookup import SUFFIXES, folders
+from potto.modules.workspace import definers, module_name
+from potto.query import Database
+
+
+def near_names(name: str, candidates: Iterable[str], count: int = 2) -> tuple[str, ...]:
+    """The names that `name` may have been meant to be, the likeliest first."""
+    known = dict.fromkeys(candidate for candidate in candidates if candidate != name)
+    exact = [candidate for candidate in known if candidate.casefold() == name.casefold()]
+    if exact or len(name) < 2:
+        return tuple(exact[:count])
+    cutoff = 0.6 if len(name) > 3 else 0.5
+    return tuple(difflib.get_close_matches(name, list(known), n=count, cutoff=cutoff))
+
+
+def did_you_mean(near: Iterable[str]) -> str:
+    """A question, or nothing if there is nothing near."""
+    names = [f"`{name}`" for name in near]
+    return f"did you mean {' or '.join(names)}?" if names else ""
+
+
+def near_modules(db: Database, file: str, dotted: str) -> tuple[str, ...]:
+    """The modules, as they would be written in `file`, that `dotted` may have been meant to be."""
+    package, _, _ = dotted.rpartition(".")
+    candidates: dict[str, None] = {}
+    for folder in folders(db, file):
+        for place in dict.fromkeys((package, "")):
+            prefix = f"{place}." if place else ""
+            listed: tuple[str, ...] = db.get_input(("folder", os.path.join(folder, place.replace(".", "/"))), ())
+            for name in listed:
+                module = prefix + os.path.splitext(name.rstrip("/"))[0]
+                if name.endswith("/"):
+                    candidates.update(dict.fromkeys(_modules_in(db, folder, module)))
+                else:
+                    candidates[module] = None
+    leaf = dotted.rpartition(".")[2]
+    same = [module for module in candidates if module != dotted and module.rpartition(".")[2] == leaf]
+    return tuple(same[:2]) or near_names(dotted, candidates)
+
+
+def _modules_in(db: Database, folder: str, package: str) -> list[str]:
+    listed: tuple[str, ...] = db.get_input(("folder", os.path.join(folder, package.replace(".", "/"))), ())
+    return [f"{package}.{os.path.splitext(name)[0]}" for name in listed if name.endswith(SUFFIXES)]
+
+
+def looked_in(db: Database, file: str, dotted: str) -> tuple[str, ...]:
+    """A note on where a module was looked for."""
+    path = dotted.replace(".", "/")
+    wanted = " or ".join(f"`{path}{suffix}`" for suffix in SUFFIXES)
+    places = folders(db, file)
+    if not places:
+        return (f"there is no folder in which to look for {wanted}",)
+    return (f"looked for {wanted} in {', '.join(places)}",)
+
+
+def elsewhere(db: Database, file: str, name: str) -> tuple[str, ...]:
+    """The modules of the workspace that define a name, as they would be written in `file`."""
+    found = (module_name(db, file, other) for other in definers(db, name) if other != file)
+    return tuple(dict.fromkeys(module for module in found if module is not None))

@@ -1,0 +1,76 @@
+"""Which imports of a file are used: in its definitions and statements, in live expressions, or by other files.
+
+Another file may take a name from here that is only imported here: it is passed on. That is asked of the workspace, and
+only for names that would be reported otherwise.
+"""
+
+from __future__ import annotations
+
+import re
+
+from potto.modules.free import free_references
+from potto.modules.lookup import bindings
+from potto.modules.texts import chunks, imports, is_diffeo, layout, parsed
+from potto.modules.workspace import is_reexported
+from potto.query import Database, query
+from potto.syntax import live_expressions, nodes, parse_expression
+from potto.syntax.nodes import Node, Statement
+
+_WORD = re.compile(r"[^\W\d]\w*(?:\.[^\W\d]\w*)*")
+
+
+@query
+def unused_imports(db: Database, file: str) -> frozenset[str]:
+    """The names that a file imports and neither uses nor passes on. A file of imports alone passes on all of them."""
+    imported = {name for item in imports(db, file) for name, _ in bindings(item)}
+    if not imported or not _has_content(db, file):
+        return frozenset()
+    return frozenset(name for name in imported - used_imports(db, file) if not is_reexported(db, file, name))
+
+
+@query
+def used_imports(db: Database, file: str) -> frozenset[str]:
+    """The imported names that occur in a file, also as the module in front of a member."""
+    imported = {name for item in imports(db, file) for name, _ in bindings(item)}
+    found: set[str] = set()
+    for chunk in chunks(db, file):
+        if len(found) == len(imported):
+            break
+        occurring = occurring_names(db, chunk.text, is_diffeo(file))
+        found.update(name for name in imported if name in occurring)
+    return frozenset(found)
+
+
+@query(keep=16384)
+def occurring_names(db: Database, text: str, diffeo: bool) -> frozenset[str]:
+    """The free names of a chunk, and its modules with all that is in front of a dot in them."""
+    chunk = parsed(db, text, diffeo)
+    found: set[str] = set()
+    if chunk.item is not None:
+        _collect(chunk.item, found)
+    if "#>" in text:
+        for live in live_expressions(text):
+            _collect(parse_expression(live.text).expr, found)
+    if any(diagnostic.severity == "error" for diagnostic in chunk.diagnostics):
+        for word in _WORD.findall(text):  # half-written: what the tree has lost may be used all the same
+            found.update(_heads(word))
+    return frozenset(found)
+
+
+def _collect(root: Node | Statement, found: set[str]) -> None:
+    for reference in free_references(root):
+        if isinstance(reference, nodes.Member):
+            found.update(_heads(reference.path))
+        else:
+            found.add(reference.id)
+
+
+def _heads(path: str) -> list[str]:
+    """`a.b.c`: a, a.b, a.b.c."""
+    parts = path.split(".")
+    return [".".join(parts[: length + 1]) for length in range(len(parts))]
+
+
+def _has_content(db: Database, file: str) -> bool:
+    found = layout(db, file)
+    return bool(found.texts or found.statements or found.nameless)
