@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from potto.calculus.diffeo import check_diffeos
+from potto.calculus.diffeo import check_conditions
 from potto.diagnostics import Diagnostic, Related
 from potto.elaborate import core
 from potto.modules import chunk_start, module_diagnostics, names, statements
@@ -42,7 +42,7 @@ def definition_diagnostics(db: Database, file: str, name: str) -> tuple[Diagnost
     elaborated = core(db, file, name).diagnostics
     if has_errors(elaborated):
         return (*found, *elaborated)
-    return (*found, *elaborated, *check_diffeos(db, file, name))
+    return (*found, *elaborated, *check_conditions(db, file, name))
 
 
 def has_errors(found: Iterable[Diagnostic]) -> bool:

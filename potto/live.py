@@ -40,7 +40,7 @@ def outcomes_of(world: World, file: str) -> list[Outcome]:
     found = []
     for live in live_expressions(source.text):
         line = source.position(live.span.start).line + 1
-        found.append(_outcome(world, file, line, live.expression_text, live.expected_text))
+        found.append(_outcome(world, file, line, live.text, live.expected))
     return found
 
 

@@ -14,9 +14,11 @@ from typing import Any, TypeVar
 
 from potto.check import absolute, definition_diagnostics, diagnostics, errors_of, has_errors
 from potto.core.terms import Term
-from potto.diagnostics import Diagnostic, PottoError
+from potto.diagnostics import Diagnostic, PottoError, declare
 from potto.elaborate import core, elaborate_expression
-from potto.modules import chunk_start, open_files, source
+from potto.modules import Unreadable, chunk_start, open_files, source
+from potto.modules.files import MAX_BYTES, decode
+from potto.modules.texts import content
 from potto.query import Database
 from potto.render import Located, ProgramError
 from potto.runtime.estimate import Estimate
@@ -31,6 +33,10 @@ from potto.types import format_type, infer_expression
 from potto.types.types import TupleOf, Type, result_of
 
 EXPRESSION = "<expression>"
+NOWHERE = Span(0, 0)
+NO_FILE = declare("P0230", "a file that does not exist")
+NO_SUCH_DEFINITION = declare("P0232", "a name on the command line that the file does not define")
+NOT_READABLE = declare("P0231", "a file that cannot be read as a program")
 T = TypeVar("T")
 
 
@@ -48,19 +54,44 @@ class World:
 
     def __init__(self, roots: Sequence[str | os.PathLike[str]] = ()) -> None:
         self.db = Database()
-        open_files(self.db, [os.path.abspath(root) for root in roots])
+        self.files = open_files(self.db, roots)
         self._local = threading.local()
 
     # Files
 
     def key(self, path: str | os.PathLike[str]) -> str:
         """How the database calls a file."""
-        return os.path.normpath(os.path.abspath(path))
+        return self.files.key(path)
 
     def put(self, key: str, text: str) -> str:
         """Give a file, or a pseudo file such as `<text>`, a text that counts instead of what is on disk."""
-        self.db.set_input(("overlay", key), text)
+        self.files.set_text(key, text)
         return key
+
+    def put_bytes(self, key: str, data: bytes) -> Located | None:
+        """The same from bytes; the diagnostic if they are no text."""
+        text = decode(data) if len(data) <= MAX_BYTES else Unreadable("too large", f"{len(data):,} bytes")
+        if isinstance(text, Unreadable):
+            return Located(key, _complaint(text))
+        self.put(key, text)
+        return None
+
+    def unreadable(self, key: str) -> Located | None:
+        """What keeps a file from being read as a program, if anything does."""
+        found = content(self.db, key)
+        if isinstance(found, str):
+            return None
+        return Located(key, NO_FILE(NOWHERE, "there is no such file") if found is None else _complaint(found))
+
+    def must_exist(self, key: str) -> None:
+        """Raise ProgramError if a file cannot be read as a program."""
+        problem = self.unreadable(key)
+        if problem is not None:
+            raise ProgramError([problem], self.source)
+
+    def refresh(self) -> bool:
+        """Read again what has changed on disk; True if anything had."""
+        return bool(self.files.refresh())
 
     def source(self, file: str) -> SourceText | None:
         """The text of a file."""
@@ -151,6 +182,22 @@ class World:
         wrong = [Located(EXPRESSION, absolute(self.db, EXPRESSION, d, 0)) for d in found if d.severity == "error"]
         if wrong:
             raise ProgramError(wrong, sources)
+
+
+def _complaint(found: Unreadable) -> Diagnostic:
+    detail = f": {found.detail}" if found.detail else ""
+    match found.reason:
+        case "folder":
+            return NO_FILE(NOWHERE, "this is a folder, and a file is needed here")
+        case "not a file":
+            return NOT_READABLE(NOWHERE, "this is no regular file")
+        case "not text":
+            message = f"this file is not UTF-8 text{detail} at byte {found.offset}"
+            return NOT_READABLE(NOWHERE, message, help="programs are text; save it as UTF-8 if it is one")
+        case "too large":
+            return NOT_READABLE(NOWHERE, f"this file is too large to be a program{detail}")
+        case "no access":
+            return NOT_READABLE(NOWHERE, f"this file cannot be read{detail}")
 
 
 def is_dual(type: Type) -> bool:

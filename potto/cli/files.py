@@ -6,14 +6,11 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 
-from potto.diagnostics import Diagnostic, declare
+from potto.modules.lookup import SUFFIXES
 from potto.render import Located
 from potto.source import Span
+from potto.world import NO_FILE
 
-NO_FILE = declare("P0230", "a file that does not exist")
-NOT_READABLE = declare("P0231", "a file that cannot be read as a program")
-
-SUFFIXES = (".po", ".diffeo")
 STDIN = "<stdin>"
 SKIPPED = {"__pycache__", "node_modules", "build", "dist"}
 
@@ -29,7 +26,8 @@ def expand(paths: Sequence[str]) -> tuple[list[str], list[Located]]:
             inside = list(walk(path))
             files.update(dict.fromkeys(inside))
             if not inside:
-                problems.append(located(path, NO_FILE(Span(0, 0), f"no {' or '.join(SUFFIXES)} file in this folder")))
+                message = f"no {' or '.join(SUFFIXES)} file in this folder"
+                problems.append(Located(path, NO_FILE(Span(0, 0), message)))
         else:
             problems.append(missing(path))
     return list(files), problems
@@ -52,11 +50,7 @@ def missing(path: str) -> Located:
     there = sorted(os.listdir(folder)) if os.path.isdir(folder) else []
     near = difflib.get_close_matches(os.path.basename(path), [n for n in there if n.endswith(SUFFIXES)], 1)
     help = f"did you mean `{os.path.join(os.path.dirname(path), near[0])}`?" if near else ""
-    return located(path, NO_FILE(Span(0, 0), "there is no such file", help=help))
-
-
-def located(path: str, diagnostic: Diagnostic) -> Located:
-    return Located(path, diagnostic)
+    return Located(path, NO_FILE(Span(0, 0), "there is no such file", help=help))
 
 
 def read_stdin() -> bytes:

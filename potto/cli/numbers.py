@@ -20,7 +20,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--atol", type=_number, default=DEFAULTS.atol, help="absolute accuracy asked for")
     group.add_argument("--samples", type=_whole, default=DEFAULTS.samples, help="points of a Monte Carlo estimate")
     group.add_argument("--seed", type=_whole, default=DEFAULTS.seed, help="where its random numbers start")
-    group.add_argument("--max-evals", type=_whole, default=DEFAULTS.max_evals, help="the most evaluations of an integrand")
+    group.add_argument("--max-evals", type=_whole, default=DEFAULTS.max_evals, help="the most evaluations")
     group.add_argument("--stats", action="store_true", help="say what the evaluation cost")
 
 

@@ -7,9 +7,9 @@ import os
 from typing import TYPE_CHECKING
 
 from potto.cli.console import Console
-from potto.cli.files import NO_FILE, STDIN, missing, read_stdin
-from potto.render import Located, ProgramError, all_to_json
-from potto.source import SourceText, Span
+from potto.cli.files import STDIN, missing, read_stdin
+from potto.render import ProgramError, all_to_json
+from potto.source import SourceText
 
 if TYPE_CHECKING:
     from potto.world import World
@@ -19,15 +19,10 @@ def opened(world: World, path: str) -> str:
     """The key of a file that a command works on. Raises ProgramError if there is no program there."""
     if path == "-":
         return open_stdin(world)
-    if os.path.isdir(path):
-        problem = NO_FILE(Span(0, 0), "this is a folder, and a file is needed here")
-        raise ProgramError([Located(path, problem)], no_sources)
     if not os.path.exists(path):
         raise ProgramError([missing(path)], no_sources)
     key = world.key(path)
-    unreadable = world.unreadable(key)
-    if unreadable is not None:
-        raise ProgramError([unreadable], no_sources)
+    world.must_exist(key)
     return key
 
 
