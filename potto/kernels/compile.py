@@ -145,7 +145,7 @@ class _Compiler:
         self.values: dict[Term, Known] = {}
         self.env: dict[str, Known] = {}
         self.objects: dict[str, object] = {}
-        self.arguments = [f"p{i}" for i in range(len(lam.params))]
+        self.arguments = [f"arg{i}" for i in range(len(lam.params))]
         for param, argument, pattern in zip(lam.params, self.arguments, patterns, strict=True):
             self.env[param] = self.unpack(argument, pattern)
 

@@ -27,6 +27,7 @@ def call_derivative(
     primal = function.primal
     if isinstance(primal, Derivative):
         primal = dual_function(machine, primal.primal)
+        machine.books.second = True
     if machine.directions or isinstance(primal, Paired):
         return machine.call(dual_function(machine, primal), groups, None)
     _, arities = machine.linker_shape(primal.lam, len(groups))

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from potto.calculus.deltas import PRODUCT_OF_DELTAS
 from potto.calculus.surfaces import uncurry
 from potto.core.terms import (
     Branch,
@@ -50,6 +51,7 @@ class Books:
     edges: list[tuple[str, Term, Array, Array]] = field(default_factory=list)
     methods: set[str] = field(default_factory=set)
     degenerate: set[str] = field(default_factory=set)
+    second: bool = False
     integrals: int = 0
     pieces: int = 0
 
@@ -256,6 +258,13 @@ class Machine:
     def falls(self, surface: Number, strict: bool) -> tuple[Any, Any]:
         """Which side a surface falls on, and nan wherever it is nan."""
         mask = surface > 0 if strict else surface >= 0
+        if self.directions and self.books.second and np.any(surface == 0):
+            raise PottoError([PRODUCT_OF_DELTAS(
+                errors.NOWHERE,
+                "the second derivative does not exist here: two surfaces coincide, or one passes through a corner",
+                notes=("it would hold a product of deltas on the same surface",),
+                help="move the parameters apart, or differentiate only once",
+            )])  # fmt: skip
         if surface.__class__ is float:
             return mask, (surface if surface != surface else None)
         bad = np.isnan(surface)
