@@ -7,8 +7,9 @@ integrated over from `verdict`; here both meet the program: places, the author's
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from potto.calculus.boundary import unguarded
 from potto.calculus.conditions import Condition, conditions_of, expanded, skeleton
 from potto.calculus.invert import Failure, Inverse, invert
 from potto.calculus.isolate import Guard
@@ -27,9 +28,25 @@ from potto.calculus.verdict import (
 )
 from potto.calculus.verify import Refuted, Untested, Verified, verify
 from potto.core.printer import format_term
-from potto.core.terms import ONE, ZERO, Branch, Const, Global, Hole, Lam, Term, Tuple, const, postorder, sub
+from potto.core.simplify import simplify
+from potto.core.terms import (
+    ONE,
+    ZERO,
+    Branch,
+    Const,
+    Global,
+    Hole,
+    Prim,
+    Term,
+    const,
+    if_,
+    postorder,
+    sub,
+    substitute,
+    var,
+)
 from potto.diagnostics import Diagnostic
-from potto.elaborate import core, elaborate_expression
+from potto.elaborate import core, core_term, diffeo_core
 from potto.modules import definition
 from potto.query import Database, query
 from potto.source import Span
@@ -89,11 +106,11 @@ def diffeo_info(db: Database, file: str, name: str) -> DiffeoInfo | None:
 @query
 def exported(db: Database, file: str, name: str) -> Term | None:
     """The conditions and calls of a definition over its parameters: what a caller's check reads."""
-    return skeleton(core(db, file, name).term)
+    return skeleton(core_term(db, file, name))
 
 
 def _whole(db: Database, target: Global) -> Term | None:
-    return core(db, target.module, target.name).term
+    return core_term(db, target.module, target.name)
 
 
 # Conditions under integrals
@@ -104,6 +121,7 @@ def _judged(found: Iterable[Condition], spans: Mapping[Term, Span], fallback: Sp
     for condition in found:
         if any(isinstance(n, Hole) for c in condition.coordinates for n in postorder(c)):
             continue  # a diagnostic has said what is wrong there
+        condition = _readable(condition)
         own = isinstance(condition.anchor, Branch) and condition.anchor.coordinates == condition.coordinates
         problem = judge(condition.coordinates, condition.variables, condition.box, own)
         if isinstance(problem, Problem):
@@ -112,6 +130,18 @@ def _judged(found: Iterable[Condition], spans: Mapping[Term, Span], fallback: Sp
             if key not in said:
                 said.add(key)
                 yield _diagnostic(problem, span, condition.calls)
+
+
+def _readable(condition: Condition) -> Condition:
+    """Copies of bound variables (x'1) under their own names, where those are free."""
+    used = {n for c in condition.coordinates for n in c.free}
+    plain = {n: n.partition("'")[0] for n in used if "'" in n}
+    plain = {n: p for n, p in plain.items() if p not in used and list(plain.values()).count(p) == 1}
+    if not plain:
+        return condition
+    names: dict[str, Term] = {n: var(p) for n, p in plain.items()}
+    coordinates = tuple(substitute(c, names) for c in condition.coordinates)
+    return replace(condition, coordinates=coordinates, box={plain.get(n, n): b for n, b in condition.box.items()})
 
 
 def _diagnostic(problem: Problem, span: Span, calls: Sequence[str] = ()) -> Diagnostic:
@@ -128,19 +158,24 @@ def _diagnostic(problem: Problem, span: Span, calls: Sequence[str] = ()) -> Diag
 def _studied(db: Database, file: str, name: str) -> _Study:
     item = definition(db, file, name)
     assert isinstance(item, nodes.DiffeoDefinition)
-    term = expanded(core(db, file, name).term, lambda g: _whole(db, g))
-    groups, body = _groups(term)
-    components = body.items if isinstance(body, Tuple) else (body,)
-    if not groups or any(isinstance(n, Hole) for n in postorder(*components)):
+    parts = diffeo_core(db, file, name)
+    assert parts is not None
+    components = tuple(expanded(c, lambda g: _whole(db, g)) for c in parts.components)
+    variables = parts.variables
+    if not variables or any(isinstance(n, Hole) for n in postorder(*components)):
         return _Study((), None)
-    variables, parameters = groups[0], tuple(groups[1:])
-    where = _conditions(db, file, item)
+    where = tuple(guard for truth in parts.where for guard in guards_of(truth))
     box = _box(where, variables)
     span = _components_span(item)
     problem = _wrong_shape(components, variables, box) or singular(components, variables)
     if problem is not None:
         return _Study((_diagnostic(problem, span),), None)
-    return _inverted(db, file, item, _Map(components, variables, parameters, where, box), span)
+    what = _Map(components, variables, parts.groups, where, box)
+    found = invert(components, variables, bool(where))
+    if item.inverse is None or parts.inverse is None:
+        return _inverted(item, what, found, span)
+    inverse = tuple(expanded(i, lambda g: _whole(db, g)) for i in parts.inverse.components)
+    return _authors(item, item.inverse.span, what, found, parts.inverse.values, inverse)
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,14 +185,6 @@ class _Map:
     parameters: tuple[tuple[str, ...], ...]
     where: tuple[Guard, ...]
     box: Box
-
-
-def _groups(term: Term) -> tuple[list[tuple[str, ...]], Term]:
-    groups: list[tuple[str, ...]] = []
-    while isinstance(term, Lam):
-        groups.append(term.params)
-        term = term.body
-    return groups, term
 
 
 def _components_span(item: nodes.DiffeoDefinition) -> Span:
@@ -191,14 +218,11 @@ def _many(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
-def _inverted(db: Database, file: str, item: nodes.DiffeoDefinition, what: _Map, span: Span) -> _Study:
-    """The inverse: the author's, verified, or the one that is found."""
-    found = invert(what.components, what.variables, bool(what.where))
-    if item.inverse is not None:
-        return _authors(db, file, item, what, found)
+def _inverted(item: nodes.DiffeoDefinition, what: _Map, found: Inverse | Failure, span: Span) -> _Study:
+    """The inverse that was found, on the branch that `where` selects."""
     if isinstance(found, Failure):
         return _Study((_diagnostic(failure(found, what.components, what.variables), span),), None)
-    branches = found.branches
+    branches = tuple(tuple(simplify(unguarded(part)) for part in branch) for branch in found.branches)
     notes: tuple[str, ...] = ()
     if what.where and len(branches) > 1:
         kept = [b for b in branches if isinstance(_on_branch(what, found.values, b), Verified)]
@@ -225,12 +249,14 @@ def _on_branch(what: _Map, values: Sequence[str], inverse: Sequence[Term]) -> Ve
 
 
 def _authors(
-    db: Database, file: str, item: nodes.DiffeoDefinition, what: _Map, found: Inverse | Failure
+    item: nodes.DiffeoDefinition,
+    span: Span,
+    what: _Map,
+    found: Inverse | Failure,
+    values: tuple[str, ...],
+    parts: tuple[Term, ...],
 ) -> _Study:
     """The author's inverse, verified."""
-    assert item.inverse is not None
-    given = item.inverse
-    values, parts = _given_inverse(db, file, item)
     if len(values) != len(what.components) or len(parts) != len(what.variables):
         problem = Problem(
             COMPONENTS,
@@ -240,10 +266,10 @@ def _authors(
             (),
             "the inverse takes the components, in their order, back to the variables",
         )
-        return _Study((_diagnostic(problem, given.span),), None)
+        return _Study((_diagnostic(problem, span),), None)
     outcome = _on_branch(what, values, parts)
     if isinstance(outcome, Refuted):
-        return _Study((_diagnostic(_wrong(what, outcome), given.span),), None)
+        return _Study((_diagnostic(_wrong(what, outcome), span),), None)
     if isinstance(outcome, Untested):
         problem = Problem(
             WRONG_INVERSE,
@@ -252,7 +278,7 @@ def _authors(
             (f"tried {listed(what.variables)} between -3 and 3, or as `where` says",),
             "say with `where` in which box the map is used",
         )
-        return _Study((_diagnostic(problem, given.span),), None)
+        return _Study((_diagnostic(problem, span),), None)
     notes = () if outcome.proven else (f"the inverse was verified at {outcome.tested} sample points only",)
     det = found.determinant
     info = DiffeoInfo(
@@ -275,46 +301,18 @@ def _wrong(what: _Map, refuted: Refuted) -> Problem:
     )
 
 
-# The author's inverse and branch
+# The branch
 
 
-def _function(db: Database, file: str, groups: Sequence[tuple[nodes.Parameter, ...]], body: nodes.Expr) -> Term:
-    span = body.span
-    return elaborate_expression(db, file, nodes.Lambda(span, tuple(g for g in groups if g), body)).term
-
-
-def _given_inverse(db: Database, file: str, item: nodes.DiffeoDefinition) -> tuple[tuple[str, ...], tuple[Term, ...]]:
-    """The names of the values and the components of the inverse, over them and the map's own parameters."""
-    assert item.inverse is not None
-    given = item.inverse
-    body: nodes.Expr = given.components[0]
-    if len(given.components) > 1:
-        body = nodes.Tuple(given.span, given.components)
-    term = _function(db, file, (given.parameters, *item.groups), body)
-    groups, inner = _groups(expanded(term, lambda g: _whole(db, g)))
-    return groups[0] if groups else (), inner.items if isinstance(inner, Tuple) else (inner,)
-
-
-def _conditions(db: Database, file: str, item: nodes.DiffeoDefinition) -> tuple[Guard, ...]:
-    """`where` as guards over the map's variables and parameters."""
-    guards: list[Guard] = []
-    for expr in item.where:
-        inner = expr if isinstance(expr, nodes.Bracket) else nodes.Bracket(expr.span, expr)
-        body: nodes.Expr = nodes.Let(expr.span, item.bindings, inner) if item.bindings else inner
-        term = _groups(_function(db, file, (item.variables, *item.groups), body))[1]
-        guards.extend(_conjunction(term))
-    return tuple(guards)
-
-
-def _conjunction(term: Term) -> list[Guard]:
-    """[p and q and ...] as single conditions; anything else as one that is positive where it holds."""
-    guards: list[Guard] = []
-    while isinstance(term, Branch) and term.orelse is ZERO:
-        guards.append(Guard(term.surface, term.strict))
-        term = term.then
-    if term is not ONE:
-        guards.append(Guard(sub(term, const(0.5))))
-    return guards
+def guards_of(truth: Term) -> list[Guard]:
+    """A condition of `where`, as surfaces that are positive where it holds."""
+    match truth:
+        case Prim(op="and", args=args):
+            return [guard for arg in args for guard in guards_of(arg)]
+        case Prim(op="lt" | "le" as op, args=(a, b)):
+            return [Guard(sub(b, a), op == "lt")]
+        case _:
+            return [Guard(sub(if_(truth, ONE, ZERO), const(0.5)))]
 
 
 def _box(where: Iterable[Guard], variables: Sequence[str]) -> dict[str, tuple[float, float]]:

@@ -93,37 +93,42 @@ class Differentiator:
         self.pair = pairs or split_pairs
 
     def dual(self, term: Term, tangents: Mapping[str, Term]) -> Dual:
-        return _Pass(self, tangents).run(term)
+        functions = {n: t for n, t in tangents.items() if n in heads_of(term)}
+        value, tangent = _Pass(self, tangents).run(term)
+        return self.as_values(value, functions), self.as_values(tangent, functions)
 
     def function(self, function: Lam) -> Lam:
         """Over duals, group by group."""
-        taken = set(function.free) | {n for t in postorder(function) for n in t.free}
-        tangents: dict[str, Term] = {}
-        values: dict[str, Term] = {}
-        groups: list[tuple[str, ...]] = []
-        body: Term = function
-        heads = _heads(function)
-        while isinstance(body, Lam):
-            names: list[str] = []
-            for param in body.params:
-                name = fresh(f"d{param}", taken)
-                taken.add(name)
-                names.append(name)
-                if param in heads:
-                    tangents[param] = var(name)
-                    values[param] = var(name)
-                else:
-                    values[param], tangents[param] = proj(var(name), 0), proj(var(name), 1)
-            groups.append(tuple(names))
-            body = body.body
-        value, tangent = self.dual(body, tangents)
-        if self.singular:
-            tangent = self.with_deltas(body, tangent, tangents)
-        result: Term = substitute(self.pair(value, tangent), values)
-        for params in reversed(groups):
-            result = lam(params, result)
-        assert isinstance(result, Lam)
-        return result
+        return _Pass(self, {}).closed(function)
+
+    def as_values(self, term: Term, functions: Mapping[str, Term]) -> Term:
+        """Calls of functions of which only the dual is at hand, as the value of the dual's answer."""
+        if not functions or not term.free & functions.keys():
+            return term
+        inner = {n.function for n in postorder(term) if isinstance(n, App)}
+        memo: dict[Term, Term] = {}
+        for node in postorder(term):
+            if isinstance(node, App) and node not in inner:
+                head, groups = spine(node)
+                used = [a for group in groups for a in group if isinstance(a, Var) and a.name in functions]
+                if used or (isinstance(head, Var) and head.name in functions):
+                    memo[node] = self.answer(head, groups, functions, memo)
+                    continue
+            memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
+        return memo[term]
+
+    def answer(
+        self, head: Term, groups: tuple[tuple[Term, ...], ...], functions: Mapping[str, Term], memo: Mapping[Term, Term]
+    ) -> Term:
+        def over(term: Term) -> Term:
+            if isinstance(term, Var) and term.name in functions:
+                return functions[term.name]
+            return deriv(term) if isinstance(term, Global | Deriv | Lam) else self.pair(memo[term], ZERO)
+
+        result = over(head)
+        for group in groups:
+            result = app(result, tuple(over(a) for a in group))
+        return proj(result, 0)
 
     def with_deltas(self, body: Term, tangent: Term, tangents: Mapping[str, Term]) -> Term:
         """The tangent of an integrand: where a surface moves, its jump as a delta."""
@@ -139,8 +144,8 @@ class Differentiator:
         return expanded(term, self.resolve, inside.function)
 
 
-def _heads(term: Term) -> frozenset[str]:
-    """The variables that are functions: they are applied."""
+def heads_of(term: Term) -> frozenset[str]:
+    """The variables that are functions: those that are applied."""
     found: set[str] = set()
     for node in postorder(term):
         if isinstance(node, App):
@@ -181,7 +186,7 @@ class _Pass:
         self.heads: frozenset[str] = frozenset()
 
     def run(self, term: Term) -> Dual:
-        self.heads = _heads(term) | {n for n, t in self.tangents.items() if isinstance(t, Lam | Global | Deriv)}
+        self.heads = heads_of(term) | {n for n, t in self.tangents.items() if isinstance(t, Lam | Global | Deriv)}
         for node in _outside(term):
             if node not in self.found:
                 self.found[node] = self.node(node)
@@ -296,34 +301,51 @@ class _Pass:
                 return deriv(term)
 
     def closed(self, function: Lam) -> Lam:
-        """The dual of a function that may use variables from around it."""
+        """The dual of a function, which may use variables from around it."""
         outside = {n: t for n, t in self.tangents.items() if n in function.free}
-        if not outside:
-            return self.owner.function(function)
-        names = set(function.params)
-        taken = set(function.free) | names | {n for t in outside.values() for n in t.free}
-        stand_ins = {n: fresh(f"{n}'tangent", taken) for n in outside}
-        taken |= set(stand_ins.values())
-        params: list[str] = []
+        taken = {n for t in postorder(function) for n in t.free} | {n for t in outside.values() for n in t.free}
+        taken |= set(function.params)
+        heads = heads_of(function)
+        tangents: dict[str, Term] = {}
+        for name in outside:
+            tangents[name] = var(fresh(f"{name}'tangent", taken))
+            taken |= tangents[name].free
         values: dict[str, Term] = {}
-        tangents = {n: var(s) for n, s in stand_ins.items()}
-        inner_tangents: dict[str, Term] = dict(tangents)
-        heads = _heads(function)
-        for param in function.params:
-            name = fresh(f"d{param}", taken)
-            taken.add(name)
-            params.append(name)
-            if param in heads:
-                inner_tangents[param] = values[param] = var(name)
-            else:
-                values[param], inner_tangents[param] = proj(var(name), 0), proj(var(name), 1)
-        inner = _Pass(self.owner, inner_tangents)
-        body = inner.closed(function.body) if isinstance(function.body, Lam) else None
-        result = body if body is not None else self.owner.pair(*inner.run(function.body))
+        functions: dict[str, Term] = {}
+        params = tuple(self.parameter(p, p in heads, taken, values, tangents, functions) for p in function.params)
+        result = self.owner.as_values(_Pass(self.owner, tangents).body_of(function), functions)
         opened = substitute(result, values)
-        made = lam(tuple(params), substitute(opened, {s: outside[n] for n, s in stand_ins.items()}))
+        stand_ins = {next(iter(t.free)): outside[n] for n, t in tangents.items() if n in outside}
+        made = lam(params, substitute(opened, stand_ins))
         assert isinstance(made, Lam)
         return made
+
+    def parameter(
+        self,
+        param: str,
+        is_function: bool,
+        taken: set[str],
+        values: dict[str, Term],
+        tangents: dict[str, Term],
+        functions: dict[str, Term],
+    ) -> str:
+        """The name of a parameter's dual; what the parameter and its tangent are in terms of it."""
+        name = fresh(f"d{param}", taken)
+        taken.add(name)
+        if is_function:
+            tangents[param] = functions[param] = var(name)
+        else:
+            values[param], tangents[param] = proj(var(name), 0), proj(var(name), 1)
+        return name
+
+    def body_of(self, function: Lam) -> Term:
+        body = function.body
+        if isinstance(body, Lam):
+            return self.closed(body)
+        value, tangent = self.run(body)
+        if self.owner.singular:
+            tangent = self.owner.with_deltas(body, tangent, self.tangents)
+        return self.owner.pair(value, tangent)
 
     # Binders
 

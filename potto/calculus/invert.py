@@ -75,8 +75,8 @@ def invert(coordinates: Sequence[Term], variables: Sequence[str], selected: bool
         return Failure("its determinant is 0 everywhere", True, ZERO, dependence(coordinates, variables))
     taken = {n for c in coordinates for n in c.free} | set(variables)
     values: list[str] = []
-    for _ in coordinates:
-        name = fresh("u", taken)
+    for wish in _names(len(coordinates)):
+        name = fresh(wish, taken)
         taken.add(name)
         values.append(name)
     search = _Search(taken, selected)
@@ -84,6 +84,10 @@ def invert(coordinates: Sequence[Term], variables: Sequence[str], selected: bool
     if branches is None:
         return Failure(search.reason or "no inverse was found", False, det)
     return Inverse(tuple(variables), tuple(values), branches, det, method)
+
+
+def _names(count: int) -> list[str]:
+    return list("uvwpqs"[:count]) if count <= 6 else [f"u{i + 1}" for i in range(count)]
 
 
 def dependence(coordinates: Sequence[Term], variables: Sequence[str]) -> str:

@@ -17,7 +17,7 @@ from potto.calculus.normal import is_zero
 from potto.calculus.ranges import ranges
 from potto.calculus.solve import Sections, sections
 from potto.core.printer import format_term
-from potto.core.terms import If, Prim, Term, postorder, var
+from potto.core.terms import Branch, If, Prim, Term, postorder, var
 from potto.diagnostics import Kind, declare
 from potto.primitives import PRIMITIVES
 
@@ -179,7 +179,7 @@ def kinks(coordinates: Sequence[Term], variables: Sequence[str], box: Box) -> Te
     for node in postorder(*coordinates):
         if isinstance(node, If) and node.condition.free & names:
             return node.condition
-        if not isinstance(node, Prim) or not node.free & names or node.op not in PRIMITIVES:
+        if not isinstance(node, Prim) or not node.free & names or not _bends(node):
             continue
         for kink in PRIMITIVES[node.op].kinks(*node.args):
             if kink.free & names:
@@ -187,6 +187,14 @@ def kinks(coordinates: Sequence[Term], variables: Sequence[str], box: Box) -> Te
                 if bounds.lo < 0 < bounds.hi:
                     return kink
     return None
+
+
+def _bends(node: Prim) -> bool:
+    """Whether a builtin's derivative jumps at its kinks; hypot's kink is a single point."""
+    entry = PRIMITIVES.get(node.op)
+    if entry is None or entry.partials is None:
+        return False
+    return any(isinstance(part, Branch) for part in postorder(*entry.partials(*node.args)))
 
 
 def failure(found: Failure, coordinates: Sequence[Term], variables: Sequence[str]) -> Problem:

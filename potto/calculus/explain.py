@@ -1,0 +1,320 @@
+"""The derivative of a definition, for a person to read: what `potto deriv` and hover show.
+
+Owns `explain_derivative`. First the derivative of each integrand with its deltas, as in equation (2) of the paper, then
+what is left when the deltas are integrated out, then the surfaces and what moves each. Functions that are parameters
+stay symbols: `shader (x, y) c` and, for its tangent, `dshader (x, y) (c, dc)`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from potto.calculus.boundary import (
+    NoClosedForm,
+    at_bounds,
+    at_surfaces,
+    branches_of,
+    jumps,
+    pivots,
+    scaled,
+)
+from potto.calculus.conditions import Resolve
+from potto.calculus.deltas import without_deltas
+from potto.calculus.derivative import NotSmooth
+from potto.calculus.dual import Differentiator, heads_of
+from potto.calculus.solve import factors
+from potto.calculus.trace import spine
+from potto.core.printer import format_term
+from potto.core.simplify import normalized_surface, simplify
+from potto.core.terms import (
+    ONE,
+    ZERO,
+    App,
+    Branch,
+    Deriv,
+    Global,
+    Integral,
+    Lam,
+    Proj,
+    Term,
+    Tuple,
+    Var,
+    app,
+    branch,
+    children,
+    delta,
+    integral,
+    mul,
+    postorder,
+    rebuild,
+    tuple_,
+    var,
+)
+from potto.diagnostics import PottoError
+from potto.elaborate import core_term
+from potto.query import Database
+from potto.types import derivative_type, format_type, interface
+
+WIDTH = 100
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceText:
+    """One surface of an integral: its equation, the parameters that move it, and where it is in one variable."""
+
+    equation: str
+    moved_by: tuple[str, ...]
+    roots: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class IntegralText:
+    """The derivative of one integral.
+
+    integrand: what is integrated. interior: its derivative between the surfaces. deltas: its derivative on them.
+    bounds: what moving bounds add. boundary: the deltas integrated out; empty where `reason` says why not.
+    """
+
+    head: str
+    variables: str
+    integrand: str
+    interior: str
+    deltas: tuple[str, ...]
+    bounds: tuple[str, ...]
+    boundary: tuple[str, ...]
+    surfaces: tuple[SurfaceText, ...]
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class DerivativeText:
+    """The derivative of a definition in symbols. `text` is all of it; the fields are for those who lay it out anew.
+
+    tangent: the whole of it, deltas integrated out. alone: the definition is its one integral and nothing else.
+    """
+
+    name: str
+    type: str
+    tangent: str
+    alone: bool
+    integrals: tuple[IntegralText, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def text(self) -> str:
+        return "\n".join(_lines(self))
+
+
+def explain_derivative(db: Database, file: str, name: str) -> DerivativeText:
+    """The derivative of a definition, in symbols."""
+    found = interface(db, file, name)
+    type_text = format_type(derivative_type(found.type))
+    return describe(core_term(db, file, name), name, type_text, lambda g: core_term(db, g.module, g.name))
+
+
+def describe(term: Term, name: str, type_text: str, resolve: Resolve) -> DerivativeText:
+    """The same for a term."""
+    body, params = term, list[str]()
+    while isinstance(body, Lam):
+        params.extend(body.params)
+        body = body.body
+    functions = {p: f"d{p}" for p in params if p in heads_of(term)}
+    tangents: dict[str, Term] = {p: var(f"d{p}") for p in params}
+    work = Differentiator(resolve)
+    notes: list[str] = []
+    tangent = ""
+    try:
+        tangent = _text(work.dual(body, tangents)[1], functions)
+    except NoClosedForm as problem:
+        notes.append(f"a boundary is found by numbers: {problem}")
+    except NotSmooth as problem:
+        notes.append(f"the derivative has no closed form: {problem}")
+    except PottoError as problem:
+        notes.extend(d.message for d in problem.diagnostics)
+    known = [work.carried_out(i) for i in _outermost(body)]
+    integrals = tuple(_integral(i, work, tangents, functions) for i in known if isinstance(i, Integral))
+    if not integrals and not notes:
+        tangent = _with_deltas(work.carried_out(body), work, tangents, functions, tangent)
+    return DerivativeText(name, type_text, tangent, isinstance(body, Integral), integrals, tuple(notes))
+
+
+def _outermost(term: Term) -> list[Integral]:
+    found: dict[Integral, None] = {}
+    stack = [term]
+    while stack:
+        node = stack.pop()
+        if isinstance(node, Integral):
+            found[node] = None
+        else:
+            stack.extend(reversed(children(node)))
+    return list(found)
+
+
+def _with_deltas(
+    plain: Term, work: Differentiator, tangents: Mapping[str, Term], functions: Mapping[str, str], tangent: str
+) -> str:
+    """A function that jumps over its parameters: its derivative is a distribution over what they are filled with."""
+    parts = [] if tangent == "0" else [tangent]
+    for item in jumps(plain, tangents, lambda t: work.dual(t, tangents)[1]):
+        parts.append(_text(scaled(item.jump, mul(delta((item.surface,)), item.rate)), functions))
+    return " + ".join(parts) or "0"
+
+
+def _integral(
+    node: Integral, work: Differentiator, tangents: Mapping[str, Term], functions: Mapping[str, str]
+) -> IntegralText:
+    def rate(term: Term) -> Term:
+        return work.dual(term, inside)[1]
+
+    inside = {n: t for n, t in tangents.items() if n not in node.variables}
+    deltas: list[str] = []
+    boundary: list[str] = []
+    bounds: list[str] = []
+    interior, reason = "?", ""
+    try:
+        interior = _text(rate(node.body), functions)
+        for item in jumps(node.body, node.variables, rate):
+            deltas.append(_text(scaled(item.jump, mul(delta((item.surface,)), item.rate)), functions))
+        plain = without_deltas(node)
+        if isinstance(plain, Integral):
+            bounds = [_text(t, functions) for t in at_bounds(plain, rate)]
+            boundary = [_text(t, functions) for t in at_surfaces(plain, frozenset(inside), rate)]
+    except (NoClosedForm, NotSmooth) as problem:
+        reason = str(problem)
+    except PottoError as problem:
+        reason = problem.diagnostics[0].message
+    head = format_term(integral(node.variables, node.bounds, ONE)).rpartition(" 1 ")[0]
+    return IntegralText(
+        head,
+        ", ".join(node.variables),
+        format_term(simplify(node.body)),
+        interior,
+        tuple(deltas),
+        tuple(bounds),
+        tuple(b for b in boundary if b != "0"),
+        _surfaces(node, inside),
+        reason,
+    )
+
+
+def _surfaces(node: Integral, tangents: Mapping[str, Term]) -> tuple[SurfaceText, ...]:
+    found: dict[Term, SurfaceText] = {}
+    for item in branches_of(node.body, node.variables):
+        for factor in factors(item.surface):
+            canonical = normalized_surface(factor)[0]
+            if canonical in found or not factor.free & frozenset(node.variables):
+                continue
+            roots: list[str] = []
+            try:
+                for root in pivots(node, factor)[0].roots:
+                    each = f" for integers {root.index}" if root.index else ""
+                    roots.append(f"{root.variable} = {format_term(simplify(root.at))}{each}")
+            except NoClosedForm:
+                pass
+            equation = format_term(branch((factor,), False, ONE, ZERO))[1:-1].replace(">=", "=").replace("<=", "=")
+            found[canonical] = SurfaceText(equation, tuple(sorted(factor.free & tangents.keys())), tuple(roots))
+    return tuple(found.values())
+
+
+# Text
+
+
+def _text(term: Term, functions: Mapping[str, str]) -> str:
+    """With brackets as factors, as people write them: what they guard against is not evaluated here."""
+    return format_term(simplify(_symbols(simplify(term), functions)))
+
+
+def _symbols(term: Term, functions: Mapping[str, str]) -> Term:
+    """Values and tangents of calls as symbols: `shader (x, y) c`, `dshader (x, y) (c, dc)`."""
+    originals = {dual: name for name, dual in functions.items()}
+    memo: dict[Term, Term] = {}
+    for node in postorder(term):
+        if isinstance(node, Proj) and isinstance(node.term, App):
+            head, groups = spine(node.term)
+            named = _named(head, originals)
+            if named is not None:
+                name, original = named
+                result: Term = original if node.index == 0 else name
+                for group in groups:
+                    args = [_symbols(a, functions) for a in group]
+                    result = app(result, tuple(_shown(a, node.index == 0, originals) for a in args))
+                memo[node] = result
+                continue
+        new = rebuild(node, tuple(memo[c] for c in children(node)))
+        if isinstance(new, Branch) and new.orelse is ZERO and not isinstance(new.then, Tuple) and new.then is not ONE:
+            new = mul(new.then, branch(new.coordinates, new.strict, ONE, ZERO))
+        memo[node] = new
+    return memo[term]
+
+
+def _named(head: Term, originals: Mapping[str, str]) -> tuple[Term, Term] | None:
+    """The symbol for the tangent of a call, and the function itself."""
+    if isinstance(head, Var) and head.name in originals:
+        return head, var(originals[head.name])
+    if isinstance(head, Deriv) and isinstance(head.function, Global):
+        return var(f"d{head.function.name}"), head.function
+    return None
+
+
+def _shown(arg: Term, primal: bool, originals: Mapping[str, str]) -> Term:
+    if isinstance(arg, Tuple) and len(arg.items) == 2:
+        value, tangent = arg.items
+        return value if primal or tangent is ZERO else tuple_((value, tangent))
+    if primal and isinstance(arg, Var) and arg.name in originals:
+        return var(originals[arg.name])
+    return arg.function if primal and isinstance(arg, Deriv) else arg
+
+
+def _lines(found: DerivativeText) -> list[str]:
+    lines = [f"d{found.name} : {found.type}", ""]
+    if not found.alone and found.tangent:
+        lines += [*_wrapped(f"D {found.name} = ", found.tangent), ""]
+    for number, item in enumerate(found.integrals, 1):
+        title = found.name if found.alone else f"integral {number}"
+        lines += [*_of_integral(title, item), ""]
+    if found.alone and found.tangent:
+        lines += ["integrated:", *_wrapped(f"  D {found.name} = ", found.tangent), ""]
+    lines += [f"note: {note}" for note in found.notes]
+    while lines and not lines[-1]:
+        lines.pop()
+    return lines
+
+
+def _of_integral(title: str, item: IntegralText) -> list[str]:
+    lines = [f"D {title} = {item.head}"]
+    parts = [(item.interior, "interior")] if item.interior != "0" or not item.deltas else []
+    parts += [(text, "boundary") for text in item.deltas]
+    width = min(WIDTH, max(len(text) for text, _ in parts))
+    for number, (text, kind) in enumerate(parts):
+        lines.append(f"    {'+ ' if number else '  '}{text.ljust(width)}   # {kind}")
+    lines.append(f"    d({item.variables})")
+    lines += [f"  + {text}   # moving bound" for text in item.bounds]
+    if item.surfaces:
+        lines += ["", "surfaces:"]
+        for surface in item.surfaces:
+            moved = f"moved by {', '.join(surface.moved_by)}" if surface.moved_by else "moved by no parameter"
+            where = f"; {', '.join(surface.roots)}" if surface.roots else ""
+            lines.append(f"  {surface.equation}   ({moved}{where})")
+    if item.boundary:
+        lines += ["", "boundary:"]
+        lines += [line for text in item.boundary for line in _wrapped("  ", text)]
+    if item.reason:
+        lines += ["", f"boundary: found by numbers, because {item.reason}"]
+    return lines
+
+
+def _wrapped(head: str, text: str) -> list[str]:
+    """A long sum over several lines, cut where it is a sum at the outside."""
+    if len(head) + len(text) <= WIDTH:
+        return [head + text]
+    pieces: list[str] = []
+    depth = start = 0
+    for i, char in enumerate(text):
+        depth += (char in "([{") - (char in ")]}")
+        if depth == 0 and text.startswith((" + ", " - "), i) and i > start:
+            pieces.append(text[start:i])
+            start = i + 1
+    pieces.append(text[start:])
+    indent = " " * min(len(head), 8)
+    return [head + pieces[0], *(indent + piece for piece in pieces[1:])]
