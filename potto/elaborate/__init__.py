@@ -1,17 +1,39 @@
-"""From the tree to core terms: the only bridge.
+"""Elaboration: trees to core terms, the only bridge between syntax and the calculus.
 
-Owns `core`, `elaborate_expression`, `diffeo_core` and `signature`. Needs no types: scopes say what a name means, and
-what a condition elaborates to says which conditional it makes. Where the program is wrong there is a `Hole`; the
-checker has said why.
+Owns scopes and what names stand for in a definition; which conditional, call or binder of the core each piece of syntax
+is. Definitions are named (`Global`), never looked into; only their signatures are read. What is wrong becomes a `Hole`
+without a word: the checker of types says it.
 """
 
 from potto.elaborate.definitions import (
+    BindCore,
     DiffeoCore,
     Elaborated,
+    ForCore,
+    InverseCore,
+    ShowCore,
+    StatementCore,
     core,
+    core_term,
     diffeo_core,
     elaborate_expression,
+    elaborate_statement,
 )
 from potto.elaborate.signatures import Signature, signature
 
-__all__ = ["DiffeoCore", "Elaborated", "Signature", "core", "diffeo_core", "elaborate_expression", "signature"]
+__all__ = [
+    "BindCore",
+    "DiffeoCore",
+    "Elaborated",
+    "ForCore",
+    "InverseCore",
+    "ShowCore",
+    "Signature",
+    "StatementCore",
+    "core",
+    "core_term",
+    "diffeo_core",
+    "elaborate_expression",
+    "elaborate_statement",
+    "signature",
+]

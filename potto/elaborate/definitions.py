@@ -1,104 +1,169 @@
-"""Definitions to terms, as queries.
+"""The questions to elaboration: core terms of definitions, expressions, statements, and the parts of diffeomorphisms.
 
-Owns `core`, `diffeo_core` and `elaborate_expression`. A definition's term is closed but for references to other
-definitions (`Global`), so that it depends on their names and signatures only.
+A definition's term is closed but for references to other definitions (`Global`), so that it depends on their names and
+signatures only.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
-from potto.core import terms
-from potto.core.terms import Term
+from potto.core.terms import Term, hole, tuple_, var
 from potto.diagnostics import Diagnostic
-from potto.elaborate.expressions import Elaborator, abstracted
-from potto.modules import definition
+from potto.elaborate import binders, calls, expressions  # noqa: F401  (imported for their rules)
+from potto.elaborate.context import Elaboration, lambdas
+from potto.elaborate.values import EMPTY, Closure, Scope
+from potto.modules.texts import definition
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import nodes
+from potto.types.context import ensure_stack
+
+Locals = Iterable[str | tuple[str, Term]]
+Names = tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Elaborated:
-    """A term, and where its branches, deltas, calls, plain conditionals and integrals were written.
+    """A core term, and where its branches, plain conditionals, deltas, calls and integrals were written.
 
-    Spans are relative to the definition's chunk. `diagnostics` is for what only elaboration can find.
+    Spans are relative to the chunk. `diagnostics` is for what only elaboration can see: the checkers say the rest.
     """
 
     term: Term
-    origins: tuple[tuple[Term, Span], ...]
+    origins: tuple[tuple[Term, Span], ...] = ()
     diagnostics: tuple[Diagnostic, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class InverseCore:
+    """The author's inverse: the variables as terms over names for the components (and the map's parameters)."""
+
+    values: Names
+    components: tuple[Term, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class DiffeoCore:
     """A diffeomorphism's parts over the names of its parameters.
 
-    inverse: (parameters, components) of the author's inverse. where: conditions as truth values.
+    `where` are truth-valued terms that select a branch.
     """
 
-    variables: tuple[str, ...]
-    groups: tuple[tuple[str, ...], ...]
+    variables: Names
+    groups: tuple[Names, ...]
     components: tuple[Term, ...]
-    inverse: tuple[tuple[str, ...], tuple[Term, ...]] | None
+    inverse: InverseCore | None
     where: tuple[Term, ...]
 
 
 @query
 def core(db: Database, file: str, name: str) -> Elaborated:
-    """The core term of a definition."""
+    """The core term of a definition, closed but for the definitions that it uses (`Global`)."""
+    ensure_stack()
     item = definition(db, file, name)
     if item is None:
-        return Elaborated(terms.hole(f"`{name}` is not defined"), ())
-    elaborator = Elaborator(db, file)
+        return Elaborated(hole(f"`{name}` could not be read"))
+    elaboration = Elaboration(db, file)
     if isinstance(item, nodes.DiffeoDefinition):
-        parts = _diffeo(elaborator, item)
-        term = abstracted([parts.variables, *parts.groups], terms.tuple_(parts.components))
-    else:
-        term = _definition(elaborator, item)
-    return Elaborated(term, tuple(elaborator.origins.items()))
+        parts = _diffeo(elaboration, item)
+        return _finished(elaboration, lambdas((parts.variables, *parts.groups), tuple_(parts.components)))
+    groups = tuple(tuple(parameter.name for parameter in group) for group in item.groups)
+    if groups:
+        return _finished(elaboration, elaboration.as_term(Closure(groups, item.bindings, item.body, EMPTY)))
+    return _finished(elaboration, elaboration.term(item.body, elaboration.block(item.bindings, EMPTY)))
+
+
+@query
+def core_term(db: Database, file: str, name: str) -> Term:
+    """The core term alone: stands still when an edit moves places only."""
+    return core(db, file, name).term
 
 
 @query
 def diffeo_core(db: Database, file: str, name: str) -> DiffeoCore | None:
-    """The parts of a diffeomorphism's definition; None for any other definition."""
+    """The parts of a diffeomorphism's definition; None for any other."""
+    ensure_stack()
     item = definition(db, file, name)
-    return _diffeo(Elaborator(db, file), item) if isinstance(item, nodes.DiffeoDefinition) else None
+    return _diffeo(Elaboration(db, file), item) if isinstance(item, nodes.DiffeoDefinition) else None
 
 
-def elaborate_expression(
-    db: Database, file: str, expr: nodes.Expr, locals: Sequence[str] = ()
-) -> Elaborated:
-    """The term of an expression with a file's names in scope; `locals` stay free variables of it."""
-    elaborator = Elaborator(db, file, locals)
-    term = elaborator.expr(expr, {name: terms.var(name) for name in locals})
-    return Elaborated(term, tuple(elaborator.origins.items()))
+def elaborate_expression(db: Database, file: str, expr: nodes.Expr, locals: Locals = ()) -> Elaborated:
+    """The core term of an expression with a file's names in scope.
+
+    `locals` are further names: one alone stays a free variable, `(name, term)` stands for the term.
+    """
+    ensure_stack()
+    with db.evaluating():
+        elaboration, scope = _opened(db, file, locals)
+        return _finished(elaboration, elaboration.term(expr, scope))
 
 
-def _definition(elaborator: Elaborator, item: nodes.Definition) -> Term:
-    env: dict[str, Term] = {}
+def _opened(db: Database, file: str, locals: Locals) -> tuple[Elaboration, Scope]:
+    pairs = [(given, var(given)) if isinstance(given, str) else given for given in locals]
+    taken = {name for _, term in pairs for name in term.free}
+    return Elaboration(db, file, taken), EMPTY.bind(dict(pairs))
+
+
+def _finished(elaboration: Elaboration, term: Term) -> Elaborated:
+    return Elaborated(term, tuple(elaboration.origins.items()))
+
+
+def _diffeo(elaboration: Elaboration, item: nodes.DiffeoDefinition) -> DiffeoCore:
+    variables, scope = elaboration.bind((parameter.name for parameter in item.variables), EMPTY)
     groups = []
     for group in item.groups:
-        names = tuple(elaborator.bind(p.name) for p in group)
-        env.update((p.name, terms.var(n)) for p, n in zip(group, names, strict=True))
+        names, scope = elaboration.bind((parameter.name for parameter in group), scope)
         groups.append(names)
-    return abstracted(groups, elaborator.expr(item.body, elaborator.bindings(item.bindings, env)))
-
-
-def _diffeo(elaborator: Elaborator, item: nodes.DiffeoDefinition) -> DiffeoCore:
-    env: dict[str, Term] = {}
-    groups = []
-    for group in (item.variables, *item.groups):
-        names = tuple(elaborator.bind(p.name) for p in group)
-        env.update((p.name, terms.var(n)) for p, n in zip(group, names, strict=True))
-        groups.append(names)
-    inner = elaborator.bindings(item.bindings, env)
-    components = tuple(elaborator.expr(c, inner) for c in item.components)
+    scope = elaboration.block(item.bindings, scope)
+    components = elaboration.terms(item.components, scope)
     inverse = None
     if item.inverse is not None:
-        names = tuple(elaborator.bind(p.name) for p in item.inverse.parameters)
-        over = {**inner, **{p.name: terms.var(n) for p, n in zip(item.inverse.parameters, names, strict=True)}}
-        inverse = (names, tuple(elaborator.expr(c, over) for c in item.inverse.components))
-    where = tuple(elaborator.truth(w, inner) for w in item.where)
-    return DiffeoCore(groups[0], tuple(g for g in groups[1:] if g), components, inverse, where)
+        values, inner = elaboration.bind((parameter.name for parameter in item.inverse.parameters), scope)
+        inverse = InverseCore(values, elaboration.terms(item.inverse.components, inner))
+    return DiffeoCore(variables, tuple(groups), components, inverse, elaboration.terms(item.where, scope))
+
+
+# Statements of scripts
+
+
+@dataclass(frozen=True, slots=True)
+class ShowCore:
+    """`print(e, …)` or a bare expression: the terms of what is shown."""
+
+    values: tuple[Elaborated, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class BindCore:
+    """`a = e` or `(a, b) = e`: the names and the whole of what is bound."""
+
+    names: Names
+    value: Elaborated
+
+
+@dataclass(frozen=True, slots=True)
+class ForCore:
+    """`for v in list`: the list; the body is elaborated once for each item, with `(variable, item)` as a local."""
+
+    variable: str
+    iterable: Elaborated
+    body: tuple[nodes.Statement, ...]
+
+
+StatementCore = ShowCore | BindCore | ForCore
+
+
+def elaborate_statement(db: Database, file: str, statement: nodes.Statement, locals: Locals = ()) -> StatementCore:
+    """The core terms of a script's statement."""
+    given = tuple(locals)
+    match statement:
+        case nodes.Print(arguments=arguments):
+            return ShowCore(tuple(elaborate_expression(db, file, e, given) for e in arguments))
+        case nodes.ExpressionStatement(value=value):
+            return ShowCore((elaborate_expression(db, file, value, given),))
+        case nodes.Binding(targets=targets, value=value):
+            return BindCore(tuple(t.name for t in targets), elaborate_expression(db, file, value, given))
+        case nodes.For(variable=variable, iterable=iterable, body=body):
+            return ForCore(variable.name, elaborate_expression(db, file, iterable, given), body)

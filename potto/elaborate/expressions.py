@@ -1,319 +1,173 @@
-"""Expressions to terms.
+"""What each kind of expression elaborates to: numbers, names, arithmetic, conditions, tuples, functions, local names.
 
-Owns `Elaborator`: one definition or expression, its environment of local names, the names that its binders have
-taken, and where the branches, deltas, calls and integrals that it makes were written.
+Calls are in `calls`, binders of numbers (integrals, sums) in `binders`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-
-from potto.core import terms as core
-from potto.core.terms import Prim, Term, Tuple
-from potto.elaborate import calls
-from potto.elaborate.conditions import bracketed, is_truth
-from potto.measures import MEASURES
-from potto.modules import DefinitionTarget, resolve, resolve_member
-from potto.primitives import PRIMITIVES
-from potto.query import Database
-from potto.source import Span
+from potto.core.terms import (
+    ONE,
+    ZERO,
+    Hole,
+    If,
+    Prim,
+    Term,
+    add,
+    const,
+    div,
+    hole,
+    list_of,
+    mul,
+    neg,
+    pow_,
+    prim,
+    tuple_,
+)
+from potto.elaborate.conditions import choose, compare, is_truth, logic
+from potto.elaborate.context import Elaboration, rule
+from potto.elaborate.values import Closure, Scope, Value
 from potto.syntax import nodes
-from potto.syntax.nodes import Expr
-
-Env = Mapping[str, Term]
-CONSTANTS = {"pi": core.PI, "inf": core.INF}
-_COMPARISONS = {"<": ("lt", False), "<=": ("le", False), ">": ("lt", True), ">=": ("le", True), "==": ("eq", False),
-                "!=": ("ne", False)}  # fmt: skip
 
 
-class Elaborator:
-    """Elaborates expressions of one file; binders come out with distinct names."""
+@rule(nodes.Number)
+def _number(elaboration: Elaboration, node: nodes.Number, scope: Scope) -> Value:
+    return const(node.value)
 
-    def __init__(self, db: Database, file: str, taken: Sequence[str] = ()) -> None:
-        self.db, self.file = db, file
-        self.taken: set[str] = set(taken)
-        self.origins: dict[Term, Span] = {}
-        self.written: dict[Term, Span] = {}
 
-    # Names
+@rule(nodes.ErrorExpr)
+def _error(elaboration: Elaboration, node: nodes.ErrorExpr, scope: Scope) -> Value:
+    return hole("this could not be read")
 
-    def bind(self, name: str) -> str:
-        """A name for a binder, distinct from all others of this definition."""
-        new = core.fresh(name, self.taken)
-        self.taken.add(new)
-        return new
 
-    def note(self, term: Term, span: Span) -> Term:
-        self.origins.setdefault(term, span)
-        return term
+@rule(nodes.Paren)
+def _paren(elaboration: Elaboration, node: nodes.Paren, scope: Scope) -> Value:
+    return elaboration.value(node.inner, scope)
 
-    def note_branch(self, span: Span) -> calls.NoteBranch:
-        def note(made: Term, truth: Term) -> None:
-            self.note(made, self.written.get(truth, span))
 
-        return note
+@rule(nodes.Name)
+def _name(elaboration: Elaboration, node: nodes.Name, scope: Scope) -> Value:
+    return elaboration.name(node.id, scope)
 
-    def name(self, expr: nodes.Name, env: Env) -> Term:
-        if expr.id in env:
-            return env[expr.id]
-        target = resolve(self.db, self.file, expr.id)
-        if isinstance(target, DefinitionTarget):
-            return core.global_(target.file, target.name)
-        if target is None and expr.id in CONSTANTS:
-            return CONSTANTS[expr.id]
-        if target is None and expr.id in PRIMITIVES and PRIMITIVES[expr.id].surface:
-            return self.builtin_as_function(expr.id)
-        if target is None and expr.id in calls.PROJECTIONS:
-            param = self.bind("p")
-            return core.lam((param,), core.proj(core.var(param), calls.PROJECTIONS[expr.id]))
-        return core.hole(f"`{expr.id}` is not a value here")
 
-    def builtin_as_function(self, name: str) -> Term:
-        entry = PRIMITIVES[name]
-        params = tuple(self.bind(stem) for stem in "xyz"[: entry.arity or 2])
-        return core.lam(params, core.apply(name, *map(core.var, params)))
+@rule(nodes.Member)
+def _member(elaboration: Elaboration, node: nodes.Member, scope: Scope) -> Value:
+    return elaboration.member(node.path, node.name, scope)
 
-    def is_free(self, name: str, env: Env) -> bool:
-        """Whether a name still means what the language gives it."""
-        return name not in env and resolve(self.db, self.file, name) is None
 
-    # Expressions
+# Arithmetic
 
-    def expr(self, expr: Expr, env: Env) -> Term:
-        match expr:
-            case nodes.Number():
-                return core.const(expr.value)
-            case nodes.Name():
-                return self.name(expr, env)
-            case nodes.Member():
-                target = resolve_member(self.db, self.file, expr.path, expr.name)
-                return core.hole(f"`{expr.path}.{expr.name}` is not a value here") if target is None else core.global_(
-                    target.file, target.name
-                )  # fmt: skip
-            case nodes.Paren():
-                return self.expr(expr.inner, env)
-            case nodes.Unary():
-                return self.unary(expr, env)
-            case nodes.Chain():
-                return self.chain(expr, env)
-            case nodes.Power():
-                return core.pow_(self.expr(expr.base, env), self.expr(expr.exponent, env))
-            case nodes.Compare() | nodes.Logic():
-                return self.truth(expr, env)
-            case nodes.Bracket():
-                return self.conditional(expr, core.ONE, core.ZERO, env)
-            case nodes.ListLiteral():
-                return core.list_of(self.expr(item, env) for item in expr.items)
-            case nodes.Tuple():
-                return core.tuple_(self.expr(item, env) for item in expr.items)
-            case nodes.If():
-                return self.conditional(expr.condition, self.expr(expr.then, env), self.expr(expr.orelse, env), env)
-            case nodes.Lambda():
-                return self.function(expr.groups, expr.body, env)
-            case nodes.Apply():
-                return calls.apply(self, expr, env)
-            case nodes.Integral():
-                return self.integral(expr, env)
-            case nodes.Sum():
-                name = self.bind(expr.variable.name)
-                body = self.expr(expr.body, {**env, expr.variable.name: core.var(name)})
-                return core.sum_(name, self.expr(expr.lo, env), self.expr(expr.hi, env), body)
-            case nodes.Let():
-                return self.expr(expr.body, self.bindings(expr.bindings, env))
-            case nodes.InlineDiffeo():
-                return core.tuple_(self.expr(c, env) for c in expr.components)
-            case nodes.ErrorExpr():
-                return core.hole("this could not be read")
 
-    def unary(self, expr: nodes.Unary, env: Env) -> Term:
-        if expr.op == "not":
-            return self.truth(expr, env)
-        inner = self.expr(expr.operand, env)
-        return core.neg(inner) if expr.op == "-" else inner
+@rule(nodes.Unary)
+def _unary(elaboration: Elaboration, node: nodes.Unary, scope: Scope) -> Value:
+    operand = elaboration.term(node.operand, scope)
+    match node.op:
+        case "-":
+            return neg(operand)
+        case "+":
+            return operand
+        case "not":
+            return _placed(elaboration, prim("not", operand), node)
 
-    def chain(self, expr: nodes.Chain, env: Env) -> Term:
-        """Sums flat; products and quotients from the left, runs of `*` flat."""
-        first = self.expr(expr.first, env)
-        if expr.rest[0].op in "+-":
-            terms = [first]
-            for operand in expr.rest:
-                value = self.expr(operand.value, env)
-                terms.append(value if operand.op == "+" else core.neg(value))
-            return core.add(*terms)
-        factors = [first]
-        for operand in expr.rest:
-            value = self.expr(operand.value, env)
-            if operand.op == "*":
-                factors.append(value)
-            else:
-                factors = [core.div(core.mul(*factors) if len(factors) > 1 else factors[0], value)]
-        return core.mul(*factors) if len(factors) > 1 else factors[0]
 
-    def function(self, groups: Sequence[Sequence[nodes.Parameter]], body: Expr, env: Env) -> Term:
-        inner = dict(env)
-        names = []
-        for group in groups:
-            fresh = tuple(self.bind(p.name) for p in group)
-            inner.update((p.name, core.var(n)) for p, n in zip(group, fresh, strict=True))
-            names.append(fresh)
-        return abstracted(names, self.expr(body, inner))
-
-    def bindings(self, bindings: Sequence[nodes.Binding], env: Env) -> dict[str, Term]:
-        """The environment after local names are bound, one after the other."""
-        inner = dict(env)
-        for binding in bindings:
-            value = self.expr(binding.value, inner)
-            if len(binding.targets) == 1:
-                inner[binding.targets[0].name] = value
-            else:
-                inner.update((t.name, core.proj(value, i)) for i, t in enumerate(binding.targets))
-        return inner
-
-    # Conditions
-
-    def truth(self, expr: Expr, env: Env) -> Term:
-        """A condition as a truth value."""
-        match expr:
-            case nodes.Paren():
-                return self.truth(expr.inner, env)
-            case nodes.Bracket():
-                return self.truth(expr.condition, env)
-            case nodes.Unary(op="not"):
-                return self.wrote(core.prim("not", self.truth(expr.operand, env)), expr.span)
-            case nodes.Logic():
-                return self.wrote(core.prim(expr.op, *(self.truth(o, env) for o in expr.operands)), expr.span)
-            case nodes.Compare():
-                return self.comparison(expr, env)
-            case _:
-                return self.expr(expr, env)
-
-    def wrote(self, truth: Term, span: Span) -> Term:
-        self.written.setdefault(truth, span)
-        return truth
-
-    def comparison(self, expr: nodes.Compare, env: Env) -> Term:
-        parts = []
-        left, start = self.expr(expr.first, env), expr.first.span
-        for operand in expr.rest:
-            right = self.expr(operand.value, env)
-            op, swapped = _COMPARISONS[operand.op]
-            made = core.prim(op, right, left) if swapped else core.prim(op, left, right)
-            parts.append(self.wrote(made, start.cover(operand.value.span)))
-            left, start = right, operand.value.span
-        return parts[0] if len(parts) == 1 else self.wrote(core.prim("and", *parts), expr.span)
-
-    def conditional(self, condition: Expr, then: Term, orelse: Term, env: Env) -> Term:
-        """Plain for a comparison, diffeomorphic for a bracket or a diffeomorphism's result."""
-        match condition:
-            case nodes.Paren():
-                return self.conditional(condition.inner, then, orelse, env)
-            case nodes.Bracket():
-                return bracketed(self.truth(condition.condition, env), then, orelse, self.note_branch(condition.span))
-            case nodes.Logic() | nodes.Unary(op="not") if _has_surfaces(condition):
-                return self.logic(condition, then, orelse, env)
-        value = self.truth(condition, env)
-        if is_truth(value):
-            return self.note(core.if_(value, then, orelse), condition.span)
-        if isinstance(value, core.Hole):
-            return value
-        coordinates = value.items if isinstance(value, Tuple) else (core.proj(value, 0),)
-        if is_one_if_zero(value):
-            assert isinstance(value, core.Branch)
-            made = core.branch(value.coordinates, value.strict, then, orelse)
-        elif isinstance(value, core.Const) or (isinstance(value, Prim) and not isinstance(value, Tuple)):
-            made = core.branch((value,), False, then, orelse)
+@rule(nodes.Chain)
+def _chain(elaboration: Elaboration, node: nodes.Chain, scope: Scope) -> Value:
+    first = elaboration.term(node.first, scope)
+    rest = [(operand.op, elaboration.term(operand.value, scope)) for operand in node.rest]
+    if node.rest[0].op in "+-":
+        if len(rest) == 1 and rest[0][0] == "-" and rest[0][1] is first:
+            return prim("add", first, neg(first))  # not 0 where it is not finite
+        return add(first, *(neg(term) if op == "-" else term for op, term in rest))
+    factors = [first]
+    for op, term in rest:
+        if op == "*":
+            factors.append(term)
         else:
-            made = core.branch(coordinates, False, then, orelse)
-        return self.note(made, condition.span)
-
-    def logic(self, condition: nodes.Logic | nodes.Unary, then: Term, orelse: Term, env: Env) -> Term:
-        """`and`, `or`, `not` of conditions some of which are diffeomorphic."""
-        if isinstance(condition, nodes.Unary):
-            return self.conditional(condition.operand, orelse, then, env)
-        result = then if condition.op == "and" else orelse
-        for operand in reversed(condition.operands):
-            if condition.op == "and":
-                result = self.conditional(operand, result, orelse, env)
-            else:
-                result = self.conditional(operand, then, result, env)
-        return result
-
-    # Integrals
-
-    def integral(self, expr: nodes.Integral, env: Env) -> Term:
-        inner = dict(env)
-        names: list[str] = []
-        bounds: list[tuple[Term, Term]] = []
-        hints: list[tuple[Term, ...]] = []
-        densities: list[Term] = []
-        guards: list[tuple[Term, str]] = []
-        for place, bound in enumerate(expr.bounds):
-            if isinstance(bound, nodes.MeasureBound):
-                written = bound.variable
-            elif place < len(expr.variables):
-                written = expr.variables[place].name
-            else:
-                return core.hole("this integral has more bounds than variables")
-            name = self.bind(written)
-            if isinstance(bound, nodes.Interval):
-                bounds.append((self.expr(bound.lo, inner), self.expr(bound.hi, inner)))
-                hints.append(())
-            else:
-                measure = MEASURES.get(bound.measure)
-                args = [self.expr(a, inner) for a in bound.arguments]
-                if measure is None or len(args) != len(measure.parameters):
-                    return core.hole(f"`{bound.measure}` is not a measure with {len(args)} parameter(s)")
-                bounds.append(measure.support(*args))
-                hints.append(measure.hints(*args))
-                densities.append(measure.density(core.var(name), *args))
-                guards += [(c, f"{bound.measure}: {why}") for c, why in measure.valid(*args)]
-            names.append(name)
-            inner[written] = core.var(name)
-        if len(names) != len(expr.variables):
-            return core.hole("this integral has fewer bounds than variables")
-        body = self.weighted(self.expr(expr.body, inner), densities)
-        made: Term = self.note(core.integral(tuple(names), tuple(bounds), body, tuple(hints)), expr.span)
-        for condition, why in reversed(guards):
-            if not condition.free & set(names):
-                made = core.if_(condition, made, core.hole(why))
-        return made
-
-    def weighted(self, body: Term, densities: list[Term]) -> Term:
-        if not densities:
-            return body
-        if isinstance(body, Tuple):
-            return core.tuple_(self.weighted(item, densities) for item in body.items)
-        return core.mul(body, *densities)
+            factors = [div(mul(*factors), term)]
+    return mul(*factors)
 
 
-def abstracted(groups: Sequence[tuple[str, ...]], body: Term) -> Term:
-    """A function of curried groups of parameters."""
-    for group in reversed(groups):
-        body = core.lam(group, body)
-    return body
+@rule(nodes.Power)
+def _power(elaboration: Elaboration, node: nodes.Power, scope: Scope) -> Value:
+    return pow_(elaboration.term(node.base, scope), elaboration.term(node.exponent, scope))
 
 
-def is_one_if_zero(term: Term) -> bool:
-    """Whether a term is an Iverson bracket of one surface, as a local name for `[p]` is."""
-    return isinstance(term, core.Branch) and term.then is core.ONE and term.orelse is core.ZERO
+# Conditions
 
 
-def _has_surfaces(expr: Expr) -> bool:
-    """Whether a logical condition has an operand that is a bracket or a diffeomorphism, not a comparison."""
-    stack: list[Expr] = [expr]
-    while stack:
-        node = stack.pop()
-        match node:
-            case nodes.Logic():
-                stack.extend(node.operands)
-            case nodes.Unary(op="not"):
-                stack.append(node.operand)
-            case nodes.Paren():
-                stack.append(node.inner)
-            case nodes.Compare() | nodes.Name():
-                continue
-            case _:
-                return True
-    return False
+@rule(nodes.Compare)
+def _compare(elaboration: Elaboration, node: nodes.Compare, scope: Scope) -> Value:
+    left = elaboration.term(node.first, scope)
+    start, parts = node.first.span, []
+    for operand in node.rest:
+        right = elaboration.term(operand.value, scope)
+        part = compare(operand.op, left, right)
+        elaboration.places.setdefault(part, start.cover(operand.value.span))
+        parts.append(part)
+        left, start = right, operand.value.span
+    return logic("and", parts)
+
+
+@rule(nodes.Logic)
+def _logic(elaboration: Elaboration, node: nodes.Logic, scope: Scope) -> Value:
+    return logic(node.op, list(elaboration.terms(node.operands, scope)))
+
+
+def _placed(elaboration: Elaboration, condition: Prim, node: nodes.Expr) -> Term:
+    elaboration.places.setdefault(condition, node.span)
+    return condition
+
+
+@rule(nodes.Bracket)
+def _bracket(elaboration: Elaboration, node: nodes.Bracket, scope: Scope) -> Value:
+    return _iverson(elaboration, elaboration.term(node.condition, scope), node)
+
+
+def _iverson(elaboration: Elaboration, condition: Term, node: nodes.Bracket | nodes.ListLiteral) -> Term:
+    if isinstance(condition, Hole):
+        return condition
+    return choose(condition, ONE, ZERO, True, elaboration.noting(node.span))
+
+
+@rule(nodes.If)
+def _if(elaboration: Elaboration, node: nodes.If, scope: Scope) -> Value:
+    condition = elaboration.term(node.condition, scope)
+    then, orelse = elaboration.term(node.then, scope), elaboration.term(node.orelse, scope)
+    made = choose(condition, then, orelse, False, elaboration.noting(node.condition.span))
+    return elaboration.note(made, node.condition.span) if isinstance(made, If) else made
+
+
+@rule(nodes.InlineDiffeo)
+def _inline(elaboration: Elaboration, node: nodes.InlineDiffeo, scope: Scope) -> Value:
+    return tuple_(elaboration.terms(node.components, scope))
+
+
+# Composites
+
+
+@rule(nodes.Tuple)
+def _tuple(elaboration: Elaboration, node: nodes.Tuple, scope: Scope) -> Value:
+    return tuple_(elaboration.terms(node.items, scope))
+
+
+@rule(nodes.ListLiteral)
+def _list(elaboration: Elaboration, node: nodes.ListLiteral, scope: Scope) -> Value:
+    items = elaboration.terms(node.items, scope)
+    if len(items) == 1 and is_truth(items[0]):  # `[p]` with a local name p for a comparison
+        return _iverson(elaboration, items[0], node)
+    return list_of(items)
+
+
+# Functions and local names
+
+
+@rule(nodes.Lambda)
+def _lambda(elaboration: Elaboration, node: nodes.Lambda, scope: Scope) -> Value:
+    groups = tuple(tuple(parameter.name for parameter in group) for group in node.groups)
+    return Closure(groups, (), node.body, scope)
+
+
+@rule(nodes.Let)
+def _let(elaboration: Elaboration, node: nodes.Let, scope: Scope) -> Value:
+    return elaboration.value(node.body, elaboration.block(node.bindings, scope))
 
 

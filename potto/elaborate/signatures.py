@@ -1,86 +1,88 @@
-"""The names by which a function's arguments can be given, group by group.
+"""What callers see of a function: its groups of parameters, also where it is a definition of another file.
 
-Owns `signature`, which reads a definition's syntax only: parameters of a `def` or a lambda, of a diffeomorphism,
-through other names for functions, partial applications and `deriv` (which puts a `d` in front of every name).
+Owns `signature`, a projection of a definition's interface that stands still when a body edit changes no parameter, and
+`groups_of`, the same for any core term: partial applications lack the groups that are given, derivatives have a `d` in
+front of each name.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from potto.core.terms import App, Deriv, Global, Lam, Term
-from potto.modules import DefinitionTarget, definition, resolve, resolve_member
+from potto.elaborate.values import Groups, Slot
+from potto.modules.texts import definition
 from potto.query import Database, query
 from potto.syntax import nodes
-
-Signature = tuple[tuple[str, ...], ...]
-
-
-def _unknown(db: Database, file: str, name: str) -> Signature | None:
-    return None
+from potto.types import interface
+from potto.types.types import Diffeo, TupleOf, Type, dual_name, groups_of, resolve, result_of
 
 
-@query(cycle=_unknown)
+@dataclass(frozen=True, slots=True)
+class Signature:
+    """The parameters of a definition, group by group; `dims` is the size of its result if that is a tuple."""
+
+    groups: Groups
+    dims: int | None = None
+
+
+@query
 def signature(db: Database, file: str, name: str) -> Signature | None:
-    """The groups of parameter names of a definition; None for one that is no function, or not known to be one."""
+    """The signature of a definition, through aliases, imports, `deriv` and partial application; None if there is none.
+
+    A value that is no function has no groups.
+    """
     item = definition(db, file, name)
-    match item:
-        case None:
-            return None
-        case nodes.DiffeoDefinition():
-            return tuple(_names(g) for g in (item.variables, *item.groups) if g)
-        case nodes.Definition():
-            own = tuple(map(_names, item.groups))
-            local = {p for group in own for p in group} | {t.name for b in item.bindings for t in b.targets}
-            rest = _of_expression(db, file, item.body, frozenset(local))
-            return (*own, *(rest or ())) or None
+    if item is None:
+        return None
+    type = interface(db, file, name).type
+    groups = tuple(tuple(Slot(p.name, _dims(p.type)) for p in group) for group in groups_of(type))
+    return Signature(groups or _written(item), _dims(result_of(type)))
 
 
-def _names(group: tuple[nodes.Parameter, ...]) -> tuple[str, ...]:
-    return tuple(p.name for p in group)
+def _dims(type: Type) -> int | None:
+    found = resolve(type)
+    if isinstance(found, TupleOf):
+        return len(found.items)
+    return found.dims if isinstance(found, Diffeo) else None
 
 
-def dual(groups: Signature) -> Signature:
-    return tuple(tuple("d" + name for name in group) for group in groups)
+def _written(item: nodes.Definition | nodes.DiffeoDefinition) -> Groups:
+    """The parameters as they are written, for a definition whose type could not be found."""
+    groups = item.groups if isinstance(item, nodes.Definition) else (item.variables, *item.groups)
+    return tuple(tuple(Slot(parameter.name) for parameter in group) for group in groups)
 
 
-def _of_expression(db: Database, file: str, expr: nodes.Expr, local: frozenset[str]) -> Signature | None:
-    match expr:
-        case nodes.Paren(inner=inner):
-            return _of_expression(db, file, inner, local)
-        case nodes.Lambda(groups=groups, body=body):
-            own = tuple(map(_names, groups))
-            inside = local | {n for g in own for n in g}
-            return (*own, *(_of_expression(db, file, body, inside) or ()))
-        case nodes.Name(id=name) if name not in local:
-            return _of_target(db, resolve(db, file, name))
-        case nodes.Member(path=path, name=name) if path.partition(".")[0] not in local:
-            return _of_target(db, resolve_member(db, file, path, name))
-        case nodes.Apply(function=nodes.Name(id="deriv"), arguments=(argument,)) if "deriv" not in local:
-            inner_groups = _of_expression(db, file, argument.value, local)
-            return None if inner_groups is None else dual(inner_groups)
-        case nodes.Apply(function=function):
-            applied = _of_expression(db, file, function, local)
-            return applied[1:] or None if applied else None
-        case _:
-            return None
-
-
-def _of_target(db: Database, target: object) -> Signature | None:
-    return signature(db, target.file, target.name) if isinstance(target, DefinitionTarget) else None
-
-
-def of_term(db: Database, term: Term) -> Signature | None:
-    """The signature of a function as a term; the names of its own binders are those that were written."""
+def groups_of_term(db: Database, term: Term) -> Groups:
+    """The parameters that a term takes, as far as they are known; empty for anything else."""
     match term:
-        case Lam():
-            own = tuple(p.partition("'")[0] for p in term.params)
-            return (own, *(of_term(db, term.body) or ()))
-        case Global():
-            return signature(db, term.module, term.name)
-        case Deriv():
-            inner = of_term(db, term.function)
-            return None if inner is None else dual(inner)
-        case App():
-            groups = of_term(db, term.function)
-            return groups[1:] or None if groups else None
+        case Lam(params=params, body=body):
+            return (tuple(Slot(stem(name)) for name in params), *groups_of_term(db, body))
+        case Global(module=file, name=name):
+            found = signature(db, file, name)
+            return () if found is None else found.groups
+        case App(function=function):
+            return groups_of_term(db, function)[1:]
+        case Deriv(function=function):
+            return tuple(
+                tuple(Slot(None if slot.name is None else dual_name(slot.name)) for slot in group)
+                for group in groups_of_term(db, function)
+            )
         case _:
-            return None
+            return ()
+
+
+def stem(name: str) -> str:
+    """A parameter's name as it was written: binders are made distinct by what stands behind a quote."""
+    return name.partition("'")[0]
+
+
+def dims_of_term(db: Database, term: Term) -> int | None:
+    """The size of the tuple that a term stands for, if it is a call of a definition that gives one."""
+    head, calls = term, 0
+    while isinstance(head, App):
+        head, calls = head.function, calls + 1
+    if not isinstance(head, Global):
+        return None
+    found = signature(db, head.module, head.name)
+    return found.dims if found is not None and len(found.groups) <= calls else None

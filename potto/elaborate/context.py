@@ -1,0 +1,191 @@
+"""One elaboration at work: where names come from, fresh binders, and where terms came from.
+
+Owns `Elaboration` and `RULES`, the table of what each kind of expression elaborates to; `expressions`, `calls` and
+`binders` fill it. It recurses as deep as the tree is nested, which the parser limits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, TypeVar
+
+from potto.core.terms import INF, PI, Term, Tuple, app, fresh, global_, hole, lam, proj, var
+from potto.elaborate import builtins
+from potto.elaborate.values import Builtin, Closure, Partial, Scope, Value
+from potto.modules.lookup import DefinitionTarget, resolve, resolve_member
+from potto.query import Database
+from potto.source import Span
+from potto.syntax import nodes
+from potto.types.scope import is_builtin
+
+MAX_DEPTH = 300  # calls of local functions within each other: deeper ones never end
+MAX_CALLS = 100_000
+
+E = TypeVar("E")
+RuleOf = Callable[["Elaboration", E, Scope], Value]
+RULES: dict[type, RuleOf[Any]] = {}
+
+
+def rule(kind: type[E]) -> Callable[[RuleOf[E]], RuleOf[E]]:
+    """Declare what a kind of expression elaborates to."""
+
+    def declare(function: RuleOf[E]) -> RuleOf[E]:
+        RULES[kind] = function
+        return function
+
+    return declare
+
+
+class Elaboration:
+    """The elaboration of one definition, statement or expression."""
+
+    def __init__(self, db: Database, file: str, taken: Iterable[str] = ()) -> None:
+        self.db, self.file = db, file
+        self.taken = set(taken)
+        self.numbers: set[str] = set()  # binders that stand for one number each: variables of integration, indices
+        self.origins: dict[Term, Span] = {}
+        self.places: dict[Term, Span] = {}  # where conditions were written
+        self.made: dict[Closure, Term] = {}
+        self.applied: dict[tuple[Closure, tuple[Value, ...]], Value] = {}
+        self.depth = self.calls = 0
+
+    # Expressions
+
+    def value(self, expr: nodes.Expr, scope: Scope) -> Value:
+        """What an expression elaborates to."""
+        return RULES[type(expr)](self, expr, scope)
+
+    def term(self, expr: nodes.Expr, scope: Scope) -> Term:
+        """The core term of an expression."""
+        return self.as_term(self.value(expr, scope))
+
+    def terms(self, exprs: Iterable[nodes.Expr], scope: Scope) -> tuple[Term, ...]:
+        return tuple(self.term(expr, scope) for expr in exprs)
+
+    def block(self, bindings: Sequence[nodes.Binding], scope: Scope) -> Scope:
+        """The names of a block in scope, each line seeing those before it."""
+        for binding in bindings:
+            value = self.value(binding.value, scope)
+            if len(binding.targets) == 1:
+                scope = scope.bind({binding.targets[0].name: value})
+                continue
+            whole, count = self.as_term(value), len(binding.targets)
+            if isinstance(whole, Tuple) and len(whole.items) != count:
+                parts: Sequence[Term] = [hole(f"{count} names for a tuple of {len(whole.items)}")] * count
+            else:
+                parts = [proj(whole, place) for place in range(count)]
+            scope = scope.bind({target.name: part for target, part in zip(binding.targets, parts)})
+        return scope
+
+    # Names
+
+    def name(self, name: str, scope: Scope) -> Value:
+        """What a name stands for: a local name, else a definition, else a builtin."""
+        local = scope.find(name)
+        if local is not None:
+            return local
+        target = resolve(self.db, self.file, name)
+        if isinstance(target, DefinitionTarget):
+            return global_(target.file, target.name)
+        if target is None and is_builtin(name):
+            return {"pi": PI, "inf": INF}.get(name) or Builtin(name)
+        return hole(f"`{name}` is not defined" if target is None else f"`{name}` is a module")
+
+    def member(self, path: str, name: str, scope: Scope) -> Value:
+        """What `path.name` stands for; a local name hides a module."""
+        hidden = scope.find(path.partition(".")[0]) is not None
+        target = None if hidden else resolve_member(self.db, self.file, path, name)
+        return hole(f"`{path}.{name}` is not defined") if target is None else global_(target.file, target.name)
+
+    # Binders
+
+    def fresh(self, name: str) -> str:
+        """A name for a binder that no other binder has."""
+        found = fresh(name, self.taken)
+        self.taken.add(found)
+        return found
+
+    def bind(self, names: Iterable[str], scope: Scope) -> tuple[tuple[str, ...], Scope]:
+        """Fresh variables for names, and the scope in which the names stand for them."""
+        pairs = [(name, self.fresh(name)) for name in names]
+        inner = scope.bind({name: var(new) for name, new in pairs})
+        return tuple(new for _, new in pairs), inner
+
+    def bind_number(self, name: str, scope: Scope) -> tuple[str, Scope]:
+        """A fresh variable that stands for one number."""
+        (new,), inner = self.bind((name,), scope)
+        self.numbers.add(new)
+        return new, inner
+
+    # Functions as terms
+
+    def as_term(self, value: Value) -> Term:
+        """The core term of a value: functions become lambdas."""
+        match value:
+            case Closure():
+                found = self.made.get(value)
+                if found is None:
+                    found = self.made[value] = self._lambda(value)
+                return found
+            case Partial():
+                return self._partial(value)
+            case Builtin(name):
+                return self.builtin_lambda(name)
+            case _:
+                return value
+
+    def _lambda(self, closure: Closure) -> Term:
+        scope, groups = closure.scope, []
+        for group in closure.groups:
+            names, scope = self.bind(group, scope)
+            groups.append(names)
+        return lambdas(groups, self.as_term(self.body(closure, scope)))
+
+    def body(self, closure: Closure, scope: Scope) -> Value:
+        """The body of a function whose parameters are in scope."""
+        self.calls += 1
+        if self.depth >= MAX_DEPTH or self.calls > MAX_CALLS:
+            return hole("a local function that is applied to itself never ends")
+        self.depth += 1
+        try:
+            return self.value(closure.body, self.block(closure.bindings, scope))
+        finally:
+            self.depth -= 1
+
+    def builtin_lambda(self, name: str) -> Term:
+        """A builtin as a function that is passed on."""
+        names = tuple(self.fresh(stem) for stem in ("x", "y", "z")[: builtins.parameters_of(name)])
+        return lam(names, builtins.applied(self.db, name, tuple(map(var, names))))
+
+    def _partial(self, value: Partial) -> Term:
+        groups, call = [], value.function
+        for group, given in zip(value.groups, value.given):
+            if given is None:
+                names = tuple(self.fresh(slot.name or "x") for slot in group)
+                groups.append(names)
+                given = tuple(map(var, names))
+            call = app(call, given)
+        return lambdas(groups, call)
+
+    # Where terms came from
+
+    def note(self, term: Term, span: Span) -> Term:
+        """Remember where a term came from; the first place counts."""
+        self.origins.setdefault(term, span)
+        return term
+
+    def noting(self, span: Span) -> Callable[[Term, Term], None]:
+        """Remembers branches at their conditions' places, or at `span`."""
+
+        def note(condition: Term, made: Term) -> None:
+            place = self.places.get(condition) or self.origins.get(condition) or span
+            self.origins.setdefault(made, place)
+
+        return note
+
+
+def lambdas(groups: Sequence[tuple[str, ...]], body: Term) -> Term:
+    """A function of several groups of parameters."""
+    for group in reversed(groups):
+        body = lam(group, body)
+    return body

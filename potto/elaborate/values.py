@@ -1,0 +1,74 @@
+"""What expressions elaborate to: core terms, and functions that are known so well that no term is made of them yet.
+
+Owns `Value` and `Groups`. A `Closure` is a local function: its text and the names around it, so that applying it is
+elaborating its body, with no substitution and no capture. It becomes a `Lam` only where it is passed on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from potto.core.terms import Term
+from potto.syntax import nodes
+
+
+@dataclass(frozen=True, slots=True)
+class Slot:
+    """One parameter as callers see it: its name, if it has one, and how many numbers make it if it is a tuple."""
+
+    name: str | None
+    dims: int | None = None
+
+
+Groups = tuple[tuple[Slot, ...], ...]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Closure:
+    """A function written in the definition at hand. `scope` has the names around it and parameters already given."""
+
+    groups: tuple[tuple[str, ...], ...]
+    bindings: tuple[nodes.Binding, ...]
+    body: nodes.Expr
+    scope: Scope
+
+
+@dataclass(frozen=True, slots=True)
+class Partial:
+    """A function that a term stands for, of which some groups are given and an earlier one is not."""
+
+    function: Term
+    groups: Groups
+    given: tuple[tuple[Term, ...] | None, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Builtin:
+    """A builtin or one of the special forms, not applied."""
+
+    name: str
+
+
+Value = Term | Closure | Partial | Builtin
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Scope:
+    """The local names, with what they stand for."""
+
+    names: Mapping[str, Value]
+
+    def bind(self, names: Mapping[str, Value]) -> Scope:
+        return Scope({**self.names, **names})
+
+    def find(self, name: str) -> Value | None:
+        return self.names.get(name)
+
+
+EMPTY = Scope({})
+
+
+def counted(names: tuple[tuple[str, ...], ...]) -> Groups:
+    """Groups of which only the names are known."""
+    return tuple(tuple(Slot(name) for name in group) for group in names)
