@@ -139,9 +139,8 @@ def _edges(
     out: list[Edge] = []
     speed = _tangents(row.t, batch, directions)
     for upper, bound, tb in ((False, low, tl), (True, high, th)):
-        with np.errstate(invalid="ignore"):
-            on = (root == bound) & np.isfinite(bound) & (low < high)
-            moves = np.abs(speed - tb) > 64 * EPS * np.maximum(np.abs(speed), np.abs(tb))
+        on = (root == bound) & np.isfinite(bound) & (low < high)
+        moves = np.abs(speed - tb) > 64 * EPS * np.maximum(np.abs(speed), np.abs(tb))
         owner = np.nonzero(on & moves.any(axis=0))[0]
         if owner.size:
             out.append(Edge(row.cut, owner, upper, bound[owner], speed[:, owner], tb[:, owner]))

@@ -50,9 +50,8 @@ def choose(a: Array, b: Array, left: Array, right: Array) -> Ints:
     """The map for each segment; a turning point further away than the segment is long needs no care."""
     kind = np.zeros(a.shape, dtype=np.int64)
     low, high = np.isinf(a), np.isinf(b)
-    with np.errstate(invalid="ignore"):
-        width = b - a
-        near_left, near_right = (a - left <= width) & ~low, (right - b <= width) & ~high
+    width = b - a
+    near_left, near_right = (a - left <= width) & ~low, (right - b <= width) & ~high
     kind[near_left] = LEFT
     kind[near_right] = RIGHT
     kind[near_left & near_right] = BOTH
@@ -67,7 +66,7 @@ def points(seg: Segments, u: Array) -> tuple[Array, Array, Array]:
     a, b = seg.a[:, None], seg.b[:, None]
     if not seg.kind.any():
         width = b - a
-        return a + width * u, np.broadcast_to(width, u.shape), u
+        return a + width * u, width, u
     x, slope, label = np.empty_like(u), np.empty_like(u), np.empty_like(u)
     for kind in np.unique(seg.kind):
         rows = np.nonzero(seg.kind == kind)[0]
@@ -137,17 +136,17 @@ _MAPS = {LINEAR: _linear, LEFT: _left, RIGHT: _right, BOTH: _both, UP: _up, DOWN
 
 
 def grade(u0: Array, u1: Array, end: Ints, t: Array) -> tuple[Array, Array]:
-    """u and du/dt for t in [0, 1] over pieces [u0, u1]; `end` -1 or 1 crowds the points at the left or right end."""
+    """u and du/dt for t (n,) in [0, 1] over pieces [u0, u1]; `end` -1 or 1 crowds the points at the left or right end."""
     width = (u1 - u0)[:, None]
     u = u0[:, None] + width * t
-    slope = np.broadcast_to(width, u.shape)
+    slope = width
     if end.any():
-        slope = slope.copy()
+        slope = np.repeat(width, t.size, axis=1)
         rows = np.nonzero(end < 0)[0]
-        u[rows] = u0[rows, None] + width[rows] * t[rows] ** GRADE
-        slope[rows] = width[rows] * GRADE * t[rows] ** (GRADE - 1)
+        u[rows] = u0[rows, None] + width[rows] * t**GRADE
+        slope[rows] = width[rows] * GRADE * t ** (GRADE - 1)
         rows = np.nonzero(end > 0)[0]
-        s = 1.0 - t[rows]
+        s = 1.0 - t
         u[rows] = u1[rows, None] - width[rows] * s**GRADE
         slope[rows] = width[rows] * GRADE * s ** (GRADE - 1)
     return u, slope
@@ -157,8 +156,7 @@ def velocity(seg: Segments, label: Array, direction: int) -> tuple[Array, Array]
     """(v, dv/dx) of the points in one direction: the ends' speeds, linear in between."""
     ta, tb = seg.ta[direction][:, None], seg.tb[direction][:, None]
     low, high = np.isinf(seg.a)[:, None], np.isinf(seg.b)[:, None]
-    with np.errstate(invalid="ignore"):
-        width = np.where(low | high, np.inf, (seg.b - seg.a)[:, None])
+    width = np.where(low | high, np.inf, (seg.b - seg.a)[:, None])
     ta = np.where(low, np.where(high, 0.0, tb), ta)
     tb = np.where(high, ta, tb)
     return ta + (tb - ta) * label, (tb - ta) / width

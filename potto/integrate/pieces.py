@@ -57,13 +57,12 @@ class Pieces:
     floor: Array = field(default_factory=lambda: np.zeros((0, 0)))
     size: Array = field(default_factory=lambda: np.zeros((0, 0)))
     most: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    left: Any = field(default_factory=lambda: np.zeros(0, dtype=bool))
-    right: Any = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    worst: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     def pick(self, index: Any) -> Pieces:
         return Pieces(self.segment[index], self.u0[index], self.u1[index], self.end[index],
                       self.integral[:, index], self.error[:, index], self.floor[:, index],
-                      self.size[:, index], self.most[:, index], self.left[index], self.right[index])  # fmt: skip
+                      self.size[:, index], self.most[:, index], self.worst[index])  # fmt: skip
 
     def join(self, other: Pieces) -> Pieces:
         return Pieces(
@@ -76,8 +75,7 @@ class Pieces:
             np.concatenate((self.floor, other.floor), axis=1),
             np.concatenate((self.size, other.size), axis=1),
             np.concatenate((self.most, other.most), axis=1),
-            np.concatenate((self.left, other.left)),
-            np.concatenate((self.right, other.right)),
+            np.concatenate((self.worst, other.worst)),
         )
 
 
@@ -120,16 +118,23 @@ def spread(
 ) -> tuple[Array, Any, Any, Array | None, Array | None]:
     """The parts of an integrand's value as full arrays, components first."""
     cells = components(value)
-
-    def full(x: Any) -> Array:
-        return np.broadcast_to(0.0 if x is None else x, shape)
-
-    f = np.stack([full(c.v) for c in cells])
-    tangents = [c.t or (None,) * (k + 1) for c in cells]
-    fx = np.stack([full(t[k]) for t in tangents]) if moving else None
-    ft = np.stack([np.stack([full(x) for x in t[:k]]) for t in tangents]) if k else None
-    if all(c.e is None for c in cells):
-        return f, fx, ft, None, None
-    e = np.stack([full(c.e) for c in cells])
-    et = np.stack([np.stack([full(x) for x in (c.et or (None,) * (k + 1))[: k + 1]]) for c in cells]) if k else None
+    m = len(cells)
+    f = np.empty((m, *shape))
+    fx = np.zeros((m, *shape)) if moving else None
+    ft = np.zeros((m, k, *shape)) if k else None
+    inexact = any(c.e is not None for c in cells)
+    e = np.zeros((m, *shape)) if inexact else None
+    et = np.zeros((m, k + 1, *shape)) if inexact and k else None
+    for i, c in enumerate(cells):
+        f[i] = c.v
+        if fx is not None and c.t and c.t[k] is not None:
+            fx[i] = c.t[k]
+        if e is not None and c.e is not None:
+            e[i] = c.e
+        for d, t in enumerate(c.t[:k]):
+            if ft is not None and t is not None:
+                ft[i, d] = t
+        for d, bound in enumerate(c.et[: k + 1]):
+            if et is not None and bound is not None:
+                et[i, d] = bound
     return f, fx, ft, e, et

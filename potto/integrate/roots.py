@@ -57,9 +57,8 @@ def _family(
         inside = (at > low) & (at < high)
         ends.append(np.where(inside, as_array(_at(family.inner, level.variable, at, env, machine), batch), np.nan))
     stack = np.stack(ends)
-    with np.errstate(invalid="ignore"):
-        first = np.ceil(np.nanmin(stack, axis=0) - 1e-6)
-        last = np.floor(np.nanmax(stack, axis=0) + 1e-6)
+    first = np.ceil(np.nanmin(stack, axis=0) - 1e-6)
+    last = np.floor(np.nanmax(stack, axis=0) + 1e-6)
     count = np.nanmax(last - first + 1) if np.isfinite(last - first).any() else 0
     if not np.isfinite(stack).all() or count > MOST_IN_FAMILY:
         machine.note_unfinished("a condition has too many roots to cut at")
@@ -99,11 +98,10 @@ def _search(
 
 def _grid(low: Array, high: Array, s: Array) -> Array:
     """Points that run through [low, high], also where an end is infinite."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        finite = low + (high - low) * s
-        up = low + s / (1 - s)
-        down = high - (1 - s) / s
-        whole = (2 * s - 1) / (4 * s * (1 - s))
+    finite = low + (high - low) * s
+    up = low + s / (1 - s)
+    down = high - (1 - s) / s
+    whole = (2 * s - 1) / (4 * s * (1 - s))
     x = np.where(np.isinf(high), np.where(np.isinf(low), whole, up), np.where(np.isinf(low), down, finite))
     return np.where(np.isfinite(x), x, np.nan)
 
@@ -157,6 +155,5 @@ def _moving(cut: int, function: Lam, variable: str, env: dict[str, Value], root:
     here[variable] = Cell(root, None, (None,) * k + (1.0,))
     value = _call(function, here, machine.with_directions(k + 1))
     slope = value.t[k]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        t = tuple(None if x is None else -np.asarray(x) / slope for x in value.t[:k])
+    t = tuple(None if x is None else -np.asarray(x) / slope for x in value.t[:k])
     return Row(root, t, cut, False)

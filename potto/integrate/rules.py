@@ -58,8 +58,7 @@ def truncation(coefficients: Array) -> Array:
     end = size[..., -1] + size[..., -2]
     before = size[..., -3] + size[..., -4]
     half = size[..., middle] + size[..., middle + 1]
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        decay = np.fmax(end / before, (end / half) ** (2 / (n - 2 - middle)))
+    decay = np.fmax(end / before, (end / half) ** (2 / (n - 2 - middle)))
     decay = np.fmin(np.fmax(decay, 0.0), 1.0)
     power = 4.5 if n >= 10 else 4.0 if n >= 8 else 2.0
     share = np.fmax(decay**power, np.fmin(1.0, (decay - 0.3) / 0.3))

@@ -90,8 +90,9 @@ class Work:
     def halve(self, p: Pieces) -> Pieces:
         """Two pieces for each; the one at the end of its segment is graded towards that end."""
         middle = 0.5 * (p.u0 + p.u1)
-        left = np.where((p.u0 == 0) & (p.end <= 0) & p.left, -1, np.minimum(p.end, 0))
-        right = np.where((p.u1 == 1) & (p.end >= 0) & p.right, 1, np.maximum(p.end, 0))
+        lean_left, lean_right = leaning(p.worst)
+        left = np.where((p.u0 == 0) & (p.end <= 0) & lean_left, -1, np.minimum(p.end, 0))
+        right = np.where((p.u1 == 1) & (p.end >= 0) & lean_right, 1, np.maximum(p.end, 0))
         return Pieces(
             np.concatenate((p.segment, p.segment)),
             np.concatenate((p.u0, middle)),
@@ -115,7 +116,7 @@ class Work:
             return joined
         rule = gauss(self.parent.order)
         seg = self.seg.pick(p.segment)
-        u, du = maps.grade(p.u0, p.u1, p.end, np.broadcast_to(rule.nodes, (p.u0.size, rule.nodes.size)))
+        u, du = maps.grade(p.u0, p.u1, p.end, rule.nodes)
         x, dx, label = maps.points(seg, u)
         weight = dx * du
         h, inner = self.values(seg, p.segment, x, label, weight)
@@ -123,17 +124,16 @@ class Work:
         p.integral = coefficients[..., 0]
         p.error = truncation(coefficients)
         worst = p.error.argmax(axis=0) if p.error.shape[0] > 1 else np.zeros(p.u0.size, dtype=np.int64)
-        p.left, p.right = leaning(coefficients[worst, np.arange(p.u0.size)])
-        size = np.abs(coefficients)
-        spread = size[..., 1:] @ rule.slopes[1:]
-        with np.errstate(invalid="ignore", over="ignore"):
-            shake = NODE_ROUNDING * EPS * np.max(np.abs(x), axis=-1) / np.abs(weight).mean(axis=-1)
+        p.worst = coefficients[worst, np.arange(p.u0.size)]
+        spread = np.abs(coefficients) @ rule.slopes
+        shake = NODE_ROUNDING * EPS * np.abs(x).max(axis=-1) / np.abs(weight).max(axis=-1)
         shake = np.where(np.isfinite(shake), np.minimum(shake, 1.0), 0.0)
         height = np.abs(h)
         p.size = height @ rule.weights
         p.most = height[:: height.shape[0] // self.width].max(axis=-1)
         p.floor = 4 * EPS * p.size + spread * shake
-        p.floor[np.arange(p.floor.shape[0]) % (p.floor.shape[0] // self.width) > 0] *= 3  # speeds are rounded too
+        if self.k:
+            p.floor.reshape(self.width, -1, p.u0.size)[:, 1:] *= 3  # speeds are rounded too
         if inner is not None:
             p.floor = p.floor + np.abs(inner) @ rule.weights
         broken = ~np.isfinite(p.integral)
@@ -206,16 +206,23 @@ class Work:
 
     def end_values(self) -> tuple[Array, Array] | None:
         """F at both ends of every segment, sides as on the segment: (m, S) each; None where they are not needed."""
-        if not self.last and not self.moving:
+        if not self.last and not (self.moving and self.sweeps()):
             return None
         seg, frozen = self.seg, self.machine.with_directions(0)
         names = self.parent.plan.body.params if self.last else self.env
-        here = gather({n: still(v) for n, v in self.env.items() if n in names}, seg.owner)
-        out = []
-        for end in (seg.a, seg.b):
-            here[self.level.variable] = Cell(end)
-            out.append(self.parent.inside(self.number, here, end.size, self.sides, frozen))
-        return out[0], out[1]
+        both = np.concatenate((seg.owner, seg.owner))
+        here = gather({n: still(v) for n, v in self.env.items() if n in names}, both)
+        here[self.level.variable] = Cell(np.concatenate((seg.a, seg.b)))
+        sides = {g: np.concatenate((m, m)) if isinstance(m, np.ndarray) else m for g, m in self.sides.items()}
+        f = self.parent.inside(self.number, here, both.size, sides, frozen)
+        return f[:, : seg.a.size], f[:, seg.a.size :]
+
+    def sweeps(self) -> bool:
+        """Whether an end moves at which the integrand may jump: not where only something further in changes."""
+        seg = self.seg
+        follows = np.zeros(seg.a.size + 1, dtype=bool)
+        follows[1:-1] = (seg.owner[1:] == seg.owner[:-1]) & (seg.a[1:] == seg.b[:-1])
+        return bool(seg.ta[:, ~(follows[:-1] & (seg.rank == 1))].any() or seg.tb[:, ~follows[1:]].any())
 
     def look_for_steps(self) -> None:
         """Whether the integral further in jumps where only its kinks were expected, which move in different ways.
@@ -247,7 +254,7 @@ class Work:
         k = self.k
         if self.moving:  # per direction the better of the two forms
             moving, fixed = error[:, 1 : 1 + k], error[:, 1 + k :]
-            better = np.minimum(moving, fixed) if ends is not None else moving
+            better = np.minimum(moving, fixed)
             error = np.concatenate((error[:, :1], better), axis=1)
             floor = floor[:, : 1 + k]
         count = np.bincount(owner, minlength=self.batch)
@@ -270,8 +277,7 @@ class Work:
     def missed_peak(self, p: Pieces, ends: tuple[Array, Array]) -> Any:
         """Pieces at an end of their segment where the integrand is far larger than at any of their nodes."""
         seg = self.seg
-        with np.errstate(invalid="ignore"):
-            width = (seg.b - seg.a)[p.segment] * (p.u1 - p.u0)
+        width = (seg.b - seg.a)[p.segment] * (p.u1 - p.u0)
         bad = np.zeros(p.segment.size, dtype=bool)
         for f, touches in ((ends[0], p.u0 == 0), (ends[1], p.u1 == 1)):
             for c in range(self.width):
@@ -281,7 +287,7 @@ class Work:
 
     def doubtful(self, p: Pieces, ends: tuple[Array, Array] | None) -> Any:
         """All pieces of the integrals whose two derivatives do not agree: something between the nodes was missed."""
-        if not self.moving or ends is None:
+        if not self.moving:
             return None
         moving, fixed, apart = self.two_forms(p, ends)
         doubt = (apart > 4 * (moving[1] + fixed[1])) & (apart > 1e-9 * np.abs(moving[0]))
@@ -289,15 +295,16 @@ class Work:
         bad = owners[self.seg.owner[p.segment]] & (p.u1 - p.u0 > 1e-14)
         return bad if bad.any() else None
 
-    def two_forms(self, p: Pieces, ends: tuple[Array, Array]) -> tuple[tuple[Array, Array], tuple[Array, Array], Array]:
+    def two_forms(
+        self, p: Pieces, ends: tuple[Array, Array] | None
+    ) -> tuple[tuple[Array, Array], tuple[Array, Array], Array]:
         """(value, bound) of the tangents in the moving and in the fixed form, and how far they are apart."""
         k = self.k
         integral, error = self.added(p.integral, p), self.added(p.error + p.floor, p)
-        boundary, rounding = self.boundary(ends)
+        boundary, rounding = (0.0, 0.0) if ends is None else self.boundary(ends)
         moving = integral[:, 1 : 1 + k], error[:, 1 : 1 + k]
         fixed = integral[:, 1 + k :] + boundary, error[:, 1 + k :] + rounding
-        with np.errstate(invalid="ignore"):
-            apart = np.abs(moving[0] - fixed[0])
+        apart = np.abs(moving[0] - fixed[0])
         return moving, fixed, np.where(np.isfinite(apart), apart, 0.0)
 
     def added(self, x: Array, p: Pieces) -> Array:
@@ -319,7 +326,7 @@ class Work:
             none = np.zeros((self.width, 0, self.batch))
             return Sums(v, e, none, none)
         t, et = integral[:, 1 : 1 + k], error[:, 1 : 1 + k]
-        if self.moving and ends is not None:
+        if self.moving:
             moving, fixed, apart = self.two_forms(p, ends)
             better = fixed[1] < moving[1]
             # two independent values that differ by more than they admit: neither estimate is believed
@@ -334,15 +341,16 @@ class Work:
         out = np.zeros((self.width, self.k, self.batch))
         size = np.zeros_like(out)
         for f, speed, sign, end in ((ends[1], seg.tb, 1.0, seg.b), (ends[0], seg.ta, -1.0, seg.a)):
-            for d in range(self.k):
-                with np.errstate(invalid="ignore"):
-                    term = np.where(speed[d] == 0, 0.0, f * speed[d] * sign)
-                term = np.where(np.isinf(end), 0.0, term)
-                for c in range(self.width):
-                    out[c, d] += np.bincount(seg.owner, term[c], minlength=self.batch)
-                    size[c, d] += np.bincount(seg.owner, np.abs(term[c]), minlength=self.batch)
-        bound = np.where(np.isfinite(out), 32 * EPS * size, np.inf)
-        return np.where(np.isfinite(out), out, 0.0), bound
+            terms = f[:, None, :] * (sign * speed)
+            still_or_infinite = (speed == 0) | np.isinf(end)
+            if still_or_infinite.any():
+                terms = np.where(still_or_infinite, 0.0, terms)
+            for c in range(self.width):
+                for d in range(self.k):
+                    out[c, d] += np.bincount(seg.owner, terms[c, d], minlength=self.batch)
+                    size[c, d] += np.bincount(seg.owner, np.abs(terms[c, d]), minlength=self.batch)
+        finite = np.isfinite(out)
+        return np.where(finite, out, 0.0), np.where(finite, 32 * EPS * size, np.inf)
 
     def cut_rounding(self, ends: tuple[Array, Array]) -> Array:
         """What a cut misplaced by rounding costs: the integrand's jump times the rounding of the cut's place."""
@@ -354,8 +362,7 @@ class Work:
         last = ~np.append(follows[1:], False)
         for c in range(self.width):
             low, high = ends[0][c], ends[1][c]
-            with np.errstate(invalid="ignore", over="ignore"):
-                jump = np.where(follows, np.abs(low - np.append(0.0, high[:-1])), np.abs(low))
-                cost = 2 * EPS * (jump * np.abs(seg.a) + np.where(last, np.abs(high * seg.b), 0.0))
+            jump = np.where(follows, np.abs(low - np.append(0.0, high[:-1])), np.abs(low))
+            cost = 2 * EPS * (jump * np.abs(seg.a) + np.where(last, np.abs(high * seg.b), 0.0))
             out[c] = np.bincount(seg.owner, np.where(np.isfinite(cost), cost, 0.0), minlength=self.batch)
         return out
