@@ -132,11 +132,9 @@ def _builtin(node: Prim, texts: _Texts) -> _Text:
         case "neg":
             return _Text(f"-{parts[0].at(_MUL)}", _SIGN)
         case "mul":
-            first = parts[0].at(_SIGN)
-            holds = _SIGN if first.startswith("-") else _MUL
-            return _Text("*".join([first, *(p.at(_POW) for p in parts[1:])]), holds)
+            return _product("*", parts)
         case "div":
-            return _Text(f"{parts[0].at(_MUL)}/{parts[1].at(_POW)}", _MUL)
+            return _product("/", parts)
         case "pow":
             return _Text(f"{parts[0].at(_ATOM)}^{parts[1].at(_POW)}", _POW)
         case "not":
@@ -148,6 +146,11 @@ def _builtin(node: Prim, texts: _Texts) -> _Text:
             return _Text(f"{parts[0].at(_ADD)} {_COMPARISONS[op]} {parts[1].at(_ADD)}", _COMPARE)
         case op:
             return _Text(f"{op}({_list(node.args, texts)})", _ATOM)
+
+
+def _product(sign: str, parts: list[_Text]) -> _Text:
+    first = parts[0].at(_SIGN)  # a minus sign in front of the first factor is one in front of the product
+    return _Text(sign.join([first, *(p.at(_POW) for p in parts[1:])]), _SIGN if first.startswith("-") else _MUL)
 
 
 def _sum(parts: list[_Text]) -> str:

@@ -190,7 +190,8 @@ def _component(term: Term, index: int) -> Term:
             continue
         match node:
             case Branch():
-                memo[node] = branch(node.coordinates, node.strict, memo[node.then], memo[node.orelse])
+                then, orelse = memo[node.then], memo[node.orelse]
+                memo[node] = then if then is orelse else branch(node.coordinates, node.strict, then, orelse)
             case If():
                 memo[node] = if_(node.condition, memo[node.then], memo[node.orelse])
             case Integral():
