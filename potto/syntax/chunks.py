@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 from potto.syntax.tokens import normalized
 
-_STARTS = re.compile(r"^\f*([^\s])|^([^\S\n]+)[^\s]|^[^\S\n]*$", re.MULTILINE)
+_STARTS = re.compile(r"^\f*([^\s])|^([^\S\n]+)[^\s]|^[^\S\n]*+\n(?:[^\S\n]*+\n)*+", re.MULTILINE)
+"""A line that starts with code or a comment in its first column, an indented one, or a run of blank ones."""
 
 
 @dataclass(frozen=True, slots=True)

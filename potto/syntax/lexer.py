@@ -19,7 +19,7 @@ from potto.syntax.sums import mark_bodies
 from potto.syntax.tokens import FIRST_NAME, KEYWORDS, MASTER, NUMBER_PREFIX, OPERATORS, Comment, Token, normalized
 from potto.syntax.unknown import foreign_operator, no_return, string_literal, unknown_character
 
-MAX_LENGTH = 1_000_000
+MAX_LENGTH = 250_000
 _new = tuple.__new__  # a token without the detour over NamedTuple's own `__new__`, which costs as much again
 _BINDING = re.compile(rf"(?:{FIRST_NAME.pattern}|\([^()\n]*\))[ \t]*=(?!=)")
 _D = re.compile(r"[ \t]*\(")
@@ -47,6 +47,8 @@ class _Lexer:
     text: str
     clauses: bool
     """Whether `inverse` and `where` are words here."""
+    alone: bool
+    """Whether this is an expression by itself, which may be indented."""
     nesting: Nesting
     tokens: list[Token]
     comments: list[Comment] = field(default_factory=list)
@@ -59,7 +61,7 @@ class _Lexer:
     def run(self) -> None:
         text, match, tokens = self.text, MASTER.match, self.tokens
         brackets, blocks = self.nesting.brackets, self.blocks
-        position = self._skip_lines(0, first=True)
+        position = self._skip_lines(0, first=not self.alone)
         while not self.too_deep:
             found = match(text, position)
             assert found is not None, "the pattern matches every character"
@@ -277,19 +279,19 @@ class _Lexer:
         self.tokens.append(Token("$END", "", last, last))
 
 
-def lex(text: str, diffeo: bool = False) -> Lexed:
-    """The tokens of a chunk; what can't be read is a diagnostic, and left out or mended."""
+def lex(text: str, diffeo: bool = False, alone: bool = False) -> Lexed:
+    """The tokens of a chunk, or of an expression `alone`; what can't be read is a diagnostic, and left out or mended."""
     text = normalized(text)
-    lexer = _read(text, diffeo, frozenset())
+    lexer = _read(text, diffeo, alone, frozenset())
     never_closed = frozenset(lexer.nesting.never_closed)
     if never_closed and "\n" in text and not lexer.too_deep:
         # Read again, knowing which brackets have no end: they end where the indentation says that they must have.
-        lexer = _read(text, diffeo, never_closed)
+        lexer = _read(text, diffeo, alone, never_closed)
     return Lexed(lexer.tokens, lexer.comments, lexer.nesting.diagnostics, lexer.too_deep, never_closed)
 
 
-def _read(text: str, diffeo: bool, unclosed: frozenset[int]) -> _Lexer:
+def _read(text: str, diffeo: bool, alone: bool, unclosed: frozenset[int]) -> _Lexer:
     nesting = Nesting(text, unclosed)
-    lexer = _Lexer(text, diffeo, nesting, nesting.tokens)
+    lexer = _Lexer(text, diffeo, alone, nesting, nesting.tokens)
     lexer.run()
     return lexer

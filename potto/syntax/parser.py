@@ -79,7 +79,7 @@ def parse_expression(text: str) -> ParsedExpression:
     broken = ErrorExpr(Span(0, len(text)), text[:200])
     if len(text) > MAX_LENGTH:
         return ParsedExpression(broken, (_too_long(text),))
-    lexed = lex(text)
+    lexed = lex(text, alone=True)
     expr, diagnostics = None, lexed.diagnostics
     if not lexed.too_deep:
         expr, diagnostics = _bounded(_parse(lexed, text, "expression"))
@@ -150,12 +150,22 @@ def _parse(lexed: Lexed, text: str, start: str, diffeo: bool = False) -> _Parse:
         edits = find_repair(engine.tables, engine.end, engine.states, tokens, index)
         if not stop.at.text:
             found = _without_doubled(found, stop)
-        stops.append(describe(stop, edits or []))
+        message = describe(stop, edits or [])
+        if not _explained(stop, found):
+            stops.append(message)
         if edits is None:
             break
         tokens = _patched(tokens, index, edits)
         index = engine.run(tokens, index)
     return _Parse(None, tokens, found + stops, first_stop, stops)
+
+
+def _explained(stop: Stop, found: list[Diagnostic]) -> bool:
+    """Whether a character that Potto does not know stands where the parse stopped: its message is enough."""
+    start = stop.before.end if stop.before is not None else 0
+    end = stop.at.start if not stop.ended else None
+    unknown = kinds.UNKNOWN_CHARACTER.code
+    return any(d.code == unknown and d.span.start >= start and (end is None or d.span.end <= end) for d in found)
 
 
 def _without_doubled(found: list[Diagnostic], stop: Stop) -> list[Diagnostic]:

@@ -14,8 +14,8 @@ from typing import Literal
 from potto.syntax.tables import Tables
 from potto.syntax.tokens import KEYWORDS, Token
 
-Stack = tuple[int, "Stack | None", int]
-"""A stack of states that shares its lower part: (state, below, height)."""
+Stack = tuple[int, "Stack | None"]
+"""A stack of states that shares its lower part: (state, below)."""
 
 ENOUGH = 4
 MOST_STEPS = 1200
@@ -80,11 +80,11 @@ class _Search:
         self.rows, self.rules, self.end, self.tokens = tables.rows, tables.rules, end, tokens
         self.queue: list[tuple[int, int, int, Stack, int, int, bool, _Trail | None]] = []
         self.count = 0
-        self.seen: set[tuple[int, int, int, int, bool]] = set()
+        self.seen: set[tuple[int, int, int, bool]] = set()
+        self.stacks: dict[tuple[int, int], Stack] = {}
 
     def push(self, cost: int, stack: Stack, index: int, run: int, deleted: bool, trail: _Trail | None) -> None:
-        key = (stack[0], stack[2], index, run, deleted)
-        if key not in self.seen:
+        if (id(stack), index, run, deleted) not in self.seen:
             self.count += 1
             # Of two repairs of one cost, the one that has read further comes first.
             heapq.heappush(self.queue, (cost, -index, self.count, stack, index, run, deleted, trail))
@@ -97,16 +97,20 @@ class _Search:
             if action is None:
                 return None
             if action >= 0:
-                return (action, stack, stack[2] + 1)
+                return self.grown(stack, action)
             rule = rules[~action]
             below: Stack | None = stack
             for _ in range(rule.size):
                 assert below is not None
                 below = below[1]
             assert below is not None
-            stack = (rows[below[0]][rule.origin], below, below[2] + 1)
+            stack = self.grown(below, rows[below[0]][rule.origin])
             if kind == "$END" and stack[0] == self.end:
                 return stack
+
+    def grown(self, below: Stack, state: int) -> Stack:
+        """The stack with a state on it; equal stacks are one object, so that their identity tells them apart."""
+        return self.stacks.setdefault((id(below), state), (state, below))
 
     def run(self, stack: Stack, index: int) -> list[Edit] | None:
         self.push(0, stack, index, 0, False, None)
@@ -114,7 +118,7 @@ class _Search:
             if not self.queue:
                 return None
             cost, _, _, stack, index, run, deleted, trail = heapq.heappop(self.queue)
-            key = (stack[0], stack[2], index, run, deleted)
+            key = (id(stack), index, run, deleted)
             if key in self.seen:
                 continue
             self.seen.add(key)
@@ -171,7 +175,7 @@ def _edits(trail: _Trail | None) -> list[Edit]:
 
 def find_repair(tables: Tables, end: int, states: list[int], tokens: list[Token], index: int) -> list[Edit] | None:
     """The cheapest repair for the token at `index` in these states, or None if none is near."""
-    stack: Stack = (states[0], None, 1)
-    for height, state in enumerate(states[1:], 2):
-        stack = (state, stack, height)
+    stack: Stack = (states[0], None)
+    for state in states[1:]:
+        stack = (state, stack)
     return _Search(tables, end, tokens).run(stack, index)
