@@ -34,8 +34,7 @@ def near_modules(db: Database, file: str, dotted: str) -> tuple[str, ...]:
     for folder in folders(db, file):
         for place in dict.fromkeys((package, "")):
             prefix = f"{place}." if place else ""
-            listed: tuple[str, ...] = db.get_input(("folder", os.path.join(folder, place.replace(".", "/"))), ())
-            for name in listed:
+            for name in _listed(db, folder, place):
                 module = prefix + os.path.splitext(name.rstrip("/"))[0]
                 if name.endswith("/"):
                     candidates.update(dict.fromkeys(_modules_in(db, folder, module)))
@@ -47,8 +46,15 @@ def near_modules(db: Database, file: str, dotted: str) -> tuple[str, ...]:
 
 
 def _modules_in(db: Database, folder: str, package: str) -> list[str]:
-    listed: tuple[str, ...] = db.get_input(("folder", os.path.join(folder, package.replace(".", "/"))), ())
+    listed = _listed(db, folder, package)
     return [f"{package}.{os.path.splitext(name)[0]}" for name in listed if name.endswith(SUFFIXES)]
+
+
+def _listed(db: Database, folder: str, package: str) -> tuple[str, ...]:
+    """What is in the folder of a package."""
+    inner = os.path.normpath(os.path.join(folder, package.replace(".", "/")))
+    found: tuple[str, ...] = db.get_input(("folder", inner), ())
+    return found
 
 
 def looked_in(db: Database, file: str, dotted: str) -> tuple[str, ...]:

@@ -23,8 +23,18 @@ from potto.modules.kinds import (
     UNREADABLE,
     UNUSED_IMPORT,
 )
-from potto.modules.lookup import Imported, Trail, bindings, find_module, locate, trail
-from potto.modules.texts import Importing, Unreadable, content, imports, names, outline
+from potto.modules.lookup import (
+    Imported,
+    Trail,
+    bindings,
+    find_module,
+    is_written,
+    locate,
+    meaning,
+    trail,
+    written_names,
+)
+from potto.modules.texts import Importing, Unreadable, imports, names, outline, problem
 from potto.modules.usage import unused_imports
 from potto.query import Database, query
 from potto.source import Span
@@ -47,6 +57,8 @@ def import_diagnostics(db: Database, file: str) -> tuple[Said, ...]:
 
 
 def _check(db: Database, file: str, item: Importing) -> Iterator[Diagnostic]:
+    if not is_written(item.module):
+        return
     found = locate(db, file, item.module)
     if found is None:
         if not _names_modules(db, file, item):
@@ -68,19 +80,19 @@ def _check(db: Database, file: str, item: Importing) -> Iterator[Diagnostic]:
             help="use its names directly; all definitions of a file see each other",
         )
         return
-    text = content(db, found.file)
-    if isinstance(text, Unreadable):
-        yield unreadable(text, found.file, item.module_span, f"the module `{item.module}`")
+    no_text = problem(db, found.file)
+    if no_text is not None:
+        yield unreadable(no_text, found.file, item.module_span, f"the module `{item.module}`")
     elif isinstance(item, nodes.FromImport):
-        for imported in item.names:
+        for imported in written_names(item):
             yield from _check_name(db, file, item, imported, found.file)
 
 
 def _names_modules(db: Database, file: str, item: Importing) -> bool:
     """`from pkg import m` of a folder: fine if every name is a module in it."""
-    if isinstance(item, nodes.Import) or not item.names:
+    if isinstance(item, nodes.Import) or not written_names(item):
         return False
-    return all(find_module(db, file, f"{item.module}.{imported.name}") is not None for imported in item.names)
+    return all(find_module(db, file, f"{item.module}.{imported.name}") is not None for imported in written_names(item))
 
 
 def _no_module(db: Database, file: str, item: Importing) -> Diagnostic:
@@ -134,7 +146,7 @@ def _turn(steps: list[str]) -> int:
 def _unknowable(db: Database, search: Trail) -> bool:
     """Whether the name may well be there: in a file that cannot be read, or in what is half-written."""
     last = search.steps[-1]
-    return not isinstance(content(db, last.file), str) or outline(db, last.file).nameless
+    return problem(db, last.file) is not None or outline(db, last.file).nameless
 
 
 def _not_in_module(
@@ -143,15 +155,16 @@ def _not_in_module(
     last = search.steps[-1]
     near = near_names(last.name, names(db, last.file))
     others = elsewhere(db, file, last.name)
-    if len(search.steps) > 1:
-        where = f"which is to take it from `{_stem(last.file)}`"
-        message = f"`{imported.name}` cannot be had from the module `{item.module}`, {where}"
-    else:
-        message = f"the module `{item.module}` has no `{imported.name}`"
+    message = f"the module `{item.module}` has no `{imported.name}`"
+    label = "not defined there"
+    if isinstance(meaning(db, last.file, last.name), Imported):
+        message, label = f"`{imported.name}` cannot be had from the module `{item.module}`", "its import there fails"
+    elif len(search.steps) > 1:
+        message = f"{message}: it is to come from `{_stem(last.file)}`, which does not define `{last.name}`"
     helps = [did_you_mean(near)] if near else []
     if others:
         helps.append(f"it is defined in the module `{others[0]}`: `from {others[0]} import {last.name}`")
-    return NOT_IN_MODULE(imported.name_span, message, label="not defined there", help="; ".join(helps))
+    return NOT_IN_MODULE(imported.name_span, message, label=label, help="; ".join(helps))
 
 
 def _repeated(db: Database, file: str, items: tuple[Importing, ...]) -> Iterator[Said]:
@@ -194,7 +207,7 @@ def _unused(db: Database, file: str, items: tuple[Importing, ...]) -> Iterator[S
                 yield (
                     number,
                     UNUSED_IMPORT(
-                        item.span if isinstance(item, nodes.Import) or len(item.names) == 1 else span,
+                        item.span if isinstance(item, nodes.Import) or len(written_names(item)) == 1 else span,
                         f"the import `{bound}` is not used",
                         label="never used",
                         help="leave it out",
@@ -228,13 +241,13 @@ def _mutual(db: Database, file: str, items: tuple[Importing, ...]) -> Iterator[S
 def _modules(item: Importing) -> Iterator[str]:
     yield item.module
     if isinstance(item, nodes.FromImport):
-        yield from (f"{item.module}.{imported.name}" for imported in item.names)
+        yield from (f"{item.module}.{imported.name}" for imported in written_names(item))
 
 
 def _spans(item: Importing) -> tuple[Span, ...]:
     """The places of what an import binds, in the order of `bindings`."""
     if isinstance(item, nodes.FromImport):
-        return tuple(imported.span for imported in item.names)
+        return tuple(imported.span for imported in written_names(item))
     return (item.alias_span or item.module_span,)
 
 

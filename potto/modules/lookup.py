@@ -102,16 +102,28 @@ def scope(db: Database, file: str) -> Mapping[str, Imported | Defined]:
 
 def bindings(item: nodes.FromImport | nodes.Import) -> Iterator[tuple[str, Imported]]:
     """The names that an import binds, and to what. `import pkg.m` binds `pkg.m`."""
+    if not is_written(item.module):
+        return
     if isinstance(item, nodes.Import):
         yield item.alias or item.module, Imported(item.module, None)
         return
-    for imported in item.names:
+    for imported in written_names(item):
         yield imported.alias or imported.name, Imported(item.module, imported.name)
 
 
 def meaning(db: Database, file: str, name: str) -> Imported | Defined | None:
     """What a name is bound to at the top of a file, if to anything."""
     return db.entry(scope, (file,), name)
+
+
+def is_written(module: str) -> bool:
+    """Whether a module's name is there in full: while it is typed it is not."""
+    return all(module.split("."))
+
+
+def written_names(item: nodes.FromImport) -> tuple[nodes.ImportedName, ...]:
+    """The names of an import that are there."""
+    return tuple(imported for imported in item.names if imported.name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,6 +152,8 @@ def trail(db: Database, file: str, name: str) -> Trail:
         module, original = bound.module, bound.name
         target = find_module(db, file, module)
         if original is not None and (target is None or meaning(db, target, original) is None):
+            if target is not None:
+                steps[DefinitionTarget(target, original)] = None
             module, original = f"{module}.{original}", None  # `from pkg import m` of a module in a folder
             target = find_module(db, file, module)
         if target is None or original is None:

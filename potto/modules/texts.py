@@ -87,6 +87,13 @@ def source(db: Database, file: str) -> SourceText | None:
 
 
 @query
+def problem(db: Database, file: str) -> Unreadable | None:
+    """Why a file that is there has no text. Stands still while the text is edited."""
+    text = content(db, file)
+    return text if isinstance(text, Unreadable) else None
+
+
+@query
 def exists(db: Database, file: str) -> bool:
     """Whether there is such a file that an import could mean."""
     text = content(db, file)

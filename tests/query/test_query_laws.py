@@ -1,0 +1,223 @@
+"""The laws of the engine over random graphs of queries and random scripts of edits.
+
+A graph is an input too: node n reads inputs and other nodes in the order in which it lists them, stops early if it
+meets a value that is divisible by 5, and coarsens what it has summed, so that there is something to cut off.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from potto.query import Cancelled, Database, query
+
+NODES, INPUTS = 7, 4
+
+
+@query
+def acyclic(db: Database, node: int) -> int:
+    sum_ = node
+    for kind, index in db.get_input(("reads", node), ()):
+        value = db.get_input(("value", index), 0) if kind == "input" else acyclic(db, index)
+        sum_ += value
+        if value % 5 == 0:
+            break
+    return sum_ // 2
+
+
+@query(cycle=lambda db, node: -node - 1)
+def cyclic(db: Database, node: int) -> int:
+    sum_ = node
+    for kind, index in db.get_input(("reads", node), ()):
+        sum_ += db.get_input(("value", index), 0) if kind == "input" else cyclic(db, index)
+    return sum_ // 2
+
+
+@query
+def table(db: Database) -> dict[int, int]:
+    return {index: db.get_input(("value", index), 0) // 2 for index in range(INPUTS)}
+
+
+@query
+def fails(db: Database, node: int) -> int:
+    """Reads a table by entry, fails at multiples of 3, and recovers from the failures below."""
+    value = db.entry(table, (), node % INPUTS) or 0
+    if node:
+        try:
+            value += fails(db, node - 1)
+        except ArithmeticError:
+            value += 100
+    if value % 3 == 0:
+        raise ArithmeticError(str(value))
+    return value
+
+
+def reads(below: int) -> st.SearchStrategy[tuple[tuple[str, int], ...]]:
+    inputs = st.tuples(st.just("input"), st.integers(0, INPUTS - 1))
+    nodes = st.tuples(st.just("node"), st.integers(0, below - 1)) if below else inputs
+    return st.lists(inputs | nodes, max_size=4).map(tuple)
+
+
+@dataclass
+class State:
+    """What the inputs should be: a database made from it knows nothing of the past."""
+
+    inputs: dict[object, tuple[object, int]] = field(default_factory=dict)
+
+    def set(self, db: Database, key: object, value: object, durability: int) -> None:
+        self.inputs[key] = (value, durability)
+        db.set_input(key, value, durability)
+
+    def fresh(self) -> Database:
+        db = Database()
+        for key, (value, durability) in self.inputs.items():
+            db.set_input(key, value, durability)
+        return db
+
+
+VALUE = st.tuples(st.just("value"), st.integers(0, INPUTS - 1), st.integers(0, 6), st.integers(0, 2))
+ASK = st.tuples(st.just("ask"), st.integers(0, NODES - 1))
+FORGET = st.tuples(st.just("forget"), st.integers(0, NODES - 1))
+
+
+def script(cycles: bool) -> st.SearchStrategy[list[tuple[object, ...]]]:
+    edit = st.integers(0, NODES - 1).flatmap(
+        lambda node: st.tuples(st.just("reads"), st.just(node), reads(NODES if cycles else node), st.integers(0, 2))
+    )
+    return st.lists(VALUE | edit | ASK | ASK | FORGET, min_size=1, max_size=40)
+
+
+def outcome(ask: object, db: Database, *args: object) -> object:
+    try:
+        return ask(db, *args)  # type: ignore[operator]
+    except ArithmeticError as error:
+        return f"failed {error}"
+
+
+def run(steps: list[tuple[object, ...]], asked: object) -> None:
+    db, state = Database(), State()
+    for step in steps:
+        match step:
+            case ("ask", node):
+                assert outcome(asked, db, node) == outcome(asked, state.fresh(), node)
+            case ("forget", node):
+                db.forget(lambda name, args, node=node: args == (node,))
+            case (what, index, value, durability):
+                state.set(db, (what, index), value, int(str(durability)))
+    for node in range(NODES):
+        assert outcome(asked, db, node) == outcome(asked, state.fresh(), node)
+
+
+@given(script(cycles=False))
+@settings(max_examples=150, deadline=None)
+def test_incremental_is_from_scratch(steps: list[tuple[object, ...]]) -> None:
+    run(steps, acyclic)
+
+
+@given(script(cycles=True))
+@settings(max_examples=150, deadline=None)
+def test_incremental_is_from_scratch_with_cycles(steps: list[tuple[object, ...]]) -> None:
+    run(steps, cyclic)
+
+
+@given(script(cycles=False))
+@settings(max_examples=100, deadline=None)
+def test_incremental_is_from_scratch_with_failures_and_tables(steps: list[tuple[object, ...]]) -> None:
+    run(steps, fails)
+
+
+@given(st.lists(reads(NODES), min_size=NODES, max_size=NODES), st.permutations(range(NODES)))
+@settings(max_examples=150, deadline=None)
+def test_a_cycle_has_the_same_values_wherever_it_is_entered(
+    graph: list[tuple[tuple[str, int], ...]], order: list[int]
+) -> None:
+    def asked(order: list[int]) -> dict[int, int]:
+        db = Database()
+        for node, edges in enumerate(graph):
+            db.set_input(("reads", node), edges)
+        return {node: cyclic(db, node) for node in order}
+
+    assert asked(order) == asked(list(range(NODES)))
+
+
+@given(st.lists(reads(NODES), min_size=NODES, max_size=NODES))
+@settings(max_examples=150, deadline=None)
+def test_exactly_the_members_of_cycles_take_their_fallbacks(graph: list[tuple[tuple[str, int], ...]]) -> None:
+    db = Database()
+    edges = {node: {index for kind, index in found if kind == "node"} for node, found in enumerate(graph)}
+    for node, found in enumerate(graph):
+        db.set_input(("reads", node), found)
+        db.set_input(("value", node), 10 * node + 50)  # every sum is positive, every fallback negative
+    reached = dict(edges)
+    for _ in range(NODES):
+        reached = {node: set(to).union(*(reached[other] for other in to)) for node, to in reached.items()}
+    found = {node for node in range(NODES) if cyclic(db, node) == -node - 1}
+    assert found >= {node for node in range(NODES) if node in reached[node]}
+    assert all(node in reached[node] or reached[node] & found for node in found)
+
+
+@given(script(cycles=True), st.integers(1, 12))
+@settings(max_examples=150, deadline=None)
+def test_a_cancelled_evaluation_leaves_the_answers_right(steps: list[tuple[object, ...]], when: int) -> None:
+    class Cancelling(Database):
+        """Cancels itself at every `when`-th reading of an input."""
+
+        count, on = 0, False
+
+        def get_input(self, key: object, default: object = None) -> object:
+            self.count += 1
+            if self.on and self.count % when == 0:
+                self.cancel()
+            return super().get_input(key, default)  # type: ignore[arg-type]
+
+    db, state = Cancelling(), State()
+    for step in steps:
+        match step:
+            case ("ask", int(node)):
+                db.on = True
+                try:
+                    found = cyclic(db, node)
+                except Cancelled:
+                    db.on = False
+                    found = cyclic(db, node)
+                db.on = False
+                assert found == cyclic(state.fresh(), node)
+            case ("reads" | "value" as what, index, value, durability):
+                state.set(db, (what, index), value, int(str(durability)))
+
+
+@given(script(cycles=False))
+@settings(max_examples=100, deadline=None)
+def test_asking_twice_runs_nothing(steps: list[tuple[object, ...]]) -> None:
+    db, state = Database(), State()
+    for step in steps:
+        match step:
+            case ("ask", int(node)):
+                acyclic(db, node)
+                with db.recording() as events:
+                    acyclic(db, node)
+                assert events == []
+            case ("reads" | "value" as what, index, value, durability):
+                state.set(db, (what, index), value, int(str(durability)))
+
+
+@given(script(cycles=False), st.integers(0, NODES - 1), st.integers(0, INPUTS - 1))
+@settings(max_examples=100, deadline=None)
+def test_a_value_set_back_changes_no_answer_and_runs_only_its_readers(
+    steps: list[tuple[object, ...]], node: int, index: int
+) -> None:
+    db, state = Database(), State()
+    for step in steps:
+        match step:
+            case ("reads" | "value" as what, number, value, durability):
+                state.set(db, (what, number), value, int(str(durability)))
+    before = [acyclic(db, n) for n in range(NODES)]
+    value = db.get_input(("value", index), 0)
+    db.set_input(("value", index), value + 1)
+    db.set_input(("value", index), value)
+    with db.recording() as events:
+        assert [acyclic(db, n) for n in range(NODES)] == before
+    readers = {n for n in range(NODES) if ("input", index) in db.get_input(("reads", n), ())}
+    assert {event.args[0] for event in events if event.kind == "executed"} <= readers
