@@ -9,15 +9,26 @@ brackets, so that they can be differentiated again.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from potto.calculus.derivative import partial, zero_like
+from potto.calculus.derivative import zero_like
 from potto.calculus.isolate import NAN
-from potto.calculus.linear import affine
-from potto.calculus.normal import as_term, normal
+from potto.calculus.pivots import NoClosedForm as NoClosedForm
+from potto.calculus.pivots import Root, chosen, conjunction, pivots
 from potto.calculus.ranges import range_of
-from potto.calculus.solve import Family, Sections, factors, sections
+from potto.calculus.sides import (
+    Box,
+    Flips,
+    box_of,
+    branches_of,
+    flipping,
+    forced,
+    side_of,
+    summed_over,
+    unguarded,
+)
+from potto.calculus.solve import factors
 from potto.core.simplify import is_zero, normalized_surface
 from potto.core.terms import (
     ONE,
@@ -26,7 +37,6 @@ from potto.core.terms import (
     Const,
     If,
     Integral,
-    Lam,
     Sum,
     Term,
     Tuple,
@@ -50,198 +60,6 @@ from potto.core.terms import (
 )
 
 Rate = Callable[[Term], Term]
-Flips = Sequence[tuple[Branch, Term]]
-Box = Mapping[str, tuple[float, float]]
-NOWHERE: Box = {}
-
-
-class NoClosedForm(Exception):
-    """A boundary that cannot be written with the builtins; evaluation finds it by numbers."""
-
-
-@dataclass(frozen=True, slots=True)
-class Root:
-    """A root of a surface in a variable of integration; `index` and `counts` when it is one of a periodic family."""
-
-    variable: str
-    at: Term
-    index: str | None = None
-    counts: tuple[Term, Term] | None = None
-
-
-# Which branches there are
-
-
-def branches_of(body: Term, variables: Iterable[str]) -> list[Branch]:
-    """The branches of an integrand that vary with the variables and with nothing bound further in."""
-    names = frozenset(variables)
-    inside: set[str] = set()
-    for node in postorder(body):
-        if isinstance(node, Integral):
-            inside.update(node.variables)
-        elif isinstance(node, Lam):
-            inside.update(node.params)
-    return [
-        node
-        for node in postorder(body)
-        if isinstance(node, Branch) and node.surface.free & names and not node.surface.free & inside
-    ]
-
-
-def summed_over(body: Term, branch_: Branch) -> list[Sum]:
-    """The sums whose index a branch's surface uses: it is one surface for each value."""
-    return [node for node in postorder(body) if isinstance(node, Sum) and node.variable in branch_.surface.free]
-
-
-# Sides
-
-
-def forced(body: Term, flips: Flips, right: bool, box: Box = NOWHERE) -> Term:
-    """The integrand just right (or left) of where the branches flip; each with the slope of its surface there."""
-    if not flips:
-        return body
-    slopes = dict(flips)
-    memo: dict[Term, Term] = {}
-    for node in postorder(body):
-        new = rebuild(node, tuple(memo[c] for c in children(node)))
-        if isinstance(node, Branch) and node in slopes and isinstance(new, Branch):
-            new = _side(slopes[node] if right else neg(slopes[node]), new.then, new.orelse, box)
-        memo[node] = new
-    return memo[body]
-
-
-def _side(slope: Term, then: Term, orelse: Term, box: Box = NOWHERE) -> Term:
-    """`then` where the slope is positive. One that is 0 only here and there may count as either."""
-    bounds = range_of(slope, box)
-    if then is orelse or bounds.hi <= 0:
-        return orelse
-    return then if bounds.lo >= 0 else branch((slope,), True, then, orelse)
-
-
-def box_of(node: Integral) -> dict[str, tuple[float, float]]:
-    """The bounds of the variables of integration, as far as the form of the bounds shows them."""
-    box: dict[str, tuple[float, float]] = {}
-    for name, (lo, hi) in zip(node.variables, node.bounds, strict=True):
-        a, b = range_of(lo, box), range_of(hi, box)
-        box[name] = min(a.lo, b.lo), max(a.hi, b.hi)
-    return box
-
-
-def flipping(
-    branches: Iterable[Branch], variable: str, at: Term, known: Sequence[Branch] = ()
-) -> list[tuple[Branch, Term]]:
-    """The branches whose surface is 0 where `variable = at` (`known` ones surely are), each with its slope there."""
-    bare = unguarded(at)
-    found: list[tuple[Branch, Term]] = []
-    for item in branches:
-        if variable in item.surface.free:
-            surface = without_poles(item.surface)
-            if item in known or is_zero(substitute(surface, {variable: bare})):
-                found.append((item, substitute(partial(surface, variable), {variable: at})))
-    return found
-
-
-def unguarded(root: Term) -> Term:
-    """A root as it is where it exists."""
-    memo: dict[Term, Term] = {}
-    for node in postorder(root):
-        new = rebuild(node, tuple(memo[c] for c in children(node)))
-        memo[node] = new.then if isinstance(new, Branch) and new.orelse is NAN else new
-    return memo[root]
-
-
-def without_poles(surface: Term) -> Term:
-    """A surface with the same sign and no divisors: a/b as a*b."""
-    if not any(getattr(n, "op", "") == "div" and n.free for n in postorder(surface)):
-        return surface
-    found = normal(surface)
-    if found is None or found.whole:
-        return surface
-    top, below = as_term(found.top), as_term(found.below)
-    return surface if top is None or below is None else mul(top, below)
-
-
-# Roots
-
-
-@dataclass(frozen=True, slots=True)
-class Pivot:
-    """The roots of a surface in one variable of integration; taken where the plain `condition` holds."""
-
-    roots: list[Root]
-    condition: Term | None = None
-
-
-def pivots(node: Integral, surface: Term) -> list[Pivot]:
-    """Where a surface cuts the integral, solved for the innermost variable that it can be solved for.
-
-    An affine surface whose slopes are known only at run time is solved for the variable of the largest slope then:
-    the others may be 0. The pivots are tried in order, the last one has no condition.
-    """
-    slopes: dict[str, Term] = {}
-    for name in reversed(node.variables):
-        found = affine(surface, (name,)) if name in surface.free else None
-        if found is not None and not found.coefficients[0].free & frozenset(node.variables):
-            slopes[name] = found.coefficients[0]
-    order = [n for n in reversed(node.variables) if n in surface.free]
-    if len(slopes) < 2 or order[0] not in slopes:
-        return [Pivot(_solved(node, surface, order))]
-    if all(isinstance(c, Const) for c in slopes.values()):
-        sizes = {n: abs(c.value) for n, c in slopes.items() if isinstance(c, Const)}
-        largest = max(sizes.values())
-        name = next(n for n in order if sizes.get(n, 0.0) * _STEEP >= largest)
-        return [Pivot(_solved(node, surface, [name]))]
-    result: list[Pivot] = []
-    for name, slope in slopes.items():
-        others = [prim("le", prim("abs", c), prim("abs", slope)) for n, c in slopes.items() if n != name]
-        result.append(Pivot(_solved(node, surface, [name]), _all(others)))
-    return [*result[:-1], Pivot(result[-1].roots)]
-
-
-_STEEP = 8.0  # a slope this much smaller than the largest one is still fine to divide by
-
-
-def _solved(node: Integral, surface: Term, order: Sequence[str]) -> list[Root]:
-    reasons: list[str] = []
-    for name in order:
-        found = sections(surface, name)
-        if isinstance(found, Sections) and found.complete:
-            roots = [Root(name, r) for r in (*found.roots, *found.poles)]
-            position = node.variables.index(name)
-            return roots + [_family(node, position, f) for f in (*found.families, *found.pole_families)]
-        reasons.append(found.reason)
-    raise NoClosedForm(reasons[0] if reasons else "the surface varies with no variable of integration")
-
-
-def chosen(alternatives: Sequence[tuple[Term | None, Term]]) -> Term:
-    """The term of the first pivot whose condition holds."""
-    result = alternatives[-1][1]
-    for condition, term in reversed(alternatives[:-1]):
-        result = result if condition is None else if_(condition, term, result)
-    return result
-
-
-def _family(node: Integral, position: int, family: Family) -> Root:
-    name, (lo, hi) = node.variables[position], node.bounds[position]
-    ends = [substitute(family.inner, {name: end}) for end in (lo, hi)]
-    if family.stops:
-        ends += [substitute(family.inner, {name: _within(stop, lo, hi)}) for stop in family.stops]
-    counts = (prim("ceil", _extreme("min", ends)), prim("floor", _extreme("max", ends)))
-    return Root(name, family.root, family.index, counts)
-
-
-def _within(stop: Term, lo: Term, hi: Term) -> Term:
-    return prim("clamp", stop, prim("min", lo, hi), prim("max", lo, hi))
-
-
-def _extreme(op: str, ends: list[Term]) -> Term:
-    result = ends[0]
-    for end in ends[1:]:
-        result = prim(op, result, end)
-    return result
-
-
-# Terms of the derivative
 
 
 def at_surfaces(node: Integral, moving: frozenset[str], rate: Rate) -> list[Term]:
@@ -312,7 +130,7 @@ def _instances(
         name = fresh(item.variable, taken)
         taken.add(name)
         names[item.variable] = var(name)
-    here = _all(prim("eq", var(s.variable), names[s.variable]) for s in sums)
+    here = conjunction(prim("eq", var(s.variable), names[s.variable]) for s in sums)
 
     def run(right: bool) -> Term:
         memo: dict[Term, Term] = {}
@@ -321,19 +139,11 @@ def _instances(
             new = rebuild(node, tuple(memo[c] for c in children(node)))
             if isinstance(node, Branch) and node in slopes and isinstance(new, Branch):
                 slope = substitute(slopes[node], names)
-                new = if_(here, _side(slope if right else neg(slope), new.then, new.orelse, box), new)
+                new = if_(here, side_of(slope if right else neg(slope), new.then, new.orelse, box), new)
             memo[node] = new
         return memo[body]
 
     return run, names
-
-
-def _all(conditions: Iterable[Term]) -> Term:
-    result: Term | None = None
-    for condition in conditions:
-        result = condition if result is None else prim("and", result, condition)
-    assert result is not None
-    return result
 
 
 def at_bounds(node: Integral, rate: Rate) -> list[Term]:
@@ -348,7 +158,7 @@ def at_bounds(node: Integral, rate: Rate) -> list[Term]:
             # Inside is left of an upper bound that is above the lower one, and of a lower bound that is above.
             flips = flipping(branches, name, bound)
             left, right = (forced(node.body, flips, side) for side in (False, True))
-            inside = left if left is right else _side(sub(bound, other), left, right)
+            inside = left if left is right else side_of(sub(bound, other), left, right)
             gain = scaled(substitute(inside, {name: bound}), speed if upper else neg(speed))
             terms.append(remaining(node, name, bound, gain))
     return terms

@@ -244,14 +244,8 @@ class _Walk:
     ) -> tuple[Term, dict[str, Term], dict[str, Term]] | None:
         """The callee's body with names of its own, and what its parameters stand for."""
         params, body = uncurry(function, len(given))
-        args: list[Term] = []
-        shape: Term = function
-        for group in given:
-            if not isinstance(shape, Lam):
-                return None
-            args.extend(fitted(group, len(shape.params)))
-            shape = shape.body
-        if len(args) != len(params):
+        args = _arguments(function, given)
+        if args is None or len(args) != len(params):
             return None
         for arg in args:
             self.taken |= arg.free
@@ -312,16 +306,63 @@ def _number(term: Term, otherwise: float) -> float:
     return value if value == value else otherwise
 
 
-def expanded(term: Term, resolve: Resolve, derive: Derive | None = None, depth: int = 0) -> Term:
-    """The term with calls of known functions carried out; of derivatives too, if it is said how."""
-    memo: dict[Term, Term] = {}
-    for node in postorder(term):
-        if isinstance(node, Proj):
-            memo[node] = proj(memo[node.term], node.index)
-            continue
-        new = rebuild(node, tuple(memo[c] for c in children(node)))
-        memo[node] = _applied(new, resolve, derive, depth) if isinstance(new, App) else new
-    return memo[term]
+def expanded(term: Term, resolve: Resolve, derive: Derive | None = None) -> Term:
+    """The term with calls of known functions carried out; of derivatives too, if it is said how.
+
+    A call of a definition inside itself stays a call: how deep it goes is decided by values.
+    """
+    return _Expansion(resolve, derive).run(term, ())
+
+
+class _Expansion:
+    """One expansion; a call with the same arguments is carried out once."""
+
+    def __init__(self, resolve: Resolve, derive: Derive | None) -> None:
+        self.resolve = resolve
+        self.derive = derive
+        self.known: dict[tuple[Lam, tuple[Term, ...]], Term] = {}
+
+    def run(self, term: Term, path: tuple[Term, ...]) -> Term:
+        memo: dict[Term, Term] = {}
+        for node in postorder(term):
+            if isinstance(node, Proj):
+                memo[node] = proj(memo[node.term], node.index)
+                continue
+            new = rebuild(node, tuple(memo[c] for c in children(node)))
+            memo[node] = self.applied(new, path) if isinstance(new, App) else new
+        return memo[term]
+
+    def applied(self, call: App, path: tuple[Term, ...]) -> Term:
+        head, groups = spine(call)
+        named = head
+        while isinstance(named, Deriv):
+            named = named.function
+        if named in path or len(path) > DEEPEST:
+            return call
+        function = known_function(head, self.resolve, self.derive)
+        if function is None:
+            return call
+        params, body = uncurry(function, len(groups))
+        args = _arguments(function, groups)
+        if args is None or len(args) != len(params):
+            return call
+        key = (function, args)
+        if key not in self.known:
+            inner = (*path, named) if isinstance(named, Global) else path
+            self.known[key] = self.run(substitute(body, dict(zip(params, args, strict=True))), inner)
+        return self.known[key]
+
+
+def _arguments(function: Lam, groups: tuple[tuple[Term, ...], ...]) -> tuple[Term, ...] | None:
+    """The arguments of all groups, each group as its parameters take it; None if there are more than it has."""
+    args: list[Term] = []
+    shape: Term = function
+    for group in groups:
+        if not isinstance(shape, Lam):
+            return None
+        args.extend(fitted(group, len(shape.params)))
+        shape = shape.body
+    return tuple(args)
 
 
 def known_function(head: Term, resolve: Resolve, derive: Derive | None) -> Lam | None:
@@ -333,21 +374,3 @@ def known_function(head: Term, resolve: Resolve, derive: Derive | None) -> Lam |
         inner = known_function(head.function, resolve, derive)
         return None if inner is None else derive(inner)
     return head if isinstance(head, Lam) else None
-
-
-def _applied(call: App, resolve: Resolve, derive: Derive | None, depth: int) -> Term:
-    head, groups = spine(call)
-    function = known_function(head, resolve, derive)
-    if function is None or depth > DEEPEST:
-        return call
-    params, body = uncurry(function, len(groups))
-    args: list[Term] = []
-    shape: Term = function
-    for group in groups:
-        if not isinstance(shape, Lam):
-            return call
-        args.extend(fitted(group, len(shape.params)))
-        shape = shape.body
-    if len(args) != len(params):
-        return call
-    return expanded(substitute(body, dict(zip(params, args, strict=True))), resolve, derive, depth + 1)

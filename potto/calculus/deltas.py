@@ -6,24 +6,12 @@ lie between the bounds. A delta met twice on one surface has no meaning: that is
 
 from __future__ import annotations
 
-from potto.calculus.boundary import (
-    NoClosedForm,
-    Root,
-    between,
-    branches_of,
-    chosen,
-    flipping,
-    forced,
-    pivots,
-    remaining,
-    scaled,
-    total,
-    unguarded,
-    vanishes,
-)
+from potto.calculus.boundary import between, remaining, scaled, total, vanishes
 from potto.calculus.derivative import NotSmooth, partial, zero_like
 from potto.calculus.isolate import quotient
+from potto.calculus.pivots import NoClosedForm, Root, chosen, pivots
 from potto.calculus.ranges import range_of
+from potto.calculus.sides import branches_of, flipping, forced, unguarded
 from potto.core.printer import format_term
 from potto.core.simplify import is_zero
 from potto.core.terms import (

@@ -9,11 +9,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from potto.calculus.boundary import unguarded
 from potto.calculus.conditions import Condition, conditions_of, expanded, skeleton
+from potto.calculus.deltas import without_deltas
+from potto.calculus.derivative import NotSmooth
+from potto.calculus.dual import Differentiator
 from potto.calculus.invert import Failure, Inverse, invert
 from potto.calculus.isolate import Guard
 from potto.calculus.linear import affine
+from potto.calculus.pivots import NoClosedForm
+from potto.calculus.sides import unguarded
+from potto.calculus.trace import spine
 from potto.calculus.verdict import (
     COMPONENTS,
     NO_INVERSE,
@@ -32,10 +37,13 @@ from potto.core.simplify import simplify
 from potto.core.terms import (
     ONE,
     ZERO,
+    App,
     Branch,
     Const,
+    Deriv,
     Global,
     Hole,
+    Integral,
     Prim,
     Term,
     const,
@@ -45,7 +53,7 @@ from potto.core.terms import (
     substitute,
     var,
 )
-from potto.diagnostics import Diagnostic
+from potto.diagnostics import Diagnostic, PottoError
 from potto.elaborate import core, core_term, diffeo_core
 from potto.modules import definition
 from potto.query import Database, query
@@ -92,7 +100,8 @@ def check_conditions(db: Database, file: str, name: str) -> tuple[Diagnostic, ..
     found = conditions_of(elaborated.term, lambda g: exported(db, g.module, g.name), lambda g: _whole(db, g))
     spans = dict(elaborated.origins)
     fallback = Span(0, 0) if item is None else item.name_span
-    return tuple(_judged(found, spans, fallback))
+    products = _products(db, elaborated.term, found, spans, fallback)
+    return (*_judged(found, spans, fallback), *products)
 
 
 @query
@@ -130,6 +139,29 @@ def _judged(found: Iterable[Condition], spans: Mapping[Term, Span], fallback: Sp
             if key not in said:
                 said.add(key)
                 yield _diagnostic(problem, span, condition.calls)
+
+
+def _products(
+    db: Database, term: Term, found: Sequence[Condition], spans: Mapping[Term, Span], fallback: Span
+) -> Iterable[Diagnostic]:
+    """Deltas that meet on one surface: what they are multiplied by is looked at only where there are any."""
+    for node in postorder(term):
+        if not isinstance(node, Integral):
+            continue
+        parts = postorder(node.body)
+        anchors = [c.anchor for c in found if c.delta and (c.anchor in parts)]
+        anchors += [p for p in parts if isinstance(p, App) and isinstance(spine(p)[0], Deriv)]
+        if not anchors:
+            continue
+        try:
+            whole = Differentiator(lambda g: _whole(db, g)).carried_out(node)
+            if isinstance(whole, Integral):
+                without_deltas(whole)
+        except PottoError as error:
+            span = spans.get(anchors[-1], spans.get(node, fallback))
+            yield from (replace(d, span=span) for d in error.diagnostics)
+        except (NoClosedForm, NotSmooth):
+            pass  # then they are eliminated by numbers, which looks again
 
 
 def _readable(condition: Condition) -> Condition:

@@ -10,19 +10,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from potto.calculus.boundary import (
-    NoClosedForm,
-    at_bounds,
-    at_surfaces,
-    branches_of,
-    jumps,
-    pivots,
-    scaled,
-)
+from potto.calculus.boundary import at_bounds, at_surfaces, jumps, scaled
 from potto.calculus.conditions import Resolve
 from potto.calculus.deltas import without_deltas
 from potto.calculus.derivative import NotSmooth
 from potto.calculus.dual import Differentiator, heads_of
+from potto.calculus.pivots import NoClosedForm, pivots
+from potto.calculus.sides import branches_of
 from potto.calculus.solve import factors
 from potto.calculus.trace import spine
 from potto.core.printer import format_term
