@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeVar
 
-from potto.core.terms import INF, PI, Term, Tuple, app, fresh, global_, hole, lam, proj, var
+from potto.core.terms import INF, PI, Term, Tuple, fresh, global_, hole, lam, proj, var
 from potto.elaborate import builtins
-from potto.elaborate.values import Builtin, Closure, Partial, Scope, Value
+from potto.elaborate.values import Builtin, Closure, Scope, Value
 from potto.modules.lookup import DefinitionTarget, resolve, resolve_member
 from potto.query import Database
 from potto.source import Span
@@ -127,8 +127,6 @@ class Elaboration:
                 if found is None:
                     found = self.made[value] = self._lambda(value)
                 return found
-            case Partial():
-                return self._partial(value)
             case Builtin(name):
                 return self.builtin_lambda(name)
             case _:
@@ -156,16 +154,6 @@ class Elaboration:
         """A builtin as a function that is passed on."""
         names = tuple(self.fresh(stem) for stem in ("x", "y", "z")[: builtins.parameters_of(name)])
         return lam(names, builtins.applied(self.db, name, tuple(map(var, names))))
-
-    def _partial(self, value: Partial) -> Term:
-        groups, call = [], value.function
-        for group, given in zip(value.groups, value.given):
-            if given is None:
-                names = tuple(self.fresh(slot.name or "x") for slot in group)
-                groups.append(names)
-                given = tuple(map(var, names))
-            call = app(call, given)
-        return lambdas(groups, call)
 
     # Where terms came from
 

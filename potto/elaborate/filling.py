@@ -1,7 +1,7 @@
 """Which arguments fill which parameters.
 
 Owns `fill`. Keywords bind by name in any group, the others fill the parameters that are left, in order. A group of n
-takes one tuple of n, and one parameter that is a tuple takes its n parts. A group that gets nothing stays open. The
+takes one tuple of n, and one parameter that is a tuple takes its n parts. Groups after the last argument stay open. The
 checker of types has the same rules and reports what does not fit; here that gives a reason, for a `Hole`.
 """
 
@@ -38,27 +38,26 @@ class Packed(Generic[V]):
     values: tuple[V, ...]
 
 
-Filled = tuple["tuple[V, ...] | Spread[V] | Packed[V] | None", ...]
+Filling = tuple[V, ...] | Spread[V] | Packed[V]
 
 
-def fill(groups: Groups, given: Sequence[Given[V]], tuples: bool) -> Filled[V] | str:
-    """What each group gets (None: nothing), or why the arguments do not fit.
+def fill(groups: Groups, given: Sequence[Given[V]], tuples: bool) -> list[Filling[V]] | str:
+    """What the groups get, as far as the arguments go, or why they do not fit.
 
     `tuples`: whether an only argument may be a tuple for a group of several.
     """
-    if not given:
-        return ((),) + (None,) * (len(groups) - 1) if not groups[0] else "an argument is missing"
-    total = sum(map(len, groups))
     first = groups[0]
     if all(argument.name is None for argument in given):
+        if not given:
+            return [()] if not first else "the arguments are missing"
         if len(given) == 1 and len(first) > 1 and tuples:
-            return (Spread(given[0].value), *(None,) * (len(groups) - 1))
-        if len(first) == 1 and len(given) > total and first[0].dims in (None, len(given)):
-            return (Packed(tuple(argument.value for argument in given)), *(None,) * (len(groups) - 1))
+            return [Spread(given[0].value)]
+        if len(groups) == len(first) == 1 and len(given) > 1 and first[0].dims in (None, len(given)):
+            return [Packed(tuple(argument.value for argument in given))]
     return _placed(groups, given)
 
 
-def _placed(groups: Groups, given: Sequence[Given[V]]) -> Filled[V] | str:
+def _placed(groups: Groups, given: Sequence[Given[V]]) -> list[Filling[V]] | str:
     parameters = [slot.name for group in groups for slot in group]
     taken: dict[int, V] = {}
     for argument in given:
@@ -80,14 +79,15 @@ def _placed(groups: Groups, given: Sequence[Given[V]]) -> Filled[V] | str:
     return _grouped(groups, taken)
 
 
-def _grouped(groups: Groups, taken: dict[int, V]) -> Filled[V] | str:
-    filled: list[tuple[V, ...] | Spread[V] | Packed[V] | None] = []
-    start = 0
+def _grouped(groups: Groups, taken: dict[int, V]) -> list[Filling[V]] | str:
+    filled: list[Filling[V]] = []
+    start, end = 0, max(taken) + 1
     for group in groups:
+        if start >= end:
+            break
         places = range(start, start + len(group))
-        values = tuple(taken[place] for place in places if place in taken)
-        if values and len(values) < len(group):
+        if not all(place in taken for place in places):
             return "an argument is missing"
-        filled.append(values if values else None)
+        filled.append(tuple(taken[place] for place in places))
         start += len(group)
-    return tuple(filled)
+    return filled

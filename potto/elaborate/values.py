@@ -35,22 +35,13 @@ class Closure:
 
 
 @dataclass(frozen=True, slots=True)
-class Partial:
-    """A function that a term stands for, of which some groups are given and an earlier one is not."""
-
-    function: Term
-    groups: Groups
-    given: tuple[tuple[Term, ...] | None, ...]
-
-
-@dataclass(frozen=True, slots=True)
 class Builtin:
     """A builtin or one of the special forms, not applied."""
 
     name: str
 
 
-Value = Term | Closure | Partial | Builtin
+Value = Term | Closure | Builtin
 
 
 @dataclass(frozen=True, eq=False, slots=True)
