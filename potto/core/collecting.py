@@ -34,6 +34,13 @@ class _Collected:
 
     terms: dict[tuple[Term, ...], tuple[Fraction, Term]] = field(default_factory=dict)
 
+    def place(self, value: Fraction) -> tuple[Term, ...]:
+        """Where a number is added: numbers whose sum is not exact stay apart."""
+        key: tuple[Term, ...] = (ONE,)
+        while key in self.terms and number(abs(self.terms[key][0] + value)) is None:
+            key = (ONE, *key)
+        return key
+
     def written(self) -> Term:
         return add(*(_scaled(c, core) for c, core in self.terms.values()))
 
@@ -42,15 +49,9 @@ def _collected(items: Iterable[tuple[Fraction, Term]]) -> _Collected:
     result = _Collected()
     for scale, item in items:
         coefficient, core = split(item)
-        key = _key(core)
-        total = coefficient * scale
-        if key in result.terms:
-            total += result.terms[key][0]
-            core = result.terms[key][1]
-        if key in result.terms and core is ONE and number(total) is None:
-            key = (item,)  # numbers whose sum is not exact stay apart
-            total = coefficient * scale
-        result.terms[key] = total, core
+        key = result.place(coefficient * scale) if core is ONE else _key(core)
+        before, core = result.terms.get(key, (Fraction(0), core))
+        result.terms[key] = before + coefficient * scale, core
     result.terms = {k: v for k, v in result.terms.items() if v[0]}
     return result
 

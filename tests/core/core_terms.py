@@ -36,25 +36,32 @@ def area(body: Term, *names: str) -> Term:
     return integral(names, UNIT * len(names), body)
 
 
-def _grow(parts: st.SearchStrategy[Term]) -> st.SearchStrategy[Term]:
-    some = st.lists(parts, min_size=2, max_size=3)
-    return st.one_of(
-        some.map(lambda items: add(*items)),
-        some.map(lambda items: mul(*items)),
-        parts.map(neg),
-        st.tuples(parts, parts).map(lambda pair: sub(*pair)),
-        st.tuples(parts, parts).map(lambda pair: div(*pair)),
-        st.tuples(parts, st.sampled_from((2.0, 3.0, -1.0, 0.5))).map(lambda pair: pow_(pair[0], const(pair[1]))),
-        st.tuples(st.sampled_from(("sin", "cos", "exp", "sqrt", "abs", "tanh", "log1p")), parts).map(
-            lambda pair: prim(*pair)
-        ),
-        st.tuples(parts, parts, parts, st.booleans()).map(lambda p: branch((p[0],), p[3], p[1], p[2])),
-        st.tuples(parts, parts).map(lambda pair: prim("max", *pair)),
-    )
+_STEPS = {
+    "add": lambda a, b, c: add(a, b, c),
+    "sub": lambda a, b, c: sub(a, b),
+    "mul": lambda a, b, c: mul(a, b),
+    "square": lambda a, b, c: pow_(a, TWO),
+    "inverse": lambda a, b, c: pow_(a, const(-1.0)),
+    "div": lambda a, b, c: div(a, b),
+    "neg": lambda a, b, c: neg(a),
+    "sin": lambda a, b, c: prim("sin", a),
+    "cos": lambda a, b, c: prim("cos", a),
+    "exp": lambda a, b, c: prim("exp", a),
+    "sqrt": lambda a, b, c: prim("sqrt", a),
+    "abs": lambda a, b, c: prim("abs", a),
+    "log1p": lambda a, b, c: prim("log1p", a),
+    "max": lambda a, b, c: prim("max", a, b),
+    "branch": lambda a, b, c: branch((a,), False, b, c),
+    "strict": lambda a, b, c: branch((a,), True, b, c),
+}
+_NUMBERS = tuple(map(const, (0.0, 1.0, 2.0, 3.0, -1.0, 0.5, 0.1, 7.25)))
 
 
-def terms() -> st.SearchStrategy[Term]:
-    """Terms over x, y and t with the common builtins and branches."""
-    numbers = st.sampled_from((0.0, 1.0, 2.0, 3.0, -1.0, 0.5, 0.1, 7.25)).map(const)
-    leaves = st.one_of(st.sampled_from((x, y, t)), numbers)
-    return st.recursive(leaves, _grow, max_leaves=12)
+@st.composite
+def terms(draw: st.DrawFn) -> Term:
+    """Terms over x, y and t with the common builtins and branches; each step works on what there is already."""
+    pool: list[Term] = [x, y, t, draw(st.sampled_from(_NUMBERS)), draw(st.sampled_from(_NUMBERS))]
+    for step in draw(st.lists(st.sampled_from(sorted(_STEPS)), min_size=1, max_size=7)):
+        parts = (draw(st.integers(0, len(pool) - 1)) for _ in range(3))
+        pool.append(_STEPS[step](*(pool[-1 - k] for k in parts)))
+    return pool[-1]
