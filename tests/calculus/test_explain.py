@@ -1,0 +1,89 @@
+"""The derivative in symbols: what `potto deriv` says."""
+
+from __future__ import annotations
+
+import textwrap
+
+from potto.calculus.explain import DerivativeText, explain_derivative
+from potto.query import Database
+
+FILE = "<text>"
+
+
+def explain(text: str, name: str) -> DerivativeText:
+    db = Database()
+    db.set_input(("overlay", FILE), textwrap.dedent(text).strip("\n") + "\n")
+    return explain_derivative(db, FILE, name)
+
+
+RENDERER = """
+    diffeo cond(x, y; c) = (x + y + c, x - y + c)
+
+    def renderer(c, shader)
+        integral ([0, 1], [0, 1]) ((shader (x, y)) c)*(((cond (x, y)) c) ? 1 : 0) d(x, y)
+"""
+
+
+def test_equation_two_of_the_paper() -> None:
+    found = explain(RENDERER, "renderer")
+    (item,) = found.integrals
+    assert item.interior == "dshader(x, y)((c, dc))*[x + y + c >= 0]"
+    assert item.deltas == ("shader(x, y)(c)*delta(x + y + c)*dc",)
+    assert found.alone and "# interior" in found.text and "# boundary" in found.text
+
+
+def test_the_delta_integrated_out() -> None:
+    (item,) = explain(RENDERER, "renderer").integrals
+    (boundary,) = item.boundary
+    assert boundary.startswith("integral [0, 1] shader(x, -c - x)(c)*dc*[")
+
+
+def test_surfaces_say_what_moves_them_and_where_they_are() -> None:
+    (surface,) = explain(RENDERER, "renderer").integrals[0].surfaces
+    assert surface.equation == "x + y + c = 0"
+    assert surface.moved_by == ("c",)
+    assert surface.roots == ("y = -x - c",)
+
+
+def test_a_surface_that_nothing_moves() -> None:
+    found = explain("def f(t)\n    integral [0, 1] (t*[x < 0.5]) d(x)", "f")
+    (surface,) = found.integrals[0].surfaces
+    assert surface.moved_by == ()
+    assert found.integrals[0].deltas == () and "moved by no parameter" in found.text
+
+
+def test_a_moving_bound() -> None:
+    found = explain("def f(t)\n    integral [0, t^2] exp(x) d(x)", "f")
+    assert found.integrals[0].bounds == ("2*exp(t^2)*t*dt",)
+    assert "# moving bound" in found.text
+
+
+def test_a_function_that_jumps_is_a_distribution() -> None:
+    found = explain("def step(y)\n    [y > 0]", "step")
+    assert found.tangent == "delta(y)*dy"
+    assert "Dist" in found.type
+
+
+def test_what_is_around_an_integral() -> None:
+    text = """
+        def f(t)
+            integral [0, 1] [x < t] d(x)
+
+        def loss(t, a)
+            (f(t) - a)^2
+    """
+    found = explain(text, "loss")
+    assert found.tangent == "2*(f(t) - a)*(df((t, dt)) - da)"
+    assert found.integrals == ()
+
+
+def test_a_boundary_found_by_numbers_says_so() -> None:
+    found = explain("def f(t)\n    integral [0, 1] [x*exp(x) < t] d(x)", "f")
+    (item,) = found.integrals
+    assert item.deltas == ("delta(t - x*exp(x))*dt",)
+    assert "`x` itself" in item.reason and "found by numbers" in found.text
+
+
+def test_a_recursion_is_not_followed() -> None:
+    found = explain("def fact(n)\n    if n > 0 then n*fact(n - 1) else 1", "fact")
+    assert "dfact" in found.tangent
