@@ -16,15 +16,17 @@ from typing import Any
 
 from potto.arguments import Batch, batch_of, misfit, value_of
 from potto.calls import Call, Gradient, gradient
+from potto.diagnostics import PottoError
 from potto.kernels.cells import Value
 from potto.kernels.errors import wrong_call
+from potto.library import NO_FILE
 from potto.modules import DefinitionTarget, ModuleTarget, find_module, names, resolve
 from potto.render import display_name
 from potto.runtime.estimate import Estimate
 from potto.source import Span
 from potto.syntax import nodes, print_expression
 from potto.types import derivative_type, format_type, infer_expression
-from potto.types.types import Diffeo, Type, groups_of
+from potto.types.types import Diffeo, Parameter, Type, groups_of
 from potto.types.types import Function as FunctionType
 from potto.world import World
 
@@ -44,7 +46,8 @@ class Workspace:
         """The module of a dotted name. Raises PottoError if there is none, or if it has errors."""
         file = find_module(self._world.db, os.path.join(self.root, "<workspace>"), name)
         if file is None:
-            raise wrong_call(f"there is no module `{name}` in {display_name(self.root)}")
+            problem = NO_FILE(NOWHERE, f"there is no module `{name}` in {display_name(self.root)}")
+            raise PottoError([problem])
         return _module(self._world, file)
 
     def load(self, path: str | os.PathLike[str]) -> Module:
@@ -103,7 +106,7 @@ def _load(world: World, path: str) -> Module:
 def _compile(world: World, key: str, text: str) -> Module:
     if not isinstance(text, str):
         raise wrong_call(f"a program is a str, not a Python {type(text).__name__}")
-    return _module(world, world.put(key, text))
+    return _module(world, world.own(key, text))
 
 
 def _module(world: World, file: str) -> Module:
@@ -225,7 +228,7 @@ def _function_value(argument: Any) -> Value | None:
 
 
 def _labelled(
-    given: Given, groups: tuple[tuple[Any, ...], ...]
+    given: Given, groups: tuple[tuple[Parameter, ...], ...]
 ) -> builtins.list[tuple[str, Any, Type | None]]:
     """Every argument with the name of its parameter and the type of it, where these are known.
 
@@ -234,12 +237,16 @@ def _labelled(
     found: list[tuple[str, Any, Type | None]] = []
     at = 0
     for args, kwargs in given:
-        count, parameters = len(args) + len(kwargs), []
+        count = len(args) + len(kwargs)
+        parameters: builtins.list[Parameter] = []
         while at < len(groups) and (not parameters or len(parameters) < count):
             parameters += groups[at]
             at += 1
         left = [p for p in parameters if p.name not in kwargs]
-        spread = len(args) == 1 and len(left) > 1  # one tuple given for a whole group
+        spread = len(args) == 1 and len(left) > 1 and isinstance(args[0], tuple)  # one tuple for a whole group
+        if len(args) < len(left) and not spread:
+            missing = ", ".join(f"`{p.name}`" for p in left[len(args) :])
+            raise wrong_call(f"no value is given for {missing}")
         for place, argument in enumerate(args):
             known = left[place] if place < len(left) and not spread else None
             name = known.name if known is not None and known.name else f"argument {place + 1}"

@@ -40,9 +40,7 @@ class Batch:
         return np.ascontiguousarray(np.broadcast_to(array, self.shape)).reshape(-1)
 
     def shaped(self, estimate: Estimate) -> Estimate:
-        """The estimate with every number as an array of the batch's shape."""
-        if self.shape is None:
-            return estimate
+        """The estimate with every number as an array of the batch's shape; as a float if there were no arrays."""
         parts = (estimate.value, estimate.error, estimate.tangent, estimate.tangent_error)
         value, error, tangent, tangent_error = map(self._restored, parts)
         return replace(estimate, value=value, error=error, tangent=tangent, tangent_error=tangent_error)
@@ -52,7 +50,8 @@ class Batch:
             return None
         if isinstance(part, tuple | list):
             return type(part)(self._restored(item) for item in part)
-        assert self.shape is not None
+        if self.shape is None:
+            return float(part)
         if 0 in self.shape:
             return np.empty(self.shape)
         count = int(np.prod(self.shape))

@@ -8,18 +8,17 @@ from __future__ import annotations
 
 import os
 import threading
+import weakref
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from potto.check import absolute, definition_diagnostics, diagnostics, errors_of, has_errors
+from potto.check import absolute, definition_diagnostics, has_errors
 from potto.core.terms import Term
-from potto.diagnostics import Diagnostic, PottoError, declare
+from potto.diagnostics import Diagnostic, PottoError
 from potto.elaborate import core, elaborate_expression
-from potto.modules import Unreadable, chunk_start, open_files, source
-from potto.modules.files import MAX_BYTES, decode
-from potto.modules.texts import content
-from potto.query import Database
+from potto.library import Library
+from potto.modules import chunk_start
 from potto.render import Located, ProgramError
 from potto.runtime.estimate import Estimate
 from potto.runtime.evaluate import Program
@@ -33,11 +32,9 @@ from potto.types import format_type, infer_expression
 from potto.types.types import TupleOf, Type, result_of
 
 EXPRESSION = "<expression>"
-NOWHERE = Span(0, 0)
-NO_FILE = declare("P0230", "a file that does not exist")
-NO_SUCH_DEFINITION = declare("P0232", "a name on the command line that the file does not define")
-NOT_READABLE = declare("P0231", "a file that cannot be read as a program")
 T = TypeVar("T")
+# Texts that were never on disk are found by functions of other worlds as well, under keys that are given once.
+_owners: weakref.WeakValueDictionary[str, World] = weakref.WeakValueDictionary()
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,63 +46,12 @@ class Answer:
     remarks: tuple[Located, ...] = ()
 
 
-class World:
+class World(Library):
     """Programs from disk and from memory, checked and evaluated."""
 
     def __init__(self, roots: Sequence[str | os.PathLike[str]] = ()) -> None:
-        self.db = Database()
-        self.files = open_files(self.db, roots)
+        super().__init__(roots)
         self._local = threading.local()
-
-    # Files
-
-    def key(self, path: str | os.PathLike[str]) -> str:
-        """How the database calls a file."""
-        return self.files.key(path)
-
-    def put(self, key: str, text: str) -> str:
-        """Give a file, or a pseudo file such as `<text>`, a text that counts instead of what is on disk."""
-        self.files.set_text(key, text)
-        return key
-
-    def put_bytes(self, key: str, data: bytes) -> Located | None:
-        """The same from bytes; the diagnostic if they are no text."""
-        text = decode(data) if len(data) <= MAX_BYTES else Unreadable("too large", f"{len(data):,} bytes")
-        if isinstance(text, Unreadable):
-            return Located(key, _complaint(text))
-        self.put(key, text)
-        return None
-
-    def unreadable(self, key: str) -> Located | None:
-        """What keeps a file from being read as a program, if anything does."""
-        found = content(self.db, key)
-        if isinstance(found, str):
-            return None
-        return Located(key, NO_FILE(NOWHERE, "there is no such file") if found is None else _complaint(found))
-
-    def must_exist(self, key: str) -> None:
-        """Raise ProgramError if a file cannot be read as a program."""
-        problem = self.unreadable(key)
-        if problem is not None:
-            raise ProgramError([problem], self.source)
-
-    def refresh(self) -> bool:
-        """Read again what has changed on disk; True if anything had."""
-        return bool(self.files.refresh())
-
-    def source(self, file: str) -> SourceText | None:
-        """The text of a file."""
-        return source(self.db, file)
-
-    def diagnostics(self, file: str) -> tuple[Located, ...]:
-        """Everything there is to say about a file."""
-        return diagnostics(self.db, file)
-
-    def require(self, file: str) -> None:
-        """Raise ProgramError if there is an error in a file."""
-        wrong = errors_of(self.diagnostics(file))
-        if wrong:
-            raise ProgramError(wrong, self.source)
 
     # Evaluating
 
@@ -132,8 +78,16 @@ class World:
             self._local.memory = {}
             self._local.program = Program(self.lookup)
 
+    def own(self, key: str, text: str) -> str:
+        """Give a pseudo file its text, for this world and for those that its functions are given to."""
+        _owners[key] = self
+        return self.put(key, text)
+
     def lookup(self, file: str, name: str) -> Term:
         """The term of a definition. Raises ProgramError if it has errors."""
+        owner = _owners.get(file, self)
+        if owner is not self:
+            return owner.lookup(file, name)
         with self.db.evaluating():
             found = definition_diagnostics(self.db, file, name)
             if has_errors(found):
@@ -182,22 +136,6 @@ class World:
         wrong = [Located(EXPRESSION, absolute(self.db, EXPRESSION, d, 0)) for d in found if d.severity == "error"]
         if wrong:
             raise ProgramError(wrong, sources)
-
-
-def _complaint(found: Unreadable) -> Diagnostic:
-    detail = f": {found.detail}" if found.detail else ""
-    match found.reason:
-        case "folder":
-            return NO_FILE(NOWHERE, "this is a folder, and a file is needed here")
-        case "not a file":
-            return NOT_READABLE(NOWHERE, "this is no regular file")
-        case "not text":
-            message = f"this file is not UTF-8 text{detail} at byte {found.offset}"
-            return NOT_READABLE(NOWHERE, message, help="programs are text; save it as UTF-8 if it is one")
-        case "too large":
-            return NOT_READABLE(NOWHERE, f"this file is too large to be a program{detail}")
-        case "no access":
-            return NOT_READABLE(NOWHERE, f"this file cannot be read{detail}")
 
 
 def is_dual(type: Type) -> bool:

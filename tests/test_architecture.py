@@ -16,7 +16,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     ("potto.ide", "potto.session", "potto.api", "potto.world", "potto.live"),
     ("potto.runtime",),
     ("potto.kernels", "potto.integrate"),
-    ("potto.check", "potto.facts"),
+    ("potto.library", "potto.facts", "potto.check"),
     ("potto.calculus",),
     ("potto.elaborate",),
     ("potto.types",),

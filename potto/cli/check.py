@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from potto.cli.console import Console
 
 if TYPE_CHECKING:
+    from potto.library import Library
     from potto.render import Located
-    from potto.world import World
 
 SUMMARY = "say what is wrong with programs, where, and what to do"
 EXAMPLE = "  potto check examples/ --watch"
@@ -23,9 +23,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    from potto.world import World
+    from potto.library import Library
 
-    world = World(["."])
+    world = Library(["."])
     status = _look(world, options, console)
     while options.watch:
         console.out.flush()
@@ -35,7 +35,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     return status
 
 
-def _look(world: World, options: argparse.Namespace, console: Console) -> int:
+def _look(world: Library, options: argparse.Namespace, console: Console) -> int:
     """Check all files once and say what was found."""
     from potto.render import all_to_json, summary
 
@@ -49,7 +49,7 @@ def _look(world: World, options: argparse.Namespace, console: Console) -> int:
     return int(any(located.diagnostic.severity == "error" for located in found))
 
 
-def gather(world: World, paths: list[str]) -> tuple[list[Located], int]:
+def gather(world: Library, paths: list[str]) -> tuple[list[Located], int]:
     """The diagnostics of all files that the paths name, and how many files there are."""
     from potto.cli.files import expand
     from potto.cli.opening import opened
@@ -64,7 +64,7 @@ def gather(world: World, paths: list[str]) -> tuple[list[Located], int]:
     return found, len(files)
 
 
-def _wait(world: World, paths: list[str]) -> None:
+def _wait(world: Library, paths: list[str]) -> None:
     """Come back when a file has changed, appeared or gone."""
     from potto.cli.files import expand
 

@@ -20,11 +20,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     from potto.cli.opening import fail, opened
     from potto.facts import derivative_facts
+    from potto.library import NO_SUCH_DEFINITION, NOWHERE, Library
     from potto.modules import DefinitionTarget, names, resolve
     from potto.render import Located, ProgramError
-    from potto.world import NO_SUCH_DEFINITION, NOWHERE, World
 
-    world = World(["."])
+    world = Library(["."])
     try:
         file = opened(world, options.file)
         world.require(file)

@@ -79,7 +79,8 @@ def _types(world: World, file: str) -> Iterator[Section]:
     from potto.modules import names
     from potto.types import format_type, interface
 
-    yield "", "\n".join(f"{name} : {format_type(interface(world.db, file, name).type)}" for name in names(world.db, file))
+    db = world.db
+    yield "", "\n".join(f"{name} : {format_type(interface(db, file, name).type)}" for name in names(db, file))
 
 
 def _core(world: World, file: str) -> Iterator[Section]:

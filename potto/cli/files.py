@@ -6,10 +6,10 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 
+from potto.library import NO_FILE
 from potto.modules.lookup import SUFFIXES
 from potto.render import Located
 from potto.source import Span
-from potto.world import NO_FILE
 
 STDIN = "<stdin>"
 SKIPPED = {"__pycache__", "node_modules", "build", "dist"}

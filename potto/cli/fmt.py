@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 from potto.cli.console import Console
 
 if TYPE_CHECKING:
+    from potto.library import Library
     from potto.render import Located
-    from potto.world import World
 
 SUMMARY = "format programs"
 EXAMPLE = "  potto fmt --diff examples/"
@@ -27,10 +27,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     from potto.cli.files import expand
     from potto.cli.opening import opened
+    from potto.library import Library
     from potto.render import ProgramError, all_to_json
-    from potto.world import World
 
-    world = World()
+    world = Library()
     files, problems = expand(options.paths)
     changed: list[str] = []
     for path in files:
@@ -52,7 +52,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 
 def _format(
-    world: World, path: str, key: str, options: argparse.Namespace, console: Console
+    world: Library, path: str, key: str, options: argparse.Namespace, console: Console
 ) -> tuple[list[Located], bool]:
     """Format one file as the options say; what is wrong with it, and whether it was (or would be) changed."""
     from potto.check import errors_of

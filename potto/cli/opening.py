@@ -12,10 +12,10 @@ from potto.render import ProgramError, all_to_json
 from potto.source import SourceText
 
 if TYPE_CHECKING:
-    from potto.world import World
+    from potto.library import Library
 
 
-def opened(world: World, path: str) -> str:
+def opened(world: Library, path: str) -> str:
     """The key of a file that a command works on. Raises ProgramError if there is no program there."""
     if path == "-":
         return open_stdin(world)
@@ -26,7 +26,7 @@ def opened(world: World, path: str) -> str:
     return key
 
 
-def open_stdin(world: World) -> str:
+def open_stdin(world: Library) -> str:
     """Standard input as a file of the working folder, so that its imports are found there."""
     key = os.path.join(os.getcwd(), STDIN)
     problem = world.put_bytes(key, read_stdin())

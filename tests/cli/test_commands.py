@@ -1,0 +1,283 @@
+"""What each command answers, where, and with which status."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+from conftest import Potto
+
+from potto.cli import COMMANDS, LATER
+
+HALF = "def f(t)\n    integral [0, 1] [x < t] d(x)\n"
+WRONG = "def f(t)\n    integral [0, 1] (if x < t then 1 else 0) d(x)\n"
+
+
+def test_run_prints_values_and_duals(potto: Potto) -> None:
+    ran = potto("run", "main.po", main=HALF + "print(f(0.25), deriv(f)((0.25, 1)))\nf(0.5)\n")
+    assert (ran.status, ran.out, ran.err) == (0, "0.25 (0.25, 1)\n0.5\n", "")
+
+
+def test_run_stops_at_a_wrong_file_before_it_prints(potto: Potto) -> None:
+    ran = potto("run", "main.po", main="print(1)\n" + WRONG)
+    assert ran.status == 1 and ran.out == ""
+    assert ran.err.startswith("error[P0301]: ") and "\n --> main.po:3:25\n" in ran.err
+
+
+def test_run_shows_what_came_before_an_error_of_evaluation(potto: Potto) -> None:
+    ran = potto("run", "main.po", main="def f(n) if n > 0 then f(n + 1) else 0\nprint(1)\nprint(f(1))\nprint(2)\n")
+    assert ran.status == 1 and ran.out == "1\n"
+    assert "P0503" in ran.err and "main.po:3:7" in ran.err
+
+
+def test_loops_and_names_in_them(potto: Potto) -> None:
+    program = "def g(s, x) s(x)\nfor s in [\\x . x + 1, \\x . x^2]:\n    a = g(s, 3)\n    print(a, a + 1)\n"
+    assert potto("run", "main.po", main=program).out == "4 5\n9 10\n"
+
+
+def test_run_as_json(potto: Potto) -> None:
+    answer = potto("run", "--json", "main.po", main=HALF + "print(f(0.25))\n").json
+    assert answer["output"][0]["text"] == "0.25"
+    assert answer["output"][0]["values"][0]["value"] == 0.25 and answer["diagnostics"] == []
+
+
+def test_eval_json_of_a_dual(potto: Potto) -> None:
+    answer = potto("eval", "main.po", "deriv(f)((0.25, 1))", "--json", main=HALF).json
+    assert math.isclose(answer["value"], 0.25, rel_tol=1e-14)
+    assert math.isclose(answer["tangent"], 1.0, rel_tol=1e-14)  # D of the length of [0, t]
+    assert answer["error"] < 1e-12 and answer["tangent_error"] < 1e-12
+    assert answer["converged"] is True and answer["type"] == "(Real, Real)"
+    assert {"evals", "seconds", "compile_seconds", "method"} <= set(answer)
+
+
+def test_eval_json_of_tuples_and_of_what_json_has_no_numbers_for(potto: Potto) -> None:
+    answer = potto("eval", "main.po", "(1/3, inf, -inf, inf - inf)", "--json", main="").json
+    assert answer["value"] == [1 / 3, "inf", "-inf", "nan"] and answer["tangent"] is None
+
+
+@pytest.mark.parametrize(
+    ("expression", "code"), [("g(1)", "P0201"), ("f(1", "P0102"), ("f(1, 2)", "P0308"), ("", "P01")]
+)
+def test_eval_says_what_is_wrong_with_the_expression(potto: Potto, expression: str, code: str) -> None:
+    ran = potto("eval", "main.po", expression, main=HALF)
+    assert ran.status == 1 and ran.out == "" and f"error[{code}" in ran.err and "<expression>:1:" in ran.err
+    answer = potto("eval", "main.po", expression, "--json").json
+    assert answer["diagnostics"][0]["code"].startswith(code)
+    assert set(answer["diagnostics"][0]["range"]) == {"start", "end"}
+
+
+def test_eval_with_numbers_asked_for(potto: Potto) -> None:
+    options = ("--method", "mc", "--samples", "2e4", "--seed", "3", "--json")
+    first = potto("eval", "main.po", "f(0.25)", *options, main=HALF).json
+    again = potto("eval", "main.po", "f(0.25)", *options).json
+    assert first["method"] == "mc" and first["value"] == again["value"]
+    # 5 standard deviations of a mean of 20,000 values of [x < 1/4]
+    assert abs(first["value"] - 0.25) < 5 * math.sqrt(0.25 * 0.75 / 2e4)
+
+
+@pytest.mark.parametrize("option", [("--rtol", "-1"), ("--rtol", "x"), ("--samples", "0"), ("--method", "best")])
+def test_impossible_options_are_wrong_use(potto: Potto, option: tuple[str, str]) -> None:
+    ran = potto("eval", "main.po", "f(1)", *option, main=HALF)
+    assert ran.status == 2 and ran.out == "" and ran.err
+
+
+def test_stats_go_to_the_person(potto: Potto) -> None:
+    ran = potto("eval", "main.po", "f(0.25)", "--stats", main=HALF)
+    assert ran.out == "0.25\n" and "evaluations" in ran.err and "kernels" in ran.err
+
+
+def test_standard_input_is_a_file_of_the_folder(potto: Potto) -> None:
+    ran = potto("run", "-", stdin="from half import f\nprint(f(0.5))\n", half=HALF)
+    assert ran.out == "0.5\n", ran.err
+    assert "<stdin>:2:25: error[P0301]" in potto("check", "-", stdin=WRONG).out
+
+
+def test_check_answers_in_one_line_and_an_excerpt(potto: Potto) -> None:
+    ran = potto("check", "main.po", main=WRONG)
+    assert ran.status == 1
+    first, *rest = ran.out.splitlines()
+    assert first == "main.po:2:25: error[P0301]: this condition depends on the variable of integration `x`"
+    assert any("^^^^^" in line for line in rest) and any("= help:" in line for line in rest)
+
+
+def test_check_json(potto: Potto) -> None:
+    found = potto("check", "--json", "main.po", main=WRONG).json["diagnostics"]
+    assert found[0]["code"] == "P0301" and found[0]["severity"] == "error" and found[0]["file"] == "main.po"
+    assert found[0]["range"] == {"start": {"line": 1, "character": 24}, "end": {"line": 1, "character": 29}}
+    assert potto("check", "--json", "main.po", main=HALF).json == {"diagnostics": []}
+
+
+def test_check_walks_folders(potto: Potto, tmp_path: Path) -> None:
+    inner = tmp_path / "pkg" / "deep"
+    inner.mkdir(parents=True)
+    (inner / "bad.po").write_text(WRONG)
+    (tmp_path / "pkg" / ".hidden").mkdir()
+    (tmp_path / "pkg" / ".hidden" / "worse.po").write_text("def (")
+    ran = potto("check", "pkg")
+    assert ran.status == 1 and "pkg/deep/bad.po:2:25" in ran.out and "worse" not in ran.out
+
+
+def test_related_places_in_other_files(potto: Potto) -> None:
+    ran = potto("check", "main.po", lib="def step(y) if y > 0 then 1 else 0\n",
+                main="from lib import step\ndef f(t)\n    integral [0, 1] step(t - x) d(x)\n")  # fmt: skip
+    assert ran.status == 1 and "P0301" in ran.out and "lib.po:1:" in ran.out
+
+
+def test_fmt(potto: Potto, tmp_path: Path) -> None:
+    messy = "def f( t )\n    integral [0,1]   [x<t] d(x)  # keep\n"
+    ran = potto("fmt", "--check", "main.po", main=messy)
+    assert ran.status == 1 and (tmp_path / "main.po").read_text() == messy
+    ran = potto("fmt", "--diff", "main.po")
+    assert ran.status == 1 and "-def f( t )" in ran.out and "+def f(t)" in ran.out
+    assert potto("fmt", "main.po").status == 0
+    formatted = (tmp_path / "main.po").read_text()
+    assert "# keep" in formatted and "def f(t)" in formatted
+    assert potto("fmt", "--check", "main.po").status == 0
+    assert potto("fmt", "-", stdin=messy).out == formatted
+
+
+def test_fmt_leaves_alone_what_it_cannot_read(potto: Potto, tmp_path: Path) -> None:
+    ran = potto("fmt", "main.po", main="def f(t) (t\n")
+    assert ran.status == 1 and "P0102" in ran.err and (tmp_path / "main.po").read_text() == "def f(t) (t\n"
+
+
+def test_live_expressions(potto: Potto) -> None:
+    good = HALF + "#> f(1/3)\n#= 0.333\n#> deriv(f)((0.3, 1))\n#= (0.3, 1)\n#> f(2)\n"
+    ran = potto("test", "main.po", main=good)
+    assert ran.status == 0 and "3 live expressions in 1 file: all hold" in ran.out
+    ran = potto("test", "main.po", main=HALF + "#> f(1/3)\n#= 0.334\n")
+    assert ran.status == 1 and "main.po:3: f(1/3)" in ran.err and "expected 0.334" in ran.err
+    ran = potto("test", "--json", "main.po", main=HALF + "#> nothing\n#= 1\n")
+    assert ran.status == 1 and "not defined" in ran.json["tests"][0]["message"]
+
+
+@pytest.mark.parametrize("wrong", ["0.30001", "(0.3, 1)", "1", "0.3 + 1e-9", "nan"])
+def test_a_live_expression_does_not_hold_by_accident(potto: Potto, wrong: str) -> None:
+    assert potto("test", "main.po", main=HALF + f"#> f(0.3)\n#= {wrong}\n").status == 1
+
+
+def test_explain(potto: Potto) -> None:
+    ran = potto("explain", "p0520")
+    assert ran.status == 0 and ran.out.startswith("P0520: a setting")
+    assert "```" not in ran.out
+    assert "P0520  a setting" in potto("explain").out
+    ran = potto("explain", "P9999")
+    assert ran.status == 2 and "no diagnostic P9999" in ran.err
+    assert potto("explain", "--json", "P0520").json["pages"][0]["code"] == "P0520"
+
+
+def test_deriv(potto: Potto) -> None:
+    ran = potto("deriv", "main.po", "f", main=HALF)
+    assert ran.status == 0
+    assert "f : (t: Real) -> Real" in ran.out and "dt*delta(t - x)" in ran.out and "t - x = 0" in ran.out
+    ran = potto("deriv", "main.po", "g")
+    assert ran.status == 1 and "P0232" in ran.err
+    assert potto("deriv", "--json", "main.po", "f").json["surfaces"] == ["t - x = 0"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "part"),
+    [
+        ("tokens", "1:1\tDEF\t'def'"),
+        ("tree", "Definition [0, 41) name='f'"),
+        ("types", "f : (t: Real) -> Real"),
+        ("core", "integral [0, 1] [x < t] d(x)"),
+        ("deriv", "delta(t - x)"),
+        ("kernel", "def kernel("),
+    ],
+)
+def test_dump(potto: Potto, kind: str, part: str) -> None:
+    ran = potto("dump", kind, "main.po", main=HALF)
+    assert ran.status == 0 and part in ran.out
+
+
+def test_cache(potto: Potto, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("POTTO_CACHE", str(tmp_path))
+    (tmp_path / "grammar-0.json").write_text("{}")
+    (tmp_path / "mine.txt").write_text("keep")
+    ran = potto("cache", "--json")
+    assert ran.json["folder"] == str(tmp_path) and ran.json["files"] >= 1
+    assert potto("cache", "--clear").status == 0
+    assert not list(tmp_path.glob("grammar-*.json")) and (tmp_path / "mine.txt").exists()
+
+
+# The command line itself
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_helps_with_an_example(potto: Potto, command: str) -> None:
+    ran = potto(command, "--help")
+    assert ran.status == 0 and "example:" in ran.out and f"potto {command}" in ran.out
+
+
+@pytest.mark.parametrize("command", LATER)
+def test_commands_of_later_releases_say_so(potto: Potto, command: str) -> None:
+    ran = potto(command, "--stdio")
+    assert ran.status == 2 and ran.out == "" and "later release" in ran.err
+    assert f"  {command} " not in potto("--help").out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ([], ""),
+        (["chek"], "did you mean `check`?"),
+        (["--nope"], "no option --nope"),
+        (["eval", "main.po"], "EXPR"),
+        (["check"], "PATH"),
+        (["check", "--nope", "x.po"], "--nope"),
+        (["dump", "ast", "main.po"], "tokens"),
+    ],
+)
+def test_wrong_use(potto: Potto, arguments: list[str], said: str) -> None:
+    ran = potto(*arguments)
+    assert ran.status == 2 and said in ran.err
+
+
+def test_colours(potto: Potto, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert "\x1b[" in potto("check", "main.po", "--color", "always", main=WRONG).out
+    assert "\x1b[" not in potto("check", "main.po").out
+    monkeypatch.setenv("NO_COLOR", "1")
+    assert "\x1b[" not in potto("check", "main.po", "--color", "auto").out
+
+
+def test_a_bug_of_ours_is_a_short_report(potto: Potto, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*arguments: object) -> None:
+        raise AssertionError("impossible")
+
+    monkeypatch.setattr("potto.check.syntax_diagnostics", broken)
+    ran = potto("check", "main.po", main=HALF)
+    assert ran.status == 70 and "internal error (AssertionError)" in ran.err and "potto check main.po" in ran.err
+    report = Path(ran.err.split("report:")[1].strip())
+    assert "impossible" in report.read_text()
+    report.unlink()
+
+
+def test_an_interrupt_ends_with_130(potto: Potto, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*arguments: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("potto.check.syntax_diagnostics", interrupted)
+    assert potto("check", "main.po", main=HALF).status == 130
+
+
+def test_watch_looks_again_when_a_file_changes(potto: Potto, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    looks = iter([HALF + "g = 1\n"])
+
+    def edit(pause: float) -> None:
+        try:
+            (tmp_path / "main.po").write_text(next(looks))
+        except StopIteration:
+            raise KeyboardInterrupt from None
+
+    monkeypatch.setattr("potto.cli.check.time.sleep", edit)
+    ran = potto("check", "--watch", "main.po", main=WRONG)
+    assert ran.status == 130
+    assert ran.out.count("P0301") == 1 and "1 error" in ran.err and "no problems" in ran.err
+
+
+def test_json_is_one_line(potto: Potto) -> None:
+    ran = potto("eval", "main.po", "f(0.5)", "--json", main=HALF)
+    assert ran.out.count("\n") == 1 and json.loads(ran.out)

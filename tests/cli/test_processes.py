@@ -1,0 +1,80 @@
+"""The command line as a process: how it starts, ends, and speaks to pipes."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+import tomllib
+from pathlib import Path
+
+import potto
+
+ROOT = Path(__file__).resolve().parents[2]
+COMMAND = [sys.executable, "-m", "potto"]
+
+
+def test_the_version_is_the_packages() -> None:
+    declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    ran = subprocess.run([*COMMAND, "--version"], capture_output=True, text=True, check=True)
+    assert ran.stdout == f"potto {declared}\n" and potto.__version__ == declared
+
+
+def test_the_version_comes_at_once() -> None:
+    """Under 60 ms beyond Python itself, best of a few, so that a busy machine does not fail it."""
+
+    def best(command: list[str]) -> float:
+        times = []
+        for _ in range(7):
+            start = time.perf_counter()
+            subprocess.run(command, capture_output=True, check=True)
+            times.append(time.perf_counter() - start)
+        return min(times)
+
+    assert best([*COMMAND, "--version"]) - best([sys.executable, "-c", "pass"]) < 0.06
+
+
+def test_the_version_imports_nothing_heavy() -> None:
+    code = "import sys, potto.__main__ as m; m.main(['--version']); print(sorted(sys.modules))"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    for name in ("numpy", "lark", "argparse", "potto.syntax", "asyncio"):
+        assert f"'{name}'" not in loaded
+
+
+def test_checking_and_formatting_need_no_numpy_and_no_lark(tmp_path: Path) -> None:
+    file = tmp_path / "main.po"
+    file.write_text("def f(t)\n    integral [0, 1] [x < t] d(x)\n")
+    subprocess.run([*COMMAND, "check", str(file)], check=True, capture_output=True)  # fills the cache of tables
+    code = (
+        "import sys, potto.__main__ as m\n"
+        f"assert m.main(['check', {str(file)!r}]) == 0 and m.main(['fmt', {str(file)!r}]) == 0\n"
+        f"assert m.main(['deriv', {str(file)!r}, 'f']) == 0\n"
+        "sys.exit('numpy' in sys.modules or 'lark' in sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+
+
+def test_a_reader_that_leaves_is_no_error(tmp_path: Path) -> None:
+    file = tmp_path / "main.po"
+    file.write_text("".join(f"print({n})\n" for n in range(3000)))
+    writer = subprocess.Popen([*COMMAND, "run", str(file)], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert writer.stdout is not None and writer.stderr is not None
+    writer.stdout.readline()
+    writer.stdout.close()
+    said = writer.stderr.read().decode()
+    writer.wait(60)
+    assert said == ""
+
+
+def test_a_terminal_that_knows_only_ascii(tmp_path: Path) -> None:
+    file = tmp_path / "main.po"
+    file.write_text("def f(θ) θ + ψ\n")
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
+    ran = subprocess.run([*COMMAND, "check", str(file)], capture_output=True, env=environment, check=False)
+    assert ran.returncode == 1 and b"P0201" in ran.stdout and b"Traceback" not in ran.stderr
+
+
+def test_standard_input_as_a_pipe() -> None:
+    ran = subprocess.run([*COMMAND, "eval", "-", "f(3)"], input="def f(x) x^2\n", capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stdout) == (0, "9\n")
