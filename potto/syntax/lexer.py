@@ -27,7 +27,8 @@ _BOUNDS = re.compile(r"[ \t\n]*[\[(]")
 _RETURNED = re.compile(r"[ \t]+[^\s=]")
 _DEFINES = re.compile(rf"[ \t]+{FIRST_NAME.pattern}")
 _CONTINUES = re.compile(r"(?:then|else|in|and|or)\b|[*/^?:,)\].=<>≤≥≠+]|!=|->")
-_CLAUSE = re.compile(r"(?:inverse|where)\b")
+_CLAUSE = re.compile(r"(?:inverse|where)\b(?![ \t]*=(?!=))")
+_ENDS_OPERAND = frozenset({"NAME", "NUMBER", "MEMBER", "RPAR", "RSQB"})
 _LINE = re.compile(r"([ \t\f\v]*)([^\n]?)")
 
 
@@ -103,7 +104,7 @@ class _Lexer:
                 return end
             if word == "d" and nesting.words and _D.match(self.text, end) and nesting.close_integral():
                 kind = "D"
-            elif self.clauses and not nesting.brackets and word in ("inverse", "where"):
+            elif self.clauses and self._starts_clause(start):
                 kind = word.upper()
         elif kind in ("LET", "SUM", "INTEGRAL"):
             nesting.open_word(kind, start)
@@ -114,6 +115,17 @@ class _Lexer:
             kind, self.clauses = "DIFFEODEF", True
         self._add(kind, word, start, end)
         return end
+
+    def _starts_clause(self, start: int) -> bool:
+        """Whether `inverse` or `where` stands after the components of a diffeomorphism; elsewhere they are names."""
+        tokens = self.tokens
+        return (
+            not self.nesting.brackets
+            and _CLAUSE.match(self.text, start) is not None
+            and len(tokens) > 2
+            and tokens[-1].kind in _ENDS_OPERAND
+            and (tokens[1].kind == "EQ" or self.blocks.state not in ("diffeo", "start"))
+        )
 
     def _add(self, kind: str, word: str, start: int, end: int) -> None:
         token = _new(Token, (kind, word, start, end))

@@ -111,6 +111,8 @@ def lark_parser(grammar: str) -> Any:
     class Tokens(Lexer):
         """Gives lark the `(kind, text, start)` triples that it was called with."""
 
+        __future_interface__ = 2
+
         def __init__(self, _configuration: Any) -> None:
             pass
 

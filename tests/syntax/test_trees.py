@@ -339,6 +339,10 @@ class TestDiffeomorphisms:
 
     def test_inverse_and_where_are_names_elsewhere(self) -> None:
         assert isinstance(item("inverse = where + 1"), Definition)
+        assert isinstance(item(r"inverse = \x . where + x", diffeo=True), DiffeoDefinition)
+        found = item("diffeo where(x) =\n    inverse = x\n    (inverse, 2)\n    where where > 0")
+        assert isinstance(found, DiffeoDefinition)
+        assert (len(found.bindings), len(found.where)) == (1, 1)
 
 
 class TestImportsAndStatements:

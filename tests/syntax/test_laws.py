@@ -1,0 +1,143 @@
+"""Laws over random trees and random damage: printing, formatting and repair, and our automaton against lark's own."""
+
+from __future__ import annotations
+
+import dataclasses
+import random
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from potto.syntax import format_source, parse_chunk, parse_expression, print_expression, print_item, split, tokenize
+from potto.syntax.engine import Engine
+from potto.syntax.groups import Context
+from potto.syntax.lexer import lex
+from potto.syntax.nodes import Paren
+from potto.syntax.tables import grammar_text, lark_parser
+from potto.syntax.walk import without_spans
+from syntax_samples import SAMPLES
+from syntax_trees import expressions, items
+
+LAW = settings(max_examples=150, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+
+
+def bare(tree: Any) -> Any:
+    """A tree without spans and parentheses."""
+    if isinstance(tree, Paren):
+        return bare(tree.inner)
+    if isinstance(tree, tuple):
+        return tuple(bare(item) for item in tree)
+    if not dataclasses.is_dataclass(tree) or isinstance(tree, type):
+        return tree
+    return type(tree)(**{f.name: bare(getattr(tree, f.name)) for f in dataclasses.fields(tree)})
+
+
+@LAW
+@given(tree=expressions)
+def test_printing_reads_back_as_the_same_expression(tree: Any) -> None:
+    text = print_expression(tree)
+    parsed = parse_expression(text)
+    assert parsed.diagnostics == (), text
+    assert bare(without_spans(parsed.expr)) == bare(tree), text
+
+
+@LAW
+@given(tree=items)
+def test_printing_reads_back_as_the_same_item(tree: Any) -> None:
+    text = print_item(tree)
+    (chunk,) = split(text)
+    parsed = parse_chunk(chunk.text)
+    assert parsed.diagnostics == (), text
+    assert bare(without_spans(parsed.item)) == bare(tree), text
+
+
+@LAW
+@given(tree=items, seed=st.integers(0, 2**16))
+def test_formatting_keeps_the_tree_and_is_idempotent(tree: Any, seed: int) -> None:
+    text = ruffled(print_item(tree), random.Random(seed))
+    before = parse_chunk(text)
+    if before.diagnostics:
+        return
+    formatted = format_source(text)
+    (chunk,) = split(formatted)
+    after = parse_chunk(chunk.text)
+    assert after.diagnostics == ()
+    assert without_spans(after.item) == without_spans(before.item), formatted
+    assert sorted(c.text for c in after.comments) == sorted(c.text for c in before.comments)
+    assert format_source(formatted) == formatted
+
+
+def ruffled(text: str, rng: random.Random) -> str:
+    """A text with other blanks, line breaks and comments within its brackets, to be put in order again."""
+    out, last, depth = [], 0, 0
+    for token in tokenize(text):
+        gap = text[last : token.start]
+        if depth and "\n" not in gap:
+            gap = rng.choice([gap, gap, gap, gap + "  ", gap + "\n  ", f"{gap} # why {len(out)}\n "])
+        out += [gap, token.text]
+        depth += (token.kind in ("LPAR", "LSQB")) - (token.kind in ("RPAR", "RSQB"))
+        last = token.end
+    return "".join(out)
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_formatting_the_samples(name: str) -> None:
+    text, diffeo = SAMPLES[name], name.endswith(".diffeo")
+    formatted = format_source(text, diffeo)
+    assert format_source(formatted, diffeo) == formatted
+    assert [c.text for c in tokenize(text, diffeo)] == [c.text for c in tokenize(formatted, diffeo)]
+    trees = [without_spans(parse_chunk(chunk.text, diffeo).item) for chunk in split(text)]
+    assert trees == [without_spans(parse_chunk(chunk.text, diffeo).item) for chunk in split(formatted)]
+
+
+@LAW
+@given(text=st.text(alphabet="abd x12.,;:()[]=+-*/^<>?\\~#\n\t λ∫\r", max_size=60))
+def test_any_text_has_a_tree_and_a_format(text: str) -> None:
+    for chunk in split(text):
+        parsed = parse_chunk(chunk.text)
+        assert parsed.item is not None or parsed.comments or parsed.diagnostics
+        for diagnostic in parsed.diagnostics:
+            assert 0 <= diagnostic.span.start <= diagnostic.span.end <= len(chunk.text)
+    formatted = format_source(text)
+    assert format_source(formatted) == formatted
+
+
+WORDS = "def f x ( ) [ ] , . : = + * - ^ < if then else let in integral d(x) sum 1 2.5 \\ ? and not .. ; ~ for diffeo\n   ".split(" ")
+
+
+@LAW
+@given(words=st.lists(st.sampled_from(WORDS), max_size=25))
+def test_any_words_have_a_tree(words: list[str]) -> None:
+    for chunk in split(" ".join(words).lstrip()):
+        parsed = parse_chunk(chunk.text)
+        assert parsed.item is not None or parsed.diagnostics
+
+
+class TestAgainstLark:
+    """Our driver accepts what lark's own parser accepts, over the same tables' grammar."""
+
+    parser = lark_parser(grammar_text())
+
+    def accepts(self, tokens: list[Any]) -> bool:
+        from lark.exceptions import UnexpectedToken
+
+        try:
+            self.parser.parse([(t.kind, t.text, t.start) for t in tokens if t.kind != "$END"], start="chunk")
+        except UnexpectedToken:
+            return False
+        return True
+
+    def ours(self, tokens: list[Any]) -> bool:
+        return Engine(Context("", False), "chunk").run(tokens, 0) == len(tokens)
+
+    @pytest.mark.parametrize("name", SAMPLES)
+    def test_samples_and_what_is_left_of_them(self, name: str) -> None:
+        rng = random.Random(7)
+        for chunk in split(SAMPLES[name]):
+            tokens = lex(chunk.text, name.endswith(".diffeo")).tokens
+            assert self.accepts(tokens) and self.ours(tokens)
+            for _ in range(10):
+                index = rng.randrange(len(tokens) - 1)
+                fewer = tokens[:index] + tokens[index + 1 :]
+                assert self.accepts(fewer) == self.ours(fewer)
