@@ -128,7 +128,7 @@ class _Factors:
                     self.levels += b is not root
                     stack.extend(((b, -n), (a, n)))
                 case Prim(op="neg", args=(a,)):
-                    self.coefficient *= (-1) ** n
+                    self.coefficient = -self.coefficient if n % 2 else self.coefficient
                     stack.append((a, n))
                 case Prim(op="pow", args=(a, Const(value=value))) if value.is_integer() and abs(value * n) <= 64:
                     stack.append((a, n * int(value)))

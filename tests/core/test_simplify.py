@@ -65,6 +65,7 @@ def text(term: Term) -> str:
         (add(const(0.1), const(1.0)), "0.1 + 1"),
         (add(const(0.1), neg(ONE), x, const(-0.1), ONE), "x"),
         (add(const(0.5), x, const(0.25)), "0.75 + x"),
+        (div(mul(THREE, neg(t)), prim("neg", mul(THREE, x))), "t/x"),
         (mul(ZERO, prim("log", x)), "0"),
         (div(mul(x, t), x), "t"),
         (mul(div(x, y), y), "x"),
