@@ -116,6 +116,28 @@ def meaning(db: Database, file: str, name: str) -> Imported | Defined | None:
     return db.entry(scope, (file,), name)
 
 
+def is_entry(file: str) -> bool:
+    """Whether this is a pseudo file, such as an entry of a prompt, which may go on from others."""
+    return file.startswith("<")
+
+
+def preludes(db: Database, file: str) -> Iterator[str]:
+    """The files whose names an entry of a prompt sees behind its own, the latest first.
+
+    The input `("prelude", entry)` names the files that it goes on from; earlier entries among them have their own.
+    """
+    seen = {file}
+    stack = [file]
+    while stack:
+        at = stack.pop()
+        if at != file:
+            yield at
+        earlier: tuple[str, ...] = db.get_input(("prelude", at), ()) if is_entry(at) else ()
+        fresh = [other for other in earlier if other not in seen]
+        seen.update(fresh)
+        stack += reversed(fresh)
+
+
 def is_written(module: str) -> bool:
     """Whether a module's name is there in full: while it is typed it is not."""
     return all(module.split("."))
@@ -145,10 +167,13 @@ def trail(db: Database, file: str, name: str) -> Trail:
             return Trail(None, tuple(steps), circular=True)
         steps[here] = None
         bound = meaning(db, file, name)
+        if bound is None and is_entry(file):
+            file = next((earlier for earlier in preludes(db, file) if meaning(db, earlier, name) is not None), file)
+            bound = meaning(db, file, name)
         if bound is None:
             return Trail(None, tuple(steps))
         if isinstance(bound, Defined):
-            return Trail(here, tuple(steps))
+            return Trail(DefinitionTarget(file, name), tuple(steps))
         module, original = bound.module, bound.name
         target = find_module(db, file, module)
         if original is not None and (target is None or meaning(db, target, original) is None):

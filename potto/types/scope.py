@@ -15,7 +15,7 @@ from typing import Literal
 
 from potto.diagnostics import Diagnostic
 from potto.modules.graph import refer
-from potto.modules.lookup import DefinitionTarget, ModuleTarget, find_module, resolve_module
+from potto.modules.lookup import DefinitionTarget, ModuleTarget, find_module, preludes, resolve_module
 from potto.modules.texts import imports, names
 from potto.primitives import PRIMITIVES
 from potto.query import Database
@@ -204,12 +204,15 @@ def modules_with(outside: Outside, name: str) -> tuple[str, ...]:
 
 
 def _file_names(outside: Outside) -> tuple[str, ...]:
-    found = list(names(outside.db, outside.file))
-    for item in imports(outside.db, outside.file):
-        if isinstance(item, nodes.Import):
-            found.append(item.alias or item.module)
-        else:
-            found.extend(imported.alias or imported.name for imported in item.names)
+    """The names at the top of a file, and behind an entry of a prompt those of the entries before."""
+    found: list[str] = []
+    for file in (outside.file, *preludes(outside.db, outside.file)):
+        found += names(outside.db, file)
+        for item in imports(outside.db, file):
+            if isinstance(item, nodes.Import):
+                found.append(item.alias or item.module)
+            else:
+                found.extend(imported.alias or imported.name for imported in item.names)
     return tuple(found)
 
 
