@@ -189,7 +189,10 @@ def trail(db: Database, file: str, name: str) -> Trail:
 @query
 def resolve(db: Database, file: str, name: str) -> Target | None:
     """What a name means at the top of a file: a definition, here or where it was imported from, or a module."""
-    return trail(db, file, name).target
+    bound = meaning(db, file, name)
+    if isinstance(bound, Defined):
+        return DefinitionTarget(file, name)
+    return None if bound is None else trail(db, file, name).target
 
 
 @query

@@ -8,7 +8,8 @@ import time
 
 import pytest
 
-from potto.query import SEGMENT, Cancelled, CycleError, Database, Event, query
+from potto.query import Cancelled, CycleError, Database, Event, query
+from potto.query.engine import SEGMENT
 
 
 @query

@@ -1,0 +1,175 @@
+"""`Database`: inputs, reading, threads, events, and what is forgotten."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterator, Mapping
+from contextlib import contextmanager
+from threading import get_ident
+from typing import Any, TypeVar, cast
+
+from potto.query.engine import Engine, drop
+from potto.query.nodes import FOREVER, MISSING, Entry, Event, Input, Memo, Query, same
+
+K = TypeVar("K")
+V = TypeVar("V")
+
+
+class Database(Engine):
+    """Inputs and memos of one world. Every query takes it as its first argument."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        #: Called once for an input that is read and was never set: gives `(value, durability)`, or None for "none".
+        #: Sound without a new revision, because nothing can have read it before.
+        self.on_missing_input: Callable[[Hashable], tuple[Any, int] | None] | None = None
+        self._inputs: dict[Hashable, Input] = {}
+        self._limits: dict[Query, int] = {}
+
+    # Inputs
+
+    def set_input(self, key: Hashable, value: Any, durability: int = 0) -> bool:
+        """Set an input; True if it changed. An equal value changes nothing and costs no revision."""
+        with self.evaluating():
+            self._forbid_in_queries("set_input")
+            old = self._inputs.get(key)
+            if old is None:
+                self._inputs[key] = Input(value, self.revision, durability)
+                self._log("input", "input", (key,))
+                return True
+            differs = old.value is MISSING or not same(old.value, value)
+            if not differs and old.durability == durability:
+                return False
+            self.revision += 1
+            self._evict()
+            for level in range(max(old.durability, durability) + 1):
+                self._last_changed[level] = self.revision
+            old.durability = durability
+            if differs:
+                old.value, old.changed_at = value, self.revision
+                self._log("input", "input", (key,))
+            return differs
+
+    def get_input(self, key: Hashable, default: Any = None) -> Any:
+        """The value of an input; inside a query it is noted as read, also when it was never set."""
+        if self._owner != get_ident():
+            with self.evaluating():
+                return self.get_input(key, default)
+        node = self._inputs.get(key)
+        if node is None:
+            node = self._load(key)
+        if self._frame is not None:
+            self._frame[node] = None
+        return default if node.value is MISSING else node.value
+
+    def _load(self, key: Hashable) -> Input:
+        """An input that is read and was never set. What the loader reads is not read by the query that runs."""
+        frame, self._frame = self._frame, None
+        try:
+            loaded = self.on_missing_input(key) if self.on_missing_input is not None else None
+        finally:
+            self._frame = frame
+        value, durability = loaded if loaded is not None else (MISSING, 0)
+        node = self._inputs[key] = Input(value, self.revision, durability)
+        return node
+
+    def input_keys(self) -> tuple[Hashable, ...]:
+        """The keys of all inputs that were set or read."""
+        with self.evaluating():
+            return tuple(self._inputs)
+
+    # Reading
+
+    def entry(self, table: Callable[..., Mapping[K, V]], args: tuple[Hashable, ...], key: K) -> V | None:
+        """What the mapping `table(db, *args)` has under `key`, reading (and depending on) that alone."""
+        if self._owner != get_ident():
+            with self.evaluating():
+                return self.entry(table, args, key)
+        query: Query = table.query  # type: ignore[attr-defined]
+        memo = self._memos[query].get(args)
+        if memo is None or memo.verified_at < self.revision or self._cancelled == self._evaluation:
+            memo = self._demand_unread(query, args)
+        if memo.entries is None:
+            memo.entries = {}
+        node = memo.entries.get(key)
+        if node is None:
+            node = memo.entries[key] = Entry(memo, memo.value.get(key))
+        if self._frame is not None:
+            self._frame[node] = None
+        return cast("V | None", node.value)
+
+    def _demand_unread(self, query: Query, args: tuple[Hashable, ...]) -> Memo:
+        """The memo of a query, up to date, without noting that it was read, unless it fails."""
+        frame, self._frame = self._frame, None
+        try:
+            return self._demand(query, args)
+        except Exception:
+            if frame is not None:
+                frame[self._memos[query][args]] = None
+            raise
+        finally:
+            self._frame = frame
+
+    @contextmanager
+    def evaluating(self) -> Iterator[None]:
+        """Hold the database: no other thread writes or evaluates. `cancel` holds for all of the block."""
+        if self._owner == get_ident():
+            yield
+            return
+        self._acquire()
+        try:
+            yield
+        finally:
+            self._release()
+
+    # Events
+
+    @property
+    def events(self) -> list[Event]:
+        """What was recorded so far by the innermost `recording`."""
+        return self._events if self._events is not None else []
+
+    @contextmanager
+    def recording(self) -> Iterator[list[Event]]:
+        """Record events in the list that this gives."""
+        before, logs, self._events, self._logs = self._events, self._logs, [], True
+        try:
+            yield self._events
+        finally:
+            self._events, self._logs = before, logs
+
+    # Forgetting
+
+    def forget(self, predicate: Callable[[str, tuple[Hashable, ...]], bool]) -> int:
+        """Drop the memos whose query's name and arguments fulfil `predicate`; how many. Asked again, they run again."""
+        return self._forget(lambda memo: predicate(memo.query.name, memo.args))
+
+    def forget_unused(self, revisions: int, durability: int = 0) -> int:
+        """Drop the memos of at most this durability that nobody asked for in the last `revisions` revisions."""
+        before = self.revision - revisions
+        return self._forget(lambda memo: memo.verified_at < before and memo.durability <= durability)
+
+    def _forget(self, predicate: Callable[[Memo], bool]) -> int:
+        with self.evaluating():
+            self._forbid_in_queries("forget")
+            return sum(drop(table, [m for m in table.values() if predicate(m)]) for table in self._memos.values())
+
+    def _evict(self) -> None:
+        """Bring the tables of queries that `keep` back to size. Only between evaluations: nothing is in use then.
+
+        The longest unused go first. A memo that reads no input is verified for ever, so whether it is used shows only
+        after it was set back to the present revision: it goes at the sweep after, if it is still there.
+        """
+        for query, table in self._memos.items():
+            if not query.keep or len(table) <= self._limits.get(query, query.keep):
+                continue
+            by_age = sorted(table.values(), key=lambda memo: memo.verified_at)
+            surplus = by_age[: len(table) - query.keep // 2]
+            drop(table, [memo for memo in surplus if memo.verified_at < self.revision - 1])
+            for memo in table.values():
+                if memo.verified_at == FOREVER:
+                    memo.verified_at = self.revision
+            self._limits[query] = max(query.keep, len(table) + query.keep // 2)
+
+    def _forbid_in_queries(self, what: str) -> None:
+        if self._running:
+            raise RuntimeError(f"the query {self._running[-1]} calls {what}: queries are pure")

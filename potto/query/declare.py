@@ -1,0 +1,55 @@
+"""`query`: a function becomes a query."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Hashable
+from threading import get_ident
+from typing import Any, Concatenate, ParamSpec, TypeVar, overload
+
+from potto.query.database import Database
+from potto.query.nodes import GONE, Cancelled, Query
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+@overload
+def query(function: Callable[Concatenate[Database, P], R], /) -> Callable[Concatenate[Database, P], R]: ...
+@overload
+def query(
+    *, cycle: Callable[..., Any] | None = None, keep: int = 0
+) -> Callable[[Callable[Concatenate[Database, P], R]], Callable[Concatenate[Database, P], R]]: ...
+def query(
+    function: Callable[..., Any] | None = None, /, *, cycle: Callable[..., Any] | None = None, keep: int = 0
+) -> Any:
+    """Declare a query `f(db, *hashable_args)`, called with positional arguments.
+
+    `cycle(db, *args)` gives its value when it is found in a cycle. `keep`: about how many memos are kept, for a query
+    whose arguments go out of use (texts); the longest unused go first, those of the present revision never.
+    """
+    if function is None:
+        return lambda f: _declare(Query(f, cycle, keep))
+    return _declare(Query(function, cycle, keep))
+
+
+def _declare(declared: Query) -> Callable[..., Any]:
+    @functools.wraps(declared.function)
+    def call(db: Database, *args: Hashable) -> Any:
+        # What happens at a hit, all in one place: this is the hottest code of the front end.
+        memo = db._memos[declared].get(args)
+        if memo is not None and memo.verified_at >= db.revision:
+            if db._owner == get_ident():
+                if db._cancelled == db._evaluation:
+                    raise Cancelled
+                frame = db._frame
+                if frame is not None:
+                    frame[memo] = None
+                return memo.value
+            value = memo.value
+            if value is not GONE:  # else forgotten by another thread at this very moment
+                return value
+        return db._demand(declared, args).value
+
+    call.query = declared  # type: ignore[attr-defined]
+    return call

@@ -1,0 +1,286 @@
+"""Demanding, verifying and running queries, and the cycles that show on the way.
+
+Verification is iterative. Running is recursive by nature; every `SEGMENT` levels it moves to a fresh thread, which owns
+the database while the old one waits, so that a chain of any length overflows no stack.
+"""
+
+from __future__ import annotations
+
+import contextvars
+import os
+import sys
+import threading
+from collections import defaultdict
+from collections.abc import Callable, Hashable
+from threading import get_ident
+from typing import Any, Final, Literal
+
+from potto.query.nodes import DURABILITIES, FOREVER, GONE, Cancelled, CycleError, Event, Memo, Node, Query, short
+
+SEGMENT: Final = 40  # levels of running queries on one thread: at 20 frames a level still below the limit
+
+
+class Engine:
+    """The memos of one world, and what keeps them right. See `Database` for what it offers."""
+
+    def __init__(self) -> None:
+        self.revision = 1
+        self._memos: defaultdict[Query, dict[tuple[Hashable, ...], Memo]] = defaultdict(dict)
+        self._last_changed = [1] * (DURABILITIES + 1)  # by durability; of what reads no input: never
+        self._lock = threading.Lock()
+        self._owner = 0  # the thread that evaluates or writes
+        self._evaluation, self._cancelled = 1, 0  # the number of the present evaluation and of the one to cancel
+        self._frame: dict[Node, None] | None = None  # what the running query has read
+        self._running: list[Memo] = []
+        self._provisional: list[Memo] = []  # finished members of a cycle whose first query still runs
+        self._events: list[Event] | None = None
+        self._print = "query" in os.environ.get("POTTO_LOG", "").split(",")
+        self._logs = self._print
+
+    def cancel(self) -> None:
+        """Make the evaluation that runs now, if any, raise `Cancelled` at its next query."""
+        self._cancelled = self._evaluation
+
+    def _acquire(self) -> None:
+        self._lock.acquire()
+        self._owner = get_ident()
+        self._evaluation += 1
+
+    def _release(self) -> None:
+        self._owner = 0
+        self._evaluation += 1  # a cancellation that comes too late is for nobody
+        self._lock.release()
+
+    def _log(self, kind: Literal["executed", "reused", "input"], name: str, args: tuple[Hashable, ...]) -> None:
+        if self._events is not None:
+            self._events.append(Event(kind, name, args))
+        if self._print:
+            print(f"query: {kind} {name}({', '.join(map(short, args))})", file=sys.stderr)
+
+    # Demanding and verifying
+
+    def _demand(self, query: Query, args: tuple[Hashable, ...]) -> Memo:
+        """The memo of a query, up to date, noted as read by the running query."""
+        if self._owner != get_ident():
+            self._acquire()
+            try:
+                return self._demand(query, args)
+            finally:
+                self._release()
+        if self._cancelled == self._evaluation:
+            raise Cancelled
+        table = self._memos[query]
+        memo = table.get(args)
+        if memo is None:
+            memo = table[args] = Memo(query, args)
+        if self._frame is not None:
+            self._frame[memo] = None
+        if memo.index >= 0 or memo.provisional:
+            self._meet_cycle(memo)
+        elif memo.verified_at < 0:
+            self._run(memo)
+        elif memo.verified_at < self.revision:
+            self._refresh(memo)
+        return memo
+
+    def _refresh(self, root: Memo) -> None:
+        """Bring a memo up to date, its nodes first; without recursion."""
+        stack, places, revision = [root], [0], self.revision
+        while stack:
+            memo = stack[-1]
+            if memo.verified_at >= revision:
+                must_run = False
+            elif memo.verified_at < 0:
+                must_run = True
+            else:
+                below = self._verify(memo, places)
+                if isinstance(below, Memo):
+                    stack.append(below)
+                    places.append(0)
+                    continue
+                must_run = below
+            while must_run:
+                must_run = not self._run_again(memo, memo is root)
+                if must_run:  # it failed, or is no more: whoever read it must find out by running
+                    stack.pop()
+                    places.pop()
+                    memo = stack[-1]
+            stack.pop()
+            places.pop()
+
+    def _verify(self, memo: Memo, places: list[int]) -> Memo | bool:
+        """Go on verifying a memo at `places[-1]`: True if it must run, False if it stands, or the node to do first.
+
+        In the order of reading: a node is looked at only if all that was read before it stands, for else the query
+        might not ask for it any more.
+        """
+        revision, since, last_changed = self.revision, memo.verified_at, self._last_changed
+        if last_changed[memo.durability] > since:
+            durability, deps = DURABILITIES, memo.deps
+            for place in range(places[-1], len(deps)):
+                dep = deps[place]
+                source = dep.source
+                if source is not None and source.verified_at < revision:
+                    if source.verified_at >= 0 and last_changed[source.durability] <= source.verified_at:
+                        source.verified_at = revision
+                    elif source.index >= 0 or source.provisional:
+                        return True
+                    else:
+                        places[-1] = place
+                        return source
+                if dep.changed_at > since:
+                    return True
+            for dep in deps:
+                if dep.durability < durability:
+                    durability = dep.durability
+            memo.durability = durability
+        memo.verified_at = revision if memo.durability < DURABILITIES else FOREVER
+        if self._logs:
+            self._log("reused", memo.query.name, memo.args)
+        return False
+
+    def _run_again(self, memo: Memo, asked: bool) -> bool:
+        """Run a memo that is found stale; False if that gave no value and it was not asked for by itself."""
+        table = self._memos[memo.query]
+        if asked:
+            table[memo.args] = memo
+            self._run(memo)
+            return True
+        if table.get(memo.args) is not memo:
+            return False
+        try:
+            self._run(memo)
+        except Exception:
+            return False  # not swallowed: its reader runs next, asks for it again and meets the exception itself
+        return memo.verified_at >= self.revision
+
+    # Running
+
+    def _run(self, memo: Memo) -> None:
+        """Run a query and keep its answer."""
+        if self._cancelled == self._evaluation:
+            raise Cancelled
+        index, caller, mark = len(self._running), self._frame, len(self._provisional)
+        frame: dict[Node, None] = {}
+        fresh = memo.value is GONE and memo.verified_at < 0
+        memo.index, memo.low, memo.cyclic = index, index, False
+        self._running.append(memo)
+        self._frame = frame
+        if self._logs:
+            self._log("executed", memo.query.name, memo.args)
+        try:
+            memo.put(self._answer(memo), self.revision)
+            self._depend(memo, frame)
+        except BaseException as error:
+            self._fail(memo, frame, mark, fresh, isinstance(error, Exception))
+            raise
+        finally:
+            memo.index = -1
+            self._running.pop()
+            self._frame = caller
+        if memo.low < index:
+            memo.provisional, memo.verified_at = True, -1
+            self._provisional.append(memo)
+            for member in self._provisional[mark:]:  # what hung on this one now hangs on what this one hangs on
+                member.low = min(member.low, memo.low)
+        elif memo.cyclic:
+            self._close_cycle(memo, mark)
+
+    def _answer(self, memo: Memo) -> Any:
+        function, fallback, args = memo.query.function, memo.query.fallback, memo.args
+        try:
+            if memo.index % SEGMENT == SEGMENT - 1:
+                value = self._on_fresh_stack(function, args)
+            else:
+                value = function(self, *args)
+        except CycleError:
+            if fallback is None or not (memo.cyclic or memo.low < memo.index):
+                raise
+            return fallback(self, *args)
+        if fallback is not None and (memo.cyclic or memo.low < memo.index):
+            return fallback(self, *args)
+        return value
+
+    def _depend(self, memo: Memo, frame: dict[Node, None]) -> None:
+        """The memo stands as long as what it has read; what reads no input itself stands for ever."""
+        durability = DURABILITIES
+        for dep in frame:
+            if dep.durability < durability:
+                durability = dep.durability
+        memo.durability = durability
+        memo.deps = tuple([dep for dep in frame if dep.durability < DURABILITIES])
+        memo.verified_at = self.revision if durability < DURABILITIES else FOREVER
+
+    def _fail(self, memo: Memo, frame: dict[Node, None], mark: int, fresh: bool, failed: bool) -> None:
+        """Leave no half-made answers. A cancelled memo stays as it was; a failed one will differ from what it was."""
+        for member in self._provisional[mark:]:
+            member.provisional = False
+            drop(self._memos[member.query], [member])
+            member.deps, member.verified_at = (), -1
+        del self._provisional[mark:]
+        if failed:
+            memo.put_error(self.revision, min((dep.durability for dep in frame), default=0))
+        elif fresh:
+            self._memos[memo.query].pop(memo.args, None)
+
+    def _on_fresh_stack(self, function: Callable[..., Any], args: tuple[Hashable, ...]) -> Any:
+        """Call a function on a new thread, which owns the database while this one waits."""
+        answer: list[tuple[Any, BaseException | None]] = []
+        owner, context = self._owner, contextvars.copy_context()
+
+        def work() -> None:
+            self._owner = get_ident()
+            try:
+                answer.append((context.run(function, self, *args), None))
+            except BaseException as error:
+                answer.append((None, error))
+
+        thread = threading.Thread(target=work, name="potto-query", daemon=True)
+        thread.start()
+        try:
+            thread.join()
+        except BaseException:  # interrupted while waiting: the other thread must be out of the database first
+            self.cancel()
+            thread.join()
+            raise
+        finally:
+            self._owner = owner
+        value, error = answer[0]
+        if error is not None:
+            raise error
+        return value
+
+    # Cycles
+
+    def _meet_cycle(self, memo: Memo) -> None:
+        """The running query asks for one that runs, or for a finished member of a cycle that is still open."""
+        low = memo.index if memo.index >= 0 else memo.low
+        for above in self._running[low + 1 :]:
+            above.low = min(above.low, low)
+        self._running[low].cyclic = True
+        if memo.index < 0:
+            return
+        if memo.query.fallback is None:
+            path = " -> ".join(map(repr, [*self._running[low:], memo]))
+            raise CycleError(f"a query needs its own answer: {path}")
+        memo.put(memo.query.fallback(self, *memo.args), self.revision)
+
+    def _close_cycle(self, first: Memo, mark: int) -> None:
+        """All members of a cycle depend on all that any of them read outside it."""
+        members = [*self._provisional[mark:], first]
+        del self._provisional[mark:]
+        inside = set(members)
+        outside = dict.fromkeys(dep for member in members for dep in member.deps if dep.source not in inside)
+        for member in members:
+            member.provisional = False
+            self._depend(member, outside)
+
+
+def drop(table: dict[tuple[Hashable, ...], Memo], memos: list[Memo]) -> int:
+    """Detach memos from their table and free their values. Their readers still verify through what they had read."""
+    dropped = 0
+    for memo in memos:
+        if memo.index < 0 and not memo.provisional and table.pop(memo.args, None) is not None:
+            memo.value, memo.entries = GONE, None
+            dropped += 1
+    return dropped

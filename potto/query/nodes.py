@@ -1,0 +1,133 @@
+"""What the database is made of: inputs, memos, entries of tables, events, and what can go wrong."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+DURABILITIES: Final = 3  # of inputs: 0, 1, 2; a memo that reads no input has this one
+FOREVER: Final = sys.maxsize  # the revision up to which such a memo is verified
+GONE: Final[Any] = object()  # the value of a memo that was forgotten, or that failed
+MISSING: Final[Any] = object()  # the value of an input that was never set
+
+
+class Cancelled(BaseException):
+    """The evaluation was cancelled. Not an `Exception`, so that no handler of errors holds it up."""
+
+
+class CycleError(Exception):
+    """A query needs its own answer and has no fallback: an internal error that names the cycle."""
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """What happened to a query (`reused`: verified after an edit, not run) or an input (`query` is then "input")."""
+
+    kind: Literal["executed", "reused", "input"]
+    query: str
+    args: tuple[Hashable, ...]
+
+
+class Query:
+    """A declared query: its function, name, fallback in a cycle, and how many memos to keep (0: all)."""
+
+    __slots__ = ("fallback", "function", "keep", "name")
+
+    def __init__(self, function: Callable[..., Any], fallback: Callable[..., Any] | None, keep: int) -> None:
+        self.function, self.fallback, self.keep, self.name = function, fallback, keep, function.__name__
+
+
+class Input:
+    """A value from outside. `source` None: it needs no verification."""
+
+    __slots__ = ("changed_at", "durability", "source", "value")
+
+    def __init__(self, value: Any, changed_at: int, durability: int) -> None:
+        self.value, self.changed_at, self.durability = value, changed_at, durability
+        self.source: None = None
+
+
+class Memo:
+    """The answer of a query for its arguments.
+
+    `index` is its place on the stack of running queries, or -1. `low` is the lowest place that it reaches by a cycle,
+    `cyclic` says that a cycle leads back to it, `provisional` that it has finished but its cycle has not.
+    """
+
+    __slots__ = (
+        "args",
+        "changed_at",
+        "cyclic",
+        "deps",
+        "durability",
+        "entries",
+        "index",
+        "low",
+        "provisional",
+        "query",
+        "source",
+        "value",
+        "verified_at",
+    )
+
+    def __init__(self, query: Query, args: tuple[Hashable, ...]) -> None:
+        self.query, self.args, self.value = query, args, GONE
+        self.deps: tuple[Node, ...] = ()
+        self.verified_at, self.changed_at, self.durability = -1, -1, 0
+        self.entries: dict[Any, Entry] | None = None
+        self.index, self.low, self.cyclic, self.provisional = -1, 0, False, False
+        self.source = self
+
+    def __repr__(self) -> str:
+        return f"{self.query.name}({', '.join(short(arg) for arg in self.args)})"
+
+    def put(self, value: Any, revision: int) -> None:
+        """Give it a value. An equal one is no change, and the old object stays."""
+        if self.value is not GONE and same(self.value, value):
+            return
+        self.value, self.changed_at = value, revision
+        for key, entry in (self.entries or {}).items():
+            new = value.get(key)
+            if not same(entry.value, new):
+                entry.value, entry.changed_at = new, revision
+
+    def put_error(self, revision: int, durability: int) -> None:
+        """It failed: whatever comes next differs from what it was."""
+        self.value, self.verified_at, self.changed_at = GONE, -1, revision
+        self.deps, self.durability = (), durability
+        for entry in (self.entries or {}).values():
+            entry.value, entry.changed_at = GONE, revision
+
+
+class Entry:
+    """One key of a query whose value is a mapping: changes only when the value under that key does."""
+
+    __slots__ = ("changed_at", "source", "value")
+
+    def __init__(self, source: Memo, value: Any) -> None:
+        self.source, self.value, self.changed_at = source, value, source.changed_at
+
+    @property
+    def durability(self) -> int:
+        return self.source.durability
+
+
+Node = Input | Memo | Entry
+
+
+def same(old: Any, new: Any) -> bool:
+    """Whether two values are equal, so that nothing changed."""
+    if old is new:
+        return True
+    try:
+        return bool(old == new)
+    except RecursionError:  # values nested deeper than `==` can walk: to run a reader once more is always right
+        return False
+
+
+def short(value: object) -> str:
+    """A value for a log."""
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:40]}...{text[-16:]}"
