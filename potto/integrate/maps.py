@@ -136,7 +136,7 @@ _MAPS = {LINEAR: _linear, LEFT: _left, RIGHT: _right, BOTH: _both, UP: _up, DOWN
 
 
 def grade(u0: Array, u1: Array, end: Ints, t: Array) -> tuple[Array, Array]:
-    """u and du/dt for t (n,) in [0, 1] over pieces [u0, u1]; `end` -1 or 1 crowds the points at the left or right end."""
+    """u and du/dt for t (n,) in [0, 1] over pieces [u0, u1]; `end` -1 or 1 crowds points at the left or right end."""
     width = (u1 - u0)[:, None]
     u = u0[:, None] + width * t
     slope = width

@@ -57,26 +57,24 @@ class Pieces:
     floor: Array = field(default_factory=lambda: np.zeros((0, 0)))
     size: Array = field(default_factory=lambda: np.zeros((0, 0)))
     most: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    worst: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    lean: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def pick(self, index: Any) -> Pieces:
         return Pieces(self.segment[index], self.u0[index], self.u1[index], self.end[index],
                       self.integral[:, index], self.error[:, index], self.floor[:, index],
-                      self.size[:, index], self.most[:, index], self.worst[index])  # fmt: skip
+                      self.size[:, index], self.most[:, index], self.lean[index])  # fmt: skip
 
     def join(self, other: Pieces) -> Pieces:
-        return Pieces(
-            np.concatenate((self.segment, other.segment)),
-            np.concatenate((self.u0, other.u0)),
-            np.concatenate((self.u1, other.u1)),
-            np.concatenate((self.end, other.end)),
-            np.concatenate((self.integral, other.integral), axis=1),
-            np.concatenate((self.error, other.error), axis=1),
-            np.concatenate((self.floor, other.floor), axis=1),
-            np.concatenate((self.size, other.size), axis=1),
-            np.concatenate((self.most, other.most), axis=1),
-            np.concatenate((self.worst, other.worst)),
-        )
+        return joined([self, other])
+
+
+def joined(parts: list[Pieces]) -> Pieces:
+    """Pieces put together; one copy for any number of parts."""
+    if len(parts) == 1:
+        return parts[0]
+    names = ("segment", "u0", "u1", "end", "integral", "error", "floor", "size", "most", "lean")
+    axes = (0, 0, 0, 0, 1, 1, 1, 1, 1, 0)
+    return Pieces(*(np.concatenate([getattr(p, n) for p in parts], axis=a) for n, a in zip(names, axes, strict=True)))
 
 
 def gather(env: dict[str, Value], index: Ints) -> dict[str, Value]:

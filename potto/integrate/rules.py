@@ -11,8 +11,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import numpy.typing as npt
 
 from potto.kernels.cells import Array
+
+Ints = npt.NDArray[np.int64]
 
 EPS = 2.0**-52
 
@@ -62,19 +65,19 @@ def truncation(coefficients: Array) -> Array:
     decay = np.fmin(np.fmax(decay, 0.0), 1.0)
     power = 4.5 if n >= 10 else 4.0 if n >= 8 else 2.0
     share = np.fmax(decay**power, np.fmin(1.0, (decay - 0.3) / 0.3))
-    return 2 * end * share  # type: ignore[no-any-return]
+    return 8 * end * share  # type: ignore[no-any-return]
 
 
-def leaning(coefficients: Array) -> tuple[Array, Array]:
-    """Whether the tail of the coefficients adds up at the left, or at the right end: the mark of a singularity there.
+def leaning(coefficients: Array) -> Ints:
+    """-1 or 1 where a slowly falling tail of the coefficients (P, n) adds up at the left, or at the right end.
 
-    coefficients: (P, n). Two masks (P,). Elsewhere, and where nothing is left to resolve, both are False.
+    That is the mark of a singularity there. Elsewhere, and where the tail falls fast, 0.
     """
     n = coefficients.shape[-1]
     tail = coefficients[:, n // 2 :]
     total = np.abs(tail).sum(axis=-1)
     signs = (-1.0) ** np.arange(n // 2, n)
-    strong = total > 1e-6 * np.abs(coefficients).max(axis=-1)
+    slow = np.abs(tail[:, -2:]).sum(axis=-1) > 0.03 * np.abs(tail[:, :2]).sum(axis=-1)
     left = np.abs(tail @ signs) > 0.9 * total
     right = np.abs(tail.sum(axis=-1)) > 0.9 * total
-    return left & strong, right & strong
+    return np.where(slow & left, -1, np.where(slow & right, 1, 0))

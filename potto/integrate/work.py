@@ -19,7 +19,7 @@ import numpy as np
 
 from potto.integrate import maps
 from potto.integrate.maps import Ints, Segments
-from potto.integrate.pieces import Evaluator, Pieces, Sums, column, gather, spread, still, take
+from potto.integrate.pieces import Evaluator, Pieces, Sums, column, gather, joined, spread, still, take
 from potto.integrate.plan import LevelPlan
 from potto.integrate.rules import EPS, gauss, leaning, truncation
 from potto.kernels.cells import Array, Cell, Mask, Number, Value, pad
@@ -31,7 +31,12 @@ CHUNK = 1 << 15  # points per kernel call: a few buffers of this length fit the 
 # The rounding of a node, in units of the last place, that noise in a steep integrand is blamed on.
 NODE_ROUNDING = 0.5
 MOST_HALVINGS = 64
-DOUBTFUL_HALVINGS = 24
+# Nodes for pieces that were too coarse: first more of them on the same piece, then on halves.
+HIGH_ORDER = 16
+HALF_ORDER = 10
+# The relative error of a piece up to which more nodes promise more than halves do.
+PROMISING = 1e-2
+DOUBTFUL_ROUNDS = 24
 # How much larger than at the nodes an integrand must be at an end of a segment to be taken for a peak.
 PEAK = 8.0
 # A relative jump of an inner integral where only kinks are expected: a surface there runs along the inner variable.
@@ -70,29 +75,56 @@ class Work:
             return Sums(np.zeros(shape), np.zeros(shape), np.zeros((1, self.k, self.batch)),
                         np.zeros((1, self.k, self.batch)))  # fmt: skip
         zero, one = np.zeros(count), np.ones(count)
-        fresh = Pieces(np.arange(count), zero, one, np.zeros(count, dtype=np.int64))
-        pieces = self.measure(fresh)
+        fresh = self.measure(Pieces(np.arange(count), zero, one, np.zeros(count, dtype=np.int64)), self.parent.order)
         ends = self.end_values()
         if self.conflict and not self.last:
             self.look_for_steps()
+        tally = Tally(self, fresh)
+        done = self.refine(fresh, ends, tally)
+        for _ in range(DOUBTFUL_ROUNDS):
+            bad = self.doubtful(done, ends)
+            if bad is None or self.machine.exhausted():
+                break
+            halves = self.halve(done.pick(bad))
+            halves = self.replaced(done.pick(bad), halves, HALF_ORDER, tally)
+            done = done.pick(~bad).join(self.refine(halves, ends, tally))
+        return self.total(done, ends)
+
+    def refine(self, fresh: Pieces, ends: Any, tally: Tally) -> Pieces:
+        """More nodes, then halves, for what is too coarse until nothing is; what is accepted stays accepted."""
+        accepted: list[Pieces] = []
         for turn in range(MOST_HALVINGS):
-            bad = self.too_coarse(pieces, ends)
-            if bad is None and turn < DOUBTFUL_HALVINGS:
-                bad = self.doubtful(pieces, ends)
+            bad = self.too_coarse(fresh, ends, tally)
             if bad is None:
                 break
             if self.machine.exhausted():
                 self.machine.note_unfinished("the budget of evaluations is spent")
                 break
-            pieces = pieces.pick(~bad).join(self.measure(self.halve(pieces.pick(bad))))
-        return self.total(pieces, ends)
+            accepted.append(fresh.pick(~bad))
+            coarse = fresh.pick(bad)
+            nearly = (coarse.error <= PROMISING * coarse.size).all(axis=0) if turn == 0 else np.zeros(0, dtype=bool)
+            if nearly.any():
+                near, far = coarse.pick(nearly), coarse.pick(~nearly)
+                same = Pieces(near.segment, near.u0, near.u1, near.end)
+                fresh = self.replaced(near, same, HIGH_ORDER, tally)
+                if far.segment.size:
+                    fresh = fresh.join(self.replaced(far, self.halve(far), HALF_ORDER, tally))
+            else:
+                fresh = self.replaced(coarse, self.halve(coarse), HALF_ORDER, tally)
+        accepted.append(fresh)
+        return joined(accepted)
+
+    def replaced(self, old: Pieces, new: Pieces, order: int, tally: Tally) -> Pieces:
+        """The new pieces that stand for the old ones, measured; the books follow."""
+        new = self.measure(new, order)
+        tally.replace(self, old, new)
+        return new
 
     def halve(self, p: Pieces) -> Pieces:
         """Two pieces for each; the one at the end of its segment is graded towards that end."""
         middle = 0.5 * (p.u0 + p.u1)
-        lean_left, lean_right = leaning(p.worst)
-        left = np.where((p.u0 == 0) & (p.end <= 0) & lean_left, -1, np.minimum(p.end, 0))
-        right = np.where((p.u1 == 1) & (p.end >= 0) & lean_right, 1, np.maximum(p.end, 0))
+        left = np.where((p.u0 == 0) & (p.end <= 0) & (p.lean < 0), -1, np.minimum(p.end, 0))
+        right = np.where((p.u1 == 1) & (p.end >= 0) & (p.lean > 0), 1, np.maximum(p.end, 0))
         return Pieces(
             np.concatenate((p.segment, p.segment)),
             np.concatenate((p.u0, middle)),
@@ -100,21 +132,17 @@ class Work:
             np.concatenate((left, right)),
         )
 
-    def measure(self, p: Pieces) -> Pieces:
-        """Integrals, errors and rounding floors of pieces, chunk by chunk."""
-        rows = max(1, CHUNK // self.parent.order)
+    def measure(self, p: Pieces, order: int) -> Pieces:
+        """Integrals, errors and rounding floors of pieces, chunk by chunk, by the rule with `order` nodes."""
+        rows = max(1, CHUNK // order)
         if p.segment.size > rows:
-            parts = [
-                self.measure(
-                    Pieces(p.segment[i : i + rows], p.u0[i : i + rows], p.u1[i : i + rows], p.end[i : i + rows])
-                )
-                for i in range(0, p.segment.size, rows)
-            ]
-            joined = parts[0]
-            for part in parts[1:]:
-                joined = joined.join(part)
-            return joined
-        rule = gauss(self.parent.order)
+            return joined(
+                [
+                    self.measure(Pieces(p.segment[part], p.u0[part], p.u1[part], p.end[part]), order)
+                    for part in (slice(i, i + rows) for i in range(0, p.segment.size, rows))
+                ]
+            )
+        rule = gauss(order)
         seg = self.seg.pick(p.segment)
         u, du = maps.grade(p.u0, p.u1, p.end, rule.nodes)
         x, dx, label = maps.points(seg, u)
@@ -123,8 +151,8 @@ class Work:
         coefficients = h @ rule.transform
         p.integral = coefficients[..., 0]
         p.error = truncation(coefficients)
-        worst = p.error.argmax(axis=0) if p.error.shape[0] > 1 else np.zeros(p.u0.size, dtype=np.int64)
-        p.worst = coefficients[worst, np.arange(p.u0.size)]
+        worst = p.error.argmax(axis=0)
+        p.lean = leaning(coefficients[worst, np.arange(p.u0.size)])
         spread = np.abs(coefficients) @ rule.slopes
         shake = NODE_ROUNDING * EPS * np.abs(x).max(axis=-1) / np.abs(weight).max(axis=-1)
         shake = np.where(np.isfinite(shake), np.minimum(shake, 1.0), 0.0)
@@ -245,33 +273,23 @@ class Work:
         if (apart > DISCONTINUITY * (np.abs(values[0]) + np.abs(values[1]))).any():
             self.machine.note_degenerate(self.level.variable)
 
-    def too_coarse(self, p: Pieces, ends: Any) -> Any:
+    def too_coarse(self, p: Pieces, ends: Any, tally: Tally) -> Any:
         """A mask of the pieces to halve, None if there are none."""
         owner = self.seg.owner[p.segment]
         rows, m = p.integral.shape[0] // self.width, self.width
-        error = p.error.reshape(m, rows, -1)
-        floor = p.floor.reshape(m, rows, -1)
+        error, floor = p.error.reshape(m, rows, -1), p.floor.reshape(m, rows, -1)
         k = self.k
         if self.moving:  # per direction the better of the two forms
-            moving, fixed = error[:, 1 : 1 + k], error[:, 1 + k :]
-            better = np.minimum(moving, fixed)
+            better = np.minimum(error[:, 1 : 1 + k], error[:, 1 + k :])
             error = np.concatenate((error[:, :1], better), axis=1)
             floor = floor[:, : 1 + k]
-        count = np.bincount(owner, minlength=self.batch)
-        bad = np.zeros(p.segment.size, dtype=bool)
-        integral = (p.integral if self.number == 0 else p.size).reshape(m, rows, -1)
-        for c in range(m):
-            for r in range(error.shape[1]):
-                scale = np.abs(np.bincount(owner, integral[c, r], minlength=self.batch))
-                if self.number:
-                    scale = self.parent.siblings(scale, self.root)
-                tolerance = np.maximum(self.machine.atol, self.machine.rtol * scale)
-                share = (tolerance / (2 * np.maximum(count, 1)))[owner]
-                bad |= (error[c, r] > share) & (error[c, r] > 8 * floor[c, r])
+        error, floor = error.reshape(-1, error.shape[-1]), floor.reshape(-1, floor.shape[-1])
+        bad = ((error > tally.shares(self, owner)) & (error > 8 * floor)).any(axis=0)
         if ends is not None:
             bad |= self.missed_peak(p, ends)
-        narrow = (p.u1 - p.u0) < 1e-14
-        bad &= ~narrow
+        if not bad.any():
+            return None
+        bad &= (p.u1 - p.u0) >= 1e-14
         return bad if bad.any() else None
 
     def missed_peak(self, p: Pieces, ends: tuple[Array, Array]) -> Any:
@@ -290,7 +308,10 @@ class Work:
         if not self.moving:
             return None
         moving, fixed, apart = self.two_forms(p, ends)
-        doubt = (apart > 4 * (moving[1] + fixed[1])) & (apart > 1e-9 * np.abs(moving[0]))
+        size = self.added(p.size, p)[:, 1 : 1 + self.k]
+        doubt = (apart > 4 * (moving[1] + fixed[1])) & (apart > 1e-9 * (np.abs(moving[0]) + 1e-3 * size))
+        if not doubt.any():
+            return None
         owners = np.asarray(doubt.any(axis=(0, 1)))
         bad = owners[self.seg.owner[p.segment]] & (p.u1 - p.u0 > 1e-14)
         return bad if bad.any() else None
@@ -366,3 +387,44 @@ class Work:
             cost = 2 * EPS * (jump * np.abs(seg.a) + np.where(last, np.abs(high * seg.b), 0.0))
             out[c] = np.bincount(seg.owner, np.where(np.isfinite(cost), cost, 0.0), minlength=self.batch)
         return out
+
+
+class Tally:
+    """Running totals per integral, by which tolerances are measured: (m * (1 + k), B), and how many pieces there are.
+
+    For the outermost variable the magnitude of the result counts; further in, where results are added up once more,
+    the largest magnitude of what is added up, among all that go into the same answer.
+    """
+
+    def __init__(self, work: Work, p: Pieces) -> None:
+        owner = work.seg.owner[p.segment]
+        self.count = np.bincount(owner, minlength=work.batch)
+        x = self.channels(work, p)
+        self.total = np.empty((x.shape[0], work.batch))
+        for i, row in enumerate(x):
+            self.total[i] = np.bincount(owner, row, minlength=work.batch)
+        self.scale: Array | None = None
+
+    def channels(self, work: Work, p: Pieces) -> Array:
+        x = p.size if work.number else p.integral
+        rows = x.shape[0] // work.width
+        return x.reshape(work.width, rows, -1)[:, : 1 + work.k].reshape(-1, x.shape[-1])
+
+    def replace(self, work: Work, old: Pieces, new: Pieces) -> None:
+        for p, sign in ((old, -1), (new, 1)):
+            owner = work.seg.owner[p.segment]
+            np.add.at(self.count, owner, sign)
+            for i, row in enumerate(self.channels(work, p)):
+                np.add.at(self.total[i], owner, sign * row)
+        if not work.number:
+            self.scale = None
+
+    def shares(self, work: Work, owner: Ints) -> Array:
+        """The error that one piece of each of these integrals may have: (m * (1 + k), P)."""
+        if self.scale is None:
+            scale = np.abs(self.total)
+            if work.number:
+                scale = np.stack([work.parent.siblings(row, work.root) for row in scale])
+            self.scale = np.maximum(work.machine.atol, work.machine.rtol * scale)
+        shares: Array = self.scale[:, owner] / (2 * self.count[owner])
+        return shares

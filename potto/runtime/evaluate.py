@@ -177,13 +177,19 @@ def _flat(numbers: Any, bounds: Any) -> list[tuple[Any, Any]]:
 
 
 def _missed(value: Any, error: Any, settings: Settings) -> str | None:
-    """Why an answer is not as accurate as was asked, or None."""
+    """Why an answer is not as accurate as was asked, or None.
+
+    A number that is zero but for rounding has no relative accuracy; what counts there is the size of its neighbours.
+    """
     v, e = np.abs(np.asarray(value, dtype=float)), np.asarray(error, dtype=float)
     if np.isnan(v).any():
         return "the value is not a number"
-    with np.errstate(invalid="ignore"):
-        bad = ~(e <= np.maximum(settings.atol, settings.rtol * v)) & ~np.isinf(v)
-        bad &= ~(v <= 1e3 * e) | (e > 1e-10)  # a zero by cancellation has no relative accuracy
+    if np.isnan(e).any() or (np.isinf(e) & ~np.isinf(v)).any():
+        return "the error is not known"
+    finite = np.where(np.isinf(v), 0.0, v)
+    bad = ~(e <= np.maximum(settings.atol, settings.rtol * v)) & ~np.isinf(v)
+    bad &= e > max(1e-12, settings.rtol) * max(float(finite.max(initial=0.0)), 1e-300)
+    bad &= (v > 1e3 * e) | (e > 1e-10)
     if bad.any():
         return "rounding limits the accuracy" if (e[bad] < 1e-6 * v[bad]).all() else "the error estimate is too large"
     return None

@@ -6,13 +6,17 @@ chooses the method, and gives the result the shape of the batch again.
 
 from __future__ import annotations
 
+import operator
 import threading
 from collections import OrderedDict
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from threadpoolctl import ThreadpoolController
 
 from potto.calculus.surfaces import TooDeep
 from potto.core.terms import Global, Integral, Lam, Sum, Term, Var, integral, postorder, substitute, var
@@ -28,7 +32,8 @@ if TYPE_CHECKING:
     from potto.runtime.machine import Machine
 
 START_ORDER = 10
-BATCH_ORDER = 6
+ORDERS = (4, 6, 8, 10)
+PILOTS = 64
 BATCH = 4096  # members integrated at once
 MOST_PLANS = 1024
 MOST_LEVELS = 3
@@ -84,6 +89,8 @@ def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermos
 
 def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value], batch: int, outermost: bool) -> Sums:
     method = machine.settings.method
+    if outermost:
+        machine.books.members = max(machine.books.members, batch)
     if outermost and (method in ("mc", "qmc") or (method == "auto" and len(term.variables) > MOST_LEVELS)):
         from potto.integrate.sampling import sample
 
@@ -127,12 +134,14 @@ def orders(term: Integral) -> Iterator[Integral]:
 def in_parts(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> Sums:
     """Quadrature, a bounded number of members of the batch at a time."""
     if batch <= BATCH:
-        return Iteration(plan, machine, START_ORDER if batch <= 64 else BATCH_ORDER).run(0, env, batch, {}, machine)
-    parts = []
-    for start in range(0, batch, BATCH):
-        here = {n: map_arrays(v, lambda a, s=start: a[s : s + BATCH]) for n, v in env.items()}
-        size = min(BATCH, batch - start)
-        parts.append(Iteration(plan, machine, BATCH_ORDER).run(0, here, size, {}, machine))
+        return Iteration(plan, machine, START_ORDER).run(0, env, batch, {}, machine)
+    with one_thread():
+        order = best_order(plan, machine, env, batch)
+        parts = []
+        for start in range(0, batch, BATCH):
+            index = slice(start, min(start + BATCH, batch))
+            here = {n: map_arrays(v, operator.itemgetter(index)) for n, v in env.items()}
+            parts.append(Iteration(plan, machine, order).run(0, here, index.stop - start, {}, machine))
     m = max(p.v.shape[0] for p in parts)
 
     def joined(name: str) -> Array:
@@ -140,6 +149,28 @@ def in_parts(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) ->
         return np.concatenate([np.broadcast_to(r, (m, *r.shape[1:])) for r in rows], axis=-1)
 
     return Sums(joined("v"), joined("e"), joined("t"), joined("et"))
+
+
+def best_order(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> int:
+    """The number of nodes to start with that is the cheapest for a few members spread over the batch."""
+    index = np.linspace(0, batch - 1, PILOTS).astype(np.int64)
+    here = {n: map_arrays(v, operator.itemgetter(index)) for n, v in env.items()}
+    costs = []
+    for order in ORDERS:
+        before = machine.books.evaluations
+        Iteration(plan, machine, order).run(0, here, PILOTS, {}, machine)
+        costs.append(machine.books.evaluations - before)
+    return ORDERS[costs.index(min(costs))]
+
+
+def one_thread() -> AbstractContextManager[object]:
+    """Many small products of matrices: threads only get in each other's way."""
+    return _threads().limit(limits=1, user_api="blas")
+
+
+@lru_cache(maxsize=1)
+def _threads() -> ThreadpoolController:
+    return ThreadpoolController()
 
 
 def _shaped(sums: Sums, shape: tuple[int, ...]) -> Value:

@@ -52,6 +52,7 @@ class Books:
     methods: set[str] = field(default_factory=set)
     degenerate: set[str] = field(default_factory=set)
     second: bool = False
+    members: int = 1
     integrals: int = 0
     pieces: int = 0
 
@@ -136,7 +137,7 @@ class Machine:
         self.books.evaluations += evaluations
 
     def exhausted(self) -> bool:
-        return self.books.evaluations > self.settings.max_evals
+        return self.books.evaluations > self.settings.max_evals * self.books.members
 
     def note_edge(self, variable: str, surface: Any, backward: Array, forward: Array) -> None:
         self.books.edges.append((variable, surface, backward, forward))
