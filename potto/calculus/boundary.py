@@ -19,6 +19,7 @@ from potto.calculus.pivots import Root, chosen, conjunction, pivots
 from potto.calculus.ranges import range_of
 from potto.calculus.sides import (
     Box,
+    Flip,
     Flips,
     box_of,
     branches_of,
@@ -43,6 +44,7 @@ from potto.core.terms import (
     add,
     branch,
     children,
+    const,
     fresh,
     if_,
     integral,
@@ -134,12 +136,11 @@ def _instances(
 
     def run(right: bool) -> Term:
         memo: dict[Term, Term] = {}
-        slopes = dict(flips)
+        signs = {f.branch: f.right if right else f.left for f in flips}
         for node in postorder(body):
             new = rebuild(node, tuple(memo[c] for c in children(node)))
-            if isinstance(node, Branch) and node in slopes and isinstance(new, Branch):
-                slope = substitute(slopes[node], names)
-                new = if_(here, side_of(slope if right else neg(slope), new.then, new.orelse, box), new)
+            if isinstance(node, Branch) and node in signs and isinstance(new, Branch):
+                new = if_(here, side_of(substitute(signs[node], names), new.then, new.orelse, box), new)
             memo[node] = new
         return memo[body]
 
@@ -284,7 +285,7 @@ def jumps(body: Term, variables: Iterable[str], rate: Rate) -> list[JumpTerm]:
         speed = rate(first.surface)
         if speed is ZERO:
             continue
-        flips: list[tuple[Branch, Term]] = [(b, ONE if o == side else neg(ONE)) for b, o in members]
+        flips = [Flip(b, const(-o * side), const(o * side)) for b, o in members]
         positive, negative = forced(body, flips, True), forced(body, flips, False)
         if positive is not negative:
             found.append(JumpTerm(first.surface, difference(positive, negative), speed))

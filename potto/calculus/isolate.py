@@ -16,6 +16,7 @@ from potto.core.terms import (
     ONE,
     PI,
     ZERO,
+    Branch,
     Const,
     Prim,
     Term,
@@ -343,15 +344,28 @@ def _registered(op: str, args: tuple[Term, ...], value: Term) -> Steps:
     one_to_one = entry.increasing != 0
     if one_to_one and isinstance(value, Prim) and value.op == op and not entry.edges(inner):
         return (Step(inner, value.args[0]),)
+    if value is ZERO and op in _ODD:
+        return (Step(inner, ZERO, (), entry.period(value)[0] if entry.period else None),)
     if entry.inverse is None:
-        if one_to_one and value is ZERO and op in _ODD:
-            return (Step(inner, ZERO),)
         return Stuck(f"`{op}` has no inverse in closed form")
-    solutions = entry.inverse(value)
+    solutions = tuple(_folded(s) for s in entry.inverse(value))
     if entry.period is None:
         return tuple(Step(inner, s) for s in solutions)
     period, further = entry.period(value)
     return tuple(Step(inner, s, (), period) for s in (*solutions, *further))
+
+
+def _folded(term: Term) -> Term:
+    """A solution with the guards that the form of the value decides taken off."""
+    while isinstance(term, Branch):
+        bounds = range_of(term.surface)
+        if bounds.positive or (bounds.lo >= 0 and not term.strict):
+            term = term.then
+        elif bounds.negative or (bounds.hi <= 0 and term.strict):
+            term = term.orelse
+        else:
+            break
+    return term
 
 
 def _turn(start: Term) -> Callable[[tuple[Term, ...], int, Term], Steps]:
@@ -365,7 +379,8 @@ def _turn(start: Term) -> Callable[[tuple[Term, ...], int, Term], Steps]:
     return run
 
 
-_ODD = frozenset(("erf", "sinh", "tanh", "atan", "asin", "tan", "expm1", "log1p"))  # f(0) = 0
+# Builtins with f(0) = 0, and nowhere else within a period.
+_ODD = frozenset(("erf", "sinh", "tanh", "asinh", "atanh", "atan", "asin", "tan", "expm1", "log1p"))
 
 _SPECIAL: dict[str, Callable[[tuple[Term, ...], int, Term], Steps]] = {
     "add": _add,

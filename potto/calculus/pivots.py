@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from potto.calculus.linear import affine
 from potto.calculus.solve import Family, Sections, sections
-from potto.core.terms import Const, Integral, Term, if_, prim, substitute
+from potto.core.terms import Const, Integral, Term, const, if_, prim, substitute
 
 
 class NoClosedForm(Exception):
@@ -90,8 +90,14 @@ def _family(node: Integral, position: int, family: Family) -> Root:
     ends = [substitute(family.inner, {name: end}) for end in (lo, hi)]
     if family.stops:
         ends += [substitute(family.inner, {name: _within(stop, lo, hi)}) for stop in family.stops]
-    counts = (prim("ceil", _extreme("min", ends)), prim("floor", _extreme("max", ends)))
+    lowest, highest = _extreme("min", ends), _extreme("max", ends)
+    counts = (_whole("ceil", lowest, 1.0), _whole("floor", highest, 0.0))
     return Root(name, family.root, family.index, counts)
+
+
+def _whole(op: str, end: Term, otherwise: float) -> Term:
+    """An end of the range of the index; an empty range where the roots do not exist."""
+    return if_(prim("eq", end, end), prim(op, end), const(otherwise))
 
 
 def _within(stop: Term, lo: Term, hi: Term) -> Term:
@@ -99,9 +105,13 @@ def _within(stop: Term, lo: Term, hi: Term) -> Term:
 
 
 def _extreme(op: str, ends: list[Term]) -> Term:
+    """The least or the greatest of the ends; one that is nan, where the index ends, does not count."""
     result = ends[0]
     for end in ends[1:]:
-        result = prim(op, result, end)
+        either: Term = prim(op, result, end)
+        if len(ends) > 2:  # there are stops, so there may be an end
+            either = if_(prim("ne", result, result), end, if_(prim("ne", end, end), result, either))
+        result = either
     return result
 
 

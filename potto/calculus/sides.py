@@ -7,6 +7,7 @@ just left and just right of it, every other branch as it falls.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 from potto.calculus.derivative import partial
 from potto.calculus.isolate import NAN
@@ -14,6 +15,7 @@ from potto.calculus.normal import as_term, normal
 from potto.calculus.ranges import range_of
 from potto.core.simplify import is_zero
 from potto.core.terms import (
+    ONE,
     Branch,
     Integral,
     Lam,
@@ -28,7 +30,6 @@ from potto.core.terms import (
     substitute,
 )
 
-Flips = Sequence[tuple[Branch, Term]]
 Box = Mapping[str, tuple[float, float]]
 NOWHERE: Box = {}
 
@@ -54,16 +55,28 @@ def summed_over(body: Term, branch_: Branch) -> list[Sum]:
     return [node for node in postorder(body) if isinstance(node, Sum) and node.variable in branch_.surface.free]
 
 
+@dataclass(frozen=True, slots=True)
+class Flip:
+    """A branch whose surface is 0 at a root, and terms with the signs of that surface just left and right of it."""
+
+    branch: Branch
+    left: Term
+    right: Term
+
+
+Flips = Sequence[Flip]
+
+
 def forced(body: Term, flips: Flips, right: bool, box: Box = NOWHERE) -> Term:
-    """The integrand just right (or left) of where the branches flip; each with the slope of its surface there."""
+    """The integrand just right (or left) of where the branches flip."""
     if not flips:
         return body
-    slopes = dict(flips)
+    signs = {f.branch: f.right if right else f.left for f in flips}
     memo: dict[Term, Term] = {}
     for node in postorder(body):
         new = rebuild(node, tuple(memo[c] for c in children(node)))
-        if isinstance(node, Branch) and node in slopes and isinstance(new, Branch):
-            new = side_of(slopes[node] if right else neg(slopes[node]), new.then, new.orelse, box)
+        if isinstance(node, Branch) and node in signs and isinstance(new, Branch):
+            new = side_of(signs[node], new.then, new.orelse, box)
         memo[node] = new
     return memo[body]
 
@@ -86,17 +99,47 @@ def box_of(node: Integral) -> dict[str, tuple[float, float]]:
 
 
 def flipping(
-    branches: Iterable[Branch], variable: str, at: Term, known: Sequence[Branch] = ()
-) -> list[tuple[Branch, Term]]:
-    """The branches whose surface is 0 where `variable = at` (`known` ones surely are), each with its slope there."""
-    bare = unguarded(at)
-    found: list[tuple[Branch, Term]] = []
+    branches: Iterable[Branch], variable: str, at: Term, known: Sequence[Branch] = (), bends: int = 3
+) -> list[Flip]:
+    """The branches whose surface is 0 where `variable = at` (`known` ones surely are), with their sides there.
+
+    `bends`: how many kinks inside kinks are looked into.
+    """
+    found: list[Flip] = []
     for item in branches:
         if variable in item.surface.free:
             surface = without_poles(item.surface)
-            if item in known or is_zero(substitute(surface, {variable: bare})):
-                found.append((item, substitute(partial(surface, variable), {variable: at})))
+            if item in known or is_zero(substitute(surface, {variable: unguarded(at)})):
+                signs = _signs(surface, variable, at, bends)
+                if signs is not None:
+                    found.append(Flip(item, *signs))
     return found
+
+
+_HIGHEST = 4  # derivatives that are asked for a sign
+
+
+def _signs(surface: Term, variable: str, at: Term, bends: int) -> tuple[Term, Term] | None:
+    """Terms with the sign of a surface just left and right of its root; None if it is 0 around it."""
+    bounds = range_of(surface)
+    if bounds.lo >= 0 or bounds.hi <= 0:
+        side = ONE if bounds.lo >= 0 else neg(ONE)
+        return None if is_zero(surface) else (side, side)
+    slope, parity = surface, 1
+    for _ in range(_HIGHEST):
+        slope, parity = partial(slope, variable), -parity
+        left, right = _both(slope, variable, at, bends)
+        if not (is_zero(unguarded(left)) and is_zero(unguarded(right))):
+            return (neg(left) if parity < 0 else left), right
+    return None
+
+
+def _both(slope: Term, variable: str, at: Term, bends: int) -> tuple[Term, Term]:
+    """A slope just left and right of a root, where the surface may have a kink."""
+    inner = [n for n in postorder(slope) if isinstance(n, Branch) and variable in n.surface.free]
+    flips = flipping(inner, variable, at, (), bends - 1) if inner and bends else []
+    place = {variable: at}
+    return substitute(forced(slope, flips, False), place), substitute(forced(slope, flips, True), place)
 
 
 def unguarded(root: Term) -> Term:

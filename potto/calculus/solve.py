@@ -48,7 +48,8 @@ class Family:
     """One root for each integer `index`, because a periodic builtin was undone.
 
     `inner` is the index as a function of the variable solved for: the roots between lo and hi belong to the integers
-    between the least and the greatest value of `inner` at lo, at hi and at those `stops` that lie between them.
+    between the least and the greatest value of `inner` at lo, at hi and at those `stops` that lie between them, values
+    that are nan left out (`inner` ends at a stop, as x^1.5 does at 0).
     """
 
     root: Term
@@ -226,7 +227,7 @@ class _Search:
             following,
             value=add(item.value, mul(item.period, var(index))),
             index=index,
-            count=div(sub(item.inner, item.value), item.period),
+            count=div(sub(shorter(item.inner), item.value), item.period),
             counted=item.inner,
         )
 
@@ -275,7 +276,7 @@ def _singular(surface: Term, name: str) -> Iterable[Goal]:
             case "tan":
                 yield Goal(prim("cos", node.args[0]), ZERO)
             case "atan2" if name in node.args[0].free and not positive(node.args[1]):
-                yield Goal(node.args[0], ZERO, (Guard(neg(node.args[1]), strict=True),))
+                yield Goal(node.args[0], ZERO, (Guard(neg(node.args[1])),))
 
 
 # Where roots come and go
@@ -328,7 +329,7 @@ def _edges(node: Term) -> tuple[Term, ...]:
 
 
 def _stops(term: Term, name: str) -> tuple[Term, ...] | None:
-    """Where `term` turns as the variable varies, as roots in the variable; None where that is not known."""
+    """Where `term` turns or ends as the variable varies, as roots in the variable; None where that is not known."""
     stops: list[Term] = []
     while not isinstance(term, Var):
         if not isinstance(term, Prim):
@@ -338,17 +339,20 @@ def _stops(term: Term, name: str) -> tuple[Term, ...] | None:
             return _vertex(term, name, stops)
         inner = where[0]
         entry = PRIMITIVES.get(term.op)
+        ends = [edge for edge in entry.edges(*term.args) if name in edge.free] if entry else []
         even = term.op == "pow" and isinstance(term.args[1], Const) and term.args[1].value % 2 == 0
-        if even or term.op in ("abs", "cosh", "hypot") or (term.op == "div" and term.args[1] is inner):
+        if even or term.op in ("abs", "cosh", "hypot"):
+            ends.append(inner)
+        elif term.op not in ("add", "neg", "mul", "div", "pow") and not (entry and entry.increasing):
+            return None
+        for end in ends:
             search = _Search(name, term)
-            search.run(Goal(inner, ZERO))
+            search.run(Goal(end, ZERO))
             if search.reasons or search.families:
                 return None
             stops += search.roots
-        elif term.op not in ("add", "neg", "mul", "div", "pow") and not (entry and entry.increasing):
-            return None
         term = inner
-    return tuple(stops)
+    return tuple(dict.fromkeys(stops))
 
 
 def _vertex(term: Term, name: str, stops: list[Term]) -> tuple[Term, ...] | None:

@@ -79,6 +79,9 @@ SURFACES = [
     "x^3 - t*x",
     "2^x - t",
     "t*x - 1",
+    "tan(1 - 2*x^1.5) - t",
+    "sin(3*sqrt(x + 1)) - t",
+    "atan2(x, 3*x) - 0.4",
 ]
 
 GRID = 301
@@ -98,7 +101,8 @@ def all_roots(found: Sections, env: dict[str, float], poles: bool = False) -> li
         at = [mpmath.mpf(LO), mpmath.mpf(HI)]
         at += [s for s in (value(stop, env) for stop in family.stops) if LO < s < HI]
         counts = [value(family.inner, {**env, "x": x}) for x in at]
-        if any(c != c for c in counts):
+        counts = [c for c in counts if c == c]
+        if not counts:
             continue
         for k in range(math.ceil(min(counts) - 1e-12), math.floor(max(counts) + 1e-12) + 1):
             roots.append(value(family.root, {**env, family.index: k}))
