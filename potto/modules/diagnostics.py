@@ -40,6 +40,8 @@ def _no_text(problem: Unreadable | None, file: str) -> Diagnostic:
 def _definitions(db: Database, file: str) -> Iterator[Diagnostic]:
     imported = _imported(db, file)
     for name, places in layout(db, file).places.items():
+        if len(places) == 1 and name not in imported and not is_builtin(name):
+            continue
         first = _span(places[0])
         for place in places[1:]:
             yield DEFINED_TWICE(

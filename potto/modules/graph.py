@@ -10,11 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from typing import TypeVar
 
-from potto.modules.free import free_references
+from potto.modules.free import Reference
 from potto.modules.lookup import DefinitionTarget, ModuleTarget, Target, bindings, find_module, resolve, resolve_member
-from potto.modules.texts import definition, imports, names
+from potto.modules.texts import chunk_references, chunk_text, imports, is_diffeo, names
 from potto.query import Database, query
-from potto.syntax import nodes
 
 N = TypeVar("N", bound=Hashable)
 
@@ -63,10 +62,10 @@ def import_cycle(db: Database, file: str) -> tuple[str, ...]:
 
 
 @query
-def references(db: Database, file: str, name: str) -> tuple[tuple[str | None, str], ...]:
+def references(db: Database, file: str, name: str) -> tuple[Reference, ...]:
     """The names `(None, name)` and members `(path, name)` that a definition refers to, in order, each once."""
-    item = definition(db, file, name)
-    return () if item is None else tuple(dict.fromkeys(map(_reference, free_references(item))))
+    text = chunk_text(db, file, name)
+    return () if text is None else chunk_references(db, text, is_diffeo(file))
 
 
 @query
@@ -148,7 +147,3 @@ def _close(open_: dict[N, None], node: N) -> list[N]:
     while not group or group[-1] != node:
         group.append(open_.popitem()[0])
     return group
-
-
-def _reference(node: nodes.Name | nodes.Member) -> tuple[str | None, str]:
-    return (node.path, node.name) if isinstance(node, nodes.Member) else (None, node.id)

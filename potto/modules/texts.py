@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from potto.diagnostics import Diagnostic
+from potto.modules.free import Reference, references_in
 from potto.query import Database, query
 from potto.source import SourceText, Span
 from potto.syntax import ParsedChunk, nodes, parse_chunk, split
@@ -128,6 +129,13 @@ def head(db: Database, text: str, diffeo: bool) -> Head:
             return Head("broken", item.name, item.span)
         case _:
             return Head("statement")
+
+
+@query(keep=16384)
+def chunk_references(db: Database, text: str, diffeo: bool) -> tuple[Reference, ...]:
+    """What a chunk refers to, as `references_in` says it."""
+    item = parsed(db, text, diffeo).item
+    return () if item is None else references_in(item)
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import re
 
-from potto.modules.free import free_references
+from potto.modules.free import Reference, references_in
 from potto.modules.lookup import bindings
-from potto.modules.texts import chunks, imports, is_diffeo, layout, parsed
+from potto.modules.texts import chunk_references, chunks, imports, is_diffeo, layout, parsed
 from potto.modules.workspace import is_reexported
 from potto.query import Database, query
-from potto.syntax import live_expressions, nodes, parse_expression
-from potto.syntax.nodes import Node, Statement
+from potto.syntax import live_expressions, parse_expression
 
 _WORD = re.compile(r"[^\W\d]\w*(?:\.[^\W\d]\w*)*")
 
@@ -44,25 +43,23 @@ def used_imports(db: Database, file: str) -> frozenset[str]:
 @query(keep=16384)
 def occurring_names(db: Database, text: str, diffeo: bool) -> frozenset[str]:
     """The free names of a chunk, and its modules with all that is in front of a dot in them."""
-    chunk = parsed(db, text, diffeo)
     found: set[str] = set()
-    if chunk.item is not None:
-        _collect(chunk.item, found)
+    _collect(chunk_references(db, text, diffeo), found)
     if "#>" in text:
         for live in live_expressions(text):
-            _collect(parse_expression(live.text).expr, found)
-    if any(diagnostic.severity == "error" for diagnostic in chunk.diagnostics):
+            _collect(references_in(parse_expression(live.text).expr), found)
+    if any(diagnostic.severity == "error" for diagnostic in parsed(db, text, diffeo).diagnostics):
         for word in _WORD.findall(text):  # half-written: what the tree has lost may be used all the same
             found.update(_heads(word))
     return frozenset(found)
 
 
-def _collect(root: Node | Statement, found: set[str]) -> None:
-    for reference in free_references(root):
-        if isinstance(reference, nodes.Member):
-            found.update(_heads(reference.path))
+def _collect(references: tuple[Reference, ...], found: set[str]) -> None:
+    for path, name in references:
+        if path is None:
+            found.add(name)
         else:
-            found.add(reference.id)
+            found.update(_heads(path))
 
 
 def _heads(path: str) -> list[str]:

@@ -9,9 +9,8 @@ from __future__ import annotations
 import os.path
 import re
 
-from potto.modules.free import free_members
 from potto.modules.lookup import SUFFIXES, bindings, find_module, folders
-from potto.modules.texts import chunks, content, imports, is_diffeo, names, parsed
+from potto.modules.texts import chunk_references, chunks, content, imports, is_diffeo, names
 from potto.query import Database, query
 from potto.syntax import nodes
 
@@ -68,5 +67,6 @@ def _takes(db: Database, other: str, file: str, name: str) -> bool:
 @query
 def _members(db: Database, file: str) -> frozenset[tuple[str, str]]:
     """The members of modules that a file uses."""
-    items = (parsed(db, chunk.text, is_diffeo(file)).item for chunk in chunks(db, file))
-    return frozenset(member for item in items if item is not None for member in free_members(item))
+    diffeo = is_diffeo(file)
+    found = (reference for chunk in chunks(db, file) for reference in chunk_references(db, chunk.text, diffeo))
+    return frozenset((path, name) for path, name in found if path is not None)

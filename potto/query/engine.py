@@ -79,7 +79,7 @@ class Engine:
             self._meet_cycle(memo)
         elif memo.verified_at < 0:
             self._run(memo)
-        elif memo.verified_at < self.revision:
+        elif memo.verified_at < self.revision and self._verify(memo, [0]) is not False:
             self._refresh(memo)
         return memo
 
