@@ -235,7 +235,7 @@ def _make(cls: type[T], free: frozenset[str], *fields: object) -> T:
         if found is None:
             found = cls(free, digest, *fields)
             _table[digest] = found
-    return found  # type: ignore[no-any-return]
+    return found
 
 
 def _union(terms: Iterable[Term]) -> frozenset[str]:

@@ -33,7 +33,7 @@ NODE_ROUNDING = 0.5
 MOST_HALVINGS = 64
 # Nodes for pieces that were too coarse: first more of them on the same piece, then on halves.
 HIGH_ORDER = 16
-HALF_ORDER = 10
+HALF_ORDER = 14
 # The relative error of a piece up to which more nodes promise more than halves do.
 PROMISING = 1e-2
 DOUBTFUL_ROUNDS = 24
@@ -283,8 +283,8 @@ class Work:
             better = np.minimum(error[:, 1 : 1 + k], error[:, 1 + k :])
             error = np.concatenate((error[:, :1], better), axis=1)
             floor = floor[:, : 1 + k]
-        error, floor = error.reshape(-1, error.shape[-1]), floor.reshape(-1, floor.shape[-1])
-        bad = ((error > tally.shares(self, owner)) & (error > 8 * floor)).any(axis=0)
+        off, rounding = error.reshape(-1, p.segment.size), floor.reshape(-1, p.segment.size)
+        bad = ((off > tally.shares(self, owner)) & (off > 8 * rounding)).any(axis=0)
         if ends is not None:
             bad |= self.missed_peak(p, ends)
         if not bad.any():

@@ -165,7 +165,8 @@ def best_order(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) 
 
 def one_thread() -> AbstractContextManager[object]:
     """Many small products of matrices: threads only get in each other's way."""
-    return _threads().limit(limits=1, user_api="blas")
+    limit: AbstractContextManager[object] = _threads().limit(limits=1, user_api="blas")
+    return limit
 
 
 @lru_cache(maxsize=1)
