@@ -7,8 +7,8 @@ walked again until they stand still (they only grow, and there are finitely many
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Set
+from dataclasses import dataclass, replace
 
 from potto.diagnostics import Diagnostic
 from potto.modules.lookup import DefinitionTarget
@@ -25,9 +25,9 @@ from potto.types.lints import lints
 from potto.types.reasons import Reasons
 from potto.types.recursion import endless
 from potto.types.scope import Outside
-from potto.types.types import Diffeo, Function, Meta, Parameter, Real, Type, groups_of, resolve
+from potto.types.types import UNKNOWN, Diffeo, Function, Meta, Parameter, Real, Type, Unknown, groups_of, resolve
 from potto.types.unify import close_type, unify
-from potto.types.values import STILL, Closure, Scalar, TupleValue, Value, flat, inputs_of, symbolic
+from potto.types.values import STILL, Closure, Port, Scalar, Source, TupleValue, Value, flat, inputs_of, symbolic
 
 MAX_ROUNDS = 20
 
@@ -54,9 +54,11 @@ class Analysis:
 
 
 def analyse(
-    items: Mapping[DefinitionTarget, Written], outsides: Mapping[DefinitionTarget, Outside]
+    items: Mapping[DefinitionTarget, Written],
+    outsides: Mapping[DefinitionTarget, Outside],
+    broken: Set[DefinitionTarget] = frozenset(),
 ) -> dict[DefinitionTarget, Analysis]:
-    """Analyse definitions that need each other (mostly one)."""
+    """Analyse definitions that need each other (mostly one). Of what is `broken` the parser has spoken already."""
     ensure_stack()
     skeletons = {target: _skeleton(item) for target, item in items.items()}
     inferences = {}
@@ -65,8 +67,8 @@ def analyse(
         _infer(inference, item, skeletons[target])
     for inference in inferences.values():
         inference.finish()
-    flows: dict[DefinitionTarget, Value] = {target: _nothing(skeletons[target]) for target in items}
     recursive = len(items) > 1 or any(inference.recursive() for inference in inferences.values())
+    flows: dict[DefinitionTarget, Value] = {target: _nothing(skeletons[target]) for target in items if recursive}
     for _ in range(MAX_ROUNDS if recursive else 1):
         walked = {target: _walk(inferences[target], item, flows) for target, item in items.items()}
         closed = {target: Closing(value).value(value) for target, (_, value) in walked.items()}
@@ -74,10 +76,19 @@ def analyse(
             break
         flows = closed
     unended = endless(items, inferences) if recursive else {}
-    return {
-        target: _conclude(target, item, inferences[target], *walked[target], skeletons[target], unended.get(target, ()))
-        for target, item in items.items()
-    }
+    found = {}
+    for target, item in items.items():
+        walk, value = walked[target]
+        typed = found[target] = _conclude(target, item, inferences[target], walk, value, skeletons[target])
+        if target in broken:
+            found[target] = replace(typed, interface=replace(typed.interface, broken=True), diagnostics=())
+        elif target in unended:
+            found[target] = replace(typed, diagnostics=_sorted((*typed.diagnostics, *unended[target])))
+    return found
+
+
+def _sorted(found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
+    return tuple(sorted(found, key=lambda diagnostic: (diagnostic.span, diagnostic.code)))
 
 
 def _skeleton(item: Written) -> Type:
@@ -91,13 +102,11 @@ def _skeleton(item: Written) -> Type:
 
 def _nothing(type: Type) -> Value:
     """The flow of which nothing is known yet: varies with nothing, demands nothing."""
-    type = resolve(type)
-    if isinstance(type, Function):
-        from potto.types.values import Port, Source
-
-        inputs = tuple(symbolic(p.type, lambda: Source("input", ""), lambda: Port("")) for p in type.parameters)
-        return Closing(Closure(inputs, _nothing(type.result))).value(Closure(inputs, _nothing(type.result)))
-    return STILL
+    value: Value = STILL
+    for group in reversed(groups_of(type)):
+        inputs = tuple(symbolic(p.type, lambda: Source("input", ""), lambda: Port("")) for p in group)
+        value = Closure(inputs, value)
+    return Closing(value).value(value)
 
 
 def _infer(inference: Inference, item: Written, skeleton: Type) -> None:
@@ -112,6 +121,7 @@ def _infer(inference: Inference, item: Written, skeleton: Type) -> None:
         result = resolve(result)
         assert isinstance(result, Function)
         result = result.result
+    result = resolve(result)
     if isinstance(item, nodes.DiffeoDefinition):
         _infer_diffeo(inference, item, result)
     else:
@@ -125,13 +135,16 @@ def _infer_body(inference: Inference, item: nodes.Definition, result: Type) -> N
         written = written_type(inference, item.result)
         if not unify(body, written):
             inference.report(mismatch(body, written, item.body, f"the result of `{item.name}`"))
-    if not unify(result, body):
+    if isinstance(resolve(body), Unknown) and isinstance(result, Meta):
+        result.found = UNKNOWN  # else it would be taken to hold for all types
+    elif not unify(result, body):
         inference.report(mismatch(body, result, item.body, f"the result of `{item.name}`, as it is used in it,"))
 
 
 def _infer_diffeo(inference: Inference, item: nodes.DiffeoDefinition, result: Type) -> None:
     for variable in item.variables:
-        inference.need_number(inference.binders[id(variable)].type, nodes.Name(variable.span, variable.name), "a variable")
+        local = inference.binders[id(variable)]
+        inference.need_number(local.type, nodes.Name(variable.span, variable.name), "a variable of a diffeomorphism")
     for component in item.components:
         inference.number(component, "a coordinate of a diffeomorphism")
     unify(result, Diffeo(len(item.components)))
@@ -175,7 +188,6 @@ def _conclude(
     walk: Walk,
     value: Value,
     skeleton: Type,
-    unended: tuple[Diagnostic, ...],
 ) -> Analysis:
     closing = Closing(value)
     decorating = Decorating(value)
@@ -188,9 +200,8 @@ def _conclude(
         varies=_named(_varying(value), decorating),
         diffeo=isinstance(item, nodes.DiffeoDefinition),
     )
-    found = [*inference.diagnostics, *walk.diagnostics, *unended, *lints(inference, walk, item)]
-    found.sort(key=lambda diagnostic: (diagnostic.span, diagnostic.code))
-    return Analysis(interface, tuple(found), reasons_of(value, closing, decorating), _typed(inference, walk))
+    found = _sorted((*inference.diagnostics, *walk.diagnostics, *lints(inference, walk, item)))
+    return Analysis(interface, found, reasons_of(value, closing, decorating), _typed(inference, walk))
 
 
 def _named(sources: object, decorating: Decorating) -> tuple[str, ...]:

@@ -236,7 +236,7 @@ def _substitute_sources(sources: Sources, values: dict[Source, Value]) -> Source
 
 def _substitute_scalar(value: Scalar, values: dict[Source, Value]) -> Value:
     jumps = set(_surfaces(value.jumps, values))
-    spikes = {Spike(over, "") for over in _surfaces((spike.over for spike in value.spikes), values)}
+    spikes = {Spike(_surface(spike.over, values), "") for spike in value.spikes}
     for source in value.sources:
         actual = values.get(source)
         if isinstance(actual, Scalar):
@@ -254,12 +254,17 @@ def _substitute_scalar(value: Scalar, values: dict[Source, Value]) -> Value:
 
 def _surfaces(surfaces: Iterable[Surface], values: dict[Source, Value]) -> Iterable[Surface]:
     for surface in surfaces:
-        found: set[Source] = set()
-        for source in surface:
-            actual = values.get(source)
-            found.update((source,) if actual is None else flat(actual))
+        found = _surface(surface, values)
         if found:
-            yield frozenset(found)
+            yield found
+
+
+def _surface(surface: Surface, values: dict[Source, Value]) -> Surface:
+    found: set[Source] = set()
+    for source in surface:
+        actual = values.get(source)
+        found.update((source,) if actual is None else flat(actual))
+    return frozenset(found)
 
 
 # Effects

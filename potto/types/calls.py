@@ -204,7 +204,7 @@ class _Filling:
         first, given = len(self.groups[0]), self.positional
         if len(given) != len(self.node.arguments):
             return False
-        if first == 1 and len(given) > len(self.parameters):
+        if first == 1 and len(self.groups) == 1 and len(given) > 1:
             only = resolve(self.parameters[0].type)
             if isinstance(only, TupleOf) and len(only.items) == len(given):
                 self.slots[0] = tuple(given)
@@ -240,17 +240,16 @@ class _Filling:
         )
 
     def _complete(self) -> bool:
-        """Check that no group is filled in part."""
-        fine, start = True, 0
-        nothing = not self.node.arguments
-        for number, group in enumerate(self.groups):
-            slots = self.slots[start : start + len(group)]
-            empty = [parameter for parameter, slot in zip(group, slots) if not slot]
-            if empty and (len(empty) < len(group) or (nothing and number == 0)):
-                self.inference.report(self._missing(empty))
-                fine = False
+        """Check that groups are filled whole and in order: those after the last argument stay open."""
+        end = max((place + 1 for place, slot in enumerate(self.slots) if slot), default=1)
+        start, empty = 0, []
+        for group in self.groups:
+            if start < end:
+                empty += [p for p, slot in zip(group, self.slots[start : start + len(group)]) if not slot]
             start += len(group)
-        return fine
+        if empty:
+            self.inference.report(self._missing(empty))
+        return not empty
 
     def _missing(self, empty: Sequence[Parameter]) -> Diagnostic:
         names = [f"`{parameter.name}`" for parameter in empty if parameter.name]
@@ -328,9 +327,9 @@ def _deriv(inference: Inference, node: nodes.Apply) -> Type:
     if isinstance(found, Unknown):
         return UNKNOWN
     if not isinstance(found, Function | Meta):
-        help = "derive the function and apply the result: `deriv(f)(…)`" if isinstance(strip(inner), nodes.Apply) else ""
-        if isinstance(found, Real) and not help:
-            help = "write it as a function of what it depends on: `deriv(\\t . …)`"
+        help = "write it as a function of what it depends on: `deriv(\\t . …)`"
+        if isinstance(strip(inner), nodes.Apply):
+            help = "derive the function and apply the result: `deriv(f)(…)`"
         message = f"`deriv` takes a function, but this is {describe(found)}"
         inference.report(kinds.NOT_A_FUNCTION(inner.span, message, label=describe(found), help=help))
         return UNKNOWN

@@ -132,7 +132,7 @@ def _note_reasons(
             last = next((step for step in reversed(way) if step.argument), None)
             if last is not None:
                 span, text = last.span, last.message
-        name = decorating.names.get(source, source.name)
+        name = decorating.roles.get(source, f"its parameter `{source.name}`")
         plain[sink.kind, own.number] = Reason(sink.kind, own.number, name, span, way, text, further)
 
 

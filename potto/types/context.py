@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal, TypeVar
 
-from potto.diagnostics import Diagnostic
+from potto.diagnostics import Diagnostic, Related
 from potto.modules.lookup import DefinitionTarget
 from potto.source import Span
 from potto.syntax import nodes
@@ -90,7 +90,9 @@ class Inference:
         self.locals: list[Local] = []
         self.plans: dict[int, Plan] = {}
         self.conditions: dict[int, Condition] = {}
+        self.comparisons: list[nodes.Compare] = []
         self.brackets: set[int] = set()
+        self.mixed: set[int] = set()  # the `and`, `or`, `not` of conditions, where brackets may stand
         self.integrals = 0  # how many integrals are around the place that is looked at
         self._late: list[Callable[[], None]] = []
         self._duals: list[tuple[Meta, Meta]] = []
@@ -137,12 +139,8 @@ class Inference:
 
     def bind_group(self, parameters: tuple[nodes.Parameter, ...], annotated: Callable[[Any], Type]) -> list[Local]:
         """Bring a group of parameters into scope."""
-        seen: set[str] = set()
         found = []
         for parameter in parameters:
-            if parameter.name in seen:
-                self.report(twice_bound(parameter.name, parameter.span))
-            seen.add(parameter.name)
             type = self.fresh() if parameter.annotation is None else annotated(parameter.annotation)
             found.append(self.bind(parameter, Local(parameter.name, parameter.span, "parameter", type)))
         return found
@@ -342,8 +340,6 @@ def _not_a_number(found: Type, expr: nodes.Expr, where: str) -> Diagnostic:
 
 
 def _shadowing(local: Local, before: Local) -> Diagnostic:
-    from potto.diagnostics import Related
-
     what = {"parameter": "parameter", "variable": "variable of integration"}.get(before.kind, "local name")
     return kinds.SHADOWED(
         local.span,
@@ -351,12 +347,6 @@ def _shadowing(local: Local, before: Local) -> Diagnostic:
         label="hides it from here on",
         related=(Related(before.span, f"the {what} `{before.name}` is bound here"),),
         help="give one of them another name",
-    )
-
-
-def twice_bound(name: str, span: Span) -> Diagnostic:
-    return kinds.DUPLICATE_BINDER(
-        span, f"`{name}` is bound twice here", label="already bound beside it", help="give each its own name"
     )
 
 

@@ -22,7 +22,7 @@ from potto.types.infer import strip
 from potto.types.interface import localized
 from potto.types.rules import Violation, equality, nonlinear, product_of_deltas, violation
 from potto.types.scope import Builtin, Global, Local, Member
-from potto.types.types import Truth, resolve
+from potto.types.types import Truth, Unknown, resolve
 from potto.types.values import (
     HAZY,
     NONE,
@@ -253,7 +253,7 @@ def _name(walk: Walk, node: nodes.Name | nodes.Member) -> Value:
             walk.places[id(node)] = value
             return value
         case Global(target, interface):
-            return walk.known(target, interface.flow)
+            return HAZY if interface.broken else walk.known(target, interface.flow)
         case Member(target):
             return walk.known(target, walk.members[target])
         case Builtin(name):
@@ -351,7 +351,7 @@ def _met(walk: Walk, span: Span, surfaces: Iterable[Surface]) -> None:
 @walks(nodes.If)
 def _if(walk: Walk, node: nodes.If) -> Value:
     if walk.inference.conditions.get(id(node)) == "plain":
-        condition: Scalar = Scalar(plain_condition(walk, node.condition).sources)
+        condition = plain_condition(walk, node.condition)
     else:
         condition = _jumping_condition(walk, node)
     both = join(walk.value(node.then), walk.value(node.orelse))
@@ -377,10 +377,12 @@ def plain_condition(walk: Walk, expr: nodes.Expr) -> Scalar:
             return _scalar(joined(plain_condition(walk, operand) for operand in operands))
         case nodes.Unary(op="not", operand=operand):
             return plain_condition(walk, operand)
+        case nodes.Bracket():
+            return _scalar(walk.value(expr))
         case _:
             value = _scalar(walk.value(expr))
             walk.sink("condition", expr.span, value, node=expr)
-            return Scalar(value.sources)
+            return Scalar(value.sources)  # what is plain makes no surface
 
 
 @walks(nodes.InlineDiffeo)
@@ -390,7 +392,8 @@ def _inline(walk: Walk, node: nodes.InlineDiffeo) -> Value:
 
 @walks(nodes.Tuple)
 def _tuple(walk: Walk, node: nodes.Tuple) -> Value:
-    return TupleValue(tuple(walk.value(item) for item in node.items))
+    items = tuple(walk.value(item) for item in node.items)
+    return HAZY if isinstance(walk.inference.types.get(id(node)), Unknown) else TupleValue(items)  # too large
 
 
 @walks(nodes.ListLiteral)

@@ -13,7 +13,7 @@ from potto.primitives import PRIMITIVES
 from potto.syntax import nodes
 from potto.types import kinds
 from potto.types.annotations import written_type
-from potto.types.context import Inference, comparison, describe, mismatch, rule
+from potto.types.context import Condition, Inference, comparison, describe, mismatch, rule
 from potto.types.scope import Builtin, Global, Local, Meaning, Member, Module, undefined, undefined_member
 from potto.types.types import (
     REAL,
@@ -87,7 +87,7 @@ def _meant(inference: Inference, node: nodes.Name | nodes.Member, meaning: Meani
             meaning.used = True
             return instantiate(meaning.type, meaning.generic, inference.level)
         case Global(_, interface):
-            return open_type(interface.type, inference.level)
+            return UNKNOWN if interface.broken else open_type(interface.type, inference.level)
         case Member(target):
             return inference.members[target]
         case Module(name):
@@ -125,7 +125,7 @@ def _builtin(inference: Inference, node: nodes.Name | nodes.Member, name: str) -
 @rule(nodes.Unary)
 def _unary(inference: Inference, node: nodes.Unary) -> Type:
     if node.op == "not":
-        _truth(inference, node.operand, "`not`")
+        _operand(inference, node, node.operand, "`not`")
         return TRUTH
     inference.number(node.operand, f"what stands behind `{node.op}`")
     return REAL
@@ -151,6 +151,7 @@ def _power(inference: Inference, node: nodes.Power) -> Type:
 
 @rule(nodes.Compare)
 def _compare(inference: Inference, node: nodes.Compare) -> Type:
+    inference.comparisons.append(node)
     inference.number(node.first, f"the left of `{node.rest[0].op}`")
     for operand in node.rest:
         inference.number(operand.value, f"the right of `{operand.op}`")
@@ -160,7 +161,7 @@ def _compare(inference: Inference, node: nodes.Compare) -> Type:
 @rule(nodes.Logic)
 def _logic(inference: Inference, node: nodes.Logic) -> Type:
     for operand in node.operands:
-        _truth(inference, operand, f"`{node.op}`")
+        _operand(inference, node, operand, f"`{node.op}`")
     return TRUTH
 
 
@@ -168,6 +169,17 @@ def _logic(inference: Inference, node: nodes.Logic) -> Type:
 def _bracket(inference: Inference, node: nodes.Bracket) -> Type:
     _truth(inference, node.condition, "the bracket")
     return REAL
+
+
+def _operand(inference: Inference, node: nodes.Logic | nodes.Unary, operand: nodes.Expr, where: str) -> None:
+    """An operand of `and`, `or`, `not`: in a condition it may be a bracket, elsewhere it is a comparison."""
+    inner = strip(operand)
+    if id(node) in inference.mixed:
+        if isinstance(inner, nodes.Bracket):
+            inference.infer(operand)
+            return
+        inference.mixed.add(id(inner))
+    _truth(inference, operand, where)
 
 
 def _truth(inference: Inference, expr: nodes.Expr, where: str) -> None:
@@ -199,17 +211,28 @@ def _if(inference: Inference, node: nodes.If) -> Type:
 def _condition(inference: Inference, node: nodes.If) -> None:
     """Infer a condition and find out of which kind it is."""
     expr = strip(node.condition)
+    if isinstance(expr, nodes.Logic | nodes.Unary):
+        inference.mixed.add(id(expr))
     found = resolve(inference.infer(node.condition))
-    kind = "plain"
+    kind: Condition = "plain"
     if isinstance(found, Meta):
         unify(found, Diffeo(None))
     if is_bracket(inference, expr):
         kind = "bracket"
-    elif isinstance(found, Diffeo | Meta) or (isinstance(found, TupleOf) and not isinstance(expr, nodes.Tuple) and unify(found, Diffeo(len(found.items)))):
+    elif isinstance(found, Diffeo | Meta) or _coordinates(found, expr):
         kind = "diffeo"
     elif not isinstance(found, Truth | Unknown):
         inference.report(_no_condition(found, node.condition))
-    inference.conditions[id(node)] = kind  # type: ignore[assignment]
+    inference.conditions[id(node)] = kind
+
+
+def _coordinates(found: Type, expr: nodes.Expr) -> bool:
+    """Whether a value can pass for a diffeomorphism's result: a tuple of numbers, but not one that is written out."""
+    return (
+        isinstance(found, TupleOf)
+        and not isinstance(expr, nodes.Tuple)
+        and unify(found, Diffeo(len(found.items)))
+    )
 
 
 def is_bracket(inference: Inference, expr: nodes.Expr) -> bool:
@@ -221,7 +244,10 @@ def is_bracket(inference: Inference, expr: nodes.Expr) -> bool:
         meaning = inference.meanings.get(id(expr))
         if not isinstance(meaning, Local) or meaning.kind != "local" or meaning.value is None:
             return False
-        expr = meaning.value
+        value = strip(meaning.value)
+        if isinstance(value, nodes.Bracket) and not _one_surface(value):
+            return False
+        expr = value
     return False
 
 
@@ -238,6 +264,12 @@ def _no_condition(found: Type, expr: nodes.Expr) -> Diagnostic:
         label="not a condition",
         help=help,
     )
+
+
+def _one_surface(bracket: nodes.Bracket) -> bool:
+    """Whether a bracket is a single inequality: only such a one can be given a name and still decide a condition."""
+    inner = strip(bracket.condition)
+    return isinstance(inner, nodes.Compare) and len(inner.rest) == 1 and inner.rest[0].op not in ("==", "!=")
 
 
 @rule(nodes.InlineDiffeo)
@@ -317,19 +349,20 @@ def escape(expr: nodes.Expr, message: str) -> Diagnostic:
 def _lambda(inference: Inference, node: nodes.Lambda) -> Type:
     with inference.scope.inside():
         groups = [inference.bind_group(group, lambda a: written_type(inference, a)) for group in node.groups]
-        result = inference.infer(node.body)
-    returned(inference, result, node.body)
+        result = returned(inference, inference.infer(node.body), node.body)
     for group in reversed(groups):
         result = Function(tuple(Parameter(local.name, local.type) for local in group), result)
     return result
 
 
-def returned(inference: Inference, result: Type, body: nodes.Expr) -> None:
-    """Check what a function gives: no comparison, and a function only by currying."""
+def returned(inference: Inference, result: Type, body: nodes.Expr) -> Type:
+    """What a function gives: no comparison, and a function only by currying."""
     if isinstance(resolve(result), Truth):
         inference.report(comparison(body, "a function gives a number"))
-    elif not isinstance(resolve(result), Real):
+        return UNKNOWN
+    if not isinstance(resolve(result), Real):
         inference.later(lambda: _returned_late(inference, result, body))
+    return result
 
 
 def _returned_late(inference: Inference, result: Type, body: nodes.Expr) -> None:
@@ -395,13 +428,7 @@ def _bind_parts(inference: Inference, binding: nodes.Binding, type: Type) -> Non
         message = f"{len(parts)} names are bound here, but this is {describe(found)}"
         help = "" if count is None else f"bind {count} names"
         inference.report(kinds.MISMATCH(binding.value.span, message, label=describe(found), help=help))
-    seen: set[str] = set()
     for target, part in zip(binding.targets, parts):
-        if target.name in seen:
-            from potto.types.context import twice_bound
-
-            inference.report(twice_bound(target.name, target.span))
-        seen.add(target.name)
         inference.bind(target, Local(target.name, target.span, "local", part))
 
 

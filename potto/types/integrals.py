@@ -12,7 +12,7 @@ from potto.diagnostics import Diagnostic
 from potto.measures import MEASURES
 from potto.syntax import nodes
 from potto.types import kinds
-from potto.types.context import Inference, comparison, describe, near_names, rule, twice_bound
+from potto.types.context import Inference, comparison, describe, near_names, rule
 from potto.types.infer import bindings, escape
 from potto.types.scope import Local
 from potto.types.types import REAL, Dist, Function, ListOf, Meta, Real, Truth, TupleOf, Type, Unknown, resolve
@@ -34,7 +34,10 @@ def _integral(inference: Inference, node: nodes.Integral) -> Type:
     return body
 
 
-def _bounds(inference: Inference, node: nodes.Integral, place: int, bounds: nodes.Interval | nodes.MeasureBound) -> None:
+Bounds = nodes.Interval | nodes.MeasureBound
+
+
+def _bounds(inference: Inference, node: nodes.Integral, place: int, bounds: Bounds) -> None:
     later = [variable.name for variable in node.variables[place:]]
     inside = [name for name in later if not (inference.scope.find(name) or inference.outside.find(None, name))]
     parts = (bounds.lo, bounds.hi) if isinstance(bounds, nodes.Interval) else bounds.arguments
@@ -49,8 +52,6 @@ def _bounds(inference: Inference, node: nodes.Integral, place: int, bounds: node
         _measure(inference, bounds)
     if place < len(node.variables):
         variable = node.variables[place]
-        if variable.name in [earlier.name for earlier in node.variables[:place]]:
-            inference.report(twice_bound(variable.name, variable.span))
         inference.local(variable, variable.name, variable.span, "variable", REAL)
 
 
@@ -76,18 +77,7 @@ def _inner_bound(name: nodes.Name, node: nodes.Integral) -> Diagnostic:
 
 
 def _matching(inference: Inference, node: nodes.Integral) -> None:
-    """Check that there are as many bounds as variables, and that measures name theirs in the same order."""
-    bounds, variables = len(node.bounds), len(node.variables)
-    if bounds != variables:
-        has = f"{bounds} bound{'s' if bounds != 1 else ''} but {variables} variable{'s' if variables != 1 else ''}"
-        inference.report(
-            kinds.BOUNDS(
-                node.variables[-1].span if node.variables else node.span,
-                f"this integral has {has} of integration",
-                label="one interval for each variable",
-                help="write for example `integral ([0, 1], [0, 1]) … d(x, y)`",
-            )
-        )
+    """Check that measures name their variables in the order of `d(…)`; that there are as many the parser has seen."""
     for bound, variable in zip(node.bounds, node.variables):
         if isinstance(bound, nodes.MeasureBound) and bound.variable != variable.name:
             inference.report(

@@ -48,6 +48,7 @@ from potto.types.values import (
     Value,
     flat,
     inputs_of,
+    inputs_of_ports,
     ports_in,
 )
 
@@ -59,7 +60,8 @@ class Interface:
     """A definition as others see it.
 
     `plain`: the names of the parameters that must not vary. `varies`: those that the result varies with. `flow` is for
-    the checker: what goes where. `diffeo`: declared a diffeomorphism.
+    the checker: what goes where. `diffeo`: declared a diffeomorphism. `broken`: the text could not be read; the type is
+    the best guess, and fits everything where the definition is used.
     """
 
     name: str
@@ -68,6 +70,7 @@ class Interface:
     plain: tuple[str, ...] = ()
     varies: tuple[str, ...] = ()
     diffeo: bool = False
+    broken: bool = False
 
     @property
     def groups(self) -> tuple[tuple[str | None, ...], ...]:
@@ -82,7 +85,7 @@ class Interface:
 
 def unknown_interface(name: str) -> Interface:
     """The interface of what is broken beyond reading: fits everywhere."""
-    return Interface(name, UNKNOWN)
+    return Interface(name, UNKNOWN, broken=True)
 
 
 @cache
@@ -147,7 +150,7 @@ class Closing:
         if variables and any(source.kind == "variable" for source in value.sources):
             sources[VARYING] = None
         jumps = frozenset(filter(None, map(self._surface, value.jumps)))
-        spikes = frozenset(Spike(over, "") for spike in value.spikes if (over := self._surface(spike.over)))
+        spikes = frozenset(Spike(self._surface(spike.over), "") for spike in value.spikes)
         carriers = frozenset(self.sources[s] for s in value.carriers if s in self.sources)
         return Scalar(sources or NONE, jumps, spikes, carriers)
 
@@ -246,6 +249,7 @@ class Decorating:
                 self.given.setdefault(effect.to, set()).update(flat(effect.value))
         self.inputs = set(inputs_of([symbol for closure in closures for symbol in closure.inputs]))
         self.names: dict[Source, str] = {}
+        self.roles: dict[Source, str] = {}
 
     def type(self, type: Type, value: Value) -> Type:
         if isinstance(type, Function) and isinstance(value, Choice):
@@ -254,11 +258,11 @@ class Decorating:
             case Function(group, result), Closure(inputs, answer):
                 regrouped = inputs if len(inputs) == len(group) else ()
                 for parameter, symbol in zip(group, regrouped):
-                    self.names.update((source, parameter.name or "_") for source in inputs_of((symbol,)))
+                    self._name(parameter.name or "_", symbol)
                 parameters = self._parameters(group, regrouped)
                 return Function(parameters, self.type(result, answer))
             case Function(), Abstract():
-                return self._input(type, value, star=True)
+                return self._input(type, value, self.settled)
             case ListOf(item), ListValue(inner):
                 return ListOf(self.type(item, inner))
             case TupleOf(items, dual), TupleValue(parts) if len(items) == len(parts):
@@ -268,10 +272,22 @@ class Decorating:
             case _:
                 return type
 
+    def _name(self, name: str, symbol: Value) -> None:
+        """Note which parameter an input belongs to, and what of it the input is."""
+        for source in inputs_of((symbol,)):
+            self.names[source] = name
+            self.roles[source] = f"its parameter `{name}`"
+        if isinstance(symbol, Abstract):
+            for source in inputs_of((symbol,)):
+                self.roles[source] = f"what its parameter `{name}` gives"
+            for tree in symbol.ports:
+                for source in inputs_of_ports(tree):
+                    self.roles[source] = f"what its parameter `{name}` passes on"
+
     def _parameters(self, group: tuple[Parameter, ...], inputs: Sequence[Value]) -> tuple[Parameter, ...]:
         if not inputs:
             return group
-        return tuple(Parameter(p.name, self._input(p.type, symbol, True)) for p, symbol in zip(group, inputs))
+        return tuple(Parameter(p.name, self._input(p.type, s, self.settled)) for p, s in zip(group, inputs))
 
     def _result(self, value: Scalar) -> Type:
         if value.spikes:
@@ -285,16 +301,19 @@ class Decorating:
         known = sorted((source for source in found if source in order), key=order.__getitem__)
         return tuple(dict.fromkeys(self.names[source] for source in known if source not in self.plain))
 
-    def _input(self, type: Type, value: Value, star: bool) -> Type:
+    def _input(self, type: Type, value: Value, still: set[Source] | None) -> Type:
+        """The type of an input. `still`: the sources at which it is `Real`; None where no star is printed."""
         match type, value:
             case Real(), Scalar(sources):
-                return Real(star=star and not any(source in self.settled for source in sources))
+                return Real(star=still is not None and not any(source in still for source in sources))
             case TupleOf(items, dual), TupleValue(parts) if len(items) == len(parts):
-                inner = tuple(self._input(item, part, star) for item, part in zip(items, parts))
+                inner = tuple(self._input(item, part, still) for item, part in zip(items, parts))
                 return TupleOf(inner, dual)
             case Function(group, result), Abstract(ports, answer) if len(group) == len(ports):
-                parameters = (Parameter(p.name, self._given(p.type, tree)) for p, tree in zip(group, ports))
-                return Function(tuple(parameters), self._input(result, answer, star=isinstance(result, Function)))
+                parameters = (Parameter(None, self._given(p.type, tree)) for p, tree in zip(group, ports))
+                return Function(tuple(parameters), self._input(result, answer, None))
+            case Function(group, result), _:
+                return Function(tuple(Parameter(None, p.type) for p in group), result)
             case _:
                 return type
 
@@ -305,7 +324,7 @@ class Decorating:
             case TupleOf(items, dual), PortTuple(parts) if len(items) == len(parts):
                 return TupleOf(tuple(self._given(item, part) for item, part in zip(items, parts)), dual)
             case Function(group, result), PortFunction(inputs) if len(group) == len(inputs):
-                parameters = (Parameter(p.name, self._input(p.type, s, True)) for p, s in zip(group, inputs))
+                parameters = (Parameter(None, self._input(p.type, s, self.plain)) for p, s in zip(group, inputs))
                 return Function(tuple(parameters), result)
             case _:
                 return type

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from potto.diagnostics import Diagnostic
-from potto.modules.free import free_references
 from potto.syntax import nodes
 from potto.syntax.nodes import Node
-from potto.syntax.walk import walk as walk_tree
 from potto.types import kinds
 from potto.types.context import Inference
 from potto.types.flow import Walk
@@ -16,9 +14,10 @@ from potto.types.flow import Walk
 
 def lints(inference: Inference, walk: Walk, item: Node) -> Iterator[Diagnostic]:
     """The warnings about one definition, statement or expression."""
+    if any(diagnostic.severity == "error" for diagnostic in (*inference.diagnostics, *walk.diagnostics)):
+        return  # what is wrong may be why a name is not used
     yield from _unused(inference)
-    if isinstance(item, nodes.Definition | nodes.DiffeoDefinition):
-        yield from _constant_conditions(item)
+    yield from _constant_conditions(inference)
     if isinstance(item, nodes.Definition) and (item.groups or isinstance(item.body, nodes.Lambda)):
         yield from _still_surfaces(walk)
 
@@ -45,15 +44,21 @@ def _unused(inference: Inference) -> Iterator[Diagnostic]:
             )
 
 
-def _constant_conditions(item: Node) -> Iterator[Diagnostic]:
-    for node in walk_tree(item):
-        if isinstance(node, nodes.Compare) and next(free_references(node), None) is None:
+def _constant_conditions(inference: Inference) -> Iterator[Diagnostic]:
+    for node in inference.comparisons:
+        if _literal(node.first) and all(_literal(operand.value) for operand in node.rest):
             yield kinds.CONSTANT_CONDITION(
                 node.span,
-                "this condition never changes: it has no variables",
+                "this condition never changes: it compares numbers",
                 label="always true or always false",
                 help="leave the condition out",
             )
+
+
+def _literal(expr: nodes.Expr) -> bool:
+    while isinstance(expr, nodes.Paren | nodes.Unary):
+        expr = expr.inner if isinstance(expr, nodes.Paren) else expr.operand
+    return isinstance(expr, nodes.Number)
 
 
 def _still_surfaces(walk: Walk) -> Iterator[Diagnostic]:

@@ -14,7 +14,7 @@ from potto.diagnostics import Diagnostic
 from potto.modules.free import free_references
 from potto.modules.graph import refer, references, strongly_connected
 from potto.modules.lookup import DefinitionTarget, ModuleTarget
-from potto.modules.texts import definition
+from potto.modules.texts import chunk_text, definition, is_diffeo, parsed
 from potto.query import Database, query
 from potto.syntax import nodes
 from potto.types.analysis import Analysis, Typed, analyse, local_type
@@ -87,7 +87,15 @@ def _analyses(db: Database, group: tuple[DefinitionTarget, ...]) -> dict[Definit
         if item is not None:
             items[target] = item
     outsides = {target: _outside(db, target.file, references(db, target.file, target.name), items) for target in items}
-    return analyse(items, outsides)
+    broken = frozenset(target for target in items if _broken(db, target.file, target.name))
+    return analyse(items, outsides, broken)
+
+
+def _broken(db: Database, file: str, name: str) -> bool:
+    """Whether the parser could read a definition only by guessing."""
+    text = chunk_text(db, file, name)
+    found = () if text is None else parsed(db, text, is_diffeo(file)).diagnostics
+    return any(diagnostic.severity == "error" for diagnostic in found)
 
 
 def _outside(

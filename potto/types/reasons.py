@@ -14,7 +14,10 @@ from potto.types.values import SinkKind, Step
 
 @dataclass(frozen=True, slots=True)
 class Reason:
-    """Why a parameter must not vary: the place in the definition, and the way there. `further`: it is passed on."""
+    """Why an input must not vary: what it is ("its parameter `y`"), the place in the definition, and the way there.
+
+    `further`: it is passed on to another definition's input, which must not vary.
+    """
 
     kind: SinkKind
     number: int

@@ -118,7 +118,7 @@ class _Wording:
     def _foreign(self, reason: Reason | None) -> str:
         owner = self.sink.origin
         name = f"`{owner.name}`" if isinstance(owner, DefinitionTarget) else "this function"
-        parameter = f"its parameter `{reason.parameter}`" if reason else "its parameter"
+        parameter = reason.parameter if reason else "its parameter"
         does = {
             "jump": f"takes a builtin that jumps of {parameter}",
             "sum": f"takes the bound of a sum from {parameter}",
@@ -180,7 +180,8 @@ class _Wording:
                 return f"{where}declare the parameter `Real*`, or leave the annotation out"
             case _:
                 shown = f"`[{condition_text(self.sink.node)}]`" if not where else "in brackets, `[…]`"
-                return f"{where}state the jump as a diffeomorphic condition, {shown}, so that its boundary term is counted"
+                bracket = f"{where}state the jump as a diffeomorphic condition, {shown}"
+                return f"{bracket}, so that its boundary term is counted"
 
 
 def condition_text(node: object) -> str:
