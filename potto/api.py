@@ -19,8 +19,8 @@ from potto.calls import Call, Gradient, gradient
 from potto.diagnostics import PottoError
 from potto.kernels.cells import Value
 from potto.kernels.errors import wrong_call
-from potto.library import NO_FILE
 from potto.modules import DefinitionTarget, ModuleTarget, find_module, names, resolve
+from potto.modules.kinds import NO_MODULE
 from potto.render import display_name
 from potto.runtime.estimate import Estimate
 from potto.source import Span
@@ -46,7 +46,7 @@ class Workspace:
         """The module of a dotted name. Raises PottoError if there is none, or if it has errors."""
         file = find_module(self._world.db, os.path.join(self.root, "<workspace>"), name)
         if file is None:
-            problem = NO_FILE(NOWHERE, f"there is no module `{name}` in {display_name(self.root)}")
+            problem = NO_MODULE(NOWHERE, f"there is no module `{name}` in {display_name(self.root)}")
             raise PottoError([problem])
         return _module(self._world, file)
 
@@ -244,7 +244,8 @@ def _labelled(
             at += 1
         left = [p for p in parameters if p.name not in kwargs]
         spread = len(args) == 1 and len(left) > 1 and isinstance(args[0], tuple)  # one tuple for a whole group
-        if len(args) < len(left) and not spread:
+        unknown = len(parameters) - len(left) < len(kwargs)  # elaboration says which name is meant
+        if len(args) < len(left) and not spread and not unknown:
             missing = ", ".join(f"`{p.name}`" for p in left[len(args) :])
             raise wrong_call(f"no value is given for {missing}")
         for place, argument in enumerate(args):

@@ -20,13 +20,12 @@ from potto.runtime.estimate import Estimate
 from potto.runtime.evaluate import Clock, report
 from potto.runtime.functions import Closure
 from potto.runtime.machine import Machine
-from potto.runtime.shown import as_dual
+from potto.runtime.shown import as_dual, gives_dual
 from potto.settings import current
 from potto.source import Span
 from potto.syntax import nodes
 from potto.types import infer_expression
-from potto.types.types import Function, Type, groups_of, resolve
-from potto.world import World, is_dual
+from potto.world import World
 
 NOWHERE = Span(0, 0)
 Form = tuple[tuple[int, tuple[str, ...]], ...]
@@ -47,12 +46,14 @@ class Call:
         with Clock() as clock:
             value = self.value(values, machine)
         estimate = report(value, machine, clock)
-        return batch.shaped(as_dual(estimate) if is_dual(self.elaborated[1]) else estimate)
+        term = self.elaborated
+        body = term.body if values and isinstance(term, Lam) else term
+        return batch.shaped(as_dual(estimate) if gives_dual(body, self.world.program.linker) else estimate)
 
     def value(self, values: Sequence[Value], machine: Machine | None = None) -> Value:
         """The value of the call for these arguments. Raises PottoError."""
         program = self.world.program
-        term, _ = self.elaborated
+        term = self.elaborated
         if machine is None:
             machine = program.machine(current())
         if not values:
@@ -61,42 +62,33 @@ class Call:
         return program.value(machine, term.body, dict(zip(term.params, values, strict=True)))
 
     @property
-    def elaborated(self) -> tuple[Term, Type]:
-        """The call as a function of its arguments, and the type of its result; once for the present texts."""
+    def elaborated(self) -> Term:
+        """The call as a function of its arguments; once for the present texts."""
         return self.world.remember((self.file, self.expr, self.form), self._elaborate)
 
-    def _elaborate(self) -> tuple[Term, Type]:
-        whole, count = applied(self.expr, self.form)
+    def _elaborate(self) -> Term:
+        whole = applied(self.expr, self.form)
         inferred = infer_expression(self.world.db, self.file, whole)
         wrong = [d for d in inferred.diagnostics if d.severity == "error"]
         elaborated = elaborate_expression(self.world.db, self.file, whole)
         wrong = wrong or [d for d in elaborated.diagnostics if d.severity == "error"]
         if wrong:
             raise ProgramError([Located(None, d) for d in wrong], self.world.source)
-        type = inferred.type
-        if count and groups_of(type):
-            type = _result(type)
-        return elaborated.term, type
+        return elaborated.term
 
 
-def _result(type: Type) -> Type:
-    """The type behind the first group, which stands for the arguments."""
-    found = resolve(type)
-    return found.result if isinstance(found, Function) else found
-
-
-def applied(expr: nodes.Expr, form: Form) -> tuple[nodes.Expr, int]:
-    """The call as a lambda over all its arguments, and how many there are. Its names cannot be written in a program."""
+def applied(expr: nodes.Expr, form: Form) -> nodes.Expr:
+    """The call as a lambda over all its arguments. Its names cannot be written in a program."""
     names = [f"argument'{place + 1}" for place in range(sum(count + len(keywords) for count, keywords in form))]
     if not names:
-        return expr, 0
+        return expr
     rest, body = iter(names), expr
     for count, keywords in form:
         given = [nodes.Argument(NOWHERE, None, None, nodes.Name(NOWHERE, next(rest))) for _ in range(count)]
         given += [nodes.Argument(NOWHERE, word, NOWHERE, nodes.Name(NOWHERE, next(rest))) for word in keywords]
         body = nodes.Apply(NOWHERE, body, tuple(given), True)
     parameters = tuple(nodes.Parameter(NOWHERE, name) for name in names)
-    return nodes.Lambda(NOWHERE, (parameters,), body), len(names)
+    return nodes.Lambda(NOWHERE, (parameters,), body)
 
 
 # Gradients

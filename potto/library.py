@@ -9,18 +9,18 @@ import os
 from collections.abc import Sequence
 
 from potto.check import diagnostics, errors_of
-from potto.diagnostics import Diagnostic, declare
-from potto.modules import Unreadable, open_files, source
+from potto.diagnostics import declare
+from potto.modules import Unreadable, module_diagnostics, open_files, source
 from potto.modules.files import MAX_BYTES, decode
+from potto.modules.import_checks import unreadable
 from potto.modules.texts import content
 from potto.query import Database
 from potto.render import Located, ProgramError
 from potto.source import SourceText, Span
 
 NOWHERE = Span(0, 0)
-NO_FILE = declare("P0230", "a file that does not exist")
+NO_PROGRAMS = declare("P0230", "a folder without programs")
 NO_SUCH_DEFINITION = declare("P0232", "a name on the command line that the file does not define")
-NOT_READABLE = declare("P0231", "a file that cannot be read as a program")
 
 
 class Library:
@@ -43,16 +43,15 @@ class Library:
         """The same from bytes; the diagnostic if they are no text."""
         text = decode(data) if len(data) <= MAX_BYTES else Unreadable("too large", f"{len(data):,} bytes")
         if isinstance(text, Unreadable):
-            return Located(key, _complaint(text))
+            return Located(key, unreadable(text, key, NOWHERE, "standard input"))
         self.put(key, text)
         return None
 
     def unreadable(self, key: str) -> Located | None:
         """What keeps a file from being read as a program, if anything does."""
-        found = content(self.db, key)
-        if isinstance(found, str):
+        if isinstance(content(self.db, key), str):
             return None
-        return Located(key, NO_FILE(NOWHERE, "there is no such file") if found is None else _complaint(found))
+        return Located(key, module_diagnostics(self.db, key)[0])
 
     def must_exist(self, key: str) -> None:
         """Raise ProgramError if a file cannot be read as a program."""
@@ -77,19 +76,3 @@ class Library:
         wrong = errors_of(self.diagnostics(file))
         if wrong:
             raise ProgramError(wrong, self.source)
-
-
-def _complaint(found: Unreadable) -> Diagnostic:
-    detail = f": {found.detail}" if found.detail else ""
-    match found.reason:
-        case "folder":
-            return NO_FILE(NOWHERE, "this is a folder, and a file is needed here")
-        case "not a file":
-            return NOT_READABLE(NOWHERE, "this is no regular file")
-        case "not text":
-            message = f"this file is not UTF-8 text{detail} at byte {found.offset}"
-            return NOT_READABLE(NOWHERE, message, help="programs are text; save it as UTF-8 if it is one")
-        case "too large":
-            return NOT_READABLE(NOWHERE, f"this file is too large to be a program{detail}")
-        case "no access":
-            return NOT_READABLE(NOWHERE, f"this file cannot be read{detail}")

@@ -40,7 +40,8 @@ class Page:
     @property
     def examples(self) -> tuple[Example, ...]:
         found: list[Example] = []
-        heading, block = "", None
+        heading = ""
+        block: list[str] | None = None
         for line in self.text.splitlines():
             if block is not None:
                 if line.startswith("```"):

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from potto.diagnostics import Diagnostic, PottoError, Related
-from potto.excerpt import Mark, excerpt, printable
+from potto.excerpt import Excerpt, Mark, excerpt, printable
 from potto.source import Position, SourceText, Span
 
 Sources = Callable[[str], SourceText | None]
@@ -74,7 +74,7 @@ def render(located: Located, sources: Sources, *, palette: Palette = PLAIN, inli
         return "\n".join([place + head + message, *_footer(diagnostic, palette, 1)])
     place = _place(file, source, diagnostic.span)
     here, elsewhere = _marks(located, source, sources)
-    blocks = [(None, excerpt(source, here))]
+    blocks: list[tuple[str | None, Excerpt]] = [(None, excerpt(source, here))]
     blocks += [(f, excerpt(s, [mark])) for f, s, mark in elsewhere]
     width = max(block.gutter_width for _, block in blocks)
     lines = [f"{place}: {head}{message}"] if inline_header else [head + message]

@@ -23,13 +23,12 @@ from potto.render import Located, ProgramError
 from potto.runtime.estimate import Estimate
 from potto.runtime.evaluate import Program
 from potto.runtime.script import Script, Shown, placed, remarks
-from potto.runtime.shown import as_dual
+from potto.runtime.shown import as_dual, gives_dual
 from potto.settings import Settings, current
 from potto.source import SourceText, Span
 from potto.syntax import parse_expression
 from potto.syntax.nodes import Expr
 from potto.types import format_type, infer_expression
-from potto.types.types import TupleOf, Type, result_of
 
 EXPRESSION = "<expression>"
 T = TypeVar("T")
@@ -110,16 +109,17 @@ class World(Library):
         self._stop(inferred.diagnostics, sources)
         elaborated = elaborate_expression(self.db, file, parsed.expr)
         self._stop(elaborated.diagnostics, sources)
+        chosen = settings or current()
         try:
-            estimate = self.program.evaluate(elaborated.term, settings or current())
-            if is_dual(inferred.type):
+            estimate = self.program.evaluate(elaborated.term, chosen)
+            if gives_dual(elaborated.term, self.program.linker):
                 estimate = as_dual(estimate)
         except ProgramError:
             raise
         except PottoError as error:
             whole = Span(0, len(text))
             raise ProgramError([Located(EXPRESSION, placed(d, whole, 0)) for d in error.diagnostics], sources) from None
-        said = tuple(Located(EXPRESSION, d) for d in remarks(estimate, Span(0, len(text))))
+        said = tuple(Located(EXPRESSION, d) for d in remarks(estimate, Span(0, len(text)), chosen))
         return Answer(estimate, format_type(inferred.type), said)
 
     def parse(self, text: str) -> Expr:
@@ -136,12 +136,6 @@ class World(Library):
         wrong = [Located(EXPRESSION, absolute(self.db, EXPRESSION, d, 0)) for d in found if d.severity == "error"]
         if wrong:
             raise ProgramError(wrong, sources)
-
-
-def is_dual(type: Type) -> bool:
-    """Whether values of a type are duals: the second half is a tangent, not a second number."""
-    result = result_of(type)
-    return isinstance(result, TupleOf) and result.dual
 
 
 @dataclass(frozen=True)

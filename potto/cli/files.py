@@ -6,7 +6,8 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 
-from potto.library import NO_FILE
+from potto.library import NO_PROGRAMS
+from potto.modules.kinds import UNREADABLE
 from potto.modules.lookup import SUFFIXES
 from potto.render import Located
 from potto.source import Span
@@ -27,7 +28,7 @@ def expand(paths: Sequence[str]) -> tuple[list[str], list[Located]]:
             files.update(dict.fromkeys(inside))
             if not inside:
                 message = f"no {' or '.join(SUFFIXES)} file in this folder"
-                problems.append(Located(path, NO_FILE(Span(0, 0), message)))
+                problems.append(Located(path, NO_PROGRAMS(Span(0, 0), message)))
         else:
             problems.append(missing(path))
     return list(files), problems
@@ -50,7 +51,7 @@ def missing(path: str) -> Located:
     there = sorted(os.listdir(folder)) if os.path.isdir(folder) else []
     near = difflib.get_close_matches(os.path.basename(path), [n for n in there if n.endswith(SUFFIXES)], 1)
     help = f"did you mean `{os.path.join(os.path.dirname(path), near[0])}`?" if near else ""
-    return Located(path, NO_FILE(Span(0, 0), "there is no such file", help=help))
+    return Located(path, UNREADABLE(Span(0, 0), f"there is no file `{path}`", help=help))
 
 
 def read_stdin() -> bytes:

@@ -6,8 +6,10 @@ an error ends the run, a warning does not. Names of loops and of local assignmen
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 from potto.diagnostics import Diagnostic, PottoError, declare
 from potto.elaborate import elaborate_expression
@@ -26,6 +28,7 @@ from potto.syntax import nodes
 
 NOT_CONVERGED = declare("P0501", "an estimate that is not as accurate as was asked", "warning")
 NOT_A_LIST = declare("P0521", "a loop over something that is not a list")
+NO_NUMBER = declare("P0524", "an answer that is not a number", "warning")
 ONE_SIDED = declare("P0522", "a derivative that differs on the two sides of the parameters", "info")
 
 Environment = dict[str, Value]
@@ -82,7 +85,8 @@ class Script:
             texts.append(format_value(value))
             if estimate is not None:
                 estimates.append(estimate)
-                yield from (Located(self.file, d) for d in remarks(estimate, argument.span.shift(self.start)))
+                place = argument.span.shift(self.start)
+                yield from (Located(self.file, d) for d in remarks(estimate, place, self.settings))
         yield Shown(span.shift(self.start), " ".join(texts), tuple(estimates))
 
     def items(self, iterable: nodes.Expr, env: Environment) -> list[Value]:
@@ -135,9 +139,18 @@ def placed(diagnostic: Diagnostic, place: Span, start: int) -> Diagnostic:
     return replace(diagnostic, span=place)
 
 
-def remarks(estimate: Estimate, place: Span) -> Iterator[Diagnostic]:
-    """What a reader of a number should know: that it is not accurate enough, that its derivative is one-sided."""
-    if not estimate.converged:
+def remarks(estimate: Estimate, place: Span, settings: Settings) -> Iterator[Diagnostic]:
+    """What a reader of a number should know: that it is not accurate enough, that its derivative is one-sided.
+
+    Of an answer by sampling nobody expects the accuracy of quadrature; its digits say how good it is.
+    """
+    if _has_nan(estimate.value) or _has_nan(estimate.tangent):
+        yield NO_NUMBER(
+            place,
+            "this is not a number",
+            help="a builtin was used where it is not defined, or a parameter is not a number itself",
+        )
+    elif not estimate.converged and settings.method in ("auto", "quadrature"):
         reason = "; ".join(estimate.reasons)
         yield NOT_CONVERGED(
             place,
@@ -146,6 +159,12 @@ def remarks(estimate: Estimate, place: Span) -> Iterator[Diagnostic]:
         )
     for note in estimate.notes:
         yield ONE_SIDED(place, str(note))
+
+
+def _has_nan(value: Any) -> bool:
+    if isinstance(value, tuple | list):
+        return any(map(_has_nan, value))
+    return value is not None and math.isnan(value)
 
 
 def _has_functions(value: Value) -> bool:

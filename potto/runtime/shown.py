@@ -11,9 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from potto.core.terms import App, Deriv, Global, If, Lam, Term
 from potto.kernels.cells import Cell, Value
 from potto.runtime.estimate import Estimate
 from potto.runtime.functions import Derivative
+from potto.runtime.machine import Linker
 from potto.runtime.printing import format_error, format_number, format_tuple
 
 MOST_ITEMS = 12  # of an array that are shown
@@ -107,6 +109,26 @@ def estimate_json(estimate: Estimate, type: str | None = None) -> dict[str, Any]
 
 
 # Duals
+
+
+def gives_dual(term: Term, linker: Linker) -> bool:
+    """Whether the value of a term is that of a derivative, and so a dual: found by following what is called."""
+    groups = 0
+    for _ in range(1000):
+        match term:
+            case App():
+                term, groups = term.function, groups + 1
+            case Global():
+                term = linker.term(term.module, term.name)
+            case Lam() if groups:
+                term, groups = term.body, groups - 1
+            case If():
+                term = term.then
+            case Deriv():
+                return groups > 0
+            case _:
+                return False
+    return False
 
 
 def as_dual(estimate: Estimate) -> Estimate:

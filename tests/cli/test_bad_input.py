@@ -11,8 +11,8 @@ from conftest import Potto
 LENGTH = "def f(t)\n    integral [0, 1] [x < t] d(x)\n"
 
 BAD = {
-    "binary": (bytes(range(256)) * 10, "P0231"),
-    "utf16": ("def f(t) t\n".encode("utf-16"), "P0231"),
+    "binary": (bytes(range(256)) * 10, "P0209"),
+    "utf16": ("def f(t) t\n".encode("utf-16"), "P0209"),
     "nul": (b"def f(t)\x00 t\n", "P01"),
     "ten_megabytes_in_a_line": (b"a = " + b"x" * 10_000_000 + b"\n", "P01"),
     "open_bracket": (b"def f(t)\n    (t + 1\n", "P01"),
@@ -50,7 +50,8 @@ def test_no_file_and_a_folder_for_a_file(potto: Potto, tmp_path: Path, command: 
         before = ["core"] if command == "dump" else []
         after = ["f"] if command in ("eval", "deriv") else []
         ran = potto(command, *before, name, *after)
-        assert ran.status == 1 and "error[P0230]" in ran.out + ran.err
+        walks = name == "folder.po" and command in ("check", "fmt", "test")  # these take folders, but this one is empty
+        assert ran.status == 1 and f"error[{'P0230' if walks else 'P0208'}]" in ran.out + ran.err
         if name == "mian.po":
             assert "did you mean `main.po`?" in ran.out + ran.err
 
@@ -70,9 +71,9 @@ GOOD = {
         + b"    a999\nprint(f(1))\n",
         "1001\n",
     ),
-    "1000_definitions": (
-        b"def f0(t) t\n" + b"".join(b"def f%d(t) f%d(t) + 1\n" % (i, i - 1) for i in range(1, 1000)) + b"print(f999(1))\n",
-        "1000\n",
+    "300_definitions": (
+        b"def f0(t) t\n" + b"".join(b"def f%d(t) f%d(t) + 1\n" % (i, i - 1) for i in range(1, 300)) + b"print(f299(1))\n",
+        "300\n",
     ),
 }  # fmt: skip
 

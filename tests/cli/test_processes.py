@@ -76,5 +76,6 @@ def test_a_terminal_that_knows_only_ascii(tmp_path: Path) -> None:
 
 
 def test_standard_input_as_a_pipe() -> None:
-    ran = subprocess.run([*COMMAND, "eval", "-", "f(3)"], input="def f(x) x^2\n", capture_output=True, text=True, check=False)
+    command = [*COMMAND, "eval", "-", "f(3)"]
+    ran = subprocess.run(command, input="def f(x) x^2\n", capture_output=True, text=True, check=False)
     assert (ran.returncode, ran.stdout) == (0, "9\n")

@@ -1,0 +1,276 @@
+"""The Python interface: modules, calls, arrays, derivatives, settings, threads, and what is said of wrong arguments."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import potto
+
+PAPER = Path(__file__).resolve().parents[2] / "examples" / "paper"
+LENGTH = "def f(t)\n    integral [0, 1] [x < t] d(x)\n"
+QUAD = r"shader = \(x, y) . c . 1/(sqrt(2)*(x+y+c)+2)^2"
+
+# mpmath, 30 digits: the integral over s = x + y with its density s, 2 - s (see examples/demo.py for the closed form)
+VALUE, SLOPE = 0.113903865769439, 0.0455890722835269
+
+
+@pytest.fixture(scope="module")
+def renderer() -> Any:
+    return potto.Workspace(PAPER).module("renderer").renderer
+
+
+@pytest.fixture(scope="module")
+def shader() -> Any:
+    return potto.compile(QUAD).shader
+
+
+def refused(code: str, action: Callable[[], Any]) -> potto.PottoError:
+    with pytest.raises(potto.PottoError) as caught:
+        action()
+    assert caught.value.diagnostics and all(d.code.startswith(code) for d in caught.value.diagnostics), caught.value
+    return caught.value
+
+
+# Calls
+
+
+def test_a_call_gives_an_estimate(renderer: Any, shader: Any) -> None:
+    r = renderer(-0.7, shader)
+    assert isinstance(r, potto.Estimate)
+    assert math.isclose(float(r), VALUE, rel_tol=1e-10) and r.value == float(r)  # the accuracy asked for by default
+    assert abs(r.value - VALUE) <= r.error + 1e-15 and r.converged and r.evals > 0 and r.tangent is None
+
+
+def test_keywords_bind_by_name_in_any_place(renderer: Any, shader: Any) -> None:
+    value = renderer(-0.7, shader).value
+    assert renderer(shader=shader, c=-0.7).value == value
+    assert renderer(shader, c=-0.7).value == value
+
+
+def test_groups_may_be_given_one_by_one_or_together(shader: Any) -> None:
+    value = 1 / (math.sqrt(2) * 0.6 + 2) ** 2
+    for r in (shader(0.1, 0.2)(0.3), shader((0.1, 0.2))(0.3), shader(0.1, 0.2, 0.3), shader(x=0.1, y=0.2)(c=0.3)):
+        assert math.isclose(r.value, value, rel_tol=1e-14)
+    assert shader(0.1, 0.2).type == "(c: Real*) -> Real"
+
+
+def test_a_partial_application_is_an_argument() -> None:
+    m = potto.compile("def add(a)(b) a + b\ndef twice(g, x) g(g(x))\n")
+    assert m.twice(m.add(3), 1).value == 7.0
+
+
+def test_functions_of_other_texts_are_arguments_with_what_they_need(renderer: Any) -> None:
+    other = potto.compile("def helper(s) 1/(sqrt(2)*s+2)^2\nshader = \\(x, y) . c . helper(x + y + c)\n")
+    assert math.isclose(renderer(-0.7, other.shader).value, VALUE, rel_tol=1e-10)
+
+
+@pytest.mark.parametrize("number", [3, np.float32(3), np.int64(3), np.array(3.0), Fraction(3)])
+def test_numbers_of_every_kind(number: Any) -> None:
+    assert potto.compile("def g(x) x^2").g(number).value == 9.0
+
+
+def test_tuples_lists_and_answers_are_arguments() -> None:
+    m = potto.compile("def g(p, k) fst(p)*k + snd(p)\ndef f(t)\n    integral [0, 1] [x < t] d(x)\n")
+    assert m.g((2, 3), 10).value == 23.0
+    assert m.g((2, 3), m.f(0.5)).value == 4.0
+
+
+def test_tuples_come_out_as_tuples() -> None:
+    r = potto.compile("def g(x) (x, x^2, 1/3)").g(3)
+    assert r.value == (3.0, 9.0, 1 / 3) and all(type(v) is float for v in r.value)
+
+
+# Arrays
+
+
+def test_arrays_broadcast(renderer: Any, shader: Any) -> None:
+    cs = np.linspace(-1.5, -0.1, 7)
+    r = renderer(cs, shader)
+    assert r.value.shape == r.error.shape == (7,)
+    for c, value in zip(cs, r.value, strict=True):
+        assert math.isclose(renderer(float(c), shader).value, value, rel_tol=1e-10)
+
+
+def test_shapes_of_several_arrays() -> None:
+    two = potto.compile("def two(x, y) x - 2*y").two
+    x, y = np.arange(3.0).reshape(3, 1), np.arange(4.0)
+    np.testing.assert_array_equal(two(x, y).value, x - 2 * y)
+    assert two(np.zeros((0, 2)), 1).value.shape == (0, 2)
+    assert two(np.arange(3), 1).value.dtype == np.float64
+    refused("P0509", lambda: two(np.zeros(3), np.zeros(4)))
+
+
+def test_answers_that_do_not_vary_have_the_shape_all_the_same() -> None:
+    r = potto.compile("def one(x) 1").one(np.zeros((2, 2)))
+    assert r.value.shape == r.error.shape == (2, 2) and (r.value == 1).all()
+
+
+def test_an_array_may_be_strided_or_of_float32() -> None:
+    g = potto.compile("def g(x) x^2").g
+    np.testing.assert_array_equal(g(np.arange(10.0)[::-2]).value, np.arange(10.0)[::-2] ** 2)
+    np.testing.assert_allclose(g(np.float32([1, 2])).value, [1, 4])
+
+
+# Derivatives
+
+
+def test_deriv_takes_duals(renderer: Any, shader: Any) -> None:
+    r = potto.deriv(renderer)((-0.7, 1.0), potto.deriv(shader))
+    assert math.isclose(r.value, VALUE, rel_tol=1e-10) and math.isclose(r.tangent, SLOPE, rel_tol=1e-10)
+    assert abs(r.tangent - SLOPE) <= r.tangent_error + 1e-15
+    again = potto.deriv(renderer)(dc=(-0.7, 2.0), dshader=potto.deriv(shader))
+    assert math.isclose(again.tangent, 2 * SLOPE, rel_tol=1e-10)
+
+
+def test_deriv_over_arrays(renderer: Any, shader: Any) -> None:
+    cs = np.array([-0.7, -0.7, -1.2])
+    r = potto.deriv(renderer)((cs, 1.0), potto.deriv(shader))
+    assert r.tangent.shape == (3,)
+    np.testing.assert_allclose(r.tangent[:2], SLOPE, rtol=1e-10)
+
+
+def test_grad_names_its_parameters(renderer: Any, shader: Any) -> None:
+    r = potto.grad(renderer, wrt=["c"])(c=-0.7, shader=shader)
+    assert math.isclose(r.tangent, SLOPE, rel_tol=1e-10) and r["c"] == r.tangent
+    assert math.isclose(r.value, VALUE, rel_tol=1e-10)
+
+
+def test_grad_by_several_parameters_and_by_tuples() -> None:
+    g = potto.compile("def g(p, s) fst(p)*s + snd(p)^2").g
+    r = potto.grad(g, wrt=["p", "s"])((1, 2), 3)
+    assert r.value == 7.0 and r.tangent == ((3.0, 4.0), 1.0) and r["s"] == 1.0
+    with pytest.raises(KeyError):
+        r["q"]
+
+
+def test_grad_over_arrays() -> None:
+    f = potto.compile("def f(a, t)\n    integral [0, 1] a*[x < t] d(x)\n").f
+    ts = np.array([0.2, 0.5, 2.0])
+    r = potto.grad(f, wrt=["a", "t"])(3.0, ts)  # f = 3 min(t, 1)
+    np.testing.assert_allclose(r["a"], [0.2, 0.5, 1.0], rtol=1e-12)
+    np.testing.assert_allclose(r["t"], [3.0, 3.0, 0.0], rtol=1e-12, atol=1e-15)
+
+
+# What can be asked
+
+
+def test_types_surfaces_and_representations(renderer: Any) -> None:
+    assert renderer.type == "(c: Real, shader: (Real*, Real*) -> Real -> Real) -> Real"
+    assert potto.deriv(renderer).type.startswith("(dc: (Real, Real)")
+    assert renderer.surfaces == ("x + y + c = 0",)
+    assert repr(renderer) == f"<Potto function renderer : {renderer.type}>"
+    assert "deriv(renderer)" in repr(potto.deriv(renderer))
+
+
+def test_modules(tmp_path: Path) -> None:
+    (tmp_path / "pkg").mkdir()
+    (tmp_path / "pkg" / "m.po").write_text("k = 0.5\nl = [1, 2]\ndef f(x) x + k\n")
+    (tmp_path / "user.po").write_text("from pkg.m import f\nimport pkg.m as inner\ndef g(x) 2*f(x)\n")
+    ws = potto.Workspace(tmp_path)
+    m = ws.module("pkg.m")
+    assert dir(m) == ["f", "k", "l"] and float(m.k) == 0.5 and m.l.value == [1.0, 2.0]
+    user = ws.module("user")
+    assert user.g(1).value == 3.0 and user.f(1).value == 1.5 and user.inner.f(1).value == 1.5
+    assert "user.po" in repr(user) and user.eval("g(2)").value == 5.0
+    with pytest.raises(AttributeError, match="defines no `gg`; did you mean `g`"):
+        _ = user.gg
+    assert not hasattr(user, "nothing_like_it")
+    refused("P0202", lambda: ws.module("nope"))
+
+
+def test_reload_sees_new_texts(tmp_path: Path) -> None:
+    (tmp_path / "m.po").write_text("def f(x) x\n")
+    ws = potto.Workspace(tmp_path)
+    f = ws.module("m").f
+    assert f(2).value == 2.0 and not ws.reload()
+    (tmp_path / "m.po").write_text("def f(x) x + 40\n")
+    assert f(2).value == 2.0
+    assert ws.reload() and f(2).value == 42.0
+
+
+def test_load_and_compile(tmp_path: Path) -> None:
+    (tmp_path / "m.po").write_text(LENGTH)
+    assert math.isclose(potto.load(tmp_path / "m.po").f(0.25).value, 0.25, rel_tol=1e-14)
+    assert potto.Workspace(tmp_path).compile("from m import f\ndef g(t) f(t)/2").g(0.5).value == 0.25
+
+
+# Settings
+
+
+def test_settings_hold_inside_their_block(renderer: Any, shader: Any) -> None:
+    with potto.settings(method="mc", samples=2_000, seed=7):
+        first, second = renderer(-0.7, shader), renderer(-0.7, shader)
+    with potto.settings(method="mc", samples=2_000, seed=8):
+        other = renderer(-0.7, shader)
+    assert first.method == "mc" and first.value == second.value != other.value
+    assert abs(first.value - VALUE) < 6 * first.error
+    assert renderer(-0.7, shader).method == "quadrature"
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"method": "best"}, {"rtol": -1}, {"samples": 0}, {"seed": 1.5}, {"nope": 1}, {"rtol": math.nan}]
+)
+def test_settings_that_cannot_be(wrong: dict[str, Any]) -> None:
+    def enter() -> None:
+        with potto.settings(**wrong):
+            pass
+
+    refused("P0520", enter)
+
+
+def test_settings_belong_to_their_thread() -> None:
+    f = potto.compile(LENGTH).f
+    with ThreadPoolExecutor(1) as pool, potto.settings(method="mc"):
+        assert pool.submit(lambda: f(0.3).method).result() == "quadrature"
+
+
+# What is wrong
+
+
+@pytest.mark.parametrize("argument", ["0.5", None, True, 1j, object(), {}, np.array(["a"]), np.array([True]), 10**400])
+def test_python_values_without_a_meaning(argument: Any) -> None:
+    error = refused("P0523", lambda: potto.compile(LENGTH).f(argument))
+    assert "`t`" in error.diagnostics[0].message
+
+
+def test_arguments_that_do_not_fit(renderer: Any, shader: Any) -> None:
+    refused("P0509", lambda: renderer(shader, 0.1))
+    refused("P0509", lambda: renderer((1, 2), shader))
+    refused("P0509", lambda: renderer(0.1))
+    refused("P0308", lambda: renderer(0.1, shader, 3))
+    assert "did you mean `shader`" in str(refused("P0310", lambda: renderer(0.1, shade=shader)))
+    refused("P0509", lambda: potto.deriv(3))  # type: ignore[arg-type]
+    refused("P0509", lambda: potto.grad(renderer, wrt=["d"]))
+    refused("P0509", lambda: potto.grad(renderer, wrt=["shader"])(0.1, shader))
+    refused("P0509", lambda: potto.compile(3))  # type: ignore[arg-type]
+
+
+def test_programs_that_are_wrong() -> None:
+    error = refused("P0301", lambda: potto.compile("def f(t)\n    integral [0, 1] (if x < t then 1 else 0) d(x)\n"))
+    assert "^^^^^" in str(error) and "P0301" in str(error)
+    refused("P02", lambda: potto.load("/no/such/file.po"))
+    refused("P0503", lambda: potto.compile("def f(n) if n > 0 then f(n + 1) else 0").f(1))
+
+
+# Threads
+
+
+def test_many_threads_at_once(renderer: Any, shader: Any) -> None:
+    cs = [-1.6 + 0.05 * n for n in range(24)]
+    alone = [renderer(c, shader).value for c in cs]
+    fresh = potto.Workspace(PAPER).module("renderer").renderer  # nothing of it is compiled yet
+
+    def work(c: float) -> float:
+        return float(potto.deriv(fresh)((c, 1.0), potto.deriv(shader)).value)
+
+    with ThreadPoolExecutor(8) as pool:
+        together = list(pool.map(work, cs))
+    np.testing.assert_allclose(together, alone, rtol=1e-10)
