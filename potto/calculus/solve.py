@@ -67,7 +67,8 @@ class Sections:
     turning: terms over the other variables; roots appear, merge, disappear or run off only where one of them is 0.
     families: periodic roots.
     poles, pole_families: where the surface can change its sign without being 0 (1/(x - t), tan x).
-    surface: has the sign of the surface that was asked about, and is 0 with a finite derivative at roots and poles.
+
+    What does not contain the variable is not looked at: of (x - t)*(y - s) there is one root in y. See `factors`.
     """
 
     roots: tuple[Term, ...]

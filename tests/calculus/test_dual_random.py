@@ -48,7 +48,8 @@ class Programs:
         return self.term(depth, ("sin", "cos", "exp"))
 
     def surface(self, depth: int) -> Term:
-        return self.term(depth, ("sin", "cos", "exp", "abs", "tanh", "atan", "sqrt", "hypot", "min", "max"))
+        """No sqrt and no log: where those are not defined, neither is the program."""
+        return self.term(depth, ("sin", "cos", "exp", "abs", "tanh", "atan", "hypot", "min", "max"))
 
     def bracket(self, surface: Term) -> Term:
         return t.branch((surface,), self.random.random() < 0.5, ONE, ZERO)
