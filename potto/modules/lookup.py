@@ -192,7 +192,9 @@ def resolve(db: Database, file: str, name: str) -> Target | None:
     bound = meaning(db, file, name)
     if isinstance(bound, Defined):
         return DefinitionTarget(file, name)
-    return None if bound is None else trail(db, file, name).target
+    if bound is None and not is_entry(file):
+        return None
+    return trail(db, file, name).target
 
 
 @query

@@ -20,7 +20,7 @@ def key(name: str) -> str:
 def world(text: str, roots: tuple[str, ...] = (FOLDER,)) -> Database:
     """A database with the files of a snippet and no disk."""
     db = Database()
-    parts = re.split(r"(?m)^# file: *(\S+) *\n", textwrap.dedent(text))
+    parts = re.split(r"(?m)^# file: *(\S.*?) *\n", textwrap.dedent(text))
     named = list(zip(parts[1::2], parts[2::2])) or [("main.po", parts[0])]
     for name, body in named:
         db.set_input(("file", key(name)), body)

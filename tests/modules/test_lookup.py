@@ -164,3 +164,24 @@ def test_a_long_chain_of_re_exports() -> None:
     files = "".join(f"# file: m{i}.po\nfrom m{i + 1} import f\n" for i in range(3000))
     db = world(files + "# file: m3000.po\ndef f(x) x\n")
     assert resolve(db, key("m0.po"), "f") == DefinitionTarget(key("m3000.po"), "f")
+
+
+def test_an_entry_of_a_prompt_sees_those_before_it_the_latest_first() -> None:
+    db = world("""
+        # file: <In 1>
+        def f(x) x
+        def g(x) f(x)
+        # file: <In 2>
+        from m import h
+        def f(x) 2*x
+        # file: <In 3>
+        f(1) + g(1) + h(1)
+        # file: m.po
+        def h(x) x
+    """)
+    db.set_input(("prelude", "<In 2>"), ("<In 1>",))
+    db.set_input(("prelude", "<In 3>"), ("<In 2>",))
+    assert resolve(db, "<In 3>", "f") == DefinitionTarget("<In 2>", "f")
+    assert resolve(db, "<In 3>", "g") == DefinitionTarget("<In 1>", "g")
+    assert resolve(db, "<In 3>", "h") == DefinitionTarget(key("m.po"), "h")
+    assert resolve(db, "<In 1>", "h") is None
