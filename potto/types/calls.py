@@ -171,10 +171,7 @@ class _Filling:
             if argument.name not in names:
                 self.inference.report(self._unknown_keyword(argument, tuple(names)))
                 fine = False
-            elif self.slots[names[argument.name]]:
-                self.inference.report(self._twice(argument))
-                fine = False
-            else:
+            else:  # the parser has seen to it that none is given twice
                 self.slots[names[argument.name]] = (place,)
         return fine
 
@@ -189,14 +186,6 @@ class _Filling:
             f"{callee_name(self.node)} has no parameter `{argument.name}`",
             label="no such parameter",
             help=head + (" or " if near else ", ").join(f"`{name}`" for name in choice) + ("?" if near else ""),
-        )
-
-    def _twice(self, argument: nodes.Argument) -> Diagnostic:
-        return kinds.TWICE(
-            argument.name_span or argument.span,
-            f"the parameter `{argument.name}` of {callee_name(self.node)} is given twice",
-            label="given before",
-            help="leave one of them out",
         )
 
     def _pack(self) -> bool:

@@ -21,7 +21,6 @@ from potto.types.unify import unify
 
 @rule(nodes.Integral)
 def _integral(inference: Inference, node: nodes.Integral) -> Type:
-    _matching(inference, node)
     with inference.scope.inside():
         for place, bounds in enumerate(node.bounds):
             _bounds(inference, node, place, bounds)
@@ -74,20 +73,6 @@ def _inner_bound(name: nodes.Name, node: nodes.Integral) -> Diagnostic:
         notes=(f"in `d({order})` the first variable is the outermost; a bound sees only the variables before its own",),
         help="change the order of the bounds and variables, or give the outer name another name",
     )
-
-
-def _matching(inference: Inference, node: nodes.Integral) -> None:
-    """Check that measures name their variables in the order of `d(…)`; that there are as many the parser has seen."""
-    for bound, variable in zip(node.bounds, node.variables):
-        if isinstance(bound, nodes.MeasureBound) and bound.variable != variable.name:
-            inference.report(
-                kinds.BOUNDS(
-                    bound.variable_span,
-                    f"`{bound.variable}` stands where the integral is over `{variable.name}`",
-                    label=f"not `{variable.name}`",
-                    help="list the variables after `d` in the order of their bounds",
-                )
-            )
 
 
 def _measure(inference: Inference, bounds: nodes.MeasureBound) -> None:
