@@ -120,9 +120,7 @@ def _name(term: Term) -> str:
     return name
 
 
-def _instances(
-    body: Term, flips: Flips, sums: list[Sum], box: Box
-) -> tuple[Callable[[bool], Term], dict[str, Term]]:
+def _instances(body: Term, flips: Flips, sums: list[Sum], box: Box) -> tuple[Callable[[bool], Term], dict[str, Term]]:
     """The forced integrand; under sums only the instance of a branch that flips is forced, the others fall."""
     if not sums:
         return (lambda right: forced(body, flips, right, box)), {}

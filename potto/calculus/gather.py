@@ -351,4 +351,3 @@ def _show(atom: Term, name: str) -> str:
     if isinstance(atom, Var):
         return f"`{name}` itself"
     return f"`{atom.op}(...)`" if isinstance(atom, Prim) else "a function"
-

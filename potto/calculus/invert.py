@@ -97,9 +97,7 @@ def dependence(coordinates: Sequence[Term], variables: Sequence[str]) -> str:
         if all(is_zero(entry) for entry in row):
             return f"coordinate {i + 1} does not vary with {_listed(variables)}"
         for j in range(i):
-            minors = (
-                sub(mul(rows[j][a], row[b]), mul(rows[j][b], row[a])) for a in range(len(row)) for b in range(a)
-            )
+            minors = (sub(mul(rows[j][a], row[b]), mul(rows[j][b], row[a])) for a in range(len(row)) for b in range(a))
             if all(is_zero(m) for m in minors):
                 return f"coordinate {i + 1} varies only together with coordinate {j + 1}"
     return "one coordinate is a function of the others"

@@ -340,4 +340,3 @@ def _exponential(node: Prim, inner: Rational) -> Rational:
         atom = prim("exp", part)
         side[atom] = side.get(atom, 0) + (int(abs(coefficient)) if whole else 1)
     return Rational({_sorted(top): Fraction(1)}, {_sorted(below): Fraction(1)})
-

@@ -367,4 +367,3 @@ def _vertex(term: Term, name: str, stops: list[Term]) -> tuple[Term, ...] | None
     if Fraction(2) not in degrees:
         return tuple(stops)
     return (*stops, neg(div(degrees.get(Fraction(1), ZERO), mul(const(2.0), degrees[Fraction(2)]))))
-

@@ -82,9 +82,7 @@ CLOSED_FORMS = [
 
 
 @pytest.mark.parametrize(("text", "name", "env", "exact", "tolerance"), CLOSED_FORMS)
-def test_derivative_in_closed_form(
-    text: str, name: str, env: dict[str, float], exact: float, tolerance: float
-) -> None:
+def test_derivative_in_closed_form(text: str, name: str, env: dict[str, float], exact: float, tolerance: float) -> None:
     found = float(value(derivative(text, name), env))
     assert found == pytest.approx(exact, rel=tolerance, abs=1e-300)
 
