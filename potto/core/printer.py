@@ -154,9 +154,12 @@ def _product(sign: str, parts: list[_Text]) -> _Text:
 
 
 def _sum(parts: list[_Text]) -> str:
-    pieces = [parts[0].at(_ADD)]
-    for part in parts[1:]:
-        text = part.at(_SIGN)
+    texts = [part.at(_ADD if i == 0 else _SIGN) for i, part in enumerate(parts)]
+    if texts[0].startswith("-"):  # 1 - x rather than -x + 1
+        first = next((i for i, text in enumerate(texts) if not text.startswith("-")), 0)
+        texts.insert(0, texts.pop(first))
+    pieces = texts[:1]
+    for text in texts[1:]:
         # What starts with a minus sign is a number or a product, so that the sign belongs to all of it.
         pieces.append(f" - {text[1:]}" if text.startswith("-") else f" + {text}")
     return "".join(pieces)

@@ -95,7 +95,7 @@ cauchy = register(
         domain=((-3.0, 3.0), (0.1, 5.0)),
         hints=lambda m, s: spread(m, s, (1.0, 10.0)),
         doc="The Cauchy distribution around m with half width s. Its mean does not exist.",
-        example="integral (x ~ cauchy(0, 1)) cos(x) d(x)",
+        example="integral (x ~ cauchy(0, 1)) [x < 1] d(x)",
     )
 )
 

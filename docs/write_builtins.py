@@ -1,0 +1,124 @@
+"""Writes `builtins.md` from the tables of builtins and of measures: `python docs/write_builtins.py`.
+
+The values on the page come from the reference evaluator, so that they check the one that people use.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import mpmath
+
+from potto.core.printer import format_term
+from potto.core.reference import evaluate
+from potto.core.simplify import simplify
+from potto.core.terms import Term, var
+from potto.elaborate import elaborate_expression
+from potto.measures import MEASURES, Measure
+from potto.primitives import PRIMITIVES, Primitive
+from potto.query import Database
+from potto.syntax import parse_expression
+
+PAGE = Path(__file__).resolve().parent / "builtins.md"
+SECTIONS = (
+    ("Roots, exponentials, logarithms, powers", ("sqrt", "exp", "log", "log1p", "expm1", "pow")),
+    ("Angles", ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "hypot")),
+    ("Hyperbolic functions", ("sinh", "cosh", "tanh")),
+    ("The error function", ("erf", "erfc")),
+    ("With kinks", ("abs", "min", "max", "clamp")),
+    ("With jumps", ("sign", "floor", "ceil")),
+)
+NOTES = {
+    "With kinks": "They bend where the derivative jumps. The integrator cuts there, so they cost no accuracy.",
+    "With jumps": "Their derivative would have deltas that nobody states, so they take plain values only: numbers that "
+    "vary with no\nvariable of integration. Under an integral state the jump as a bracket, `[x > 0]`.",
+}
+NAMES = {"clamp": ("x", "lo", "hi"), "atan2": ("y", "x"), "hypot": ("x", "y"), "pow": ("x", "n")}
+INTRODUCTION = """# Builtins
+
+Written by `docs/write_builtins.py` from the tables in `potto/primitives` and `potto/measures`.
+
+The arithmetic `+ - * / ^` is written as usual; `^` binds tightest and to the right. `pi` and `inf` are constants.
+Every builtin takes numbers. Derivatives are by each argument in turn.
+"""
+
+
+def page() -> str:
+    """The text of the page."""
+    parts = [INTRODUCTION]
+    for title, names in SECTIONS:
+        parts.append(f"## {title}\n\n" + (f"{NOTES[title]}\n\n" if title in NOTES else "") + builtin_table(names))
+    parts.append(MEASURE_INTRODUCTION + measure_table())
+    return "\n".join(parts)
+
+
+def builtin_table(names: tuple[str, ...]) -> str:
+    rows = ["| builtin | what | derivative | example | value |", "|---|---|---|---|---|"]
+    for name in names:
+        entry = PRIMITIVES[name]
+        arguments = parameters(entry)
+        cells = (
+            code(f"{name}({', '.join(arguments)})"),
+            entry.doc,
+            derivatives(entry, arguments),
+            *shown(entry.example),
+        )
+        rows.append(f"| {' | '.join(cells)} |")
+    return "\n".join(rows) + "\n"
+
+
+def parameters(entry: Primitive) -> tuple[str, ...]:
+    return NAMES.get(entry.name) or (("a", "b", "...") if entry.arity is None else ("x",))
+
+
+def derivatives(entry: Primitive, arguments: tuple[str, ...]) -> str:
+    if entry.partials is None:
+        return ""
+    slopes = entry.partials(*(var(a) for a in arguments if a != "..."))
+    return "<br>".join(code(format_term(simplify(slope))) for slope in slopes)
+
+
+MEASURE_INTRODUCTION = """## Measures
+
+`integral (x ~ normal(m, s)) body d(x)` is the expectation of the body where x has that distribution.
+
+"""
+
+
+def measure_table() -> str:
+    rows = ["| measure | what | density | support | valid where | example | value |", "|---|---|---|---|---|---|---|"]
+    for name in sorted(MEASURES):
+        entry = MEASURES[name]
+        terms = tuple(map(var, entry.parameters))
+        lo, hi = entry.support(*terms)
+        cells = (
+            code(f"{name}({', '.join(entry.parameters)})"),
+            entry.doc,
+            code(format_term(simplify(entry.density(var("x"), *terms)))),
+            code(f"[{format_term(lo)}, {format_term(hi)}]"),
+            conditions(entry, terms),
+            *shown(entry.example),
+        )
+        rows.append(f"| {' | '.join(cells)} |")
+    return "\n".join(rows) + "\n"
+
+
+def conditions(entry: Measure, terms: tuple[Term, ...]) -> str:
+    return "<br>".join(code(format_term(condition)) for condition, _ in entry.valid(*terms))
+
+
+def shown(example: str) -> tuple[str, str]:
+    """An example and its value to twelve digits."""
+    parsed = parse_expression(example)
+    assert parsed.expr is not None and not parsed.diagnostics, example
+    value = evaluate(elaborate_expression(Database(), "<builtins>", parsed.expr).term, {}, digits=15)
+    return code(example), code(re.sub(r"\.0$", "", mpmath.nstr(value, 12)))
+
+
+def code(text: str) -> str:
+    return f"`{text}`".replace("|", "\\|")
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
