@@ -36,12 +36,13 @@ def _reductions() -> tuple[tuple[int, str, Action | None], ...]:
 class Engine:
     """The state of one parse: parallel stacks of states and values."""
 
-    __slots__ = ("context", "end", "rows", "states", "tables", "values")
+    __slots__ = ("context", "end", "rows", "start", "states", "tables", "values")
 
     def __init__(self, context: Context, start: str) -> None:
         self.tables: Tables = tables()
         self.rows = self.tables.rows
         self.context = context
+        self.start = start
         self.states = [self.tables.starts[start]]
         self.end = self.tables.ends[start]
         self.values: list[Any] = []

@@ -292,7 +292,7 @@ class _Lexer:
 
 
 def lex(text: str, diffeo: bool = False, alone: bool = False) -> Lexed:
-    """The tokens of a chunk, or of an expression `alone`; what can't be read is a diagnostic, and left out or mended."""
+    """The tokens of a chunk, or of an expression `alone`; what can't be read is reported, and left out or mended."""
     text = normalized(text)
     lexer = _read(text, diffeo, alone, frozenset())
     never_closed = frozenset(lexer.nesting.never_closed)

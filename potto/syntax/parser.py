@@ -140,24 +140,40 @@ def _parse(lexed: Lexed, text: str, start: str, diffeo: bool = False) -> _Parse:
         if index >= len(tokens):
             found += stops + _causes(engine.context.diagnostics, stops)
             return _Parse(engine.result, tokens, found, first_stop, stops)
-        if engine.values and engine.values[-1] is not tokens[index - 1] and len(tokens) <= LONG:
-            # The token that has no action has already led to reductions, after which less can follow than before.
-            # Go back to where it had not been seen.
-            engine = Engine(Context(text, diffeo), start)
-            engine.run(tokens[:index], 0)
-        stop = Stop(engine.values[:], engine.possible(), tokens, index)
+        stop, engine, edits = _stopped(engine, tokens, index, Context(text, diffeo))
         first_stop = first_stop or stop
-        edits = find_repair(engine.tables, engine.end, engine.states, tokens, index)
         if not stop.at.text:
             found = _without_doubled(found, stop)
-        message = describe(stop, edits or [])
         if not _explained(stop, found):
-            stops.append(message)
+            stops.append(describe(stop, edits or []))
         if edits is None:
             break
-        tokens = _patched(tokens, index, edits)
-        index = engine.run(tokens, index)
+        tokens = _patched(tokens, stop.index, edits)
+        index = engine.run(tokens, stop.index)
     return _Parse(None, tokens, found + stops, first_stop, stops)
+
+
+def _stopped(
+    engine: Engine, tokens: list[Token], index: int, context: Context
+) -> tuple[Stop, Engine, list[Edit] | None]:
+    """A stop at `index`, with an automaton that stands where its repair begins."""
+    if len(tokens) > LONG or index == 0:
+        edits = find_repair(engine.tables, engine.end, tokens, index, engine.states, None)
+        return Stop(engine.values[:], engine.possible(), tokens, index), engine, edits
+    # The token without an action has already led to reductions, after which less can follow than before. Read again, up
+    # to where it had not been seen; and note the state before the word ahead of it, which may be what is wrong.
+    again = Engine(context, engine.start)
+    again.run(tokens[: index - 1], 0)
+    behind = Stop(again.values[:], again.possible(), tokens, index - 1)
+    states = again.states[:]
+    again.run(tokens[:index], index - 1)
+    edits = find_repair(again.tables, again.end, tokens, index, again.states, states)
+    if not edits or not edits[0].back:
+        return Stop(again.values[:], again.possible(), tokens, index), again, edits
+    before = Engine(context, engine.start)
+    context.diagnostics.clear()
+    before.run(tokens[: index - 1], 0)
+    return behind, before, edits
 
 
 def _explained(stop: Stop, found: list[Diagnostic]) -> bool:
@@ -190,6 +206,8 @@ def _patched(tokens: list[Token], index: int, edits: list[Edit]) -> list[Token]:
         if edit.action == "insert":
             at = out[-1].end if out else token.start
             out.append(Token(edit.kind, "+" if edit.kind == "BINOP" else "", at, at))
+            if edit.kind == "LPAR":
+                out.append(Token("RPAR", "", at, at))
             continue
         index += 1
         if edit.action == "replace":

@@ -8,8 +8,7 @@ tokens, or all that are left, go through after it. The search is bounded: where 
 from __future__ import annotations
 
 import heapq
-from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from potto.syntax.tables import Tables
 from potto.syntax.tokens import KEYWORDS, Token
@@ -18,7 +17,7 @@ Stack = tuple[int, "Stack | None"]
 """A stack of states that shares its lower part: (state, below)."""
 
 ENOUGH = 4
-MOST_STEPS = 1200
+MOST_STEPS = 600
 
 _INSERT: dict[str, int] = {
     "NAME": 2,
@@ -28,10 +27,6 @@ _INSERT: dict[str, int] = {
     "IMPORT": 2,
     "COLON": 3,
     "EQ": 4,
-    "RPAR": 4,
-    "RSQB": 4,
-    "LPAR": 4,
-    "LSQB": 4,
     "COMMA": 3,
     "SEMI": 4,
     "DOT": 3,
@@ -39,8 +34,10 @@ _INSERT: dict[str, int] = {
     "BINOP": 4,
     "SUMBODY": 1,
     "TILDE": 4,
+    "LPAR": 4,
 }
-"""What may be inserted, and what it costs."""
+"""What may be inserted, and what it costs. Brackets are balanced already (see `nesting`), so that none is inserted but
+an empty pair of parentheses, here `LPAR`."""
 
 _DELETE: dict[str, int] = {
     "INDENT": 20,
@@ -59,18 +56,39 @@ _DELETE: dict[str, int] = {
 }
 _DELETE_OTHER = 3
 _REPLACE = 1
+_GO_BACK = 3
+"""What it costs more to change the word before the place where the parse stopped: a stray `if` shows only after it."""
 
 
-@dataclass(frozen=True, slots=True)
-class Edit:
+class Edit(NamedTuple):
     """One step of a repair: insert a token of `kind`, delete the next one, read it as `kind`, or take it as it is."""
 
     action: Literal["insert", "delete", "replace", "shift"]
     kind: str
+    back: bool = False
+    """Whether it is about the token before the one where the parse stopped."""
 
 
+_STRAY = frozenset({"SUM", "LET", "IF", "LAMBDA", "FOR", "DIFFEO"})
+_EMPTY_GROUP = Edit("insert", "LPAR")
 _Trail = tuple[Edit, "_Trail | None"]
 """The steps of a repair so far, last first; shared between the branches of the search."""
+
+
+class _Branch(NamedTuple):
+    """A state of the search, ordered by cost; of two of one cost, the one that has read further comes first.
+
+    `stack` is as it was before `edit`, which is only carried out when the branch's turn comes: most never do.
+    """
+
+    cost: int
+    ahead: int
+    order: int
+    stack: Stack
+    at: int
+    run: int
+    edit: Edit | None
+    trail: _Trail | None
 
 
 class _Search:
@@ -78,16 +96,14 @@ class _Search:
 
     def __init__(self, tables: Tables, end: int, tokens: list[Token]) -> None:
         self.rows, self.rules, self.end, self.tokens = tables.rows, tables.rules, end, tokens
-        self.queue: list[tuple[int, int, int, Stack, int, int, bool, _Trail | None]] = []
+        self.queue: list[_Branch] = []
         self.count = 0
         self.seen: set[tuple[int, int, int, bool]] = set()
         self.stacks: dict[tuple[int, int], Stack] = {}
 
-    def push(self, cost: int, stack: Stack, index: int, run: int, deleted: bool, trail: _Trail | None) -> None:
-        if (id(stack), index, run, deleted) not in self.seen:
-            self.count += 1
-            # Of two repairs of one cost, the one that has read further comes first.
-            heapq.heappush(self.queue, (cost, -index, self.count, stack, index, run, deleted, trail))
+    def push(self, cost: int, stack: Stack, index: int, run: int, edit: Edit | None, trail: _Trail | None) -> None:
+        self.count += 1
+        heapq.heappush(self.queue, _Branch(cost, -index, self.count, stack, index, run, edit, trail))
 
     def advance(self, stack: Stack, kind: str) -> Stack | None:
         """The stack after reading a token of `kind`; None if it can't be read. At `$END`: the stack at the end."""
@@ -112,45 +128,67 @@ class _Search:
         """The stack with a state on it; equal stacks are one object, so that their identity tells them apart."""
         return self.stacks.setdefault((id(below), state), (state, below))
 
-    def run(self, stack: Stack, index: int) -> list[Edit] | None:
-        self.push(0, stack, index, 0, False, None)
+    def edited(self, stack: Stack, edit: Edit) -> Stack | None:
+        """The stack after an insertion or a replacement."""
+        after = self.advance(stack, edit.kind)
+        if after is not None and edit == _EMPTY_GROUP:
+            return self.advance(after, "RPAR")
+        return after
+
+    def go_back(self, stack: Stack, index: int) -> None:
+        """Consider to do without the word at `index`, the last one that was read, or to take it for a name."""
+        token = self.tokens[index]
+        if token.kind not in _STRAY or not any(token.text for token in self.tokens[index + 1 : index + 1 + ENOUGH]):
+            return  # nothing follows: it is being typed
+        self.push(_GO_BACK + _DELETE_OTHER, stack, index + 1, 0, Edit("delete", token.kind, True), None)
+        if token.text in KEYWORDS:
+            self.push(_GO_BACK + _REPLACE, stack, index + 1, 0, Edit("replace", "NAME", True), None)
+
+    def run(self) -> list[Edit] | None:
         for _ in range(MOST_STEPS):
             if not self.queue:
                 return None
-            cost, _, _, stack, index, run, deleted, trail = heapq.heappop(self.queue)
-            key = (id(stack), index, run, deleted)
+            branch = heapq.heappop(self.queue)
+            stack, edit, trail = branch.stack, branch.edit, branch.trail
+            deleted = False
+            if edit is not None:
+                deleted = edit.action == "delete"
+                edited = stack if deleted else self.edited(stack, edit)
+                if edited is None:
+                    continue
+                stack, trail = edited, (edit, trail)
+            key = (id(stack), branch.at, branch.run, deleted)
             if key in self.seen:
                 continue
             self.seen.add(key)
-            if run >= ENOUGH:
+            if branch.run >= ENOUGH:
                 return _edits(trail)
-            token = self.tokens[index]
+            token = self.tokens[branch.at]
             after = self.advance(stack, token.kind)
             if after is not None:
                 if token.kind == "$END":
                     return _edits(trail)
-                self.push(cost, after, index + 1, run + 1, False, (Edit("shift", token.kind), trail))
-            self._others(cost, stack, index, deleted, trail, token)
+                shift = Edit("shift", token.kind)
+                self.push(branch.cost, after, branch.at + 1, branch.run + 1, None, (shift, trail))
+            if after is None or branch.run == 0:
+                self._branch(branch.cost, stack, branch.at, deleted, trail, token)
         return None
 
-    def _others(self, cost: int, stack: Stack, index: int, deleted: bool, trail: _Trail | None, token: Token) -> None:
+    def _branch(self, cost: int, stack: Stack, index: int, deleted: bool, trail: _Trail | None, token: Token) -> None:
+        """What else could be done here than read on."""
         row = self.rows[stack[0]]
         if not deleted:
             # Insertions come before deletions at one place, or each pair would be tried in both orders.
             for kind, price in _INSERT.items():
                 if kind in row:
-                    after = self.advance(stack, kind)
-                    if after is not None:
-                        self.push(cost + price, after, index, 0, False, (Edit("insert", kind), trail))
+                    self.push(cost + price, stack, index, 0, Edit("insert", kind), trail)
         if token.kind == "$END":
             return
-        kind_instead = _instead(token)
-        if kind_instead is not None and kind_instead in row:
-            after = self.advance(stack, kind_instead)
-            if after is not None:
-                self.push(cost + _REPLACE, after, index + 1, 0, False, (Edit("replace", kind_instead), trail))
+        instead = _instead(token)
+        if instead is not None and instead in row:
+            self.push(cost + _REPLACE, stack, index + 1, 0, Edit("replace", instead), trail)
         price = _DELETE.get(token.kind, _DELETE_OTHER) if token.text or token.kind != "LPAR" else 1
-        self.push(cost + price, stack, index + 1, 0, True, (Edit("delete", token.kind), trail))
+        self.push(cost + price, stack, index + 1, 0, Edit("delete", token.kind), trail)
 
 
 def _instead(token: Token) -> str | None:
@@ -173,9 +211,22 @@ def _edits(trail: _Trail | None) -> list[Edit]:
     return edits
 
 
-def find_repair(tables: Tables, end: int, states: list[int], tokens: list[Token], index: int) -> list[Edit] | None:
-    """The cheapest repair for the token at `index` in these states, or None if none is near."""
+def find_repair(
+    tables: Tables, end: int, tokens: list[Token], index: int, states: list[int], before: list[int] | None
+) -> list[Edit] | None:
+    """The cheapest repair for the token at `index`, or None if none is near.
+
+    `states` are those in which it can't be read; `before`, if they are known, those before the token ahead of it.
+    """
+    search = _Search(tables, end, tokens)
+    search.push(0, _stack(states), index, 0, None, None)
+    if before is not None and index > 1:
+        search.go_back(_stack(before), index - 1)
+    return search.run()
+
+
+def _stack(states: list[int]) -> Stack:
     stack: Stack = (states[0], None)
     for state in states[1:]:
         stack = (state, stack)
-    return _Search(tables, end, tokens).run(stack, index)
+    return stack

@@ -80,8 +80,8 @@ def compute(grammar: str) -> Tables:
     rows: list[dict[str, int]] = [{} for _ in table.states]
     for state, actions in table.states.items():
         for symbol, (action, target) in actions.items():
-            rows[state][symbol] = target if action.name == "Shift" else ~rules.setdefault(target, len(rules))
-    known = tuple(Rule(rule.origin.name, len(rule.expansion), _action(rule)) for rule in rules)
+            rows[state][str(symbol)] = target if action.name == "Shift" else ~rules.setdefault(target, len(rules))
+    known = tuple(Rule(str(rule.origin.name), len(rule.expansion), _action(rule)) for rule in rules)
     _skip_units(rows, known)
     return Tables(known, tuple(rows), dict(table.start_states), dict(table.end_states))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from hypothesis import strategies as st
+
 from potto.syntax.nodes import (
     Apply,
     Argument,
@@ -200,9 +201,7 @@ def _imports() -> st.SearchStrategy[Item]:
     dotted = st.sampled_from(["m", "pkg.m"])
     aliases = st.none() | names
     taken = st.tuples(names, aliases).map(lambda p: ImportedName(O, p[0], O, p[1], None if p[1] is None else O))
-    some = st.tuples(dotted, st.lists(taken, min_size=1, max_size=3)).map(
-        lambda p: FromImport(O, p[0], O, tuple(p[1]))
-    )
+    some = st.tuples(dotted, st.lists(taken, min_size=1, max_size=3)).map(lambda p: FromImport(O, p[0], O, tuple(p[1])))
     whole = st.tuples(dotted, aliases).map(lambda p: Import(O, p[0], O, p[1], None if p[1] is None else O))
     return some | whole
 

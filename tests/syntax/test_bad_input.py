@@ -7,12 +7,13 @@ import time
 from collections.abc import Callable
 
 import pytest
+from syntax_help import everything, messages
+from syntax_samples import CONSTRUCTS, SAMPLES
+
 from potto.source import SourceText
 from potto.syntax import completeness, format_source, parse_chunk, parse_expression, split, tokenize
 from potto.syntax.nodes import BrokenItem, Definition, ErrorExpr
 from potto.syntax.walk import deeper_than, walk
-from syntax_help import everything, messages
-from syntax_samples import CONSTRUCTS, SAMPLES
 
 SECONDS = 5.0
 """Generous: these take about a second each at most; a quadratic step would take minutes."""

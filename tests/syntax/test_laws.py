@@ -9,15 +9,25 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from potto.syntax import format_source, parse_chunk, parse_expression, print_expression, print_item, split, tokenize
+from syntax_samples import SAMPLES
+from syntax_trees import expressions, items
+
+from potto.syntax import (
+    RESERVED,
+    format_source,
+    parse_chunk,
+    parse_expression,
+    print_expression,
+    print_item,
+    split,
+    tokenize,
+)
 from potto.syntax.engine import Engine
 from potto.syntax.groups import Context
 from potto.syntax.lexer import lex
 from potto.syntax.nodes import Paren
 from potto.syntax.tables import grammar_text, lark_parser
 from potto.syntax.walk import without_spans
-from syntax_samples import SAMPLES
-from syntax_trees import expressions, items
 
 LAW = settings(max_examples=150, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 
@@ -103,7 +113,7 @@ def test_any_text_has_a_tree_and_a_format(text: str) -> None:
     assert format_source(formatted) == formatted
 
 
-WORDS = "def f x ( ) [ ] , . : = + * - ^ < if then else let in integral d(x) sum 1 2.5 \\ ? and not .. ; ~ for diffeo\n   ".split(" ")
+WORDS = [*"()[],.:=+*-^<12?;~x", *sorted(RESERVED), "..", "d(x)", "f", "2.5", "\\", "\n   "]
 
 
 @LAW

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from potto.syntax import parse_chunk, print_item
 from syntax_help import check_messages, messages
+
+from potto.syntax import parse_chunk, print_item
 
 
 def test_an_expression_is_missing() -> None:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import pytest
+from syntax_help import everything, expression, item
+from syntax_samples import PAPER, SAMPLES
+
 from potto.source import Span
 from potto.syntax import parse_chunk, print_expression, print_item, print_type, split, walk
 from potto.syntax.nodes import (
@@ -40,8 +43,6 @@ from potto.syntax.nodes import (
     TupleType,
     Unary,
 )
-from syntax_help import everything, expression, item
-from syntax_samples import PAPER, SAMPLES
 
 
 def brackets(text: str) -> str:
