@@ -14,9 +14,10 @@ from typing import Any
 from potto.diagnostics import Diagnostic, PottoError, declare
 from potto.elaborate import elaborate_expression
 from potto.kernels.cells import Value
+from potto.kernels.errors import wrong_call
 from potto.modules import statements
 from potto.query import Database
-from potto.render import Located
+from potto.render import Located, ProgramError
 from potto.runtime.estimate import Estimate
 from potto.runtime.evaluate import Clock, Program, report
 from potto.runtime.functions import Closure
@@ -27,7 +28,6 @@ from potto.source import Span
 from potto.syntax import nodes
 
 NOT_CONVERGED = declare("P0501", "an estimate that is not as accurate as was asked", "warning")
-NOT_A_LIST = declare("P0521", "a loop over something that is not a list")
 NO_NUMBER = declare("P0524", "an answer that is not a number", "warning")
 ONE_SIDED = declare("P0522", "a derivative that differs on the two sides of the parameters", "info")
 
@@ -93,8 +93,7 @@ class Script:
         value, _ = self.value(iterable, env)
         if isinstance(value, list):
             return value
-        complaint = NOT_A_LIST(iterable.span.shift(self.start), "a loop goes over a list", help="write `[a, b, c]`")
-        raise _Failed(Located(self.file, complaint))
+        raise self.failed(wrong_call("a loop goes over a list"), iterable.span)
 
     def bind(self, binding: nodes.Binding, env: Environment) -> None:
         value, _ = self.value(binding.value, env)
@@ -104,8 +103,7 @@ class Script:
             return
         parts = value if isinstance(value, tuple | list) else ()
         if len(parts) != len(targets):
-            message = f"{len(targets)} names are given to a value of {len(parts) or 1}"
-            raise _Failed(Located(self.file, NOT_A_LIST(binding.span.shift(self.start), message)))
+            raise self.failed(wrong_call(f"{len(targets)} names are given to a value of {len(parts) or 1}"), binding.span)
         env.update({target.name: part for target, part in zip(targets, parts, strict=True)})
 
     def value(self, expr: nodes.Expr, env: Environment) -> tuple[Value, Estimate | None]:
@@ -117,8 +115,13 @@ class Script:
                 value = evaluate_in(self.db, self.file, expr, env, self.program, machine)
             return value, (report(value, machine, clock) if not _has_functions(value) else None)
         except PottoError as error:
-            first = error.diagnostics[0]
-            raise _Failed(Located(self.file, placed(first, place.shift(self.start), self.start))) from None
+            raise self.failed(error, place) from None
+
+    def failed(self, error: PottoError, place: Span) -> _Failed:
+        """An error of evaluation, at the place of what was evaluated."""
+        if isinstance(error, ProgramError):  # about a definition, and knows where that is
+            return _Failed(error.located[0])
+        return _Failed(Located(self.file, placed(error.diagnostics[0], place.shift(self.start), self.start)))
 
 
 def evaluate_in(

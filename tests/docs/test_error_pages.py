@@ -11,7 +11,9 @@ import pytest
 import potto
 from potto import pages
 from potto.diagnostics import KINDS, Diagnostic
+from potto.__main__ import main
 from potto.pages import Example, Page
+from potto.render import Located
 from potto.world import World
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -75,3 +77,48 @@ def test_the_programs_of_a_page(page: Page, example: Example, tmp_path: Path) ->
     first = next((d for d in found if d.severity == severity), None)
     assert first is not None, f"no {severity}: {[(d.code, d.message) for d in found]}"
     assert first.code == page.code, first.message
+
+
+def of_pages(suffix: str) -> list[object]:
+    return [
+        pytest.param(page, example, id=f"{page.code}-{number}-{example.heading}")
+        for page in PAGES.values()
+        for number, example in enumerate(page.examples)
+        if example.heading.endswith(suffix)
+    ]
+
+
+@pytest.mark.parametrize(("page", "example"), of_pages("(run)"))
+def test_what_only_shows_when_a_program_runs(page: Page, example: Example, tmp_path: Path) -> None:
+    assert not found_in(example, tmp_path), "the checker sees nothing yet"
+    world = World([tmp_path])
+    said = [event for event in world.run(world.key(tmp_path / example.files[0][0])) if isinstance(event, Located)]
+    assert (page.code in [item.diagnostic.code for item in said]) == (example.heading == "Wrong (run)")
+
+
+@pytest.mark.parametrize(("page", "example"), of_pages("(Python)"))
+def test_what_only_shows_from_python(page: Page, example: Example) -> None:
+    if example.heading == "Right (Python)":
+        exec(example.text, {"potto": potto})
+        return
+    with pytest.raises(potto.PottoError) as caught:
+        exec(example.text, {"potto": potto})
+    assert caught.value.diagnostics[0].code == page.code
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES.values() if "(run)" in page.text], ids=lambda page: page.code)
+def test_the_right_programs_of_such_pages_run_without_a_word(page: Page, tmp_path: Path) -> None:
+    for example in page.examples:
+        if example.heading == "Right":
+            found_in(example, tmp_path)
+            world = World([tmp_path])
+            events = list(world.run(world.key(tmp_path / example.files[0][0])))
+            assert not [event for event in events if isinstance(event, Located)]
+
+
+def test_a_budget_that_is_too_small_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """P0501, whose page shows a command."""
+    waves = tmp_path / "waves.po"
+    waves.write_text("def wave(t)\n    integral [0, 1] sin(1e5*t*x)/(x + 0.001) d(x)\n")
+    assert main(["eval", str(waves), "wave(3)", "--max-evals", "100"]) == 0
+    assert "warning[P0501]" in capsys.readouterr().err
