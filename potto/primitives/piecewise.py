@@ -21,7 +21,7 @@ def _absolute_roots(y: Term) -> Terms:
 def _choose(op: str, args: Terms) -> Terms:
     """The partials of min or max, folded from the left: of what is best so far, and of the next argument."""
     best = args[0]
-    chosen: list[Term] = [ONE] + [ZERO] * (len(args) - 1)
+    chosen: list[Term] = [ONE, *(ZERO,) * (len(args) - 1)]
     for i in range(1, len(args)):
         margin = sub(best, args[i]) if op == "max" else sub(args[i], best)
         for j in range(i):
