@@ -103,7 +103,8 @@ class Script:
             return
         parts = value if isinstance(value, tuple | list) else ()
         if len(parts) != len(targets):
-            raise self.failed(wrong_call(f"{len(targets)} names are given to a value of {len(parts) or 1}"), binding.span)
+            complaint = wrong_call(f"{len(targets)} names are given to a value of {len(parts) or 1}")
+            raise self.failed(complaint, binding.span)
         env.update({target.name: part for target, part in zip(targets, parts, strict=True)})
 
     def value(self, expr: nodes.Expr, env: Environment) -> tuple[Value, Estimate | None]:
