@@ -11,10 +11,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from potto.diagnostics import Diagnostic
+from potto.modules.hints import did_you_mean, near_names
 from potto.primitives import PRIMITIVES
 from potto.syntax import nodes
 from potto.types import kinds
-from potto.types.context import Inference, Plan, comparison, describe, near_names, rule
+from potto.types.context import Inference, Plan, comparison, describe, rule
 from potto.types.infer import deriv_argument, is_known, special, strip
 from potto.types.scope import Builtin, Local
 from potto.types.types import (
@@ -179,13 +180,11 @@ class _Filling:
         if not names:
             return _no_names(argument, self.node)
         near = near_names(argument.name or "", names)
-        choice = near or names
-        head = "did you mean " if near else "it has "
         return kinds.UNKNOWN_KEYWORD(
             argument.name_span or argument.span,
             f"{callee_name(self.node)} has no parameter `{argument.name}`",
             label="no such parameter",
-            help=head + (" or " if near else ", ").join(f"`{name}`" for name in choice) + ("?" if near else ""),
+            help=did_you_mean(near) or "it has " + ", ".join(f"`{name}`" for name in names),
         )
 
     def _pack(self) -> bool:

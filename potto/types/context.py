@@ -18,7 +18,7 @@ from potto.source import Span
 from potto.syntax import nodes
 from potto.types import kinds
 from potto.types.format import format_type, format_types
-from potto.types.scope import Local, LocalKind, Meaning, Member, Outside, Scope, near_names
+from potto.types.scope import Local, LocalKind, Meaning, Member, Outside, Scope
 from potto.types.types import (
     REAL,
     UNKNOWN,
@@ -120,6 +120,11 @@ class Inference:
 
     def report(self, diagnostic: Diagnostic) -> None:
         self.diagnostics.append(diagnostic)
+
+    def say(self, diagnostic: Diagnostic | None) -> None:
+        """Report, if there is anything to be reported."""
+        if diagnostic is not None:
+            self.diagnostics.append(diagnostic)
 
     def later(self, check: Callable[[], None]) -> None:
         """Do a check when all types are known."""
@@ -350,4 +355,4 @@ def _shadowing(local: Local, before: Local) -> Diagnostic:
     )
 
 
-__all__ = ["RULES", "Inference", "Plan", "comparison", "describe", "ensure_stack", "mismatch", "near_names", "rule"]
+__all__ = ["RULES", "Inference", "Plan", "comparison", "describe", "ensure_stack", "mismatch", "rule"]

@@ -64,7 +64,7 @@ def strip(expr: nodes.Expr) -> nodes.Expr:
 def _name(inference: Inference, node: nodes.Name) -> Type:
     meaning = inference.scope.find(node.id) or inference.outside.find(None, node.id)
     if meaning is None:
-        inference.report(undefined(inference.outside, inference.scope, node))
+        inference.say(undefined(inference.outside, inference.scope, node))
         return UNKNOWN
     inference.meanings[id(node)] = meaning
     return _meant(inference, node, meaning)
@@ -75,7 +75,7 @@ def _member(inference: Inference, node: nodes.Member) -> Type:
     hidden = inference.scope.find(node.path.partition(".")[0]) is not None
     meaning = None if hidden else inference.outside.find(node.path, node.name)
     if meaning is None:
-        inference.report(undefined_member(inference.outside, inference.scope, node))
+        inference.say(undefined_member(inference.outside, inference.scope, node))
         return UNKNOWN
     inference.meanings[id(node)] = meaning
     return _meant(inference, node, meaning)

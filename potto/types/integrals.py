@@ -10,9 +10,10 @@ from collections.abc import Sequence
 
 from potto.diagnostics import Diagnostic
 from potto.measures import MEASURES
+from potto.modules.hints import did_you_mean, near_names
 from potto.syntax import nodes
 from potto.types import kinds
-from potto.types.context import Inference, comparison, describe, near_names, rule
+from potto.types.context import Inference, comparison, describe, rule
 from potto.types.infer import bindings, escape
 from potto.types.scope import Local
 from potto.types.types import REAL, Dist, Function, ListOf, Meta, Real, Truth, TupleOf, Type, Unknown, resolve
@@ -79,8 +80,7 @@ def _measure(inference: Inference, bounds: nodes.MeasureBound) -> None:
     """Check that a measure exists and has all its parameters."""
     measure = MEASURES.get(bounds.measure)
     if measure is None:
-        near = near_names(bounds.measure, MEASURES)
-        help = "did you mean " + " or ".join(f"`{name}`" for name in near) + "?" if near else ""
+        help = did_you_mean(near_names(bounds.measure, MEASURES))
         message = f"there is no measure `{bounds.measure}`"
         known = f"the measures are {', '.join(f'`{name}`' for name in MEASURES)}"
         inference.report(kinds.MEASURE(bounds.measure_span, message, label="not a measure", help=help or known))

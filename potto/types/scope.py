@@ -7,15 +7,15 @@ defined. Local names come first, then the file's definitions and imports, then b
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Literal
 
 from potto.diagnostics import Diagnostic
-from potto.modules.graph import refer
-from potto.modules.lookup import DefinitionTarget, ModuleTarget, find_module, preludes, resolve_module
+from potto.modules.builtins import CONSTANTS, PROJECTIONS, SPECIALS, is_builtin
+from potto.modules.hints import did_you_mean, elsewhere, near_names
+from potto.modules.lookup import Defined, DefinitionTarget, find_module, meaning, preludes, resolve_module
 from potto.modules.texts import imports, names
 from potto.primitives import PRIMITIVES
 from potto.query import Database
@@ -27,11 +27,6 @@ from potto.types.reasons import Reasons
 from potto.types.types import Meta, Type
 
 LocalKind = Literal["parameter", "local", "variable", "index", "loop"]
-CONSTANTS = ("pi", "inf")
-SPECIALS = ("deriv", "delta")
-PROJECTIONS = ("fst", "snd")
-
-
 @dataclass(eq=False, slots=True)
 class Local:
     """A name that is bound inside a definition. `known`: its value is a function whose parameters have names.
@@ -100,14 +95,6 @@ class Outside:
         return found
 
 
-def is_builtin(name: str) -> bool:
-    """Whether a name means a builtin where nothing else is in scope."""
-    if name in CONSTANTS or name in SPECIALS or name in PROJECTIONS:
-        return True
-    primitive = PRIMITIVES.get(name)
-    return primitive is not None and primitive.surface
-
-
 def builtin_names() -> tuple[str, ...]:
     """All builtin names that programs may write."""
     return (*CONSTANTS, *SPECIALS, *PROJECTIONS, *(p.name for p in PRIMITIVES.values() if p.surface))
@@ -142,9 +129,11 @@ class Scope:
         self._names.pop(name, None)
 
 
-def undefined(outside: Outside, scope: Iterable[str], node: nodes.Name) -> Diagnostic:
-    """What is said of a name that means nothing here."""
+def undefined(outside: Outside, scope: Iterable[str], node: nodes.Name) -> Diagnostic | None:
+    """What is said of a name that means nothing here; nothing if an import that fails has been reported for it."""
     name = node.id
+    if meaning(outside.db, outside.file, name) is not None:
+        return None
     if name == "print":
         return NOT_DEFINED(
             node.span,
@@ -153,54 +142,37 @@ def undefined(outside: Outside, scope: Iterable[str], node: nodes.Name) -> Diagn
             help="print at the top of a script, in a line of its own",
         )
     near = near_names(name, (*scope, *_file_names(outside), *builtin_names()))
-    modules = () if near else modules_with(outside, name)
-    helps = []
-    if near:
-        helps.append("did you mean " + " or ".join(f"`{other}`" for other in near) + "?")
+    help = did_you_mean(near)
+    modules = elsewhere(outside.db, outside.file, name)
     if modules:
-        helps.append(f"it is defined in the module `{modules[0]}`: add `from {modules[0]} import {name}`")
-    return NOT_DEFINED(node.span, f"`{name}` is not defined", label="not defined here", help="; ".join(helps))
+        help = f"the module `{modules[0]}` defines it: add `from {modules[0]} import {name}`"
+    return NOT_DEFINED(node.span, f"`{name}` is not defined", label="not defined here", help=help)
 
 
-def undefined_member(outside: Outside, scope: Scope, node: nodes.Member) -> Diagnostic:
+def undefined_member(outside: Outside, scope: Scope, node: nodes.Member) -> Diagnostic | None:
     """What is said of `module.name` where there is no such module, or nothing of that name in it."""
-    written = f"{node.path}.{node.name}"
-    head = node.path.partition(".")[0]
-    module = None if scope.find(head) else resolve_module(outside.db, outside.file, node.path)
+    head, db, file = node.path.partition(".")[0], outside.db, outside.file
+    local = scope.find(head) is not None
+    module = None if local else resolve_module(db, file, node.path)
     if module is not None:
-        near = near_names(node.name, names(outside.db, module))
-        help = "did you mean " + " or ".join(f"`{node.path}.{other}`" for other in near) + "?" if near else ""
-        return NOT_DEFINED(
-            node.name_span, f"the module `{node.path}` defines no `{node.name}`", label="not defined there", help=help
-        )
-    if find_module(outside.db, outside.file, node.path) is not None:
-        help = f"add `import {node.path}`"
-    elif scope.find(node.name) or scope.find(head) or node.path.isidentifier():
-        help = f"for a function of `{node.path}` write blanks around the dot: `\\{node.path} . {node.name}`"
-    else:
-        help = ""
-    what = f"`{head}` is no module" if scope.find(head) else f"there is no module `{node.path}` here"
-    return NOT_DEFINED(node.path_span, f"{what}, so `{written}` is not defined", label="not a module", help=help)
+        near = [f"{node.path}.{name}" for name in near_names(node.name, names(db, module))]
+        message = f"the module `{node.path}` defines no `{node.name}`"
+        return NOT_DEFINED(node.name_span, message, label="not defined there", help=did_you_mean(near))
+    bound = None if local else (meaning(db, file, node.path) or meaning(db, file, head))
+    if isinstance(bound, Defined):
+        return _no_module(node, f"`{head}` is a definition, not a module")
+    if bound is not None:
+        return None
+    if find_module(db, file, node.path) is not None and not local:
+        return _no_module(node, f"the module `{node.path}` is not imported", f"add `import {node.path}`")
+    return _no_module(node, f"`{head}` is no module" if local else f"there is no module `{node.path}` here")
 
 
-def near_names(name: str, candidates: Iterable[str], count: int = 2) -> tuple[str, ...]:
-    """The names that `name` may have been meant to be, the likeliest first."""
-    known = dict.fromkeys(candidate for candidate in candidates if candidate != name)
-    exact = [candidate for candidate in known if candidate.casefold() == name.casefold()]
-    if exact or len(name) < 2:
-        return tuple(exact[:count])
-    cutoff = 0.6 if len(name) > 3 else 0.5
-    return tuple(difflib.get_close_matches(name, list(known), n=count, cutoff=cutoff))
-
-
-def modules_with(outside: Outside, name: str) -> tuple[str, ...]:
-    """The modules that this file already imports something of and that define `name`."""
-    found = []
-    for item in imports(outside.db, outside.file):
-        module = find_module(outside.db, outside.file, item.module)
-        if module is not None and name in names(outside.db, module):
-            found.append(item.module)
-    return tuple(dict.fromkeys(found))
+def _no_module(node: nodes.Member, what: str, help: str = "") -> Diagnostic:
+    if not help and "." not in node.path:
+        help = f"for one more parameter of a function write blanks around the dot: `{node.path} . {node.name}`"
+    message = f"{what}, so `{node.path}.{node.name}` is not defined"
+    return NOT_DEFINED(node.path_span, message, label="not a module", help=help)
 
 
 def _file_names(outside: Outside) -> tuple[str, ...]:
@@ -215,5 +187,3 @@ def _file_names(outside: Outside) -> tuple[str, ...]:
                 found.extend(imported.alias or imported.name for imported in item.names)
     return tuple(found)
 
-
-__all__ = ["DefinitionTarget", "ModuleTarget", "refer"]
