@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 from potto.check import absolute
 from potto.modules import DefinitionTarget, chunk_start, definition, imports, names, resolve, statements
+from potto.modules.builtins import is_builtin
 from potto.modules.lookup import bindings, preludes, scope
 from potto.modules.texts import import_starts
 from potto.render import Located, ProgramError
@@ -23,7 +24,6 @@ from potto.settings import Settings
 from potto.source import SourceText
 from potto.syntax import nodes, parse_expression
 from potto.types import Inferred, format_type, infer_expression, interface
-from potto.types.scope import is_builtin
 from potto.world import Answer, World
 
 PROMPT = "<prompt>"

@@ -16,7 +16,7 @@ import threading
 import weakref
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import Any, TypeGuard, TypeVar
 
 
 @dataclass(frozen=True, eq=False, slots=True, weakref_slot=True)
@@ -366,9 +366,15 @@ INF = const(math.inf, "inf")
 
 # Arithmetic that folds
 
+LONGEST = 1000
 
 def _exact_integer(value: float) -> bool:
     return value.is_integer() and abs(value) < 2.0**53
+
+
+def _flattens(arg: Term, op: str) -> TypeGuard[Prim]:
+    """Whether the operands of `arg` join those around it. Long ones stay apart: x*x of a shared x would double them."""
+    return isinstance(arg, Prim) and arg.op == op and len(arg.args) <= LONGEST
 
 
 def add(*args: Term) -> Term:
@@ -376,7 +382,7 @@ def add(*args: Term) -> Term:
     terms: list[Term] = []
     total = 0.0
     for arg in args:
-        for term in arg.args if isinstance(arg, Prim) and arg.op == "add" else (arg,):
+        for term in arg.args if _flattens(arg, "add") else (arg,):
             if isinstance(term, Const) and _exact_integer(term.value) and _exact_integer(total + term.value):
                 total += term.value
             else:
@@ -407,7 +413,7 @@ def mul(*args: Term) -> Term:
     factors: list[Term] = []
     total, sign = 1.0, 1
     for arg in args:
-        for term in arg.args if isinstance(arg, Prim) and arg.op == "mul" else (arg,):
+        for term in arg.args if _flattens(arg, "mul") else (arg,):
             if isinstance(term, Prim) and term.op == "neg":
                 sign, term = -sign, term.args[0]
             if isinstance(term, Const) and _exact_integer(term.value) and _exact_integer(total * term.value):

@@ -12,11 +12,11 @@ from typing import Any, TypeVar
 from potto.core.terms import INF, PI, Term, Tuple, fresh, global_, hole, lam, proj, var
 from potto.elaborate import builtins
 from potto.elaborate.values import Builtin, Closure, Scope, Value
+from potto.modules.builtins import is_builtin
 from potto.modules.lookup import DefinitionTarget, resolve, resolve_member
 from potto.query import Database
 from potto.source import Span
 from potto.syntax import nodes
-from potto.types.scope import is_builtin
 
 MAX_DEPTH = 300  # calls of local functions within each other: deeper ones never end
 MAX_CALLS = 100_000

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from textwrap import dedent
 
+from potto.core.lint import lint
 from potto.core.printer import format_term
 from potto.core.terms import Term
 from potto.elaborate import Elaborated, core
@@ -22,7 +23,11 @@ def program(text: str, **others: str) -> Database:
 
 
 def elaborated(text: str, name: str = "f", **others: str) -> Elaborated:
-    return core(program(text, **others), "<text>", name)
+    """A definition's elaboration, which keeps the invariants of core terms."""
+    found = core(program(text, **others), "<text>", name)
+    assert lint(found.term) == []
+    assert not found.term.free
+    return found
 
 
 def term(text: str, name: str = "f", **others: str) -> Term:
