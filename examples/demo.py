@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import sys
 import tempfile
 import time
@@ -12,7 +13,7 @@ import potto
 from potto.__main__ import main
 
 HERE = Path(__file__).resolve().parent
-RENDERER = str(HERE / "paper" / "renderer.po")
+RENDERER = "paper/renderer.po"
 QUAD = r"\(x, y) . c . 1/(sqrt(2)*(x+y+c)+2)^2"
 C = -0.7
 
@@ -54,10 +55,10 @@ def exact(c: float) -> tuple[float, float]:
 
 def accuracy() -> None:
     """Time against error, for the renderer with the quadratic shader."""
-    renderer = potto.load(RENDERER).renderer
+    renderer = potto.load(HERE / RENDERER).renderer
     shader = potto.compile(f"shader = {QUAD}").shader
     value, slope = exact(C)
-    print(f"\nSpeed against error: the quadratic shader at c = {C}, value and derivative (one run each, kernels made before)")
+    say(f"Speed against error: the quadratic shader at c = {C}, value and derivative, kernels made before.")
     print(f"{'':>22} {'time':>10} {'evaluations':>12} {'error of value':>15} {'error of derivative':>20}")
     for label, settings in (
         ("quadrature", {"method": "quadrature"}),
@@ -74,15 +75,29 @@ def accuracy() -> None:
         print(f"{label:>22} {seconds * 1e3:>7.2f} ms {r.evals:>12,} {errors}")
 
 
+def say(text: str) -> None:
+    print(f"\n{text}", flush=True)
+
+
 def run() -> None:
-    show("run", str(HERE / "paper" / "main.po"))
-    show("eval", RENDERER, f"renderer({C}, {QUAD})")
+    os.chdir(HERE)
+    say("The paper's main program: the derivative of a pixel for three shaders, at a corner where all is 0.")
+    show("run", "paper/main.po")
+    say(f"A pixel that the edge cuts (c = {C}), with the constant shader: its value, and its derivative by c.")
+    show("eval", RENDERER, f"renderer({C}, \\(x, y) . c . 1)")
+    show("eval", RENDERER, f"drenderer(({C}, 1), deriv(\\(x, y) . c . 1))")
+    say("Differentiating samples instead would say 0: the shader is constant, and no sample moves with the edge.")
+    say("The same with the quadratic shader, whose derivative has an interior part as well.")
     show("eval", RENDERER, f"drenderer(({C}, 1), deriv({QUAD}))")
+    say("The derivative in symbols.")
     show("deriv", RENDERER, "renderer")
+    say("A jump that Potto is not told about is refused.")
     with tempfile.TemporaryDirectory() as folder:
-        wrong = Path(folder) / "wrong.po"
-        wrong.write_text("def f(t)\n    integral [0, 1] (if x < t then 1 else 0) d(x)\n", encoding="utf-8")
-        show("check", str(wrong), status=1)
+        os.chdir(folder)
+        text = "def f(t)\n    integral [0, 1] (if x < t then 1 else 0) d(x)\n"
+        Path("wrong.po").write_text(text, encoding="utf-8")
+        show("check", "wrong.po", status=1)
+        os.chdir(HERE)
     accuracy()
 
 

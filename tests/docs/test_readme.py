@@ -79,6 +79,7 @@ def test_the_live_expressions_of_the_examples_hold(capsys: pytest.CaptureFixture
 
 def test_the_demo_runs(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(str(ROOT / "examples"))
+    monkeypatch.chdir(ROOT)  # the demo changes the folder; this brings it back
     import demo
 
     demo.run()
