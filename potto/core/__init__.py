@@ -1,4 +1,1 @@
-"""The calculus that programs become: core terms, what shortens, prints, checks and evaluates them.
-
-Owns nothing itself. `terms` has the terms; the other modules are passes over them.
-"""
+"""The calculus: hash-consed terms, their simplification, their text, and the oracle that evaluates them slowly."""

@@ -1,0 +1,1 @@
+"""Integration along surfaces: plans, cuts, pieces, estimates, and sampling in many dimensions."""

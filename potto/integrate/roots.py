@@ -56,13 +56,15 @@ def _family(
         at = as_array(_at(stop, level.variable, lo.v, env, machine), batch)
         inside = (at > low) & (at < high)
         ends.append(np.where(inside, as_array(_at(family.inner, level.variable, at, env, machine), batch), np.nan))
-    stack = np.stack(ends)
-    first = np.ceil(np.nanmin(stack, axis=0) - 1e-6)
-    last = np.floor(np.nanmax(stack, axis=0) + 1e-6)
-    count = np.nanmax(last - first + 1) if np.isfinite(last - first).any() else 0
-    if not np.isfinite(stack).all() or count > MOST_IN_FAMILY:
+    stack = np.stack(ends)  # nan where an end or a stop does not count
+    known = ~np.isnan(stack)
+    first = np.ceil(np.where(known, stack, np.inf).min(axis=0) - 1e-6)
+    last = np.floor(np.where(known, stack, -np.inf).max(axis=0) + 1e-6)
+    spans = np.where(np.isfinite(first) & np.isfinite(last), last - first + 1, 0.0)
+    count = float(spans.max(initial=0.0))
+    if np.isinf(stack).any() or count > MOST_IN_FAMILY:
         machine.note_unfinished("a condition has too many roots to cut at")
-        count = min(count, MOST_IN_FAMILY) if np.isfinite(count) else 0
+        count = min(count, MOST_IN_FAMILY)
     function = function_of(family.root)
     turning = level.level.cuts[cut].turning
     rows = []

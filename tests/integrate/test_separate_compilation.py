@@ -1,0 +1,63 @@
+"""A definition is compiled alone: swapping a shader compiles the shader, swapping it back compiles nothing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import potto
+from potto.kernels import compile as kernels
+
+RENDERER = """
+def renderer(c, shader)
+    integral ([0, 1], [0, 1]) shader (x, y) c*[x + y + c >= 0] d(x, y)
+"""
+FIRST = "def shader(x, y)(c) 1/(x + y + c + 2)\n"
+SECOND = "def shader(x, y)(c) exp(-x*y)*(c + 2)\n"
+
+
+def workspace(folder: Path) -> potto.Workspace:
+    (folder / "renderer.po").write_text(RENDERER)
+    (folder / "shaders.po").write_text(FIRST)
+    return potto.Workspace(folder)
+
+
+def swap(ws: potto.Workspace, folder: Path, text: str) -> potto.Estimate:
+    (folder / "shaders.po").write_text(text)
+    ws.reload()
+    return potto.deriv(ws.module("renderer").renderer)((-0.7, 1.0), potto.deriv(ws.module("shaders").shader))
+
+
+def compiled(ws: potto.Workspace, folder: Path, text: str) -> int:
+    return int(swap(ws, folder, text).stats["kernels compiled"])
+
+
+def test_swapping_a_shader_compiles_the_shader_alone(tmp_path: Path) -> None:
+    kernels.clear()
+    ws = workspace(tmp_path)
+    assert compiled(ws, tmp_path, FIRST) > 0
+    # One kernel for its values and one for its values and tangents; nothing of the renderer's.
+    assert compiled(ws, tmp_path, SECOND) == 2
+    assert compiled(ws, tmp_path, FIRST) == 0
+    assert compiled(ws, tmp_path, SECOND) == 0
+
+
+def test_a_separately_compiled_renderer_gives_the_same_as_one_written_out(tmp_path: Path) -> None:
+    ws = workspace(tmp_path)
+    apart = swap(ws, tmp_path, SECOND)
+    whole = potto.deriv(
+        potto.compile("def f(c) integral ([0, 1], [0, 1]) exp(-x*y)*(c + 2)*[x + y + c >= 0] d(x, y)").f
+    )((-0.7, 1.0))
+    assert abs(apart.value - whole.value) <= 1e-15 and abs(apart.tangent - whole.tangent) <= 1e-14
+
+
+def test_a_jump_inside_a_callee_is_forced_through_its_trace() -> None:
+    # int_0^1 s(t x) dx with s(u) = [u > 1/2]: 1 - 1/(2 t); derivative 1/(2 t^2). Twice in one integrand, once squared.
+    m = potto.compile("""
+def step(u) [u > 0.5]
+def f(t) integral [0, 1] step (t*x) d(x)
+def g(t) integral [0, 1] (step (t*x) + step (t*x)^2)*step (x + 1) d(x)
+""")
+    for f, factor in ((m.f, 1.0), (m.g, 2.0)):
+        r = potto.deriv(f)((0.8, 1.0))
+        assert abs(r.value - factor * (1 - 0.625)) < 1e-15
+        assert abs(r.tangent - factor / (2 * 0.64)) < 1e-14
