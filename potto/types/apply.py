@@ -141,13 +141,13 @@ def bind(symbol: Value, actual: Value, binding: Binding, note: Step | None = Non
         case Abstract():
             for option in actual.options if isinstance(actual, Choice) else (actual,):
                 binding.functions.append((option, symbol, note))
-                _bind_function(symbol, option, binding)
+                _bind_function(symbol, option, binding, note)
             binding.ports.update(ports_in((symbol,)))
         case _:
             pass
 
 
-def _bind_function(symbol: Abstract, actual: Value, binding: Binding) -> None:
+def _bind_function(symbol: Abstract, actual: Value, binding: Binding, note: Step | None) -> None:
     """Bind what a function gives whatever its arguments, and what it passes to functions among its arguments."""
     if symbol.ports:
         before = binding.abstracts.get(id(symbol.ports))
@@ -171,9 +171,9 @@ def _bind_function(symbol: Abstract, actual: Value, binding: Binding) -> None:
         case _:
             answer = Scalar(flat(actual))
     if isinstance(symbol.result, Abstract):
-        _bind_function(symbol.result, answer, binding)
+        _bind_function(symbol.result, answer, binding, note)
     else:
-        bind(symbol.result, answer, binding)
+        bind(symbol.result, answer, binding, note)
 
 
 def _later_effects(result: Value) -> list[Effect]:
