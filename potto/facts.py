@@ -42,8 +42,8 @@ from potto.types import derivative_type, format_type, interface
 
 
 @dataclass(frozen=True, slots=True)
-class IntegralFacts:
-    """One integral of a definition and the parts of its derivative; each as Potto writes it.
+class PartFacts:
+    """One integral of a definition, or its body around them, and the parts of its derivative; as Potto writes it.
 
     interior: the integral of the integrand's derivative. boundary: per surface its jump times its speed, at the
     surface. bounds: what bounds that move bring in. reason: why a part has no symbolic form, or nothing.
@@ -64,23 +64,31 @@ class DerivativeFacts:
     type: str
     derivative_type: str
     surfaces: tuple[str, ...]
-    integrals: tuple[IntegralFacts, ...]
-    tangent: str
+    integrals: tuple[PartFacts, ...]
+    body: PartFacts | None
 
     @property
     def text(self) -> str:
         lines = [f"{self.name} : {self.type}", f"deriv({self.name}) : {self.derivative_type}"]
         for number, item in enumerate(self.integrals):
             lines += ["", f"integral {number + 1} of {len(self.integrals)}" if len(self.integrals) > 1 else "integral"]
-            lines += _part("value", (item.value,))
-            lines += _part("interior", (item.interior,))
-            lines += _part("boundary", item.boundary or ("0",))
-            lines += _part("bounds", item.bounds)
-            lines += _part("note", (item.reason,) if item.reason else ())
-        if self.tangent:
-            lines += ["", *_part("tangent", (self.tangent,))]
+            lines += _lines(item)
+        if self.body is not None:
+            lines += ["", "body" if self.integrals else "function", *_lines(self.body)]
         lines += ["", *_part("surfaces", self.surfaces or ("none",))]
         return "\n".join(lines)
+
+
+def _lines(item: PartFacts) -> list[str]:
+    note = (item.reason,) if item.reason else ()
+    boundary = item.boundary or ("0",)
+    return [
+        *_part("value", (item.value,)),
+        *_part("interior", (item.interior,)),
+        *_part("boundary", boundary),
+        *_part("bounds", item.bounds),
+        *_part("note", note),
+    ]
 
 
 def _part(word: str, texts: tuple[str, ...]) -> list[str]:
@@ -125,7 +133,7 @@ def derivative_facts(db: Database, file: str, name: str) -> DerivativeFacts | No
         format_type(derivative_type(type)),
         tuple(_surfaces(db, core(db, file, name).term)),
         found,
-        "" if isinstance(body, Integral) else _tangent(body, tangents),
+        None if isinstance(body, Integral) else _body_facts(body, tangents),
     )
 
 
@@ -145,7 +153,7 @@ def _outermost(body: Term) -> Iterator[Integral]:
     return (node for node in postorder(body) if isinstance(node, Integral) and node not in inside)
 
 
-def _integral_facts(node: Integral, tangents: Mapping[str, Term]) -> IntegralFacts:
+def _integral_facts(node: Integral, tangents: Mapping[str, Term]) -> PartFacts:
     def over(body: Term) -> str:
         return format_term(simplify(integral(node.variables, node.bounds, simplify(body), node.hints)))
 
@@ -166,14 +174,23 @@ def _integral_facts(node: Integral, tangents: Mapping[str, Term]) -> IntegralFac
         bounds = tuple(format_term(simplify(term)) for term in at_bounds(node, rate))
     except (PottoError, NoClosedForm) as error:
         reason = f"no symbolic form: {_why(error)}"
-    return IntegralFacts(format_term(node), interior or "?", boundary, bounds, reason)
+    return PartFacts(format_term(node), interior or "?", boundary, bounds, reason)
 
 
-def _tangent(body: Term, tangents: Mapping[str, Term]) -> str:
+def _body_facts(body: Term, tangents: Mapping[str, Term]) -> PartFacts:
+    """A body that is no integral by itself. Where a parameter crosses a surface, the derivative has a delta of it."""
+    interior, reason = "?", ""
+    boundary: tuple[str, ...] = ()
     try:
-        return format_term(simplify(dual(body, tangents)[1]))
-    except PottoError as error:
-        return f"no symbolic form: {_why(error)}"
+        interior = format_term(simplify(dual(body, tangents)[1]))
+        boundary = tuple(
+            format_term(simplify(scaled(jump.jump, mul(jump.rate, delta((jump.surface,))))))
+            for jump in jumps(body, body.free, lambda term: dual(term, tangents)[1])
+            if jump.rate is not ZERO
+        )
+    except (PottoError, NoClosedForm) as error:
+        reason = f"no symbolic form: {_why(error)}"
+    return PartFacts(format_term(body), interior, boundary, (), reason)
 
 
 def _why(error: PottoError | NoClosedForm) -> str:

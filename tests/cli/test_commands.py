@@ -177,6 +177,19 @@ def test_deriv(potto: Potto) -> None:
     assert potto("deriv", "--json", "main.po", "f").json["surfaces"] == ["t - x = 0"]
 
 
+def test_deriv_of_what_jumps_outside_of_an_integral(potto: Potto) -> None:
+    ran = potto("deriv", "main.po", "step", main="def step(y) [y > 0]\n")
+    assert "(Real, Dist[dy])" in ran.out and "dy*delta(y)" in ran.out and "y = 0" in ran.out
+
+
+def test_deriv_keeps_bounds_that_move_apart(potto: Potto) -> None:
+    # D of the integral of x*[x < 1] over [0, t] is t*[t < 1] dt: all of it comes from the bound
+    answer = potto("deriv", "--json", "main.po", "f", main="def f(t)\n    integral [0, t] x*[x < 1] d(x)\n").json
+    part = answer["integrals"][0]
+    assert part["interior"] == "0" and part["boundary"] == [] and len(part["bounds"]) == 1
+    assert "dt" in part["bounds"][0] and "[" in part["bounds"][0]
+
+
 @pytest.mark.parametrize(
     ("kind", "part"),
     [
