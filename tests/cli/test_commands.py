@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 
 import pytest
-from conftest import Potto
+from command_runs import Potto
 
 from potto.cli import COMMANDS, LATER
 

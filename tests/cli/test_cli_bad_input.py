@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 
 import pytest
-from conftest import Potto
+from command_runs import Potto
 
 LENGTH = "def f(t)\n    integral [0, 1] [x < t] d(x)\n"
 
