@@ -65,16 +65,15 @@ class Engine:
                     break
                 size, origin, build_value = reductions[~action]
                 if size == 1:
-                    states.pop()
                     if build_value is not None:
                         values[-1] = build_value(context, values[-1:])
-                elif size:
-                    taken = values[-size:]
-                    del states[-size:], values[-size:]
-                    values.append(build_value(context, taken))  # type: ignore[misc]
+                    states[-1] = rows[states[-2]][origin]
                 else:
-                    values.append(build_value(context, []))  # type: ignore[misc]
-                states.append(rows[states[-1]][origin])
+                    taken = values[-size:] if size else []
+                    if size:
+                        del states[-size:], values[-size:]
+                    values.append(build_value(context, taken))  # type: ignore[misc]
+                    states.append(rows[states[-1]][origin])
                 if kind == "$END" and states[-1] == end:
                     return count
             index += 1

@@ -130,6 +130,8 @@ def _special(stop: Stop) -> Diagnostic | None:
         )
     if at.kind == "STAR" and opened is not None and opened.kind == "IMPORT":
         return kinds.BAD_IMPORT(at.span, "an import says which names it takes", help="list the names instead of `*`")
+    if at.kind == "COMMA" and stop.values and isinstance(stop.values[0], Token) and stop.values[0].kind == "IMPORT":
+        return kinds.BAD_IMPORT(at.span, "one `import` takes one module", help="write an `import` for each")
     if opened is not None and opened.kind == "LSQB" and _is_interval(stop, opened):
         return kinds.UNFINISHED(opened.span.cover(stop.place), "an interval has two ends", help="write `[lo, hi]`")
     loop = stop.last("FOR")
@@ -242,6 +244,9 @@ def _unexpected(stop: Stop) -> Diagnostic:
         "FROM": "an import starts in the first column",
         "IMPORT": "an import starts in the first column",
         "FOR": "a `for` starts a line of its own",
+        "SUM": "write `sum i in 1..n (body)`",
+        "IF": "an `if` comes first: `if p then a else b`",
+        "SEMI": "a line ends without `;`",
         "COMMA": "to make a tuple, write parentheses around it",
         "TILDE": "`x ~ normal(m, s)` goes among the bounds of an integral",
         "DOTDOT": "`1..n` goes with `sum`",

@@ -13,7 +13,7 @@ from potto.source import Span
 from potto.syntax import kinds
 from potto.syntax.tokens import Token
 
-MAX_NESTING = 200
+MAX_NESTING = 100
 MOST_MESSAGES = 50
 _CLOSER = {"LPAR": "RPAR", "LSQB": "RSQB"}
 _CHARACTER = {"LPAR": "(", "RPAR": ")", "LSQB": "[", "RSQB": "]"}

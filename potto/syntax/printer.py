@@ -269,7 +269,7 @@ def _sum(expr: Sum) -> str:
 
 
 def _argument(argument: Argument) -> str:
-    value = print_expression(argument.value)
+    value = _text(argument.value, _OPEN)
     return value if argument.name is None else f"{argument.name}={value}"
 
 

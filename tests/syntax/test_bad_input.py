@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 import itertools
+import sys
 import time
 from collections.abc import Callable
 
@@ -11,7 +13,16 @@ from syntax_help import everything, messages
 from syntax_samples import CONSTRUCTS, SAMPLES
 
 from potto.source import SourceText
-from potto.syntax import completeness, format_source, parse_chunk, parse_expression, split, tokenize
+from potto.syntax import (
+    completeness,
+    dump_tree,
+    format_source,
+    parse_chunk,
+    parse_expression,
+    print_item,
+    split,
+    tokenize,
+)
 from potto.syntax.nodes import BrokenItem, Definition, ErrorExpr
 from potto.syntax.walk import deeper_than, walk
 
@@ -76,11 +87,29 @@ def test_nested_too_deeply(name: str) -> None:
     assert parsed.item.name == "x"
 
 
-def test_nested_as_deeply_as_is_allowed() -> None:
-    parsed = parse_chunk("x = " + "(" * 190 + "1" + ")" * 190)
-    assert parsed.diagnostics == ()
+@pytest.mark.parametrize(
+    "before", ["(", "f(", "[1, ", "f(a=", "1 + 2*(", "-", "2^", "if p then 1 else ", r"\a . ", "let a = 1 in "]
+)
+def test_nested_as_deeply_as_is_allowed(before: str) -> None:
+    """Everything that walks a tree bears the deepest one, with room for the frames of those who call it."""
+    after = {"(": ")", "[": "]"}.get(next((c for c in before if c in "(["), ""), "")
+    for levels in range(98, 20, -1):
+        text = "x = " + before * levels + "1" + after * levels
+        parsed = parse_chunk(text)
+        if not parsed.diagnostics:
+            break
     assert parsed.item is not None
-    assert deeper_than(parsed.item, 200) is None
+    assert deeper_than(parsed.item, 100) is None
+    limit = sys.getrecursionlimit()
+    try:
+        sys.setrecursionlimit(len(inspect.stack(0)) + 750)
+        assert parse_chunk(print_item(parsed.item)).diagnostics == ()
+        assert format_source(format_source(text)) == format_source(text)
+        assert dump_tree(parsed.item)
+        assert hash(parsed.item) == hash(parse_chunk(text).item)
+        assert parsed.item == parse_chunk(text).item
+    finally:
+        sys.setrecursionlimit(limit)
 
 
 def test_too_long() -> None:

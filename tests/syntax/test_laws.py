@@ -29,7 +29,7 @@ from potto.syntax.nodes import Paren
 from potto.syntax.tables import grammar_text, lark_parser
 from potto.syntax.walk import without_spans
 
-LAW = settings(max_examples=150, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+LAW = settings(max_examples=100, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 
 
 def bare(tree: Any) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import stat
 from pathlib import Path
 
@@ -9,7 +10,17 @@ import pytest
 from syntax_samples import SAMPLES
 
 from potto.source import Span
-from potto.syntax import completeness, dump_tree, live_expressions, node_at, parse_chunk, split, tables, tokenize
+from potto.syntax import (
+    RESERVED,
+    completeness,
+    dump_tree,
+    live_expressions,
+    node_at,
+    parse_chunk,
+    split,
+    tables,
+    tokenize,
+)
 from potto.syntax.nodes import Apply, Definition, Name
 
 
@@ -172,3 +183,19 @@ class TestCache:
         # Operators and `?` after an open-ended form go into it; a bracket after a type or a group belongs to it.
         conflicts = {str(record.args) for record in caplog.records if "conflict" in str(record.msg)}
         assert conflicts == {f"('{kind}',)" for kind in ("BINOP", "LPAR", "LSQB", "QMARK", "SIGN", "STAR")}
+
+
+def test_the_programs_of_the_grammar_page_parse() -> None:
+    page = Path(__file__).parents[2] / "docs" / "grammar.md"
+    programs = re.findall(r"```potto\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+    assert programs
+    for program in programs:
+        for chunk in split(program):
+            assert parse_chunk(chunk.text).diagnostics == ()
+
+
+def test_the_reserved_words_are_those_of_the_grammar_page() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "grammar.md").read_text(encoding="utf-8")
+    listed = re.search(r"Reserved: `([^`]*)`", page)
+    assert listed is not None
+    assert set(listed[1].split()) == RESERVED
