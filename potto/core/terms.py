@@ -19,16 +19,22 @@ from dataclasses import dataclass, field
 from typing import Any, TypeGuard, TypeVar
 
 
-@dataclass(frozen=True, eq=False, slots=True, weakref_slot=True)
+@dataclass(frozen=True, eq=False, slots=True, weakref_slot=True, repr=False)
 class _Base:
-    free: frozenset[str] = field(repr=False)
-    digest: bytes = field(repr=False)
+    free: frozenset[str] = field()
+    digest: bytes = field()
+
+    def __repr__(self) -> str:
+        """The kind and the text, cut short: a shared term may be a small object and an endless text."""
+        from potto.core.printer import format_term
+
+        return f"<{type(self).__name__} {format_term(self, 200)}>"  # type: ignore[arg-type]
 
     def __reduce__(self) -> Any:
         return _rebuild, (type(self), tuple(getattr(self, name) for name in _FIELDS[type(self)]))
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Const(_Base):
     """A number. `name` is set for named ones (`pi`), which the oracle evaluates to more digits."""
 
@@ -36,14 +42,14 @@ class Const(_Base):
     name: str | None
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Var(_Base):
     """A parameter, a variable of integration or the index of a sum. Binders in one definition have distinct names."""
 
     name: str
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Prim(_Base):
     """A builtin applied to terms. `op` names an entry of `potto.primitives`.
 
@@ -55,7 +61,7 @@ class Prim(_Base):
     args: tuple[Term, ...]
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
 class If(_Base):
     """A plain conditional: the condition varies with no variable of integration."""
 
@@ -64,7 +70,7 @@ class If(_Base):
     orelse: Term
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Branch(_Base):
     """A diffeomorphic conditional: `then` where the first coordinate is >= 0 (> 0 when strict), else `orelse`.
 
@@ -82,12 +88,12 @@ class Branch(_Base):
         return self.coordinates[0]
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Tuple(_Base):
     items: tuple[Term, ...]
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Proj(_Base):
     """Component `index` (from 0) of a tuple of `size` components (0 where the size is not known)."""
 
@@ -95,12 +101,12 @@ class Proj(_Base):
     index: int
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
 class ListOf(_Base):
     items: tuple[Term, ...]
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Lam(_Base):
     """A function of one group of parameters."""
 
@@ -108,7 +114,7 @@ class Lam(_Base):
     body: Term
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
 class App(_Base):
     """One group of arguments given to a function. A group of n parameters also takes one tuple of n, and back."""
 
@@ -116,7 +122,7 @@ class App(_Base):
     args: tuple[Term, ...]
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Global(_Base):
     """Another definition, by module (the key of its file) and name."""
 
@@ -124,7 +130,7 @@ class Global(_Base):
     name: str
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Integral(_Base):
     """The iterated integral of `body`, `variables[0]` outermost; bounds may use variables further out.
 
@@ -137,14 +143,14 @@ class Integral(_Base):
     hints: tuple[tuple[Term, ...], ...]
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Delta(_Base):
     """The Dirac delta of a diffeomorphism's first coordinate."""
 
     coordinates: tuple[Term, ...]
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Sum(_Base):
     """The sum of `body` for the integers `variable` from `lo` to `hi`, both included; 0 when there are none."""
 
@@ -154,14 +160,14 @@ class Sum(_Base):
     body: Term
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Deriv(_Base):
     """The derivative of a function: takes duals `(value, tangent)`, gives a dual."""
 
     function: Term
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Hole(_Base):
     """Where the program is wrong: evaluating it raises the diagnostic that said so."""
 

@@ -20,6 +20,8 @@ Ints = npt.NDArray[np.int64]
 LINEAR, LEFT, RIGHT, BOTH, UP, DOWN, WHOLE = range(7)
 # Powers by which a piece at the end of its segment is graded once it has shown itself not to be smooth there.
 GRADE = 6
+# How near to an infinite end points come: the square of its inverse is still a number.
+FARTHEST = 1e-150
 
 
 @dataclass
@@ -115,18 +117,19 @@ def _both(seg: Segments, u: Array) -> tuple[Array, Array, Array]:
 
 def _up(seg: Segments, u: Array) -> tuple[Array, Array, Array]:
     """[a, inf): x = a + u/(1-u); moves with a."""
-    rest = 1.0 - u
+    rest = np.maximum(1.0 - u, FARTHEST)
     return seg.a[:, None] + u / rest, 1.0 / (rest * rest), np.zeros_like(u)
 
 
 def _down(seg: Segments, u: Array) -> tuple[Array, Array, Array]:
-    return seg.b[:, None] - (1.0 - u) / u, 1.0 / (u * u), np.ones_like(u)
+    near = np.maximum(u, FARTHEST)
+    return seg.b[:, None] - (1.0 - u) / near, 1.0 / (near * near), np.ones_like(u)
 
 
 def _whole(seg: Segments, u: Array) -> tuple[Array, Array, Array]:
     """(-inf, inf): x = w/(1-w²), w = 2u - 1; nothing moves."""
     low = u < 0.5
-    near = np.where(low, u, 1.0 - u)  # distance from the nearer end, exact near both
+    near = np.maximum(np.where(low, u, 1.0 - u), FARTHEST)  # distance from the nearer end, exact near both
     w = np.where(low, 2 * near - 1, 1 - 2 * near)
     gap = 4 * near * (1 - near)
     return w / gap, 2 * (1 + w * w) / (gap * gap), np.zeros_like(u)
