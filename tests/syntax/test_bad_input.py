@@ -64,6 +64,7 @@ ENORMOUS: dict[str, Callable[[], str]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ENORMOUS)
 def test_enormous_input_is_read_in_linear_time(name: str) -> None:
     text = ENORMOUS[name]()
