@@ -1,0 +1,305 @@
+"""What the features of an editor answer with: plain values in offsets and strings.
+
+Owns the data classes that cross the border of `potto.ide`. All spans are absolute in their file and count code points;
+files are the keys of the database. Texts for people are markdown. Nothing here knows a protocol.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from potto.source import Span
+
+# Places and changes
+
+
+@dataclass(frozen=True, slots=True)
+class Location:
+    """A place to go to: `span` is what to select, `full` all that belongs to it (a whole definition)."""
+
+    file: str
+    span: Span
+    full: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Links:
+    """Where one may go from `origin`, the word under the cursor."""
+
+    origin: Span
+    targets: tuple[Location, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Edit:
+    """Put `text` in the place of `span`; edits of one file do not overlap and are in order."""
+
+    span: Span
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class FileEdits:
+    """The edits of one file, in order."""
+
+    file: str
+    edits: tuple[Edit, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class FileRename:
+    """A file that moves, after its edits were made."""
+
+    old: str
+    new: str
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A change of the workspace: edits first, then moves of files."""
+
+    files: tuple[FileEdits, ...]
+    renames: tuple[FileRename, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """Why something that was asked for is not done, for the user to read."""
+
+    message: str
+
+
+# Hover, completion, signatures
+
+
+@dataclass(frozen=True, slots=True)
+class Hover:
+    """What to show about the word at `span`."""
+
+    span: Span
+    markdown: str
+
+
+CompletionKind = Literal[
+    "variable", "parameter", "constant", "function", "diffeo", "module", "keyword", "snippet", "builtin", "measure",
+    "symbol", "argument", "type", "command",
+]  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Completion:
+    """One proposal. It replaces `span` by `insert` (with `$1`, `${2:name}`, `$0` in it if `snippet`).
+
+    `sort` orders proposals; `filter` is what is matched against the typed word. `detail` and `documentation` may be
+    empty until `resolve_completion` was asked. `edits` go with it elsewhere in the file (an import). `data` says what
+    to resolve: strings alone, so that it can go through a protocol and back.
+    """
+
+    label: str
+    kind: CompletionKind
+    span: Span
+    insert: str
+    sort: str
+    filter: str = ""
+    snippet: bool = False
+    detail: str = ""
+    description: str = ""
+    documentation: str = ""
+    edits: tuple[Edit, ...] = ()
+    data: tuple[str, ...] = ()
+    retrigger: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Completions:
+    """Proposals for the word at `span`. `incomplete`: ask again when more is typed."""
+
+    span: Span
+    items: tuple[Completion, ...]
+    incomplete: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterText:
+    """One parameter: where it stands in the signature's label, and what is to say about it."""
+
+    span: Span
+    documentation: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Signature:
+    """A function's signature; `active` is the parameter that is being filled, or None."""
+
+    label: str
+    documentation: str
+    parameters: tuple[ParameterText, ...]
+    active: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class SignatureHelp:
+    """The signatures of the call at hand, one for each group of parameters; `active` is the group being filled."""
+
+    signatures: tuple[Signature, ...]
+    active: int
+
+
+# Symbols, highlights, hierarchies
+
+SymbolKind = Literal["function", "constant", "diffeo", "module", "variable", "parameter", "local", "statement"]
+
+
+@dataclass(frozen=True, slots=True)
+class DocumentSymbol:
+    """A definition (or a local name in one) for an outline."""
+
+    name: str
+    detail: str
+    kind: SymbolKind
+    span: Span
+    selection: Span
+    children: tuple[DocumentSymbol, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class WorkspaceSymbol:
+    """A definition anywhere in the workspace; `container` is its module."""
+
+    name: str
+    kind: SymbolKind
+    container: str
+    location: Location
+
+
+@dataclass(frozen=True, slots=True)
+class Highlight:
+    """An occurrence of the name at hand in this file."""
+
+    span: Span
+    kind: Literal["read", "write", "text"]
+
+
+@dataclass(frozen=True, slots=True)
+class CallItem:
+    """A definition in a hierarchy of calls; `data` is `(file, name)`."""
+
+    name: str
+    detail: str
+    kind: SymbolKind
+    location: Location
+    data: tuple[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """Who calls or is called, and the places of the calls (in the caller's file)."""
+
+    item: CallItem
+    spans: tuple[Span, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Renaming:
+    """What a rename would change: the word and the text to start from."""
+
+    span: Span
+    placeholder: str
+
+
+# Actions, lenses, hints, tokens
+
+ActionKind = Literal[
+    "quickfix", "refactor.extract", "refactor.inline", "refactor.rewrite", "source.organizeImports", "source.fixAll",
+]  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class CodeAction:
+    """Something that can be done here. `change` is None until `resolve_code_action` was asked.
+
+    `codes` are those of the diagnostics that it fixes, `spans` their places. `preferred`: the obvious one. `disabled`
+    says why it can't be done. `rename_at`: after the change, start a rename there. `data` is for resolving.
+    """
+
+    title: str
+    kind: ActionKind
+    change: Change | None = None
+    codes: tuple[str, ...] = ()
+    spans: tuple[Span, ...] = ()
+    preferred: bool = False
+    disabled: str = ""
+    rename_at: int | None = None
+    data: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class CodeLens:
+    """A line above a definition that can be clicked. `command` is run with `arguments`; no title: ask to resolve."""
+
+    span: Span
+    command: Literal["evaluate", "differentiate", "showDerivative", "showReferences", "run"]
+    arguments: tuple[str, ...]
+    title: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class InlayHint:
+    """A text that is shown but not written. `edits` would write it. `tooltip` may come with `resolve_inlay_hint`."""
+
+    offset: int
+    label: str
+    kind: Literal["type", "parameter"]
+    pad_left: bool = False
+    pad_right: bool = False
+    tooltip: str = ""
+    edits: tuple[Edit, ...] = ()
+    data: tuple[str, ...] = ()
+
+
+TOKEN_TYPES = (
+    "namespace", "type", "parameter", "variable", "property", "function", "keyword", "comment", "number", "operator",
+    "macro",
+)  # fmt: skip
+TOKEN_MODIFIERS = (
+    "declaration", "definition", "readonly", "defaultLibrary", "integration", "plain", "diffeo", "documentation",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class SemanticToken:
+    """A coloured word: a type of `TOKEN_TYPES` and modifiers of `TOKEN_MODIFIERS`. Never over a line's end."""
+
+    span: Span
+    type: str
+    modifiers: tuple[str, ...] = ()
+
+
+# The rest
+
+
+@dataclass(frozen=True, slots=True)
+class Fold:
+    """Something that can be folded: from the end of its first line to the end of `span`."""
+
+    span: Span
+    kind: Literal["region", "comment", "imports"]
+
+
+@dataclass(frozen=True, slots=True)
+class DocumentLink:
+    """The module of an import, and the file that it means."""
+
+    span: Span
+    target: str
+    tooltip: str
+
+
+@dataclass(frozen=True, slots=True)
+class InlineValue:
+    """A text to show at the end of a line, or an expression for an evaluator to show there."""
+
+    span: Span
+    text: str
+    kind: Literal["text", "expression"]
