@@ -63,11 +63,13 @@ def accuracy() -> None:
     for label, settings in (
         ("quadrature", {"method": "quadrature"}),
         ("Monte Carlo, 10^4", {"method": "mc", "samples": 10_000}),
+        ("Monte Carlo, 10^5", {"method": "mc", "samples": 100_000}),
         ("Monte Carlo, 10^6", {"method": "mc", "samples": 1_000_000}),
     ):
+        derivative = potto.deriv(renderer)
+        with potto.settings(**{**settings, "samples": 100}):
+            derivative((C, 1.0), potto.deriv(shader))  # makes the kernels
         with potto.settings(**settings):
-            derivative = potto.deriv(renderer)
-            derivative((C, 1.0), potto.deriv(shader))
             start = time.perf_counter()
             r = derivative((C, 1.0), potto.deriv(shader))
             seconds = time.perf_counter() - start

@@ -72,7 +72,8 @@ GOOD = {
         "1001\n",
     ),
     "300_definitions": (
-        b"def f0(t) t\n" + b"".join(b"def f%d(t) f%d(t) + 1\n" % (i, i - 1) for i in range(1, 300)) + b"print(f299(1))\n",
+        b"def f0(t) t\n" + b"".join(b"def f%d(t) f%d(t) + 1\n" % (i, i - 1) for i in range(1, 300))
+        + b"print(f299(1))\n",
         "300\n",
     ),
 }  # fmt: skip

@@ -77,6 +77,7 @@ def test_the_live_expressions_of_the_examples_hold(capsys: pytest.CaptureFixture
     assert main(["test", str(ROOT / "examples")]) == 0, capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_demo_runs(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(str(ROOT / "examples"))
     monkeypatch.chdir(ROOT)  # the demo changes the folder; this brings it back
