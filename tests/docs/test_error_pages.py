@@ -10,8 +10,8 @@ import pytest
 
 import potto
 from potto import pages
-from potto.diagnostics import KINDS, Diagnostic
 from potto.__main__ import main
+from potto.diagnostics import KINDS, Diagnostic
 from potto.pages import Example, Page
 from potto.render import Located
 from potto.world import World
