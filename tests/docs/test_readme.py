@@ -27,10 +27,13 @@ def test_the_programs_of_the_readme_hold(number: int, tmp_path: Path, capsys: py
     assert main(["test", str(file)]) == 0, capsys.readouterr().err
 
 
-@pytest.mark.parametrize("number", range(len(blocks(README, "python"))))
-def test_the_python_of_the_readme_runs(number: int, monkeypatch: pytest.MonkeyPatch) -> None:
+PYTHON = [(page.name, block) for page in PAGES for block in blocks(page.read_text(encoding="utf-8"), "python")]
+
+
+@pytest.mark.parametrize(("page", "block"), PYTHON, ids=lambda item: item[:12])
+def test_the_python_of_the_pages_runs(page: str, block: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
-    exec(compile(blocks(README, "python")[number], "README.md", "exec"), {})
+    exec(compile(block, page, "exec"), {})
 
 
 def commands() -> list[str]:
