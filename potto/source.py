@@ -39,7 +39,7 @@ class Position:
 
 @dataclass(frozen=True)
 class SourceText:
-    """The text of one file and the places where its lines start. Lines end at LF, CRLF or a lone CR, at nothing else."""
+    """The text of one file and the places where its lines start. Lines end at LF, CRLF or a lone CR only."""
 
     name: str
     text: str
