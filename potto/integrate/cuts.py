@@ -8,7 +8,7 @@ then differ.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -118,6 +118,13 @@ def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, d
     cuts = _pieces(x, t, rank, sign, beyond, edges, lo, hi, batch)
     cuts.conflict = conflict
     return cuts
+
+
+def standing(cuts: Cuts) -> Cuts:
+    """The same cuts, none of which moves."""
+    seg = cuts.segments
+    seg.ta, seg.tb = np.zeros_like(seg.ta), np.zeros_like(seg.tb)
+    return replace(cuts, moving=False, edges=[], conflict=False)
 
 
 def _any_turning(plan: LevelPlan, row: Row) -> bool:

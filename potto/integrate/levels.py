@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from potto.integrate import maps
-from potto.integrate.cuts import Cuts, as_array, frame_rows, segments
+from potto.integrate.cuts import Cuts, as_array, frame_rows, segments, standing
 from potto.integrate.edges import report_edges
 from potto.integrate.maps import Ints, Segments
 from potto.integrate.pieces import Evaluator, Sums, components, gather, still, take
@@ -68,7 +68,8 @@ class Iteration:
         assert isinstance(values, tuple)
         lo, hi, rows = frame_rows(level, values)
         rows += searched_rows(level, env, lo, hi, batch, machine)
-        return segments(level, lo, hi, rows, batch, machine.directions, level is not self.plan.levels[0])
+        cuts = segments(level, lo, hi, rows, batch, machine.directions, level is not self.plan.levels[0])
+        return standing(cuts) if machine.frozen else cuts
 
     def sides_of(
         self, level: LevelPlan, env: dict[str, Value], seg: Segments, sides: dict[int, Mask], machine: Evaluator

@@ -105,7 +105,10 @@ class Linker:
 
 @dataclass
 class Machine:
-    """One evaluation, carrying `directions` tangents; `rounding` where rounding errors are kept track of."""
+    """One evaluation, carrying `directions` tangents; `rounding` where rounding errors are kept track of.
+
+    frozen: surfaces and bounds stand still, so that tangents are those of the integrands alone (by quadrature).
+    """
 
     linker: Linker
     settings: Settings
@@ -113,6 +116,7 @@ class Machine:
     directions: int = 0
     rounding: bool = True
     root: bool = True
+    frozen: bool = False
 
     @property
     def rtol(self) -> float:
@@ -178,7 +182,7 @@ class Machine:
         key = (module, name)
         if key not in self.linker.constants:
             self.enter()
-            still = replace(self, directions=0, rounding=True)
+            still = replace(self, directions=0, rounding=True, frozen=False)
             self.linker.constants[key] = still.term(term, {})
             self.books.depth -= 1
         return pad(self.linker.constants[key], self.directions)
