@@ -15,6 +15,7 @@ from typing import Literal
 from potto.calculus.trace import CallSite, Part, Side, layout
 from potto.core.terms import (
     App,
+    Branch,
     Const,
     Delta,
     Deriv,
@@ -26,10 +27,12 @@ from potto.core.terms import (
     Sum,
     Term,
     Tuple,
+    children,
     const,
     fresh,
     postorder,
     proj,
+    rebuild,
     rename_bound,
     substitute,
     tuple_,
@@ -133,12 +136,14 @@ class _Search:
         if not node.free:
             return
         for kink in entry.kinks(*node.args):
-            if kink.free:
-                yield Finding("kink", substitute(kink, mapping))
+            for piece in pieces(kink):
+                if piece.free:
+                    yield Finding("kink", substitute(piece, mapping))
         if node.op != "div":  # a pole is no edge to cut at: the integral diverges there or the pole is outside
             for edge in entry.edges(*node.args):
-                if edge.free:
-                    yield Finding("edge", substitute(edge, mapping))
+                for piece in pieces(edge):
+                    if piece.free:
+                        yield Finding("edge", substitute(piece, mapping))
 
     def nested(self, node: Integral, mapping: dict[str, Term]) -> Iterator[Finding]:
         from potto.calculus.sweep import outer_findings
@@ -188,6 +193,31 @@ class _Search:
         if dual:
             args = [_primal(a) for a in args]
         yield from self.term(body, dict(zip(params, args, strict=True)), path, (*calls, site.call), depth + 1)
+
+
+_MOST_PIECES = 16
+
+
+def pieces(surface: Term) -> tuple[Term, ...]:
+    """What a surface is on either side of the conditions inside of it: where it is 0, one of these is."""
+    done: dict[Term, None] = {}
+    waiting = [surface]
+    while waiting:
+        term = waiting.pop()
+        inner = next((node for node in postorder(term) if isinstance(node, Branch | If)), None)
+        if inner is None or len(done) + len(waiting) >= _MOST_PIECES:
+            done[term] = None
+        else:
+            waiting.extend(_in_place(term, inner, case) for case in (inner.orelse, inner.then))
+    return tuple(done)
+
+
+def _in_place(term: Term, old: Term, new: Term) -> Term:
+    memo: dict[Term, Term] = {old: new}
+    for node in postorder(term):
+        if node not in memo:
+            memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
+    return memo[term]
 
 
 def _primal(arg: Term) -> Term:

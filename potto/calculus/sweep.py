@@ -122,9 +122,10 @@ def outer_findings(term: Integral, resolve: Resolve, decide: Decide) -> tuple[Fi
     """What the variables around an integral see of it: jumps that none of its variables take part in, and kinks."""
     found = findings(term.body, resolve, decide)
     inner = set(term.variables)
+    bounds = (f for pair in term.bounds for bound in pair for f in findings(bound, resolve, decide))
     jumps = tuple(
         Finding("jump", f.surface, (), f.strict, f.coordinates, f.calls)
-        for f in found
+        for f in (*found, *bounds)
         if f.kind == "jump" and not f.surface.free & inner
     )
     swept = sweep(term, (f for f in found if f.kind != "jump" or f.surface.free & inner), resolve, decide)

@@ -82,7 +82,10 @@ def judge(coordinates: Sequence[Term], variables: Sequence[str], box: Box, whole
         if monotone(surface, name, box):
             return _solved(coordinates, variables, name, None)
     if len(coordinates) == len(variables):
-        inverse = invert(coordinates, variables)
+        try:
+            inverse = invert(coordinates, variables)
+        except NotSmooth:
+            return no_inverse(surface, mine, reasons)
         if isinstance(inverse, Inverse):
             return Verdict(mine[-1], (), inverse.determinant, None, inverse)
     return no_inverse(surface, mine, reasons)

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from potto.calculus.hoist import hidden, hoisted
 from potto.calculus.surfaces import Decide, Resolve, findings
 from potto.calculus.sweep import Cut, Level, sweep
 from potto.calculus.trace import layout
@@ -32,7 +33,7 @@ from potto.core.terms import (
     postorder,
     tuple_,
 )  # fmt: skip
-from potto.kernels.cells import Mask, Trace
+from potto.kernels.cells import Mask, Trace, Value
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,7 @@ class Plan:
     """An integral, ready to be evaluated for any parameters.
 
     decisions: plain terms and the values that they had when the plan was made; it holds where they are the same.
+    reaches: whether every jump can be forced; if not, boundary terms may be missing.
     """
 
     term: Integral
@@ -73,10 +75,15 @@ class Plan:
     body: Lam
     vanishing: Any
     decisions: tuple[tuple[Term, float | None], ...]
+    reaches: bool = True
 
     @cached_property
     def single(self) -> bool:
         return len(self.levels) == 1
+
+    def environment(self, env: dict[str, Value], everything: dict[str, Value]) -> dict[str, Value]:
+        """What the plan is evaluated in: also what functions have captured, if calls of them were carried out."""
+        return env if self.term.free <= env.keys() else everything
 
     def trace(self, sides: Mapping[int, Mask]) -> Trace | None:
         """The trace that forces the groups to the sides given: a mask, true where the canonical surface is >= 0."""
@@ -104,8 +111,11 @@ def function_of(term: Term) -> Lam:
     return lam(tuple(sorted(term.free)), term)
 
 
-def make(term: Integral, resolve: Resolve, decide: Decide) -> Plan:
-    """The plan of an integral. `resolve` gives the functions that it calls, `decide` the values of plain terms."""
+def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve) -> Plan:
+    """The plan of an integral. `resolve` gives the functions that it calls, `decide` the values of plain terms.
+
+    `inline` gives those of the functions that a call of them may be replaced by.
+    """
     decisions: dict[Term, float | None] = {}
 
     def remember(plain: Term) -> float | None:
@@ -114,6 +124,11 @@ def make(term: Integral, resolve: Resolve, decide: Decide) -> Plan:
         return decisions[plain]
 
     found = findings(term.body, resolve, remember)
+    reaches = not hidden(term, found, resolve)
+    if not reaches:
+        term = hoisted(term, inline)
+        found = findings(term.body, resolve, remember)
+        reaches = not hidden(term, found, resolve)
     swept = sweep(term, found, resolve, remember)
     groups: list[Group] = []
     levels: list[LevelPlan] = []
@@ -127,7 +142,7 @@ def make(term: Integral, resolve: Resolve, decide: Decide) -> Plan:
     numbers = {j.path: (g.number, j.orientation) for g in groups for j in g.cut.jumps}
     vanishing = _vanishing(term.body, numbers)
     kept = tuple((t, v) for t, v in decisions.items() if not isinstance(t, Const))
-    return Plan(term, tuple(levels), tuple(groups), function_of(term.body), vanishing, kept)
+    return Plan(term, tuple(levels), tuple(groups), function_of(term.body), vanishing, kept, reaches)
 
 
 def _level(level: Level, decided: tuple[int, ...], groups: list[Group]) -> LevelPlan:

@@ -156,6 +156,6 @@ def _moving(cut: int, function: Lam, variable: str, env: dict[str, Value], root:
     here = {n: pad(v, k + 1) for n, v in env.items()}
     here[variable] = Cell(root, None, (None,) * k + (1.0,))
     value = _call(function, here, machine.with_directions(k + 1))
-    slope = value.t[k]
+    slope = 0.0 if value.t[k] is None else value.t[k]
     t = tuple(None if x is None else -np.asarray(x) / slope for x in value.t[:k])
     return Row(root, t, cut, False)

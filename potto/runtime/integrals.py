@@ -73,11 +73,12 @@ def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermos
     linked = link(flat)
     groups = split_by_decisions(machine, term, linked, batch)
     if groups is None:
-        return _shaped(solve(machine, term, linked, flat, batch, outermost), shape)
+        return _shaped(solve(machine, term, linked, linked.env, batch, outermost), shape)
     result: Sums | None = None
     for index in groups:
         here = {n: map_arrays(v, lambda a, index=index: a[index]) for n, v in flat.items()}
-        part = solve(machine, term, link(here), here, index.size, outermost)
+        there = link(here)
+        part = solve(machine, term, there, there.env, index.size, outermost)
         if result is None:
             m, k = part.v.shape[0], part.t.shape[1]
             result = Sums(np.zeros((m, batch)), np.zeros((m, batch)), np.zeros((m, k, batch)), np.zeros((m, k, batch)))
@@ -94,13 +95,15 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
     if outermost and (method in ("mc", "qmc") or (method == "auto" and len(term.variables) > MOST_LEVELS)):
         from potto.integrate.sampling import sample
 
-        sums = sample(plan_for(machine, term, linked), machine, env, batch, method)
+        plan = plan_for(machine, term, linked)
+        sums = counted(sample(plan, machine, plan.environment(env, linked.env), batch, method), plan, machine)
         machine.books.methods.add("mc" if method == "mc" else "qmc")
         return sums
     machine.books.methods.add("quadrature")
     for order in orders(term):
         machine.books.degenerate.clear()
-        sums = in_parts(plan_for(machine, order, linked), machine, env, batch)
+        plan = plan_for(machine, order, linked)
+        sums = counted(in_parts(plan, machine, plan.environment(env, linked.env), batch), plan, machine)
         if not machine.books.degenerate:
             return sums
     machine.note_unfinished(
@@ -108,6 +111,14 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
         "their boundary terms are not all counted"
     )
     sums.et = np.full_like(sums.et, np.inf)
+    return sums
+
+
+def counted(sums: Sums, plan: Plan, machine: Machine) -> Sums:
+    """The sums, with derivatives that no one vouches for where a jump could not be taken account of."""
+    if machine.directions and not plan.reaches:
+        machine.note_unfinished("a condition jumps inside an inner integral where its boundary term is not counted")
+        sums.et = np.full_like(sums.et, np.inf)
     return sums
 
 
@@ -233,6 +244,7 @@ def plan_for(machine: Machine, term: Integral, linked: Linked) -> Plan:
         term,
         lambda head: linked.functions.get(head.name) if isinstance(head, Var) else machine.linker.function(head),
         lambda plain: decide(machine, plain, linked),
+        lambda head: _plainly(head, linked) if isinstance(head, Var) else machine.linker.function(head),
     )
     with _lock:
         _plans.setdefault(key, []).append(plan)
@@ -240,6 +252,11 @@ def plan_for(machine: Machine, term: Integral, linked: Linked) -> Plan:
         if len(_plans) > MOST_PLANS:
             _plans.popitem(last=False)
     return plan
+
+
+def _plainly(head: Var, linked: Linked) -> Lam | None:
+    """The function that a name stands for, unless it stands for one on duals."""
+    return linked.functions.get(head.name) if type(linked.env.get(head.name)) is Closure else None
 
 
 def decide(machine: Machine, plain: Term, linked: Linked) -> float | None:
