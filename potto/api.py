@@ -89,7 +89,7 @@ def grad(function: Function, wrt: Sequence[str] | str) -> GradientFunction:
     order of `wrt`; `answer["c"]` is the one by `c`.
     """
     _must_be_function(function)
-    return GradientFunction(function, (wrt,) if isinstance(wrt, str) else tuple(wrt))
+    return GradientFunction(function, (wrt,) if isinstance(wrt, str) else tuple(dict.fromkeys(wrt)))
 
 
 def _must_be_function(function: object) -> None:
@@ -171,7 +171,7 @@ class Function:
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         given = (*self._given, (args, kwargs))
         rest = groups_of(self._type)[1:]
-        if rest and len(args) + len(kwargs) <= len(groups_of(self._type)[0]):
+        if rest and (args or kwargs) and len(args) + len(kwargs) <= len(groups_of(self._type)[0]):
             assert isinstance(self._type, FunctionType)
             return Function(self._world, self._file, self._expr, self._type.result, given)
         return self._run(given)
@@ -187,7 +187,7 @@ class Function:
         """The arguments as values, under the names of their parameters. Raises PottoError for what does not fit."""
         labelled = _labelled(given, groups_of(self._whole))
         for label, argument, type in labelled:
-            complaint = None if type is None else misfit(label, argument, type, isinstance(argument, Function))
+            complaint = None if type is None else misfit(label, argument, type, _type_of(argument))
             if complaint is not None:
                 raise wrong_call(complaint)
         batch = batch_of((label, argument) for label, argument, _ in labelled)
@@ -223,6 +223,11 @@ class Function:
         return f"<Potto function {print_expression(self._expr)}{given} : {self.type}>"
 
 
+def _type_of(argument: Any) -> Type | None:
+    """The type of an argument that is a function."""
+    return argument._type if isinstance(argument, Function) else None
+
+
 def _function_value(argument: Any) -> Value | None:
     return argument._value() if isinstance(argument, Function) else None
 
@@ -244,6 +249,9 @@ def _labelled(
             at += 1
         left = [p for p in parameters if p.name not in kwargs]
         spread = len(args) == 1 and len(left) > 1 and isinstance(args[0], tuple)  # one tuple for a whole group
+        if spread and len(args[0]) != len(left):
+            wanted = ", ".join(f"`{p.name}`" for p in left)
+            raise wrong_call(f"a tuple of {len(args[0])} is given for {wanted}")
         unknown = len(parameters) - len(left) < len(kwargs)  # elaboration says which name is meant
         if len(args) < len(left) and not spread and not unknown:
             missing = ", ".join(f"`{p.name}`" for p in left[len(args) :])
@@ -262,6 +270,8 @@ class GradientFunction:
 
     def __init__(self, function: Function, wrt: tuple[str, ...]) -> None:
         parameters = [p.name for group in groups_of(function._whole) for p in group]
+        if not wrt:
+            raise wrong_call("`wrt` names no parameter to differentiate by")
         for name in wrt:
             if name not in parameters:
                 near = difflib.get_close_matches(name, [p for p in parameters if p], 1)

@@ -19,7 +19,7 @@ from potto.kernels.errors import wrong_call
 from potto.runtime.estimate import Estimate
 from potto.source import Span
 from potto.types import format_type
-from potto.types.types import Diffeo, Dist, Function, ListOf, Real, TupleOf, Type, resolve
+from potto.types.types import Diffeo, Dist, Function, ListOf, Real, TupleOf, Type, resolve, result_of
 
 NO_KIND = declare("P0523", "a Python value that is no value of Potto")
 
@@ -132,14 +132,21 @@ def no_kind(name: str, argument: Any, help: str) -> PottoError:
     return PottoError([NO_KIND(Span(0, 0), f"the argument `{name}` cannot be given a Python {kind}", help=help)])
 
 
-def misfit(name: str, argument: Any, type: Type, is_function: bool) -> str | None:
-    """Why an argument cannot have a parameter's type, or None; only kinds are compared, not what varies."""
+def misfit(name: str, argument: Any, type: Type, own: Type | None) -> str | None:
+    """Why an argument cannot have a parameter's type, or None; only kinds are compared, not what varies.
+
+    `own` is the type of an argument that is a function.
+    """
     type = resolve(type)
     wanted = f"`{name}` is {format_type(type)}"
     match type:
         case Function() | Diffeo():
-            return None if is_function else f"{wanted}: a function is needed, not {_kind(argument)}"
-        case _ if is_function:
+            if own is None:
+                return f"{wanted}: a function is needed, not {_kind(argument)}"
+            if _is_dual(result_of(type)) and not _is_dual(result_of(own)):
+                return f"{wanted}: the derivative of a function is needed, `potto.deriv(…)` of the one that is given"
+            return None
+        case _ if own is not None:
             return f"{wanted}: not a function" if isinstance(type, Real | Dist | TupleOf | ListOf) else None
         case TupleOf(items, dual):
             return _tuple_misfit(name, argument, items, dual, wanted)
@@ -150,6 +157,11 @@ def misfit(name: str, argument: Any, type: Type, is_function: bool) -> str | Non
             return None if fits else f"{wanted}: a number is needed, not {_kind(argument)}"
         case _:
             return None
+
+
+def _is_dual(type: Type) -> bool:
+    """A dual, or a tuple of them."""
+    return isinstance(type, TupleOf) and (type.dual or all(_is_dual(resolve(item)) for item in type.items))
 
 
 def _tuple_misfit(name: str, argument: Any, items: tuple[Type, ...], dual: bool, wanted: str) -> str | None:

@@ -30,7 +30,8 @@ def dispatch(arguments: list[str]) -> int:
     if arguments and arguments[0] in COMMANDS:
         module = importlib.import_module(module_of(arguments[0]))
         parser = _command_parser(arguments[0], module)
-        options = parser.parse_intermixed_args(arguments[1:])
+        prepare: Callable[[list[str]], list[str]] = getattr(module, "prepare", list)
+        options = parser.parse_intermixed_args(prepare(arguments[1:]))
         run: Callable[[argparse.Namespace, Console], int] = module.run
         return run(options, standard_console(options.color))
     if arguments and arguments[0] in LATER:

@@ -17,6 +17,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
     add_options(parser)
 
 
+def prepare(arguments: list[str]) -> list[str]:
+    """Let `-f(1)` be an expression: what starts with one minus and is no option of ours gets a blank in front."""
+    return [f" {word}" if len(word) > 1 and word[0] == "-" != word[1] and word != "-h" else word for word in arguments]
+
+
 def run(options: argparse.Namespace, console: Console) -> int:
     from potto.cli.opening import fail, opened
 
@@ -31,7 +36,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     try:
         file = opened(world, options.file)
         world.require(file)
-        answer = world.evaluate(file, options.expression, settings)
+        answer = world.evaluate(file, options.expression.strip(), settings)
     except ProgramError as error:
         return fail(error, options, console)
     estimate = answer.estimate
@@ -41,7 +46,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         console.answer(format_estimate(estimate))
         if estimate.text is None and options.stats:
             console.complain(f"error: {format_bounds(estimate.error)}")
-        console.diagnostics(answer.remarks, world.sources(options.expression))
+        console.diagnostics(answer.remarks, world.sources(options.expression.strip()))
     if options.stats:
         show_stats([estimate], console)
     return 0

@@ -253,6 +253,21 @@ def test_arguments_that_do_not_fit(renderer: Any, shader: Any) -> None:
     refused("P0509", lambda: potto.compile(3))  # type: ignore[arg-type]
 
 
+def test_calls_that_leave_something_out(renderer: Any, shader: Any) -> None:
+    refused("P0509", lambda: shader())
+    refused("P0509", lambda: shader(1)(2))
+    refused("P0509", lambda: shader((1, 2, 3))(2))
+    refused("P0509", lambda: potto.grad(renderer, wrt=[]))
+    assert "`shader`" in str(refused("P0509", lambda: renderer(0.1)))
+
+
+def test_a_derivative_is_given_derivatives(renderer: Any, shader: Any) -> None:
+    error = refused("P0509", lambda: potto.deriv(renderer)((-0.7, 1.0), shader))
+    assert "potto.deriv" in error.diagnostics[0].message
+    # a plain number for a dual has tangent 0
+    assert potto.deriv(renderer)(-0.7, potto.deriv(shader)).tangent == 0.0
+
+
 def test_programs_that_are_wrong() -> None:
     error = refused("P0301", lambda: potto.compile("def f(t)\n    integral [0, 1] (if x < t then 1 else 0) d(x)\n"))
     assert "^^^^^" in str(error) and "P0301" in str(error)

@@ -68,6 +68,12 @@ def test_eval_says_what_is_wrong_with_the_expression(potto: Potto, expression: s
     assert set(answer["diagnostics"][0]["range"]) == {"start", "end"}
 
 
+def test_an_expression_may_start_with_a_minus(potto: Potto) -> None:
+    assert potto("eval", "main.po", "-f(0.25)", main=HALF).out == "-0.25\n"
+    assert potto("eval", "--rtol", "1e-8", "main.po", "-pi").out.startswith("-3.14159265358979")
+    assert potto("eval", "main.po", "-1", "--json").json["value"] == -1.0
+
+
 def test_eval_with_numbers_asked_for(potto: Potto) -> None:
     options = ("--method", "mc", "--samples", "2e4", "--seed", "3", "--json")
     first = potto("eval", "main.po", "f(0.25)", *options, main=HALF).json
