@@ -1,9 +1,238 @@
-"""Owns `derivative_markdown`."""
+"""A definition's derivative and its conditions, memoized and laid out for reading.
+
+Owns the markdown of what the calculus knows: interior and boundary terms, surfaces and what moves each, the completed
+coordinates of conditions with inverse and determinant. What is true is said by `potto.calculus`; here it is set.
+"""
 
 from __future__ import annotations
 
-from potto.query import Database
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from potto.calculus.conditions import conditions_of
+from potto.calculus.diffeo import DiffeoInfo, diffeo_info, exported
+from potto.calculus.explain import DerivativeText, IntegralText, explain_derivative
+from potto.calculus.invert import Inverse, invert
+from potto.calculus.verdict import Problem, Verdict, judge
+from potto.core.printer import format_term
+from potto.core.simplify import simplify
+from potto.core.terms import Hole, Lam, Term, postorder
+from potto.elaborate import core, core_term
+from potto.modules import definition
+from potto.query import Database, query
+from potto.source import Span
+from potto.syntax import nodes
+
+LONG = 400  # characters of a formula beyond which a hover leaves it out
+
+
+@query
+def derivative_text(db: Database, file: str, name: str) -> DerivativeText | None:
+    """The derivative of a definition in symbols; None for one that cannot be read."""
+    if definition(db, file, name) is None:
+        return None
+    term = core_term(db, file, name)
+    if any(isinstance(node, Hole) for node in postorder(term)):
+        return None
+    return explain_derivative(db, file, name)
+
+
+@dataclass(frozen=True, slots=True)
+class ConditionInfo:
+    """What is known of a condition over variables of integration. `span` is relative to the definition's chunk.
+
+    `problem` says why it can't be integrated over; then the rest is empty. `missing` are the coordinates that were left
+    out. `whole`: as many coordinates as variables, so that it is a diffeomorphism.
+    """
+
+    span: Span
+    variables: tuple[str, ...]
+    coordinates: tuple[str, ...]
+    missing: tuple[str, ...] = ()
+    pivot: str = ""
+    roots: tuple[str, ...] = ()
+    inverse: tuple[tuple[str, ...], ...] = ()
+    values: tuple[str, ...] = ()
+    determinant: str = ""
+    problem: str = ""
+    notes: tuple[str, ...] = ()
+    moved_by: tuple[str, ...] = ()
+    calls: tuple[str, ...] = ()
+
+
+@query
+def condition_infos(db: Database, file: str, name: str) -> tuple[ConditionInfo, ...]:
+    """The conditions of a definition, in the order of the text; also those that calls lead to."""
+    elaborated = core(db, file, name)
+    spans = dict(elaborated.origins)
+    found = conditions_of(
+        elaborated.term, lambda g: exported(db, g.module, g.name), lambda g: core_term(db, g.module, g.name)
+    )
+    parameters = _parameters(elaborated.term)
+    out: dict[ConditionInfo, None] = {}
+    for condition in found:
+        span = spans.get(condition.anchor)
+        if span is None or any(isinstance(n, Hole) for c in condition.coordinates for n in postorder(c)):
+            continue
+        moved = tuple(p for p in parameters if p in condition.surface.free)
+        verdict = judge(condition.coordinates, condition.variables, condition.box)
+        out[_info(span, condition.coordinates, condition.variables, verdict, moved, condition.calls)] = None
+    return tuple(sorted(out, key=lambda info: info.span))
+
+
+def _parameters(term: Term) -> list[str]:
+    names: list[str] = []
+    while isinstance(term, Lam):
+        names += term.params
+        term = term.body
+    return names
+
+
+def _info(
+    span: Span,
+    coordinates: tuple[Term, ...],
+    variables: tuple[str, ...],
+    verdict: Verdict | Problem,
+    moved: tuple[str, ...],
+    calls: tuple[str, ...],
+) -> ConditionInfo:
+    shown = _terms(coordinates)
+    if isinstance(verdict, Problem):
+        said = (*verdict.notes, *([verdict.help] if verdict.help else []))
+        return ConditionInfo(span, variables, shown, problem=verdict.message, notes=said, moved_by=moved, calls=calls)
+    completed = (*coordinates, *verdict.completion)
+    inverse = verdict.inverse
+    if inverse is None and len(completed) == len(variables):
+        found = invert(completed, variables)
+        inverse = found if isinstance(found, Inverse) else None
+    roots = () if verdict.roots is None else _terms(verdict.roots.roots)
+    return ConditionInfo(
+        span,
+        variables,
+        shown,
+        _terms(verdict.completion),
+        verdict.pivot,
+        roots,
+        () if inverse is None else tuple(_terms(branch) for branch in inverse.branches),
+        () if inverse is None else inverse.values,
+        "" if verdict.determinant is None else _term(verdict.determinant),
+        moved_by=moved,
+        calls=calls,
+    )
+
+
+def _term(term: Term) -> str:
+    text = format_term(simplify(term))
+    return _plain(text)
+
+
+def _terms(terms: Iterable[Term]) -> tuple[str, ...]:
+    return tuple(_term(term) for term in terms)
+
+
+def _plain(text: str) -> str:
+    """Copies of bound variables (`x'1`) by the names that were written."""
+    parts = text.split("'")
+    return parts[0] + "".join(part.lstrip("0123456789") for part in parts[1:])
+
+
+# Markdown
+
+
+def fence(text: str) -> str:
+    """A block of Potto."""
+    return f"```potto\n{text}\n```"
+
+
+def code(text: str) -> str:
+    """A piece of Potto in a line of text; what is too long is left out."""
+    text = text if len(text) <= LONG else "…"
+    return f"`` {text} ``" if "`" in text else f"`{text}`"
 
 
 def derivative_markdown(db: Database, file: str, name: str) -> str | None:
-    return None
+    """All there is to say about a definition's derivative, as markdown."""
+    found = derivative_text(db, file, name)
+    return None if found is None else fence(found.text)
+
+
+def derivative_parts(found: DerivativeText) -> list[str]:
+    """The interior and boundary terms, and the surfaces with what moves each."""
+    lines: list[str] = []
+    for number, item in enumerate(found.integrals, 1):
+        title = f"of integral {number}" if len(found.integrals) > 1 else ""
+        lines.append(_integral(item, title))
+    if not found.integrals and found.tangent:
+        lines.append(f"**derivative** {code(f'd{found.name} = {found.tangent}')}")
+    lines += [f"*{note}*" for note in found.notes]
+    return lines
+
+
+def _integral(item: IntegralText, title: str) -> str:
+    head = f"**derivative** {title}".rstrip()
+    lines = [f"{head}", "", f"- interior: {code(item.interior)}"]
+    boundary = list(item.deltas) or ["0"]
+    lines += [f"- boundary: {code(text)}" for text in boundary]
+    lines += [f"- moving bound: {code(text)}" for text in item.bounds]
+    if item.reason:
+        lines.append(f"- the boundary is found by numbers, because {item.reason}")
+    lines += [f"- integrated: {code(text)}" for text in item.boundary if len(text) <= LONG]
+    if item.surfaces:
+        lines += ["", "**surfaces**", ""]
+    for surface in item.surfaces:
+        moved = ", ".join(code(name) for name in surface.moved_by)
+        what = f"moved by {moved}" if moved else "moved by no parameter"
+        where = "; at " + ", ".join(code(root) for root in surface.roots) if surface.roots else ""
+        lines.append(f"- {code(surface.equation)} {what}{where}")
+    return "\n".join(lines)
+
+
+def condition_markdown(info: ConditionInfo) -> str:
+    """A condition: its diffeomorphism, inverse and determinant, or why there is none."""
+    over = ", ".join(info.variables)
+    if info.problem:
+        first = f"**no diffeomorphism** over {code(over)}: {info.problem}"
+        return "\n".join([first, *(f"\n{note}" for note in info.notes)])
+    all_of_it = ", ".join((*info.coordinates, *info.missing))
+    lines = [fence(f"diffeo({all_of_it})"), f"a diffeomorphism of {code(over)}"]
+    if info.missing:
+        lines[-1] += f", completed by {code(', '.join(info.missing))}"
+    facts: list[str] = []
+    if info.moved_by:
+        facts.append(f"- moved by {', '.join(code(name) for name in info.moved_by)}")
+    else:
+        facts.append("- moved by no parameter: it adds nothing to a derivative")
+    for root in info.roots:
+        facts.append(f"- surface: {code(f'{info.pivot} = {root}')}")
+    for branch in info.inverse:
+        facts.append(f"- inverse: {code(inverse_text(info.values, branch))}")
+    if info.determinant:
+        facts.append(f"- determinant: {code(info.determinant)}")
+    if info.calls:
+        facts.append(f"- inside {', called by '.join(code(c) for c in reversed(info.calls))}")
+    return "\n".join([*lines, "", *facts])
+
+
+def inverse_text(values: Iterable[str], branch: Iterable[str]) -> str:
+    """An inverse as a program writes it, without the word."""
+    return f"({', '.join(values)}) . ({', '.join(branch)})"
+
+
+def diffeo_markdown(db: Database, file: str, name: str) -> str | None:
+    """A diffeomorphism: its inverse and determinant; None where there is none, the diagnostics say why."""
+    info = diffeo_of(db, file, name)
+    if info is None:
+        return None
+    lines = [f"- inverse: {code(inverse_text(info.values, map(format_term, branch)))}" for branch in info.branches]
+    if info.determinant is not None:
+        lines.append(f"- determinant: {code(format_term(info.determinant))}")
+    lines.append(f"- found: {info.method}" if info.method != "given" else "- the inverse was given by the author")
+    lines += [f"- {note}" for note in info.notes]
+    return "\n".join(lines)
+
+
+def diffeo_of(db: Database, file: str, name: str) -> DiffeoInfo | None:
+    """What is known of a diffeomorphism; None for other definitions."""
+    if not isinstance(definition(db, file, name), nodes.DiffeoDefinition):
+        return None
+    return diffeo_info(db, file, name)

@@ -1,0 +1,111 @@
+"""The words of the language for people: what each keyword means, what completion writes for it, letters by name.
+
+Owns `KEYWORDS`, `SPECIALS` and `LETTERS`. Builtins and measures say for themselves what they are, in their registries.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Where = Literal["top", "expression", "clause"]
+
+
+@dataclass(frozen=True, slots=True)
+class Keyword:
+    """A keyword: what it means, how it is used, and the snippet that writes it. `where`: what it may begin."""
+
+    name: str
+    doc: str
+    form: str
+    snippet: str
+    where: Where
+
+
+_ALL = (
+    Keyword("def", "Defines a function. The last line of its block is its result; a further group of parameters makes "
+            "it curried.", "def f(a, b)\n    a + b", "def ${1:name}(${2:x})\n    ${0:x}", "top"),
+    Keyword("diffeo", "Defines a diffeomorphism of the variables before the `;`, with the parameters after it; or, in "
+            "an expression, makes a condition of coordinates. It holds where the first coordinate is at least 0. "
+            "Coordinates that are left out are completed.",
+            "diffeo half(x, y; c) = (x + y + c, x - y)", "diffeo ${1:name}(${2:x, y}; ${3:c}) = (${0:x + c, y})",
+            "top"),
+    Keyword("from", "Imports names from a module: a file beside this one or under a root of the workspace.",
+            "from m import f, g as h", "from ${1:module} import ${0:name}", "top"),
+    Keyword("import", "Imports a module; its definitions are then written `m.f`.", "import m as k",
+            "import ${0:module}", "top"),
+    Keyword("for", "Runs statements for each item of a list, at the top of a script.",
+            "for v in [1, 2]:\n    print(f(v))", "for ${1:v} in ${2:list}:\n    ${0:print(v)}", "top"),
+    Keyword("print", "Prints values, at the top of a script.", "print(f(1))", "print(${0})", "top"),
+    Keyword("integral", "An integral over bounds, one interval for each variable; the first variable is the "
+            "outermost. Its derivative counts what happens inside and on the surfaces at which the body jumps.",
+            "integral ([0, 1], [0, 1]) body d(x, y)", "integral [${1:0}, ${2:1}] ${0:body} d(${3:x})", "expression"),
+    Keyword("sum", "A sum over whole numbers, with fixed bounds.", "sum i in 1..n (1/i)",
+            "sum ${1:i} in ${2:1}..${3:n} (${0:i})", "expression"),
+    Keyword("if", "A conditional. A plain condition must not vary with a variable of integration; a diffeomorphism, "
+            "or a comparison in brackets, may: its boundary term is counted.", "if [x < t] then a else b",
+            "if ${1:condition} then ${2:a} else ${0:b}", "expression"),
+    Keyword("then", "What a conditional gives where its condition holds.", "if p then a else b", "then ", "clause"),
+    Keyword("else", "What a conditional gives where its condition does not hold.", "if p then a else b", "else ",
+            "clause"),
+    Keyword("let", "Names a value for the expression after `in`.", "let a = 1 in a + a",
+            "let ${1:a} = ${2:1} in ${0:a}", "expression"),
+    Keyword("in", "Ends the names of a `let`, or says what `for` and `sum` go through.", "let a = 1 in a", "in ",
+            "clause"),
+    Keyword("and", "Both conditions.", "[a < x and x < b]", "and ", "clause"),
+    Keyword("or", "One condition or both.", "[x < a or b < x]", "or ", "clause"),
+    Keyword("not", "The opposite of a condition.", "[not x < a]", "not ", "expression"),
+    Keyword("as", "Another name for what is imported.", "from m import f as g", "as ", "clause"),
+    Keyword("inverse", "The inverse of a diffeomorphism, from its author: from values of the coordinates back to the "
+            "variables. It is verified.", "inverse (u, v) . (u + v, u - v)",
+            "inverse (${1:u, v}) . (${0:u, v})", "clause"),
+    Keyword("where", "Conditions that select the branch on which a diffeomorphism is used: a box, or a sign.",
+            "where x > 0", "where ${0:x > 0}", "clause"),
+    Keyword("d", "The variables of an integral, the outermost first.", "integral [0, 1] x d(x)", "d(${0:x})", "clause"),
+)  # fmt: skip
+
+KEYWORDS: dict[str, Keyword] = {keyword.name: keyword for keyword in _ALL}
+
+
+@dataclass(frozen=True, slots=True)
+class Special:
+    """A builtin that is no function of numbers: its type as people read it, and what it does."""
+
+    name: str
+    type: str
+    doc: str
+    derivative: str
+    example: str
+
+
+_SPECIALS = (
+    Special("deriv", "(A -> B) -> D A -> D B", "The derivative of a function: it takes duals `(value, tangent)` under "
+            "the names of the parameters with a `d` in front and gives the dual of the result. A plain number stands "
+            "for one with tangent 0.", "", "deriv(f)(dc=(0.5, 1))"),
+    Special("delta", "Real -> Dist", "The Dirac delta of a diffeomorphism's first coordinate. It has a meaning under "
+            "an integral over the variables that it varies with.", "", "integral [0, 1] x*delta(x - 0.5) d(x)"),
+    Special("fst", "(a, b) -> a", "The first part of a tuple.", "d fst(p) = fst(dp)", "fst((1, 2))"),
+    Special("snd", "(a, b) -> b", "The second part of a tuple.", "d snd(p) = snd(dp)", "snd((1, 2))"),
+    Special("pi", "Real", "The ratio of a circle's circumference to its diameter, 3.14159…", "d pi = 0", "sin(pi/2)"),
+    Special("inf", "Real", "Infinity, for bounds of integrals.", "", "integral [0, inf] exp(-x) d(x)"),
+)  # fmt: skip
+
+SPECIALS: dict[str, Special] = {special.name: special for special in _SPECIALS}
+
+TYPES: dict[str, str] = {
+    "Real": "A number that varies with no variable of integration; `Real*` accepts one that does, and `Real[x]` varies "
+    "with x.",
+    "Dist": "A distribution over variables of integration: what the derivative of something that jumps is. Only an "
+    "integral makes a number of it.",
+    "Diffeo": "What a diffeomorphism gives: coordinates that may stand as a condition.",
+}
+
+_GREEK = ["alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "iota", "kappa", "lambda", "mu", "nu", "xi", "omicron", "pi", "rho", "sigma", "tau", "upsilon", "phi", "chi", "psi", "omega"]
+LETTERS: dict[str, str] = {
+    **{name: letter for name, letter in zip(_GREEK, "αβγδεζηθικλμνξοπρστυφχψω") },
+    **{name.capitalize(): letter for name, letter in zip(_GREEK, "ΑΒΓΔΕΖΗΘΙΚΛΜΝΞΟΠΡΣΤΥΦΧΨΩ")},
+    "vartheta": "ϑ", "varphi": "ϕ", "varrho": "ϱ", "varepsilon": "ϵ", "ell": "ℓ", "hbar": "ħ",
+    "integral": "∫", "int": "∫", "le": "≤", "leq": "≤", "ge": "≥", "geq": "≥", "ne": "≠", "neq": "≠",
+    **{f"_{digit}": letter for digit, letter in zip("0123456789", "₀₁₂₃₄₅₆₇₈₉")},
+}  # fmt: skip
+"""Letters and signs by name: `\\theta` is θ. Signs are those that the lexer knows."""
