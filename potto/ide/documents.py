@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
+from potto.ide.index import call_head
 from potto.ide.symbols import home
-from potto.modules import chunk_text, chunks, definition, is_diffeo, names, parsed
+from potto.modules import chunk_text, chunks, definition, is_diffeo, parsed
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import ParsedChunk, nodes
@@ -57,13 +60,26 @@ def type_text(db: Database, file: str, name: str) -> str:
     return format_type(interface(db, file, name).type)
 
 
-def kind_of(db: Database, file: str, name: str) -> str:
-    """What a definition is: a function, a diffeomorphism, or a constant."""
+Kind = Literal["function", "diffeo", "constant"]
+
+
+@query
+def written_kind(db: Database, file: str, name: str) -> Kind:
+    """What a definition is, as far as its text shows: asks for no types."""
     item = definition(db, file, name)
     if isinstance(item, nodes.DiffeoDefinition):
         return "diffeo"
-    if isinstance(item, nodes.Definition) and (item.groups or isinstance(item.body, nodes.Lambda)):
-        return "function"
+    function = isinstance(item, nodes.Definition) and (item.groups or isinstance(item.body, nodes.Lambda))
+    derived = isinstance(item, nodes.Definition) and call_head(item.body)[2] > 0 and not item.bindings
+    return "function" if function or derived else "constant"
+
+
+@query
+def kind_of(db: Database, file: str, name: str) -> Kind:
+    """What a definition is: a function, a diffeomorphism, or a constant."""
+    written = written_kind(db, file, name)
+    if written != "constant":
+        return written
     return "function" if isinstance(interface(db, file, name).type, Function) else "constant"
 
 
@@ -83,8 +99,3 @@ def item_span(db: Database, file: str, name: str) -> Span:
     """Where a definition stands in its file, its comment included."""
     chunk = home(db, file, name)
     return Span(0, 0) if chunk is None else Span(chunk.start, chunk.start + len(chunk.text))
-
-
-def defined(db: Database, file: str) -> tuple[str, ...]:
-    """What a file defines."""
-    return names(db, file)

@@ -6,7 +6,7 @@ that does not even mention the name.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from potto.ide.index import Occurrence
 from potto.ide.model import Highlight, Location
@@ -64,13 +64,13 @@ def highlights(db: Database, file: str, offset: int) -> tuple[Highlight, ...]:
 
 
 def occurrences_of(db: Database, file: str, symbol: Symbol, only: tuple[str, ...] | None = None) -> Iterator[Place]:
-    """Where a symbol occurs, file by file in the order of the text; in all of the workspace, or in `only` some files."""
+    """Where a symbol occurs, file by file in the order of the text; in all of the workspace, or in `only` some."""
     match symbol:
         case LocalSymbol():
             yield from _local(db, symbol, only)
         case DefinitionSymbol(where, name):
             for each in only if only is not None else _files(db, where, file):
-                yield from _in_file(db, each, symbol, written_as(db, each, where, name))
+                yield from _in_file(db, each, symbol, written_as(db, each, name))
         case ModuleSymbol(where, _):
             for each in only if only is not None else _files(db, where, file):
                 yield from _in_file(db, each, symbol, None)
@@ -85,12 +85,29 @@ def _files(db: Database, *own: str) -> tuple[str, ...]:
 
 
 @query
-def written_as(db: Database, each: str, file: str, name: str) -> frozenset[str]:
-    """The words by which a file could call a definition: its name, and the names that imports give it."""
+def aliases(db: Database) -> Mapping[str, frozenset[str]]:
+    """The names that imports anywhere in the workspace give to a name; a table, to be read by entry."""
+    found: dict[str, set[str]] = {}
+    for file in files(db):
+        for item in imports(db, file):
+            for imported in item.names if isinstance(item, nodes.FromImport) else ():
+                if imported.alias:
+                    found.setdefault(imported.name, set()).add(imported.alias)
+    return {name: frozenset(given) for name, given in found.items()}
+
+
+def written_as(db: Database, file: str, name: str) -> frozenset[str]:
+    """The words by which a definition could be called: its name, and those that imports give it one after the other."""
     found = {name}
-    for item in imports(db, each):
+    pending = [name]
+    while pending:
+        for alias in db.entry(aliases, (), pending.pop()) or ():
+            if alias not in found:
+                found.add(alias)
+                pending.append(alias)
+    for item in imports(db, file):  # also of a file that is not in the workspace
         if isinstance(item, nodes.FromImport):
-            found.update(imported.alias for imported in item.names if imported.alias)
+            found.update(imported.alias for imported in item.names if imported.alias and imported.name in found)
     return frozenset(found)
 
 

@@ -100,9 +100,12 @@ TYPES: dict[str, str] = {
     "Diffeo": "What a diffeomorphism gives: coordinates that may stand as a condition.",
 }
 
-_GREEK = ["alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "iota", "kappa", "lambda", "mu", "nu", "xi", "omicron", "pi", "rho", "sigma", "tau", "upsilon", "phi", "chi", "psi", "omega"]
+_GREEK = (
+    "alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "iota", "kappa", "lambda", "mu", "nu", "xi",
+    "omicron", "pi", "rho", "sigma", "tau", "upsilon", "phi", "chi", "psi", "omega",
+)  # fmt: skip
 LETTERS: dict[str, str] = {
-    **{name: letter for name, letter in zip(_GREEK, "αβγδεζηθικλμνξοπρστυφχψω") },
+    **dict(zip(_GREEK, "αβγδεζηθικλμνξοπρστυφχψω")),
     **{name.capitalize(): letter for name, letter in zip(_GREEK, "ΑΒΓΔΕΖΗΘΙΚΛΜΝΞΟΠΡΣΤΥΦΧΨΩ")},
     "vartheta": "ϑ", "varphi": "ϕ", "varrho": "ϱ", "varepsilon": "ϵ", "ell": "ℓ", "hbar": "ħ",
     "integral": "∫", "int": "∫", "le": "≤", "leq": "≤", "ge": "≥", "geq": "≥", "ne": "≠", "neq": "≠",

@@ -1,0 +1,141 @@
+"""The call that the cursor is in, found in the text alone: while it is typed, there is no tree of it yet.
+
+Owns `call_at`.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from potto.ide.places import ChunkAt, chunk_at
+from potto.query import Database
+from potto.source import Span
+from potto.syntax import RESERVED, nodes, parse_expression
+
+_KEYWORD = re.compile(r"\s*([^\W\d]\w*)\s*=(?!=)")
+_PAIRS = {")": "(", "]": "["}
+
+
+@dataclass(frozen=True, slots=True)
+class PendingCall:
+    """A call whose parentheses are open at the cursor.
+
+    function: what is called; `function_span` where it stands (absolute). positional: how many arguments without a name
+    stand before the one at the cursor. keywords: the names given anywhere in the parentheses. keyword: the name of the
+    argument at the cursor. fresh: nothing of that argument is written but a word. measure: it stands after `~`.
+    """
+
+    function: nodes.Expr
+    function_span: Span
+    open: int
+    positional: int
+    keywords: tuple[str, ...]
+    keyword: str | None
+    fresh: bool
+    measure: bool
+
+
+def call_at(db: Database, file: str, offset: int) -> PendingCall | None:
+    """The innermost call whose parentheses hold an offset."""
+    chunk = chunk_at(db, file, offset)
+    if chunk is None:
+        return None
+    text = _blank_comments(db, chunk)
+    at = min(offset - chunk.start, len(text))
+    position = _open_before(text, at)
+    while position is not None:
+        if text[position] == "(":
+            start = _function_start(text, position)
+            if start is not None:
+                return _call(chunk, text, start, position, at)
+        position = _open_before(text, position)
+    return None
+
+
+def _blank_comments(db: Database, chunk: ChunkAt) -> str:
+    """The chunk's text with blanks for comments; the expression of a live comment stays."""
+    text = chunk.text
+    for comment in chunk.parsed(db).comments:
+        head = 2 if comment.text.startswith("#>") else len(comment.text)
+        start = comment.span.start
+        text = text[:start] + " " * head + text[start + head :]
+    return text
+
+
+def _open_before(text: str, at: int) -> int | None:
+    """The nearest bracket before a place that is open there."""
+    closed: list[str] = []
+    for position in range(at - 1, -1, -1):
+        char = text[position]
+        if char in ")]":
+            closed.append(_PAIRS[char])
+        elif char in "([":
+            if not closed:
+                return position
+            if closed[-1] == char:
+                closed.pop()
+    return None
+
+
+def _function_start(text: str, open: int) -> int | None:
+    """Where the function in front of a parenthesis begins; None if there is none, as in `(a + b)`."""
+    at, start = open, None
+    while True:
+        end = len(text[:at].rstrip(" \t"))
+        if end == 0:
+            return start
+        char = text[end - 1]
+        if char in ")]":
+            before = _open_before(text, end - 1)
+            if char == "]" or before is None:
+                return start
+            start = at = before
+            continue
+        begin = end
+        while begin and (text[begin - 1].isalnum() or text[begin - 1] in "_."):
+            begin -= 1
+        word = text[begin:end]
+        if not word or not (word[0].isalpha() or word[0] == "_") or word in RESERVED or word in ("def", "d"):
+            return start
+        if re.search(r"(?:\bdef|\bdiffeo|\\)\s*$", text[:begin]):
+            return None  # parameters, not arguments
+        start = at = begin
+
+
+def _call(chunk: ChunkAt, text: str, start: int, open: int, at: int) -> PendingCall:
+    before = _arguments(text, open + 1, at)
+    after = _arguments(text, at, len(text), stop=True)
+    current = before[-1] + (after[0] if after else "")
+    names = [found.group(1) for part in (*before[:-1], current, *after[1:]) if (found := _KEYWORD.match(part))]
+    mine = _KEYWORD.match(current)
+    written = text[start:open]
+    return PendingCall(
+        parse_expression(written).expr,
+        Span(chunk.start + start, chunk.start + open),
+        chunk.start + open,
+        sum(1 for part in before[:-1] if not _KEYWORD.match(part)),
+        tuple(names),
+        mine.group(1) if mine else None,
+        re.fullmatch(r"\s*\w*", before[-1]) is not None,
+        text[:start].rstrip().endswith("~"),
+    )
+
+
+def _arguments(text: str, start: int, end: int, stop: bool = False) -> list[str]:
+    """The texts between commas outside of brackets; `stop`: until the parenthesis that closes the call."""
+    parts: list[str] = []
+    depth, last = 0, start
+    for position in range(start, end):
+        char = text[position]
+        if char in "([":
+            depth += 1
+        elif char in ")]":
+            if depth == 0 and stop:
+                end = position
+                break
+            depth = max(0, depth - 1)
+        elif char == "," and depth == 0:
+            parts.append(text[last:position])
+            last = position + 1
+    return [*parts, text[last:end]]
