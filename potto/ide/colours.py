@@ -1,11 +1,155 @@
-"""Owns `semantic_tokens`."""
+"""Semantic tokens: every word with what it means. Owns `semantic_tokens`.
+
+Modifiers say what matters here: `integration` for variables of integration, `plain` for parameters that must not vary,
+`diffeo` for diffeomorphisms, `defaultLibrary` for builtins, `readonly` for what is never assigned (all names).
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
+from potto.ide.documents import written_kind
+from potto.ide.index import Binder, Occurrence
 from potto.ide.model import SemanticToken
-from potto.query import Database
+from potto.ide.places import ChunkAt, all_chunks
+from potto.ide.symbols import (
+    BuiltinSymbol,
+    DefinitionSymbol,
+    LocalSymbol,
+    MeasureSymbol,
+    ModuleSymbol,
+    meaning_of,
+    owner,
+)
+from potto.ide.words import SPECIALS
+from potto.query import Database, query
 from potto.source import Span
+from potto.syntax import live_expressions, tokenize
+from potto.types import Function, interface, typed_names
+
+_OPERATORS = frozenset({"BINOP", "SIGN", "STAR", "ARROW", "TILDE", "QMARK", "EQ", "LAMBDA", "DOTDOT"})
+_WORDS = frozenset(
+    {"DEF", "FOR", "IN", "IF", "THEN", "ELSE", "LET", "NOT", "INTEGRAL", "SUM", "DIFFEO", "DIFFEODEF", "FROM", "IMPORT",
+     "AS", "INVERSE", "WHERE", "D", "PRINT"}
+)  # fmt: skip
 
 
 def semantic_tokens(db: Database, file: str, span: Span | None = None) -> tuple[SemanticToken, ...]:
-    return ()
+    """The coloured words of a file, or of what touches a span, in order and without overlaps."""
+    found: list[SemanticToken] = []
+    for chunk in all_chunks(db, file, span):
+        for start, end, type, modifiers in _coloured(db, chunk):
+            place = Span(chunk.start + start, chunk.start + end)
+            if span is None or (place.start < span.end and span.start < place.end):
+                found.append(SemanticToken(place, type, modifiers))
+    return tuple(found)
+
+
+Word = tuple[int, int, str, tuple[str, ...]]
+
+
+def _coloured(db: Database, chunk: ChunkAt) -> list[Word]:
+    names: dict[int, Word] = {}
+    plain = _plain(db, chunk)
+    for occurrence in chunk.index(db).occurrences:
+        coloured = _name(db, chunk, occurrence, plain)
+        if coloured is not None:
+            names[occurrence.span.start] = (occurrence.span.start, occurrence.span.end, *coloured)
+    merged = sorted((*plain_words(db, chunk.text, chunk.diffeo), *names.values()), key=lambda word: (word[0], word[1]))
+    out: list[Word] = []
+    for word in merged:
+        if out and word[0] < out[-1][1]:
+            if word[0] in names:
+                out[-1] = names[word[0]]
+            continue
+        out.append(word)
+    return out
+
+
+@query(keep=8192)
+def plain_words(db: Database, text: str, diffeo: bool) -> tuple[Word, ...]:
+    """The words of a chunk that are no names; a live expression in its comments is coloured as code."""
+    live = [found.text_span for found in live_expressions(text)] if "#>" in text else []
+    found: list[Word] = []
+    for token in tokenize(text, diffeo):
+        if token.kind != "COMMENT":
+            found += _word(token.kind, token.text, token.start)
+            continue
+        inside = next((s for s in live if token.start <= s.start <= token.end), None)
+        if inside is None:
+            found.append((token.start, token.start + len(token.text.rstrip("\r")), "comment", ()))
+            continue
+        found.append((token.start, inside.start, "comment", ("documentation",)))
+        for inner in tokenize(text[inside.start : inside.end]):
+            found += _word(inner.kind, inner.text, inside.start + inner.start)
+    return tuple(found)
+
+
+def _word(kind: str, text: str, start: int) -> Iterator[Word]:
+    end = start + len(text)
+    if "\n" in text or not text:
+        return
+    if kind in _WORDS or text in ("and", "or", "print"):
+        yield start, end, "keyword", ()
+    elif kind in _OPERATORS:
+        yield start, end, "operator", ()
+    elif kind == "NUMBER":
+        yield start, end, "number", ()
+
+
+def _plain(db: Database, chunk: ChunkAt) -> frozenset[str]:
+    name = owner(db, chunk)
+    return frozenset() if name is None else frozenset(interface(db, chunk.file, name).plain)
+
+
+def _name(
+    db: Database, chunk: ChunkAt, occurrence: Occurrence, plain: frozenset[str]
+) -> tuple[str, tuple[str, ...]] | None:
+    symbol = meaning_of(db, chunk, occurrence)
+    made: tuple[str, ...] = ("declaration",) if occurrence.role in ("bind", "define", "alias") else ()
+    match symbol:
+        case LocalSymbol(_, _, binder):
+            if occurrence.role == "keyword":
+                return "property", ()
+            return _local(binder, made, plain, chunk, db)
+        case DefinitionSymbol(file, name):
+            kind = written_kind(db, file, name)
+            made = (*made, "definition") if occurrence.role == "define" else made
+            if kind == "diffeo":
+                return "function", (*made, "readonly", "diffeo")
+            return ("variable" if kind == "constant" else "function"), (*made, "readonly")
+        case ModuleSymbol():
+            return "namespace", made
+        case BuiltinSymbol(name):
+            constant = name in SPECIALS and "->" not in SPECIALS[name].type
+            return ("variable" if constant else "function"), ("readonly", "defaultLibrary")
+        case MeasureSymbol():
+            return "type", ("defaultLibrary",)
+        case None:
+            return ("property", ()) if occurrence.role == "keyword" else _unknown(occurrence)
+
+
+def _unknown(occurrence: Occurrence) -> tuple[str, tuple[str, ...]] | None:
+    return ("namespace", ()) if occurrence.role in ("module", "path") else ("variable", ())
+
+
+def _local(
+    binder: Binder, made: tuple[str, ...], plain: frozenset[str], chunk: ChunkAt, db: Database
+) -> tuple[str, tuple[str, ...]]:
+    if binder.kind in ("variable", "index"):
+        return "variable", (*made, "readonly", *(("integration",) if binder.kind == "variable" else ()))
+    type = "parameter" if binder.kind == "parameter" else "variable"
+    if binder.kind == "parameter" and _is_function(db, chunk, binder):
+        type = "function"
+    return type, (*made, "readonly", *(("plain",) if binder.kind == "parameter" and binder.name in plain else ()))
+
+
+def _is_function(db: Database, chunk: ChunkAt, binder: Binder) -> bool:
+    name = owner(db, chunk)
+    return name is not None and binder.span.start in functions_in(db, chunk.file, name)
+
+
+@query
+def functions_in(db: Database, file: str, name: str) -> frozenset[int]:
+    """Where a definition binds names that are functions."""
+    return frozenset(t.span.start for t in typed_names(db, file, name) if isinstance(t.type, Function))

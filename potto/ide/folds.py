@@ -1,10 +1,62 @@
-"""Owns `folding_ranges`."""
+"""What can be folded: definitions, brackets over several lines, blocks of comments, the imports. Owns `folding_ranges`."""
 
 from __future__ import annotations
 
 from potto.ide.model import Fold
+from potto.ide.places import ChunkAt, all_chunks, text_of
 from potto.query import Database
+from potto.source import Span
+from potto.syntax import nodes, walk
+
+_FOLDED = (nodes.Integral, nodes.Let, nodes.Lambda, nodes.If, nodes.ListLiteral, nodes.Tuple, nodes.Apply, nodes.Paren)
 
 
 def folding_ranges(db: Database, file: str) -> tuple[Fold, ...]:
-    return ()
+    """The folds of a file, in order; each covers two lines or more, and no two begin on the same line."""
+    text = text_of(db, file)
+    found: list[Fold] = []
+    imports: list[Span] = []
+    for chunk in all_chunks(db, file):
+        item = chunk.parsed(db).item
+        if isinstance(item, nodes.FromImport | nodes.Import):
+            imports.append(chunk.absolute(item.span))
+        else:
+            found += _in_chunk(db, chunk)
+        found += _comments(db, chunk)
+    if imports:
+        found.append(Fold(imports[0].cover(imports[-1]), "imports"))
+    kept: dict[int, Fold] = {}
+    for fold in sorted(found, key=lambda f: (f.span.start, -f.span.end)):
+        line = text.count("\n", 0, fold.span.start)
+        if "\n" in text[fold.span.start : fold.span.end] and line not in kept:
+            kept[line] = fold
+    return tuple(kept.values())
+
+
+def _in_chunk(db: Database, chunk: ChunkAt) -> list[Fold]:
+    item = chunk.parsed(db).item
+    if item is None or "\n" not in chunk.text:
+        return []
+    found = [Fold(chunk.absolute(item.span), "region")]
+    for node in walk(item):
+        if isinstance(node, _FOLDED) and "\n" in chunk.text[node.span.start : node.span.end]:
+            found.append(Fold(chunk.absolute(node.span), "region"))
+    return found
+
+
+def _comments(db: Database, chunk: ChunkAt) -> list[Fold]:
+    """Comments on lines of their own that follow one another."""
+    found: list[Fold] = []
+    block: Span | None = None
+    for comment in chunk.parsed(db).comments:
+        if not comment.own_line:
+            continue
+        if block is not None and chunk.text[block.end : comment.span.start].count("\n") == 1:
+            block = block.cover(comment.span)
+            continue
+        if block is not None:
+            found.append(Fold(chunk.absolute(block), "comment"))
+        block = comment.span
+    if block is not None:
+        found.append(Fold(chunk.absolute(block), "comment"))
+    return found

@@ -1,19 +1,106 @@
-"""Owns `format_document`, `format_range`, `format_on_type`."""
+"""Formatting as small edits, so that cursors, folds and breakpoints stay where they are.
+
+Owns `format_document`, `format_range` and `format_on_type`. The layout is that of `potto.syntax.format_source`.
+"""
 
 from __future__ import annotations
 
+from potto.ide.edits import minimal
 from potto.ide.model import Edit
+from potto.ide.places import ChunkAt, all_chunks, chunk_at, line_end, line_start, text_of
+from potto.modules import is_diffeo
 from potto.query import Database
 from potto.source import Span
+from potto.syntax import format_source, nodes
+
+_INDENT = "    "
 
 
 def format_document(db: Database, file: str) -> tuple[Edit, ...]:
-    return ()
+    """The edits that lay out a file."""
+    text = text_of(db, file)
+    mark = len(text) - len(text.removeprefix("\ufeff"))
+    return minimal(text[mark:], format_source(text, is_diffeo(file)), mark)
 
 
 def format_range(db: Database, file: str, span: Span) -> tuple[Edit, ...]:
-    return ()
+    """The edits that lay out the definitions that a span touches."""
+    edits: list[Edit] = []
+    for chunk in all_chunks(db, file, span):
+        if chunk.start <= span.end and span.start <= chunk.start + len(chunk.text):
+            edits += _chunk(chunk)
+    return tuple(edits)
+
+
+def _chunk(chunk: ChunkAt) -> tuple[Edit, ...]:
+    laid_out = format_source(chunk.text, chunk.diffeo)
+    return minimal(chunk.text, laid_out.rstrip("\r\n"), chunk.start)
 
 
 def format_on_type(db: Database, file: str, offset: int, typed: str) -> tuple[Edit, ...]:
+    """What to change when a line's end or a closing bracket has just been typed in front of `offset`.
+
+    A new line gets the indentation of a block where a head or an open bracket asks for one; the lines above it are laid
+    out where their definition is whole. A closing bracket goes where the line that opened it begins.
+    """
+    text = text_of(db, file)
+    offset = min(offset, len(text))
+    if typed == "\n":
+        return _new_line(db, file, text, offset)
+    if typed in (")", "]"):
+        return _closer(text, offset, typed)
     return ()
+
+
+def _new_line(db: Database, file: str, text: str, offset: int) -> tuple[Edit, ...]:
+    start = line_start(text, offset)
+    blanks = text[start : line_end(text, start)]
+    if blanks.strip() or start == 0:
+        return ()
+    chunk = chunk_at(db, file, start - 1)
+    if chunk is None:
+        return ()
+    before = text[line_start(text, start - 1) : start].rstrip("\r\n")
+    wanted = _indent_after(db, chunk, before, start)
+    return () if wanted is None or wanted == blanks else (Edit(Span(start, start + len(blanks)), wanted),)
+
+
+def _indent_after(db: Database, chunk: ChunkAt, line: str, start: int) -> str | None:
+    """The indentation of the line after `line`; None to leave it as the editor has it."""
+    code = line.partition("#")[0].rstrip()
+    if not code.strip():
+        return None
+    own = code[: len(code) - len(code.lstrip())]
+    item = chunk.parsed(db).item
+    opened = code.count("(") + code.count("[") - code.count(")") - code.count("]")
+    if opened > 0:
+        return own + _INDENT
+    headed = isinstance(item, nodes.Definition) and item.keyword and len(own) == 0 and code.startswith("def")
+    body_on_line = isinstance(item, nodes.Definition) and item.body.span.start < start - chunk.start - 1
+    body_on_line = body_on_line and isinstance(item, nodes.Definition) and len(item.body.span) > 0
+    if (headed and not body_on_line) or (code.lstrip().startswith("for ") and code.endswith(":")):
+        return own + _INDENT
+    return None
+
+
+def _closer(text: str, offset: int, typed: str) -> tuple[Edit, ...]:
+    """A closing bracket alone on its line goes under the line that opened it."""
+    start = line_start(text, offset)
+    if text[start : offset - 1].strip() or text[offset - 1 : offset] != typed:
+        return ()
+    depth = 0
+    for position in range(offset - 2, -1, -1):
+        char = text[position]
+        if char in ")]":
+            depth += 1
+        elif char in "([":
+            if depth == 0:
+                line = text[line_start(text, position) : position]
+                wanted = line[: len(line) - len(line.lstrip())]
+                blanks = text[start : offset - 1]
+                return () if wanted == blanks or not wanted else (Edit(Span(start, offset - 1), wanted),)
+            depth -= 1
+    return ()
+
+
+__all__ = ["format_document", "format_on_type", "format_range"]

@@ -1,14 +1,65 @@
-"""Owns `code_lenses`, `resolve_code_lens`."""
+"""Code lenses: what can be done with a definition, above it. Owns `code_lenses` and `resolve_code_lens`."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from potto.ide.documents import kind_of
+from potto.ide.explaining import derivative_text
+from potto.ide.finding import occurrences_of
 from potto.ide.model import CodeLens
+from potto.ide.places import all_chunks
+from potto.ide.symbols import DefinitionSymbol, owner
 from potto.query import Database
+from potto.syntax import live_expressions, nodes
 
 
 def code_lenses(db: Database, file: str) -> tuple[CodeLens, ...]:
-    return ()
+    """For each definition: evaluate or differentiate it, show its derivative, and who uses it; for scripts: run."""
+    found: list[CodeLens] = []
+    running = False
+    for chunk in all_chunks(db, file):
+        item = chunk.parsed(db).item
+        if isinstance(item, nodes.Definition | nodes.DiffeoDefinition):
+            name = owner(db, chunk)
+            if name is None:
+                continue
+            span, start = chunk.absolute(item.name_span), str(chunk.start + item.name_span.start)
+            kind = kind_of(db, file, name)
+            if kind == "constant":
+                found.append(CodeLens(span, "evaluate", (file, name), "evaluate"))
+            elif kind == "function":
+                found.append(CodeLens(span, "evaluate", (file, name), "evaluate"))
+                found.append(CodeLens(span, "differentiate", (file, name), "differentiate"))
+                found.append(CodeLens(span, "showDerivative", (file, name)))
+            else:
+                found.append(CodeLens(span, "showDerivative", (file, name), "show derivative"))
+            found.append(CodeLens(span, "showReferences", (file, name, start)))
+        elif isinstance(item, nodes.Print | nodes.For | nodes.ExpressionStatement) and not running:
+            running = True
+            found.append(CodeLens(chunk.absolute(item.span), "run", (file,), "run"))
+        if "#>" in chunk.text:
+            for live in live_expressions(chunk.text):
+                found.append(CodeLens(chunk.absolute(live.span), "evaluate", (file, live.text), "evaluate"))
+    return tuple(sorted(found, key=lambda lens: lens.span.start))
 
 
 def resolve_code_lens(db: Database, lens: CodeLens) -> CodeLens:
-    return lens
+    """A lens with its title: how many surfaces there are, how often a definition is used."""
+    match lens.command, lens.arguments:
+        case "showDerivative", (file, name):
+            return replace(lens, title=_derivative_title(db, file, name))
+        case "showReferences", (file, name, _):
+            symbol = DefinitionSymbol(file, name)
+            count = sum(1 for _, o in occurrences_of(db, file, symbol) if o.role != "define")
+            return replace(lens, title="1 reference" if count == 1 else f"{count} references")
+        case _:
+            return lens
+
+
+def _derivative_title(db: Database, file: str, name: str) -> str:
+    found = derivative_text(db, file, name)
+    count = 0 if found is None else len({s.equation for item in found.integrals for s in item.surfaces})
+    if not count:
+        return "show derivative"
+    return f"show derivative ({count} surface{'' if count == 1 else 's'})"

@@ -141,8 +141,8 @@ def _builtin(db: Database, file: str, name: str, call: PendingCall) -> Signature
         return None
     special = SPECIALS.get(name)
     if special is not None and "->" in special.type:
-        parameters = ("f",) if name == "deriv" else ("x",)
-        return _simple(name, parameters, f" : {special.type}", special.doc, call.positional)
+        only = ("f",) if name == "deriv" else ("x",)
+        return _simple(name, only, f" : {special.type}", special.doc, call.positional)
     primitive = PRIMITIVES.get(name)
     if primitive is None or not primitive.surface:
         return None
