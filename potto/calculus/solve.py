@@ -185,6 +185,9 @@ class _Search:
             root = guarded(surface, root, guard.strict)
         if _absent(root):
             return
+        if self.name in root.free:  # met where it was taken for a constant: in a call, or under a condition
+            self.reasons.append(f"`{self.name}` occurs in what can't be looked into")
+            return
         if goal.index is None or goal.index not in root.free:
             self.roots.append(root)
             return

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from potto.calculus.trace import CallSite, Part, Side, layout
+from potto.calculus.trace import CallSite, Part, Side, layout, spine
 from potto.core.terms import (
     App,
     Branch,
@@ -136,14 +136,21 @@ class _Search:
         if not node.free:
             return
         for kink in entry.kinks(*node.args):
-            for piece in pieces(kink):
-                if piece.free:
-                    yield Finding("kink", substitute(piece, mapping))
+            for piece in self.pieces(kink, mapping):
+                yield Finding("kink", piece)
         if node.op != "div":  # a pole is no edge to cut at: the integral diverges there or the pole is outside
             for edge in entry.edges(*node.args):
-                for piece in pieces(edge):
-                    if piece.free:
-                        yield Finding("edge", substitute(piece, mapping))
+                for piece in self.pieces(edge, mapping):
+                    yield Finding("edge", piece)
+
+    def pieces(self, surface: Term, mapping: dict[str, Term]) -> Iterator[Term]:
+        """What a surface is on either side of the conditions inside of it, also of those that calls lead to."""
+        surface = substitute(surface, mapping)
+        if any(isinstance(part, App) for part in postorder(surface)):
+            from potto.calculus.conditions import expanded
+
+            surface = expanded(surface, self.resolve)
+        return (piece for piece in pieces(surface) if piece.free)
 
     def nested(self, node: Integral, mapping: dict[str, Term]) -> Iterator[Finding]:
         from potto.calculus.sweep import outer_findings
@@ -173,14 +180,14 @@ class _Search:
     def call(
         self, site: CallSite, mapping: dict[str, Term], path: tuple[int, ...], calls: tuple[App, ...], depth: int
     ) -> Iterator[Finding]:
-        head = substitute(site.head, mapping)
+        head, before = _spine(substitute(site.head, mapping))
         dual = isinstance(head, Deriv)
         while isinstance(head, Deriv):
             head = head.function
         function = head if isinstance(head, Lam) else self.resolve(head)
         if function is None:
             return
-        groups = tuple(tuple(substitute(a, mapping) for a in group) for group in site.groups)
+        groups = (*before, *(tuple(substitute(a, mapping) for a in group) for group in site.groups))
         params, body = uncurry(function, len(groups))
         args: list[Term] = []
         shape: Lam = function
@@ -218,6 +225,11 @@ def _in_place(term: Term, old: Term, new: Term) -> Term:
         if node not in memo:
             memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
     return memo[term]
+
+
+def _spine(head: Term) -> tuple[Term, tuple[tuple[Term, ...], ...]]:
+    """What is called, and the groups of arguments that it was given before."""
+    return spine(head) if isinstance(head, App) else (head, ())
 
 
 def _primal(arg: Term) -> Term:

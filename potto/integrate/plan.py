@@ -117,18 +117,26 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve) -> P
     `inline` gives those of the functions that a call of them may be replaced by.
     """
     decisions: dict[Term, float | None] = {}
+    unknown: set[Term] = set()
+
+    def known(head: Term) -> Lam | None:
+        found = resolve(head)
+        if found is None:
+            unknown.add(head)
+        return found
 
     def remember(plain: Term) -> float | None:
         if plain not in decisions:
             decisions[plain] = decide(plain)
         return decisions[plain]
 
-    found = findings(term.body, resolve, remember)
-    reaches = not hidden(term, found, resolve)
+    found = findings(term.body, known, remember)
+    reaches = not (unknown or hidden(term, found, resolve))
     if not reaches:
+        unknown.clear()
         term = hoisted(term, inline)
-        found = findings(term.body, resolve, remember)
-        reaches = not hidden(term, found, resolve)
+        found = findings(term.body, known, remember)
+        reaches = not (unknown or hidden(term, found, resolve))
     swept = sweep(term, found, resolve, remember)
     groups: list[Group] = []
     levels: list[LevelPlan] = []
