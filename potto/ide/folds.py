@@ -1,4 +1,4 @@
-"""What can be folded: definitions, brackets over several lines, blocks of comments, the imports. Owns `folding_ranges`."""
+"""What can be folded: definitions, brackets over several lines, comments, the imports. Owns `folding_ranges`."""
 
 from __future__ import annotations
 

@@ -21,15 +21,18 @@ _PAIRS = {")": "(", "]": "["}
 class PendingCall:
     """A call whose parentheses are open at the cursor.
 
-    function: what is called; `function_span` where it stands (absolute). positional: how many arguments without a name
-    stand before the one at the cursor. keywords: the names given anywhere in the parentheses. keyword: the name of the
-    argument at the cursor. fresh: nothing of that argument is written but a word. measure: it stands after `~`.
+    function: what is called; `function_span` where it stands (absolute). open, close: the places of the parentheses
+    (the end of the chunk if there is none yet). positional: how many arguments without a name stand before the one at
+    the cursor; total: how many there are. keywords: the names given anywhere in the parentheses. keyword: the name of
+    the argument at the cursor. fresh: nothing of it is written but a word. measure: the function stands after `~`.
     """
 
     function: nodes.Expr
     function_span: Span
     open: int
+    close: int
     positional: int
+    total: int
     keywords: tuple[str, ...]
     keyword: str | None
     fresh: bool
@@ -109,12 +112,15 @@ def _call(chunk: ChunkAt, text: str, start: int, open: int, at: int) -> PendingC
     current = before[-1] + (after[0] if after else "")
     names = [found.group(1) for part in (*before[:-1], current, *after[1:]) if (found := _KEYWORD.match(part))]
     mine = _KEYWORD.match(current)
+    every = (*before[:-1], current, *after[1:])
     written = text[start:open]
     return PendingCall(
         parse_expression(written).expr,
         Span(chunk.start + start, chunk.start + open),
         chunk.start + open,
+        chunk.start + at + len(",".join(after)),
         sum(1 for part in before[:-1] if not _KEYWORD.match(part)),
+        sum(1 for part in every if part.strip() and not _KEYWORD.match(part)),
         tuple(names),
         mine.group(1) if mine else None,
         re.fullmatch(r"\s*\w*", before[-1]) is not None,

@@ -1,0 +1,109 @@
+"""Quick fixes for conditions: a plain one over a variable of integration made diffeomorphic, an inverse written down.
+
+Owns `bracket_fixes` and `inverse_fixes`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from potto.calculus.verdict import Verdict, judge
+from potto.core.printer import format_term
+from potto.core.simplify import simplify
+from potto.core.terms import Branch, Hole, postorder
+from potto.diagnostics import Diagnostic
+from potto.elaborate import elaborate_expression
+from potto.ide.edits import one_file
+from potto.ide.explaining import diffeo_of, inverse_text
+from potto.ide.model import Change, Edit
+from potto.ide.offers import At, Offer, reads
+from potto.ide.places import ChunkAt, chunk_at
+from potto.source import Span
+from potto.syntax import extent, node_at, nodes
+from potto.syntax.nodes import Expr
+
+
+def bracket_fixes(place: At, said: Diagnostic) -> Iterator[Offer]:
+    """A bracket around the condition, or the diffeomorphism that the checker makes of it."""
+    chunk = chunk_at(place.db, place.file, said.span.start)
+    item = None if chunk is None else chunk.parsed(place.db).item
+    if chunk is None or item is None:
+        return
+    relative = said.span.shift(-chunk.start)
+    condition = next((n for n in node_at(item, relative.start) if extent(n) == relative and _is_condition(n)), None)
+    if condition is None:
+        return
+    written = place.text[said.span.start : said.span.end]
+    bracketed = Edit(said.span, f"[{written}]")
+    if reads(chunk, [Edit(relative, bracketed.text)]) is not None:
+        title = f"Count the jump: `[{written}]`"
+        yield Offer(title, "quickfix", lambda: one_file(place.file, bracketed), said, True)
+    completed = completed_diffeo(place, chunk, condition)  # type: ignore[arg-type]
+    if completed is not None:
+        edit = Edit(said.span, completed)
+        yield Offer(f"Make it the diffeomorphism `{completed}`", "quickfix", lambda: one_file(place.file, edit), said)
+
+
+def _is_condition(node: object) -> bool:
+    return isinstance(node, nodes.Compare | nodes.Logic | nodes.Unary | nodes.Name)
+
+
+def completed_diffeo(place: At, chunk: ChunkAt, condition: Expr) -> str | None:
+    """`diffeo(…)` for a comparison over variables of integration, with the coordinates that complete it."""
+    if not isinstance(condition, nodes.Compare) or len(condition.rest) != 1:
+        return None
+    visible = [binder for _, binder in chunk.index(place.db).visible(condition.span.start)]
+    names = [binder.name for binder in visible]
+    bracket = nodes.Bracket(condition.span, condition)
+    term = elaborate_expression(place.db, place.file, bracket, names).term
+    if not isinstance(term, Branch) or any(isinstance(node, Hole) for node in postorder(term)):
+        return None
+    variables = tuple(binder.name for binder in visible if binder.kind == "variable")
+    used = tuple(v for v in variables if any(v in c.free for c in term.coordinates))
+    if not used:
+        return None
+    verdict = judge(term.coordinates, variables, {})
+    if not isinstance(verdict, Verdict):
+        return None
+    shown = [format_term(simplify(part)) for part in (*term.coordinates, *verdict.completion)]
+    return f"diffeo({', '.join(shown)})"
+
+
+def inverse_fixes(place: At, said: Diagnostic) -> Iterator[Offer]:
+    """An `inverse` to fill in, for a diffeomorphism whose inverse was not found."""
+    chunk = chunk_at(place.db, place.file, said.span.start)
+    item = None if chunk is None else chunk.parsed(place.db).item
+    if chunk is None or not isinstance(item, nodes.DiffeoDefinition) or item.inverse is not None:
+        return
+    if said.code != "P0402":
+        return
+    names = [name for name in ("u", "v", "w", "p", "q", "r") if name not in {v.name for v in item.variables}]
+    count = len(item.components)
+    if count > len(names):
+        return
+    text = inverse_text(names[:count], [v.name for v in item.variables])
+    edit = inverse_edit(chunk, item, text)
+    yield Offer("Add an `inverse` to fill in", "quickfix", lambda: one_file(place.file, edit), said)
+
+
+def inverse_edit(chunk: ChunkAt, item: nodes.DiffeoDefinition, text: str) -> Edit:
+    """The edit that writes an inverse behind the components of a diffeomorphism."""
+    last = item.components[-1].span.end if item.components else item.span.end
+    close = chunk.text.find(")", last)
+    end = chunk.start + (close + 1 if close >= 0 else last)
+    return Edit(Span(end, end), f"\n    inverse {text}")
+
+
+def written_inverse(place: At) -> Change | None:
+    """The inverse that the checker found, written down."""
+    chunk = place.chunk
+    item = None if chunk is None else chunk.parsed(place.db).item
+    if chunk is None or not isinstance(item, nodes.DiffeoDefinition) or item.inverse is not None:
+        return None
+    info = diffeo_of(place.db, place.file, item.name)
+    if info is None or len(info.branches) != 1:
+        return None
+    text = inverse_text(info.values, (format_term(part) for part in info.branches[0]))
+    edit = inverse_edit(chunk, item, text)
+    relative = Edit(edit.span.shift(-chunk.start), edit.text)
+    return one_file(place.file, edit) if reads(chunk, [relative]) is not None else None
