@@ -125,6 +125,11 @@ def _estimate(name: str, argument: Estimate, batch: Batch, to_function: ToFuncti
     return value_of(name, plain, batch, to_function)
 
 
+def evenly(lo: float, hi: float, count: int) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """So many numbers at equal distances, both ends included."""
+    return np.linspace(lo, hi, count)
+
+
 def no_kind(name: str, argument: Any, help: str) -> PottoError:
     kind = type(argument).__name__
     if isinstance(argument, np.ndarray):

@@ -6,8 +6,8 @@ Owns nothing but the list of commands. Each command is one module with `SUMMARY`
 
 from __future__ import annotations
 
-COMMANDS = ("run", "eval", "check", "deriv", "fmt", "test", "explain", "dump", "cache")
-LATER = ("render", "fit", "bench", "repl", "lsp")  # they answer that a later release brings them
+COMMANDS = ("run", "eval", "check", "deriv", "fmt", "test", "explain", "dump", "cache", "repl", "lsp")
+LATER = ("render", "fit", "bench")  # they answer that a later release brings them
 
 
 def module_of(command: str) -> str:

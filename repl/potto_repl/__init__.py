@@ -1,1 +1,5 @@
-"""The prompt of Potto: the only package that will know the terminal. It comes with a later release."""
+"""The prompt: a conversation with Potto.
+
+`respond(session, text)` answers an entry or a command without any terminal; `terminal` puts a terminal around it and
+`script` a pipe. Importing this package imports nothing.
+"""

@@ -1,0 +1,88 @@
+"""What an entry did, as parts of a reply.
+
+Owns `entry_parts`: definitions with their types, values with their errors, derivatives with their parts, and what to
+define for names that mean nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from potto.modules import statements
+from potto.runtime.estimate import Estimate
+from potto.runtime.shown import as_dual
+from potto.session import Defined, Imported, Outcome, Said, Valued
+from potto.source import Span
+from potto.syntax import nodes
+from potto_repl.reply import Part, answer, diagnostic, note
+from potto_repl.session import Conversation
+from potto_repl.values import is_dual, parts_of, value_parts
+
+NOT_DEFINED = "P0201"
+
+
+def entry_parts(session: Conversation, text: str) -> Iterator[Part]:
+    """Run an entry and say step by step what came of it."""
+    missing: list[str] = []
+    for outcome in session.enter(text):
+        if isinstance(outcome, Said):
+            found = outcome.located.diagnostic
+            session.last_code = found.code
+            if found.code == NOT_DEFINED and outcome.located.file == f"<In {session.number}>":
+                missing.append(session.entries[-1].text[found.span.start : found.span.end])
+        yield from outcome_parts(session, outcome)
+    advice = _advice(session, list(dict.fromkeys(missing)))
+    if advice:
+        yield Part("help", advice)
+
+
+def outcome_parts(session: Conversation, outcome: Outcome) -> Iterator[Part]:
+    match outcome:
+        case Defined():
+            kind = "diffeo" if outcome.diffeo else "definition"
+            yield answer(outcome.text, kind=kind, name=outcome.name, type=outcome.type, shadows=outcome.shadows)
+            if outcome.shadows is not None:
+                yield note(f"shadows {outcome.shadows}")
+        case Imported():
+            yield answer(f"imported {', '.join(outcome.names)}", imported=outcome.module, names=list(outcome.names))
+        case Valued():
+            yield from _valued(session, outcome)
+        case Said():
+            yield diagnostic(outcome.located, session.source)
+
+
+def _valued(session: Conversation, outcome: Valued) -> Iterator[Part]:
+    if outcome.type is None:
+        yield Part("output", outcome.text, {"output": outcome.text})
+        return
+    name = outcome.names[-1] if outcome.names else ""
+    if not outcome.estimates:
+        plain = Estimate(None, None, text=outcome.text)
+        yield from value_parts(plain, outcome.type, session.settings, name=name)
+        return
+    estimate = outcome.estimates[0]
+    file, expr = _expression(session, name)
+    parts = None
+    if isinstance(estimate.value, tuple) and is_dual(session.world, file, expr):
+        estimate = as_dual(estimate)
+        parts = parts_of(session.world, file, expr, estimate, session.settings)
+    yield from value_parts(estimate, outcome.type, session.settings, name=name, parts=parts)
+
+
+def _expression(session: Conversation, name: str) -> tuple[str, nodes.Expr]:
+    """The expression behind an answer: its name, in the scope where it means that."""
+    return session.file, nodes.Name(Span(0, 0), name)
+
+
+def _advice(session: Conversation, missing: list[str]) -> str:
+    """What to define for the free names of an expression."""
+    expression = session.entries[-1].text.strip()
+    if not missing or "\n" in expression or not all(name.isidentifier() for name in missing):
+        return ""
+    written = statements(session.db, f"<In {session.number}>")
+    if not any(isinstance(reference.statement, nodes.ExpressionStatement) for reference in written):
+        return ""
+    named = " and ".join(f"`{name}`" for name in missing)
+    function = f"\\({', '.join(missing)}) . {expression}"
+    return f"define {named} first, such as `{missing[0]} = 0.5`; or make a function: `{function}`"
+

@@ -1,0 +1,161 @@
+"""Commands that evaluate without making an entry: values, derivatives at a point, time, accuracy."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+from potto.check import absolute
+from potto.elaborate import elaborate_expression
+from potto.kernels import compile as compiling
+from potto.render import Located, ProgramError
+from potto.runtime.estimate import Estimate
+from potto.runtime.printing import format_error
+from potto.runtime.shown import as_dual, format_numbers
+from potto.settings import Settings
+from potto.syntax import parse_expression
+from potto.types import infer_expression
+from potto.world import EXPRESSION
+from potto_repl.expressions import call_of, checked
+from potto_repl.registry import command
+from potto_repl.reply import Part, Refusal, diagnostic
+from potto_repl.session import Conversation, plain_names
+from potto_repl.slopes import slopes
+from potto_repl.values import is_dual, largest, parts_of, seconds, tail, value_parts, with_error
+
+TOLERANCES = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
+SAMPLES = (1_000, 10_000, 100_000)
+
+
+@command("eval", "e", argument="EXPR", completes="expression")
+def evaluate(session: Conversation, text: str) -> Iterator[Part]:
+    """Evaluate an expression without making it an entry: `_` and the numbering stay."""
+    asked = checked(session, text, ":eval EXPR")
+    answer = session.evaluate(asked.text, session.settings)
+    estimate, parts = answer.estimate, None
+    if is_dual(session.world, session.file, asked.expr):
+        estimate = as_dual(estimate)
+        parts = parts_of(session.world, session.file, asked.expr, estimate, session.settings)
+    yield from value_parts(estimate, answer.type, session.settings, parts=parts)
+    for located in answer.remarks:
+        yield diagnostic(located, session.world.sources(asked.text))
+
+
+@command("grad", "g", argument="f(0.3, …)", completes="expression")
+def gradient(session: Conversation, text: str) -> Iterator[Part]:
+    """Show the derivative of a call by each of its numbers, interior and boundary apart: `:grad f(0.3)`."""
+    called = call_of(session, text, ":grad f(0.3)")
+    lines: list[str] = []
+    data: dict[str, Any] = {}
+    cost = ""
+    for slope in slopes(session, called):
+        dual = slope.dual
+        if not lines:
+            lines.append(f"{text.strip()} = {with_error(dual.value, dual.error)}")
+            data["value"] = dual.value
+        sign = "∂/∂" if session.options.unicode else "d/d"
+        line = f"  {sign}{slope.name} = {with_error(dual.tangent, dual.tangent_error)}"
+        if slope.parts is not None:
+            interior = format_numbers(slope.parts.interior, slope.parts.interior_error)
+            boundary = format_numbers(slope.parts.boundary, slope.parts.boundary_error)
+            line += f"   interior {interior}, boundary {boundary}"
+        lines.append(line)
+        data[slope.name] = dual.tangent
+        cost = tail(dual, session.settings)
+    yield Part("answer", "\n".join(lines), {"gradient": data})
+    if cost:
+        yield Part("tail", cost)
+
+
+@command("time", argument="EXPR", completes="expression")
+def show_time(session: Conversation, text: str) -> Iterator[Part]:
+    """Show how long each step towards a value takes: parse, check, compile, link, evaluate."""
+    text = plain_names(text)
+    if not text:
+        raise Refusal("an expression is missing", "write `:time EXPR`")
+    phases: dict[str, float] = {}
+    start = time.perf_counter()
+    parsed = parse_expression(text)
+    start = _lap(phases, "parse", start)
+    inferred = infer_expression(session.db, session.file, parsed.expr)
+    found = [*parsed.diagnostics, *inferred.diagnostics]
+    start = _lap(phases, "check", start)
+    wrong = [absolute(session.db, EXPRESSION, d, 0) for d in found if d.severity == "error"]
+    if wrong:
+        raise ProgramError([Located(EXPRESSION, d) for d in wrong], session.world.sources(text))
+    term = elaborate_expression(session.db, session.file, parsed.expr).term
+    start = _lap(phases, "compile", start)
+    program = session.world.program
+    program.linker.inexact(term)  # follows every definition that the term refers to
+    _lap(phases, "link", start)
+    made = compiling.counts.compiled
+    estimate = session.evaluate(text, session.settings).estimate
+    phases["compile"] += estimate.compile_seconds
+    phases["evaluate"] = max(estimate.seconds - estimate.compile_seconds, 0.0)
+    kernels = compiling.counts.compiled - made
+    total = sum(phases.values())
+    rows = [f"{name:<9} {seconds(spent):>9}  {spent / total:4.0%}" for name, spent in phases.items()]
+    rows += [f"{'total':<9} {seconds(total):>9}", f"{kernels} kernels made, {estimate.evals:,} evaluations"]
+    yield Part("answer", "\n".join(rows), {"seconds": phases, "kernels": kernels, "evaluations": estimate.evals})
+
+
+def _lap(phases: dict[str, float], name: str, start: float) -> float:
+    now = time.perf_counter()
+    phases[name] = now - start
+    return now
+
+
+@command("error", argument="EXPR", completes="expression")
+def show_error(session: Conversation, text: str) -> Iterator[Part]:
+    """Show how accuracy is paid for: value, estimated and actual error, evaluations and time, by method.
+
+    The actual error is the distance from the most accurate answer in the table.
+    """
+    asked = checked(session, text, ":error EXPR")
+    dual = is_dual(session.world, session.file, asked.expr)
+    rows: list[tuple[str, str, Estimate]] = []
+    attempts = list(_attempts(session.settings))
+    for number, (label, accuracy, settings) in enumerate(attempts):
+        if session.progress is not None:
+            session.progress(f"{label} {accuracy}", number / len(attempts))
+        estimate = session.evaluate(asked.text, settings).estimate
+        rows.append((label, accuracy, as_dual(estimate) if dual else estimate))
+    if rows[0][2].text is not None:
+        raise Refusal(f"`{asked.text}` is a function, which has no error", "give it its arguments")
+    numbers = [(e.tangent, e.tangent_error) if dual else (e.value, e.error) for _, _, e in rows]
+    best = min(numbers, key=lambda pair: largest(pair[1]))
+    table = [("method", "asked", "value" if not dual else "tangent", "error", "actual", "evaluations", "time")]
+    data = []
+    for (label, accuracy, e), (value, error) in zip(rows, numbers, strict=True):
+        actual = distance(value, best[0])
+        table.append((label, accuracy, format_numbers(value, error), format_error(largest(error)),
+                      format_error(actual), f"{e.evals:,}", seconds(e.seconds)))  # fmt: skip
+        data.append({"method": label, "asked": accuracy, "error": largest(error), "actual": actual, "evals": e.evals})
+    yield Part("answer", columns(table), {"table": data})
+
+
+def _attempts(settings: Settings) -> Iterator[tuple[str, str, Settings]]:
+    for rtol in TOLERANCES:
+        yield "quadrature", f"{rtol:.0e}", replace(settings, method="quadrature", rtol=rtol, atol=0.0)
+    for samples in SAMPLES:
+        yield "mc", f"{samples:,}", replace(settings, method="mc", samples=samples)
+    for samples in SAMPLES:
+        yield "qmc", f"{samples:,}", replace(settings, method="qmc", samples=samples)
+
+
+def distance(a: Any, b: Any) -> float:
+    """The largest difference between the numbers of two values."""
+    if isinstance(a, tuple | list):
+        return max((distance(x, y) for x, y in zip(a, b, strict=True)), default=0.0)
+    return abs(float(a) - float(b))
+
+
+def columns(rows: Sequence[tuple[str, ...]]) -> str:
+    """Rows of words under each other; all but the first column to the right."""
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    return "\n".join(
+        "  ".join([row[0].ljust(widths[0]), *(word.rjust(w) for word, w in zip(row[1:], widths[1:], strict=True))])
+        for row in rows
+    )

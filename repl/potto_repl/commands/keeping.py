@@ -1,0 +1,43 @@
+"""Commands about the session itself: what was entered, taking it back, starting over, leaving."""
+
+from __future__ import annotations
+
+from potto_repl.registry import command
+from potto_repl.reply import Part, answer
+from potto_repl.session import Conversation
+
+
+@command("history", argument="[N | TEXT]")
+def history(session: Conversation, text: str) -> Part:
+    """List the entries of this session; the last N, or those that hold TEXT."""
+    entries = session.entries
+    if text.isdigit():
+        entries = entries[-int(text) :] if int(text) else []
+    elif text:
+        entries = [entry for entry in entries if text in entry.text]
+    shown = [f"{entry.number:>4}  " + entry.text.strip("\n").replace("\n", "\n      ") for entry in entries]
+    listed = [{"number": entry.number, "text": entry.text} for entry in entries]
+    return Part("answer", "\n".join(shown) or "nothing was entered", {"history": listed})
+
+
+@command("undo", "u")
+def undo(session: Conversation, text: str) -> Part:
+    """Take back the last entry, load or reset of names: what it defined means again what it meant before."""
+    label = session.undo()
+    if label is None:
+        return answer("there is nothing to undo", undone=None)
+    return answer(f"took back {label}", undone=label)
+
+
+@command("reset")
+def reset(session: Conversation, text: str) -> Part:
+    """Forget all definitions, answers and loaded files. Settings stay."""
+    session.reset()
+    return answer("everything is forgotten", reset=True)
+
+
+@command("quit", "q")
+def leave(session: Conversation, text: str) -> list[Part]:
+    """Leave the prompt; so does Ctrl-D."""
+    session.leaving = True
+    return []

@@ -1,0 +1,57 @@
+"""Parts of a reply as text for a screen or a pipe.
+
+Owns `painted` and `Look`. What a screen cannot show is written in another way: symbols in ASCII, images as text.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from potto.render import COLORS, PLAIN, Palette
+from potto_repl.drawing import Protocol, braille, half_blocks, inline
+from potto_repl.pictures import Image, Plot
+from potto_repl.reply import Part
+from potto_repl.symbols import ascii_only
+
+DIM, OFF = "\x1b[2m", "\x1b[0m"
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What the screen can do. `answers`: whether an answer says under which name it stays at hand."""
+
+    color: bool = False
+    unicode: bool = True
+    width: int = 80
+    images: Protocol = "blocks"
+    answers: bool = True
+
+    @property
+    def palette(self) -> Palette:
+        return COLORS if self.color else PLAIN
+
+
+def painted(part: Part, look: Look) -> str:
+    """A part as it is written, without a final newline."""
+    text = _picture(part, look) if part.kind == "picture" else part.shown(look.palette)
+    name = (part.data or {}).get("name")
+    if not look.answers and name and text.startswith(f"{name} = "):
+        text = text.removeprefix(f"{name} = ")
+    if not look.unicode:
+        text = ascii_only(text)
+    return f"{DIM}{text}{OFF}" if look.color and part.kind in ("tail", "note") else text
+
+
+def _picture(part: Part, look: Look) -> str:
+    data = part.data or {}
+    picture = data.get("_picture")
+    if isinstance(picture, Plot):
+        width = max(20, min(look.width - 14, 72))
+        return braille(picture, width, unicode=look.unicode, color=look.color)
+    if isinstance(picture, Image):
+        if not look.color:
+            shown = half_blocks(picture, unicode=look.unicode, color=False)
+        else:
+            shown = inline(picture, look.images, min(picture.size[0], look.width))
+        return f"{shown}\n{data.get('_scale', '')}"
+    return part.text

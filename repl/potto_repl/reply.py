@@ -1,0 +1,118 @@
+"""What the prompt answers: parts, each of a kind, that a face paints or writes as JSON.
+
+Owns `Part`, `Reply` and `Refusal`. No terminal, no numbers: a part is text with the data behind it. A diagnostic goes
+with the texts that it is about as they were when it was found, so that it can be shown at any later time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from potto.render import Located, Palette, Sources, render, to_json
+from potto.source import SourceText
+
+Kind = Literal["answer", "output", "note", "tail", "error", "help", "diagnostic", "picture"]
+COMPLAINTS: frozenset[Kind] = frozenset(("error", "help", "diagnostic"))
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One part of a reply.
+
+    answer: what was asked for. output: what a program printed. note: what is good to know. tail: what it cost; shown
+    to people only. error, help: a command that could not be carried out, and what to do. diagnostic: about a program.
+    picture: an image, as pixels in `data`.
+    """
+
+    kind: Kind
+    text: str = ""
+    data: Mapping[str, Any] | None = None
+    located: Located | None = None
+    sources: Mapping[str, SourceText] = field(default_factory=dict)
+
+    @property
+    def is_error(self) -> bool:
+        if self.located is not None:
+            return self.located.diagnostic.severity == "error"
+        return self.kind == "error"
+
+    @property
+    def is_complaint(self) -> bool:
+        """Whether this goes to standard error in a pipe."""
+        return self.kind in COMPLAINTS or self.kind == "note"
+
+    def plain(self) -> str:
+        """The part as text without colours."""
+        return self.shown(Palette())
+
+    def shown(self, palette: Palette) -> str:
+        """The part as text, a diagnostic in the colours of a palette."""
+        if self.located is not None:
+            return render(self.located, self.sources.get, palette=palette)
+        if self.kind == "error":
+            return palette.paint(palette.error, "error") + palette.paint(palette.bold, f": {self.text}")
+        if self.kind == "help":
+            return f"  = {palette.paint(palette.bold, 'help')}: {self.text}"
+        return self.text
+
+    def json(self) -> dict[str, Any] | None:
+        """The part for machines; None for what is for people only."""
+        if self.located is not None:
+            return {"diagnostics": [to_json(self.located, self.sources.get)]}
+        if self.data is not None:
+            return {key: value for key, value in self.data.items() if not key.startswith("_")}
+        if self.kind in ("tail", "note", "help"):
+            return None
+        return {"error" if self.kind == "error" else "text": self.text}
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """The answer to one entry or command."""
+
+    parts: tuple[Part, ...] = ()
+
+    @property
+    def failed(self) -> bool:
+        return any(part.is_error for part in self.parts)
+
+    @property
+    def text(self) -> str:
+        """Everything, as a person reads it without colours."""
+        return "\n".join(part.plain() for part in self.parts)
+
+
+class Refusal(Exception):
+    """A command cannot be carried out: says why, and what to do."""
+
+    def __init__(self, message: str, help: str = "") -> None:
+        super().__init__(message)
+        self.message = message
+        self.help = help
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        said = (Part("error", self.message),)
+        return (*said, Part("help", self.help)) if self.help else said
+
+
+def answer(text: str, **data: Any) -> Part:
+    """An answer; `data` is what machines get instead of the text."""
+    return Part("answer", text, data or None)
+
+
+def note(text: str) -> Part:
+    return Part("note", text)
+
+
+def diagnostic(located: Located, sources: Sources) -> Part:
+    """A diagnostic with the texts that it is about."""
+    files = [located.file, *(related.file for related in located.diagnostic.related)]
+    texts = {file: text for file in files if file is not None and (text := sources(file)) is not None}
+    return Part("diagnostic", located=located, sources=texts)
+
+
+def diagnostics(found: Iterable[Located], sources: Sources) -> list[Part]:
+    return [diagnostic(located, sources) for located in found]

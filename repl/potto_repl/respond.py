@@ -1,0 +1,93 @@
+"""From text to a reply: an entry, a command, or a question such as `f?`.
+
+Owns `respond` and `stream`. Nothing that goes wrong in here ends the session: mistakes are replies, a bug of ours is
+a short report that names a file.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from potto.diagnostics import PottoError
+from potto.render import Located, ProgramError
+from potto_repl import commands as _commands  # noqa: F401  (fills the table)
+from potto_repl.registry import Result, find
+from potto_repl.reply import Part, Refusal, Reply, diagnostic, note
+from potto_repl.session import Conversation
+
+_QUESTION = re.compile(r"\s*([^\W\d][\w.']*|:\w+)\s*(\?{1,2})\s*")
+
+
+def respond(session: Conversation, text: str) -> Reply:
+    """The whole answer to an entry or a command."""
+    return Reply(tuple(stream(session, text)))
+
+
+def stream(session: Conversation, text: str) -> Iterator[Part]:
+    """The answer part by part, as it comes. An interrupt goes through; what was entered so far stays."""
+    try:
+        if session.watching:
+            yield from session.refreshed(quiet=True)
+        yield from _answered(session, text)
+    except Refusal as refusal:
+        yield from refusal.parts
+    except ProgramError as error:
+        yield from located_parts(session, error)
+    except PottoError as error:
+        for found in error.diagnostics:
+            session.last_code = found.code
+            yield diagnostic(Located(None, found), session.source)
+    except Exception as error:
+        yield from _crashed(text, error)
+
+
+def _answered(session: Conversation, text: str) -> Iterator[Part]:
+    stripped = text.strip()
+    question = _QUESTION.fullmatch(text)
+    if question is not None:
+        word = question[1]
+        named = "help" if word.startswith(":") else "doc" if question[2] == "?" else "source"
+        yield from parts(find(named).run(session, word.lstrip(":") if named == "help" else word))
+    elif stripped.startswith(":"):
+        word, argument = command_words(stripped)
+        yield from parts(find(word).run(session, argument))
+    elif stripped in ("?", "help", "quit", "exit") and session.target(stripped) is None:
+        yield from parts(find({"exit": "quit", "?": "help"}.get(stripped, stripped)).run(session, ""))
+    elif stripped:
+        from potto_repl.answers import entry_parts
+
+        yield from entry_parts(session, text)
+
+
+def command_words(text: str) -> tuple[str, str]:
+    """The word of a command and its argument: `:type f(x)`, `:t f(x)`, `:?`."""
+    found = re.match(r":\s*(\w+|\?)?\s*(.*)", text, re.DOTALL)
+    assert found is not None
+    return ("help" if found[1] in (None, "?") else found[1]), found[2].strip()
+
+
+def parts(result: Result) -> Iterator[Part]:
+    """What a command gave, as parts."""
+    if isinstance(result, str):
+        if result:
+            yield Part("answer", result)
+    elif isinstance(result, Part):
+        yield result
+    else:
+        yield from result
+
+
+def located_parts(session: Conversation, error: ProgramError) -> Iterator[Part]:
+    """The diagnostics of an expression or a file."""
+    for located in error.located:
+        session.last_code = located.diagnostic.code
+        yield diagnostic(located, error.sources)
+
+
+def _crashed(text: str, error: Exception) -> Iterator[Part]:
+    from potto.cli.crash import report
+
+    said = report(["repl", "-c", text], error)
+    yield Part("error", said.removeprefix("potto: "), {"error": said})
+    yield note("the session goes on; nothing is lost")

@@ -1,0 +1,147 @@
+"""Values of expressions over grids of numbers: what pictures are made of.
+
+Owns `curve` and `grid`. An expression is a function of one or two numbers, or names that mean nothing: these are the
+axes. A derivative counts with its tangent. Where the program has no value, a picture has a hole.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from potto.api import Function
+from potto.arguments import evenly
+from potto.diagnostics import PottoError
+from potto.modules.builtins import is_builtin
+from potto.modules.free import free_references
+from potto.runtime.estimate import Estimate
+from potto.settings import Settings, settings
+from potto.syntax import nodes, parse_expression
+from potto.types.types import Diffeo, Real, TupleOf, resolve
+from potto.types.types import Function as FunctionType
+from potto_repl.expressions import Asked, checked, without_parens
+from potto_repl.reply import Refusal
+from potto_repl.session import Conversation
+
+RTOL = 1e-5  # of a picture: finer than any pixel
+
+
+@dataclass(frozen=True, slots=True)
+class Axes:
+    """A function of the axes. `dual`: its parameters are duals, and what is drawn is the derivative by the first."""
+
+    label: str
+    names: tuple[str, ...]
+    function: Function
+    dual: bool
+
+
+def axes_of(session: Conversation, text: str, count: int, usage: str) -> Axes:
+    """An expression as a function of its axes. Raises Refusal, ProgramError."""
+    free = _free(session, text)
+    if free:
+        if len(free) != count:
+            listed = ", ".join(f"`{name}`" for name in free)
+            raise Refusal(f"`{text}` has {len(free)} names that mean nothing: {listed}; {count} can be drawn")
+        asked = checked(session, f"\\({', '.join(free)}) . ({text})", usage)
+    else:
+        asked = checked(session, text, usage)
+    if not isinstance(asked.type, FunctionType | Diffeo) or len(asked.groups) != 1 or len(asked.groups[0]) != count:
+        what = "one number" if count == 1 else f"{count} numbers"
+        raise Refusal(f"`{text}` is no function of {what}", f"write `{usage}`, or leave a name free: `sin(x)`")
+    return _axes(session, text, asked)
+
+
+def _axes(session: Conversation, text: str, asked: Asked) -> Axes:
+    types = [resolve(parameter.type) for parameter in asked.groups[0]]
+    dual = all(isinstance(type, TupleOf) and type.dual for type in types)
+    if not dual and not all(isinstance(type, Real) or not isinstance(type, TupleOf | FunctionType) for type in types):
+        raise Refusal(f"the parameters of `{text}` are not all numbers")
+    names = tuple(p.name or f"x{i + 1}" for i, p in enumerate(asked.groups[0]))
+    names = tuple(name[1:] if dual and name.startswith("d") else name for name in names)
+    return Axes(text, names, Function(session.world, session.file, asked.expr, asked.type), dual)
+
+
+def _free(session: Conversation, text: str) -> list[str]:
+    """The names of an expression that mean nothing, in order."""
+    parsed = parse_expression(text)
+    if any(d.severity == "error" for d in parsed.diagnostics) or isinstance(without_parens(parsed.expr), nodes.Name):
+        return []
+    known = session.names()
+    found = dict.fromkeys(node.id for node in free_references(parsed.expr) if isinstance(node, nodes.Name))
+    return [name for name in found if name not in known and not is_builtin(name) and not name.startswith("_")]
+
+
+def curve(session: Conversation, axes: Axes, lo: float, hi: float, count: int) -> list[list[float]]:
+    """The components of a function of one number at evenly spaced places."""
+    return _sampled(session, axes, [evenly(lo, hi, count)], count)
+
+
+def grid(
+    session: Conversation, axes: Axes, box: tuple[float, float, float, float], columns: int, rows: int
+) -> list[list[float]]:
+    """The components of a function of two numbers at the middles of pixels, row by row from the top."""
+    x0, x1, y0, y1 = box
+    dx, dy = (x1 - x0) / columns, (y1 - y0) / rows
+    across = evenly(x0 + dx / 2, x1 - dx / 2, columns)
+    down = evenly(y1 - dy / 2, y0 + dy / 2, rows)
+    points = [[x for _ in range(rows) for x in across.tolist()], [y for y in down.tolist() for _ in range(columns)]]
+    return _sampled(session, axes, [_array(place) for place in points], rows * columns)
+
+
+def _array(numbers: Sequence[float]) -> Any:
+    found = evenly(0, 0, len(numbers))
+    found[:] = numbers
+    return found
+
+
+def _sampled(session: Conversation, axes: Axes, places: list[Any], count: int) -> list[list[float]]:
+    with settings(**_coarse(session.settings)):
+        try:
+            return _components(_call(axes, places), axes, count)
+        except PottoError:
+            return _one_by_one(session, axes, places, count)
+
+
+def _coarse(chosen: Settings) -> dict[str, Any]:
+    rough = replace(chosen, rtol=max(chosen.rtol, RTOL), atol=max(chosen.atol, 1e-9))
+    return {name: getattr(rough, name) for name in ("method", "rtol", "atol", "samples", "seed", "max_evals")}
+
+
+def _call(axes: Axes, places: list[Any]) -> Estimate:
+    given = [(place, 1.0 if i == 0 else 0.0) for i, place in enumerate(places)] if axes.dual else places
+    found: Estimate = axes.function(*given)
+    return found
+
+
+def _components(estimate: Estimate, axes: Axes, count: int) -> list[list[float]]:
+    drawn = estimate.tangent if axes.dual else estimate.value
+    if drawn is None:
+        raise Refusal(f"`{axes.label}` gives a function, which cannot be drawn")
+    parts = drawn if isinstance(drawn, tuple) else (drawn,)
+    return [_numbers(part, count) for part in parts]
+
+
+def _numbers(part: Any, count: int) -> list[float]:
+    tolist: Callable[[], Any] | None = getattr(part, "tolist", None)
+    found = tolist() if tolist is not None else float(part)
+    return [float(x) for x in found] if isinstance(found, list) else [found] * count
+
+
+def _one_by_one(session: Conversation, axes: Axes, places: list[Any], count: int) -> list[list[float]]:
+    """Place by place, with holes where there is no value. Raises what went wrong first if there is none at all."""
+    rows: list[list[float] | None] = []
+    problem: PottoError | None = None
+    for i in range(count):
+        try:
+            found = _components(_call(axes, [float(p[i]) for p in places]), axes, 1)
+            rows.append([part[0] for part in found])
+        except PottoError as error:
+            problem = problem or error
+            rows.append(None)
+    size = max((len(row) for row in rows if row is not None), default=0)
+    if not size and problem is not None:
+        raise problem
+    return [[math.nan if row is None else row[i] for row in rows] for i in range(size)]

@@ -1,0 +1,53 @@
+"""The prompt on a terminal that knows no escape codes (`TERM=dumb`): lines in, lines out."""
+
+from __future__ import annotations
+
+import sys
+
+from potto_repl.editing import is_over
+from potto_repl.start import Loader, greeting, say
+
+
+class Simple:
+    """A conversation by lines."""
+
+    def __init__(self, loader: Loader, *, unicode: bool = True) -> None:
+        self.loader = loader
+        self.unicode = unicode
+
+    def run(self, file: str | None) -> int:
+        say(greeting())
+        self.loader.start()
+        if file is not None:
+            self.answer(f":load {file}")
+        while not self.loader.ready or not self.loader.session.leaving:
+            try:
+                text = self.read()
+            except EOFError:
+                say("")
+                return 0
+            except KeyboardInterrupt:
+                say("")
+                continue
+            self.answer(text)
+        return 0
+
+    def read(self) -> str:
+        """An entry, over as many lines as it takes."""
+        number = self.loader.session.number + 1 if self.loader.ready else 1
+        text = input(f"{number} po> ")
+        while not is_over(text):
+            text += "\n" + input("... ")
+        return text
+
+    def answer(self, text: str) -> None:
+        from potto_repl.paint import Look, painted
+        from potto_repl.respond import stream
+        from potto_repl.symbols import readable
+
+        look = Look(unicode=self.unicode)
+        try:
+            for part in stream(self.loader.session, readable(text)):
+                say(painted(part, look))
+        except KeyboardInterrupt:
+            sys.stdout.write("interrupted\n")

@@ -1,0 +1,71 @@
+"""The derivative of a call by each of its numbers: `f(0.3, g)` becomes `deriv(f)((0.3, 1), deriv(g))`.
+
+Owns `Slope` and `slopes`. It is written in Potto itself, so that it means what the same text at the prompt means.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from potto.runtime.estimate import Estimate
+from potto.runtime.shown import as_dual
+from potto.syntax import nodes, print_expression
+from potto.types.types import Diffeo, Function, Parameter, Real, TupleOf, resolve
+from potto_repl.expressions import Called, checked
+from potto_repl.reply import Refusal
+from potto_repl.session import Conversation
+from potto_repl.values import Parts, parts_of
+
+
+@dataclass(frozen=True, slots=True)
+class Slope:
+    """The derivative by one parameter: the call that gives it, its value, and its parts."""
+
+    name: str
+    text: str
+    expr: nodes.Expr
+    dual: Estimate
+    parts: Parts | None
+
+
+def slopes(session: Conversation, called: Called) -> Iterator[Slope]:
+    """The derivative by each number that the call is given. Raises ProgramError, Refusal."""
+    numbers = numbers_of(called)
+    if not numbers:
+        why = f"`{called.head.text}` has no number among its parameters"
+        raise Refusal(f"{why}, so there is nothing to differentiate by")
+    for name in numbers:
+        text = dual_text(called, name)
+        expr = checked(session, text, ":grad f(0.3)").expr
+        dual = as_dual(session.evaluate(text, session.settings).estimate)
+        yield Slope(name, text, expr, dual, parts_of(session.world, session.file, expr, dual, session.settings))
+
+
+def numbers_of(called: Called) -> list[str]:
+    """The parameters that are numbers."""
+    types = {parameter.name: resolve(parameter.type) for group in called.head.groups for parameter in group}
+    return [name for name, _ in called.given if isinstance(types.get(name), Real)]
+
+
+def dual_text(called: Called, wrt: str) -> str:
+    """The call of the derivative in the direction of one parameter."""
+    rest = iter(called.given)
+    groups = [", ".join(_dual(p, *next(rest), wrt) for p in group) for group in called.head.groups]
+    return f"deriv({called.head.text}){''.join(f'({group})' for group in groups)}"
+
+
+def _dual(parameter: Parameter, name: str, value: nodes.Expr, wrt: str) -> str:
+    text, type = print_expression(value), resolve(parameter.type)
+    if name == wrt:
+        return f"({text}, 1)"
+    if isinstance(type, Function | Diffeo):
+        return f"deriv({text})"
+    if isinstance(type, TupleOf):
+        return f"({text}, {_zeros(type)})"
+    return f"({text}, 0)"
+
+
+def _zeros(type: TupleOf) -> str:
+    parts = [_zeros(inner) if isinstance(inner := resolve(item), TupleOf) else "0" for item in type.items]
+    return f"({', '.join(parts)})"

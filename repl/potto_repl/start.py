@@ -1,0 +1,97 @@
+"""The way to the first prompt, kept short: what shows it is imported now, what answers on another thread.
+
+Owns `Loader` and `talk`. Importing the evaluator takes longer than showing a prompt, and nobody types that fast.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import threading
+from typing import TYPE_CHECKING
+
+from potto.settings import Settings
+
+if TYPE_CHECKING:
+    from potto_repl.session import Conversation
+
+WARM = "integral [0, 1] [x < 0.5] d(x)"
+
+
+class Loader:
+    """Makes the session on another thread; whoever needs it waits."""
+
+    def __init__(self, settings: Settings, unicode: bool = True) -> None:
+        self._settings = settings
+        self._unicode = unicode
+        self._session: Conversation | None = None
+        self._problem: BaseException | None = None
+        self._ready = threading.Event()
+        self._started = False
+        self._lock = threading.Lock()
+
+    def start(self) -> None:
+        """Begin to load, if that has not begun."""
+        with self._lock:
+            if self._started:
+                return
+            self._started = True
+        threading.Thread(target=self._load, name="potto-load", daemon=True).start()
+
+    @property
+    def ready(self) -> bool:
+        return self._ready.is_set() and self._session is not None
+
+    @property
+    def session(self) -> Conversation:
+        """The session, waited for."""
+        self.start()
+        while not self._ready.wait(0.1):  # in short waits, so that Ctrl-C comes through
+            pass
+        if self._session is None:
+            assert self._problem is not None
+            raise self._problem
+        return self._session
+
+    def _load(self) -> None:
+        try:
+            from potto_repl.options import Options
+            from potto_repl.session import Conversation
+
+            session = Conversation(["."])
+            session.settings = self._settings
+            session.options = Options(unicode=self._unicode)
+            self._session = session
+        except BaseException as error:  # told to whoever asks for the session
+            self._problem = error
+        finally:
+            self._ready.set()
+        if self._session is not None:
+            self._session.evaluate(WARM)  # the first kernel, plan and rule cost more than all later ones
+
+
+def talk(options: argparse.Namespace, settings: Settings, *, color: bool, unicode: bool) -> int:
+    """Run the prompt on a terminal; the exit status."""
+    loader = Loader(settings, unicode)
+    if os.environ.get("TERM") in ("dumb", "unknown"):
+        from potto_repl.simple import Simple
+
+        return Simple(loader, unicode=unicode).run(options.file)
+    from potto_repl.terminal import Terminal
+
+    theme = options.theme if color else "none"
+    terminal = Terminal(loader, theme=theme, color=color, unicode=unicode, vi=options.vi)
+    return terminal.run(options.file)
+
+
+def greeting() -> str:
+    """The line above the first prompt."""
+    from potto import __version__
+
+    return f"Potto {__version__}   :help says what can be done, Ctrl-D leaves"
+
+
+def say(text: str) -> None:
+    sys.stdout.write(text + "\n")
+    sys.stdout.flush()

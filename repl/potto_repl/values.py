@@ -1,0 +1,155 @@
+"""Values as the prompt shows them: the digits that hold, the error, what it cost, a derivative in its parts.
+
+Owns `value_parts`. The digits are chosen by the runtime; the parts of a derivative come from a second evaluation in
+which surfaces and bounds stand still.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+from potto.core.terms import App, Delta, Deriv, Global, Term, postorder
+from potto.diagnostics import PottoError
+from potto.elaborate import elaborate_expression
+from potto.runtime.estimate import Estimate
+from potto.runtime.evaluate import Clock, report
+from potto.runtime.shown import as_dual, estimate_json, format_bounds, format_estimate, format_numbers, gives_dual
+from potto.settings import Settings
+from potto.syntax import nodes
+from potto.world import World
+from potto_repl.reply import Part
+
+SLOW = 1.0  # seconds; of a derivative that took longer the parts are not looked for
+TINY = 1e-13
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """The two parts of a tangent, each with its error."""
+
+    interior: Any
+    interior_error: Any
+    boundary: Any
+    boundary_error: Any
+
+
+def with_error(value: Any, error: Any) -> str:
+    """`0.3 ± 4e-16`; without the error where it is zero."""
+    text = format_numbers(value, error)
+    return f"{text} ± {format_bounds(error)}" if 0 < largest(error) < float("inf") else text
+
+
+def largest(error: Any) -> float:
+    """The largest of the errors of a value."""
+    if isinstance(error, tuple | list):
+        return max((largest(item) for item in error), default=0.0)
+    return float(error) if error is not None and error == error else float("inf")
+
+
+def tail(estimate: Estimate, settings: Settings) -> str:
+    """Method, evaluations and time; nothing where there was nothing to do."""
+    if not estimate.evals and estimate.seconds < 0.05:
+        return ""
+    words = [estimate.method]
+    if "mc" in estimate.method:
+        words += [f"{settings.samples:,} samples", f"seed {settings.seed}"]
+    words += [f"{estimate.evals:,} evaluations", seconds(estimate.seconds)]
+    return ", ".join(words)
+
+
+def seconds(time: float) -> str:
+    """A time as people read it."""
+    return f"{time:.2f} s" if time >= 1 else f"{time * 1e3:.0f} ms" if time >= 0.01 else f"{time * 1e3:.1f} ms"
+
+
+def is_dual(world: World, file: str, expr: nodes.Expr) -> bool:
+    """Whether an expression gives a value with its derivative."""
+    return gives_dual(elaborate_expression(world.db, file, expr).term, world.program.linker)
+
+
+def parts_of(world: World, file: str, expr: nodes.Expr, dual: Estimate, settings: Settings) -> Parts | None:
+    """The tangent of a derivative as interior and boundary; None where it cannot be taken apart."""
+    if dual.method != "quadrature" or dual.seconds > SLOW or dual.tangent is None:
+        return None
+    term = _called(world, elaborate_expression(world.db, file, expr).term)
+    if term is None:
+        return None
+    program = world.program
+    machine = replace(program.machine(settings), frozen=True)
+    try:
+        with Clock() as clock:
+            value = program.value(machine, term)
+        still = as_dual(report(value, machine, clock))
+    except PottoError:
+        return None  # the derivative has a value, its interior alone has none
+    if still.tangent is None or machine.books.second:
+        return None
+    error = _combined(dual.tangent_error, still.tangent_error)
+    return Parts(still.tangent, still.tangent_error, *_difference(dual.tangent, still.tangent, error))
+
+
+def _called(world: World, term: Term) -> Term | None:
+    """The call of a derivative behind names; None if a delta in it makes its parts hard to tell."""
+    for _ in range(100):
+        if not isinstance(term, Global):
+            break
+        term = world.program.linker.term(term.module, term.name)
+    if not isinstance(term, App):
+        return None
+    seen: set[Term] = set()
+    todo: list[Term] = [term]
+    while todo:
+        for node in postorder(todo.pop()):
+            if isinstance(node, Delta) or (isinstance(node, Deriv) and isinstance(node.function, Deriv)):
+                return None
+            if isinstance(node, Global) and node not in seen:
+                seen.add(node)
+                todo.append(world.program.linker.term(node.module, node.name))
+    return term
+
+
+def _combined(a: Any, b: Any) -> Any:
+    if isinstance(a, tuple):
+        return tuple(_combined(x, y) for x, y in zip(a, b, strict=True))
+    return a + b
+
+
+def _difference(whole: Any, part: Any, error: Any) -> tuple[Any, Any]:
+    """What is left of the whole, nothing but rounding counting as nothing."""
+    if isinstance(whole, tuple):
+        pairs = [_difference(w, p, e) for w, p, e in zip(whole, part, error, strict=True)]
+        return tuple(p[0] for p in pairs), tuple(p[1] for p in pairs)
+    rest = whole - part
+    if abs(rest) <= max(error, TINY * max(abs(whole), abs(part))):
+        return 0.0, 0.0
+    return rest, error
+
+
+def value_parts(
+    estimate: Estimate, type: str | None, settings: Settings, *, name: str = "", parts: Parts | None = None
+) -> Iterator[Part]:
+    """An answer: name, value ± error : type; a derivative over several lines; what it cost."""
+    head = f"{name} = " if name else ""
+    data = {**estimate_json(estimate, type), **({"name": name} if name else {})}
+    if estimate.tangent is None:
+        text = estimate.text if estimate.text is not None else with_error(estimate.value, estimate.error)
+        yield Part("answer", f"{head}{text}{f' : {type}' if type else ''}", {**data, "text": text})
+    else:
+        text = format_estimate(estimate)
+        rows = [("value", estimate.value, estimate.error), ("tangent", estimate.tangent, estimate.tangent_error)]
+        if parts is not None:
+            rows += [("  interior", parts.interior, parts.interior_error),
+                     ("  boundary", parts.boundary, parts.boundary_error)]  # fmt: skip
+            data["interior"], data["boundary"] = _plain(parts.interior), _plain(parts.boundary)
+        lines = [f"{head}{text}{f' : {type}' if type else ''}"]
+        lines += [f"  {label:<11} {with_error(value, error)}" for label, value, error in rows]
+        yield Part("answer", "\n".join(lines), {**data, "text": text})
+    cost = tail(estimate, settings)
+    if cost:
+        yield Part("tail", cost)
+
+
+def _plain(value: Any) -> Any:
+    return [_plain(item) for item in value] if isinstance(value, tuple) else float(value)
