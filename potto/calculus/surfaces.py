@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 from potto.calculus.trace import CallSite, Part, Side, layout, spine
@@ -41,7 +42,7 @@ from potto.primitives import PRIMITIVES
 
 DEEPEST = 2000
 
-Kind = Literal["jump", "kink", "edge"]
+Kind = Literal["jump", "kink", "edge", "center"]
 # Where a part of the program gets its functions from: a Lam for the head of a call, or None if it is not known here.
 Resolve = Callable[[Term], "Lam | None"]
 # The value of a plain term (a condition: 1 or 0), or None where it is not decided.
@@ -52,7 +53,8 @@ Decide = Callable[[Term], "float | None"]
 class Finding:
     """One surface `surface = 0`, over the variables of the term that was searched.
 
-    kind: a jump (a branch), a kink (abs, max) or an edge, where the term stops being smooth or defined (sqrt at 0).
+    kind: a jump (a branch), a kink (abs, max), an edge, where the term stops being smooth or defined (sqrt at 0), or a
+        center, around which a smooth term may be concentrated (x - m in exp(-(x - m)^2), u in 1/(1 + exp(u))).
     path: for a jump, the sites of the trace that lead to the branch.
     calls: the calls on that path, for messages.
     """
@@ -138,6 +140,9 @@ class _Search:
         for kink in entry.kinks(*node.args):
             for piece in self.pieces(kink, mapping):
                 yield Finding("kink", piece)
+        if node.op in _CONCENTRATING:
+            for center in centers(node):
+                yield Finding("center", substitute(center, mapping))
         if node.op != "div":  # a pole is no edge to cut at: the integral diverges there or the pole is outside
             for edge in entry.edges(*node.args):
                 for piece in self.pieces(edge, mapping):
@@ -225,6 +230,33 @@ def _in_place(term: Term, old: Term, new: Term) -> Term:
         if node not in memo:
             memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
     return memo[term]
+
+
+# Builtins whose values change fast where a part of their argument is near 0, if that part is steep.
+_CONCENTRATING = frozenset({"exp", "div", "tanh", "erf", "erfc", "atan"})
+
+
+@lru_cache(maxsize=4096)
+def centers(node: Prim) -> tuple[Term, ...]:
+    """Terms around whose zeros a builtin may be concentrated."""
+    where = node.args[1] if node.op == "div" else node.args[0]
+    if not where.free:
+        return ()
+    if node.op in ("tanh", "erf", "erfc", "atan"):
+        return (where,)
+    if node.op == "div" and isinstance(where, Prim) and where.op in ("pow", "mul"):
+        return ()  # a pole there, not a center
+    found: dict[Term, None] = {}
+    for part in postorder(where):
+        if not isinstance(part, Prim) or not part.free:
+            continue
+        if part.op == "pow" and isinstance(part.args[1], Const) and part.args[1].value % 2 == 0:
+            found[part.args[0]] = None
+        elif part.op == "mul" and len(set(part.args)) < len(part.args):
+            found.update((a, None) for a in part.args if part.args.count(a) > 1 and a.free)
+        elif node.op == "div" and part.op == "exp":
+            found[part.args[0]] = None
+    return tuple(found)
 
 
 def _spine(head: Term) -> tuple[Term, tuple[tuple[Term, ...], ...]]:

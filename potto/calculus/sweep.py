@@ -18,6 +18,7 @@ from potto.core.simplify import normalized_surface, simplify
 from potto.core.terms import Const, Integral, Term, postorder, substitute
 
 MOST_CUTS = 48  # per variable; what is beyond it only costs adaptive refinement
+MOST_CENTERS = 6
 MOST_PAIRS = 12  # surfaces whose crossings are worked out
 
 
@@ -101,20 +102,30 @@ class Sweep:
 def sweep(term: Integral, found: Iterable[Finding], resolve: Resolve, decide: Decide) -> Sweep:
     """Place every surface of an integral's body at the variable that it cuts."""
     pool = _Pool()
+    centers: dict[Term, None] = {}
     for f in found:
+        if f.kind == "center":
+            centers[f.surface] = None
+            continue
         pool.put(f.surface, (f.path, f.strict) if f.kind == "jump" else None, f.kind == "edge")
     levels: list[Level] = []
     rows = list(zip(term.variables, term.bounds, term.hints, strict=True))
     for variable, (lo, hi), hints in reversed(rows):
         cuts = tuple(_cut(s, tuple(jumps), turning, variable) for s, jumps, turning in pool.take(variable))
         cuts = (*(c for c in cuts if c.jumps), *[c for c in cuts if not c.jumps][:MOST_CUTS])
-        levels.append(Level(variable, lo, hi, hints, cuts))
+        here = [c for c in centers if variable in c.free]
+        centers = {c: None for c in centers if variable not in c.free}
+        levels.append(Level(variable, lo, hi, (*hints, *_points(here, variable)[:MOST_CENTERS]), cuts))
         for surface, turning in _shadows(cuts, variable, lo, hi):
             pool.put(surface, None, turning)
         for bound in (lo, hi):
             for f in findings(bound, resolve, decide):
-                pool.put(f.surface, None, f.kind == "edge")
-    outer = tuple(Finding("edge" if turning else "kink", surface) for surface, (_, turning) in pool.surfaces.items())
+                if f.kind != "center":
+                    pool.put(f.surface, None, f.kind == "edge")
+    outer = (
+        *(Finding("edge" if turning else "kink", surface) for surface, (_, turning) in pool.surfaces.items()),
+        *(Finding("center", surface) for surface in centers),
+    )
     return Sweep(tuple(reversed(levels)), outer)
 
 
@@ -138,6 +149,16 @@ def _cut(surface: Term, jumps: tuple[Jump, ...], turning: bool, variable: str) -
         return Cut(surface, jumps, turning, None)
     roots = (*found.roots, *found.poles)
     return Cut(surface, jumps, turning, roots, (*found.families, *found.pole_families))
+
+
+def _points(centers: list[Term], variable: str) -> tuple[Term, ...]:
+    """Where the centers are, if that can be said in closed form."""
+    points: dict[Term, None] = {}
+    for center in centers:
+        found = _sections(center, variable)
+        if isinstance(found, Sections):
+            points.update(dict.fromkeys(found.roots))
+    return tuple(points)
 
 
 def _shadows(cuts: tuple[Cut, ...], variable: str, lo: Term, hi: Term) -> Iterable[tuple[Term, bool]]:

@@ -51,7 +51,9 @@ class Iteration:
             report_edges(self, number, level, cuts, env, outer, sums, machine)
         sums.v *= cuts.sign
         sums.t *= cuts.sign
-        _poison(level, env, cuts, sums, batch)
+        if cuts.bound_nan is not None:
+            sums.v[:, cuts.bound_nan] = np.nan
+            sums.t[:, :, cuts.bound_nan] = np.nan
         return sums
 
     @staticmethod
@@ -107,17 +109,3 @@ class Iteration:
         machine.count(batch)
         value = machine.evaluate(body, {n: env[n] for n in body.params}, self.plan.trace(sides))
         return np.stack([np.broadcast_to(c.v, (batch,)) for c in components(value)]).astype(float)
-
-
-def _poison(level: LevelPlan, env: dict[str, Value], cuts: Cuts, sums: Sums, batch: int) -> None:
-    """A parameter that is not a number makes the integral not a number, whatever the cuts made of it."""
-    bad = np.isnan(cuts.sign)
-    for name in level.frame.params:
-        value = env[name]
-        if isinstance(value, Cell):
-            bad = bad | np.isnan(value.v)
-    if cuts.bound_nan is not None:
-        bad = bad | cuts.bound_nan
-    if bad.any():
-        sums.v[:, bad] = np.nan
-        sums.t[:, :, bad] = np.nan

@@ -25,6 +25,8 @@ class Evaluator(Protocol):
     def atol(self) -> float: ...
     @property
     def directions(self) -> int: ...
+    @property
+    def frozen(self) -> bool: ...
     def with_directions(self, directions: int) -> Evaluator: ...
     def evaluate(self, lam: Lam, env: dict[str, Value], trace: Trace | None) -> Value: ...
     def count(self, evaluations: int) -> None: ...
@@ -57,12 +59,15 @@ class Pieces:
     floor: Array = field(default_factory=lambda: np.zeros((0, 0)))
     size: Array = field(default_factory=lambda: np.zeros((0, 0)))
     most: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    ends: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    tail: Array = field(default_factory=lambda: np.zeros((0, 0)))
     lean: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def pick(self, index: Any) -> Pieces:
         return Pieces(self.segment[index], self.u0[index], self.u1[index], self.end[index],
                       self.integral[:, index], self.error[:, index], self.floor[:, index],
-                      self.size[:, index], self.most[:, index], self.lean[index])  # fmt: skip
+                      self.size[:, index], self.most[:, index],
+                      self.ends[:, index], self.tail[:, index], self.lean[index])  # fmt: skip
 
     def join(self, other: Pieces) -> Pieces:
         return joined([self, other])
@@ -72,8 +77,8 @@ def joined(parts: list[Pieces]) -> Pieces:
     """Pieces put together; one copy for any number of parts."""
     if len(parts) == 1:
         return parts[0]
-    names = ("segment", "u0", "u1", "end", "integral", "error", "floor", "size", "most", "lean")
-    axes = (0, 0, 0, 0, 1, 1, 1, 1, 1, 0)
+    names = ("segment", "u0", "u1", "end", "integral", "error", "floor", "size", "most", "ends", "tail", "lean")
+    axes = (0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 0)
     return Pieces(*(np.concatenate([getattr(p, n) for p in parts], axis=a) for n, a in zip(names, axes, strict=True)))
 
 

@@ -39,6 +39,8 @@ PROMISING = 1e-2
 DOUBTFUL_ROUNDS = 24
 # How much larger than at the nodes an integrand must be at an end of a segment to be taken for a peak.
 PEAK = 8.0
+# How many times its last terms an interpolant may be off at an end of a segment.
+MISLED = 200.0
 # A relative jump of an inner integral where only kinks are expected: a surface there runs along the inner variable.
 DISCONTINUITY = 1e-6
 BESIDE = 1e-9
@@ -94,14 +96,15 @@ class Work:
         """More nodes, then halves, for what is too coarse until nothing is; what is accepted stays accepted."""
         accepted: list[Pieces] = []
         for turn in range(MOST_HALVINGS):
-            bad = self.too_coarse(fresh, ends, tally)
-            if bad is None:
+            found = self.too_coarse(fresh, ends, tally)
+            if found is None:
                 break
             if self.machine.exhausted():
                 self.machine.note_unfinished("the budget of evaluations is spent")
                 break
-            accepted.append(fresh.pick(~bad))
-            coarse = fresh.pick(bad)
+            bad, waiting = found
+            accepted.append(fresh.pick(~bad & ~waiting))
+            coarse, later = fresh.pick(bad), fresh.pick(waiting)
             nearly = (coarse.error <= PROMISING * coarse.size).all(axis=0) if turn == 0 else np.zeros(0, dtype=bool)
             if nearly.any():
                 near, far = coarse.pick(nearly), coarse.pick(~nearly)
@@ -111,6 +114,8 @@ class Work:
                     fresh = fresh.join(self.replaced(far, self.halve(far), HALF_ORDER, tally))
             else:
                 fresh = self.replaced(coarse, self.halve(coarse), HALF_ORDER, tally)
+            if later.segment.size:
+                fresh = fresh.join(later)
         accepted.append(fresh)
         return joined(accepted)
 
@@ -158,7 +163,11 @@ class Work:
         shake = np.where(np.isfinite(shake), np.minimum(shake, 1.0), 0.0)
         height = np.abs(h)
         p.size = height @ rule.weights
-        p.most = height[:: height.shape[0] // self.width].max(axis=-1)
+        stride = height.shape[0] // self.width
+        p.most = height[::stride].max(axis=-1)
+        values = coefficients[::stride]
+        p.ends = np.concatenate(np.moveaxis(values @ rule.ends, -1, 0))
+        p.tail = np.abs(values[..., -2:]).sum(axis=-1)
         p.floor = 4 * EPS * p.size + spread * shake
         if self.k:
             p.floor.reshape(self.width, -1, p.u0.size)[:, 1:] *= 3  # speeds are rounded too
@@ -234,7 +243,8 @@ class Work:
 
     def end_values(self) -> tuple[Array, Array] | None:
         """F at both ends of every segment, sides as on the segment: (m, S) each; None where they are not needed."""
-        if not self.last and not (self.moving and self.sweeps()):
+        hinted = any(level.level.hints for level in self.parent.plan.levels[self.number :])
+        if not self.last and not hinted and not (self.moving and self.sweeps()):
             return None
         seg, frozen = self.seg, self.machine.with_directions(0)
         names = self.parent.plan.body.params if self.last else self.env
@@ -274,7 +284,11 @@ class Work:
             self.machine.note_degenerate(self.level.variable)
 
     def too_coarse(self, p: Pieces, ends: Any, tally: Tally) -> Any:
-        """A mask of the pieces to halve, None if there are none."""
+        """Masks of the pieces to halve, and of those to look at again later; None if there are none to halve.
+
+        As long as a peak of an integral is not resolved, its total says nothing, and so what its other pieces may err
+        is not known: they wait.
+        """
         owner = self.seg.owner[p.segment]
         rows, m = p.integral.shape[0] // self.width, self.width
         error, floor = p.error.reshape(m, rows, -1), p.floor.reshape(m, rows, -1)
@@ -285,22 +299,36 @@ class Work:
             floor = floor[:, : 1 + k]
         off, rounding = error.reshape(-1, p.segment.size), floor.reshape(-1, p.segment.size)
         bad = ((off > tally.shares(self, owner)) & (off > 8 * rounding)).any(axis=0)
+        wide = (p.u1 - p.u0) >= 1e-14
+        waiting = np.zeros(bad.size, dtype=bool)
         if ends is not None:
-            bad |= self.missed_peak(p, ends)
-        if not bad.any():
-            return None
-        bad &= (p.u1 - p.u0) >= 1e-14
-        return bad if bad.any() else None
+            peak = self.missed_peak(p, ends) & wide
+            if peak.any():
+                blind = np.zeros(self.batch, dtype=bool)
+                blind[owner[peak]] = True
+                waiting = bad & blind[owner] & ~peak & wide
+                bad = (bad & ~blind[owner]) | peak
+        bad &= wide
+        return (bad, waiting) if bad.any() else None
 
     def missed_peak(self, p: Pieces, ends: tuple[Array, Array]) -> Any:
-        """Pieces at an end of their segment where the integrand is far larger than at any of their nodes."""
+        """Pieces at an end of their segment where the integrand is not what its values at the nodes lead to.
+
+        Either it is far larger there than at any node, or it is off the interpolant through the nodes by far more
+        than the interpolant's last terms: something narrow sits at the end.
+        """
         seg = self.seg
         width = (seg.b - seg.a)[p.segment] * (p.u1 - p.u0)
+        plain = (seg.kind[p.segment] == maps.LINEAR) & (p.end == 0)
         bad = np.zeros(p.segment.size, dtype=bool)
-        for f, touches in ((ends[0], p.u0 == 0), (ends[1], p.u1 == 1)):
-            for c in range(self.width):
-                at_end = np.abs(f[c][p.segment]) * width
-                bad |= touches & np.isfinite(at_end) & (at_end > PEAK * p.most[c])
+        m = self.width
+        for f, touches, led in ((ends[0], p.u0 == 0, p.ends[:m]), (ends[1], p.u1 == 1, p.ends[m:])):
+            for c in range(m):
+                at_end = f[c][p.segment] * width
+                known = touches & np.isfinite(at_end)
+                bad |= known & (np.abs(at_end) > PEAK * p.most[c])
+                off = np.abs(at_end - led[c])
+                bad |= known & plain & (off > MISLED * p.tail[c] + 1e-8 * p.most[c])
         return bad
 
     def doubtful(self, p: Pieces, ends: tuple[Array, Array] | None) -> Any:
@@ -416,8 +444,7 @@ class Tally:
             np.add.at(self.count, owner, sign)
             for i, row in enumerate(self.channels(work, p)):
                 np.add.at(self.total[i], owner, sign * row)
-        if not work.number:
-            self.scale = None
+        self.scale = None
 
     def shares(self, work: Work, owner: Ints) -> Array:
         """The error that one piece of each of these integrals may have: (m * (1 + k), P)."""

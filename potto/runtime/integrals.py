@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
+from potto.calculus.cases import cased
 from potto.calculus.surfaces import TooDeep
 from potto.core.terms import Global, Integral, Lam, Sum, Term, Var, integral, postorder, substitute, var
 from potto.diagnostics import PottoError
@@ -73,7 +74,7 @@ def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermos
     linked = link(flat)
     groups = split_by_decisions(machine, term, linked, batch)
     if groups is None:
-        return _shaped(solve(machine, term, linked, linked.env, batch, outermost), shape)
+        return _shaped(poisoned(solve(machine, term, linked, linked.env, batch, outermost), linked.env), shape)
     result: Sums | None = None
     for index in groups:
         here = {n: map_arrays(v, lambda a, index=index: a[index]) for n, v in flat.items()}
@@ -85,7 +86,21 @@ def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermos
         result.v[:, index], result.e[:, index] = part.v, part.e
         result.t[:, :, index], result.et[:, :, index] = part.t, part.et
     assert result is not None
-    return _shaped(result, shape)
+    return _shaped(poisoned(result, linked.env), shape)
+
+
+def poisoned(sums: Sums, env: dict[str, Value]) -> Sums:
+    """A parameter that is not a number makes the integral not a number, whatever the cuts made of it."""
+    bad: Any = False
+    for value in env.values():
+        for cell in (value,) if isinstance(value, Cell) else value if isinstance(value, tuple) else ():
+            if isinstance(cell, Cell):
+                bad = bad | np.isnan(cell.v)
+    if np.any(bad):
+        where = np.broadcast_to(bad, sums.v.shape[-1:])
+        sums.v[:, where] = np.nan
+        sums.t[:, :, where] = np.nan
+    return sums
 
 
 def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value], batch: int, outermost: bool) -> Sums:
@@ -123,11 +138,20 @@ def counted(sums: Sums, plan: Plan, machine: Machine) -> Sums:
 
 
 def orders(term: Integral) -> Iterator[Integral]:
-    """The integral as it is written, then with other variables innermost, where the bounds allow it.
+    """The integral as it is written, then with other variables innermost, then with its conditions in cases.
 
     A surface that runs along the innermost variable has no section in it; another variable then takes its place.
     """
     yield term
+    yield from _turned(term)
+    taken_apart = cased(term)
+    if taken_apart is not term:
+        yield taken_apart
+        yield from _turned(taken_apart)
+
+
+def _turned(term: Integral) -> Iterator[Integral]:
+    """The integral with each of the other variables innermost, where the bounds allow it."""
     names = set(term.variables)
     if any((lo.free | hi.free) & names for lo, hi in term.bounds):
         return

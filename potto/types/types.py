@@ -147,6 +147,14 @@ def derivative_type(type: Type) -> Type:
     return _derivative(resolve(type), frozenset())
 
 
+def _paired(items: tuple[Type, ...], duals: tuple[Type, ...]) -> Type:
+    """The dual of a tuple of numbers (and tuples of them): the tuple of values, then the tuple of tangents."""
+    pairs = [d.items for d in duals if isinstance(d, TupleOf) and len(d.items) == 2]
+    if len(pairs) != len(duals) or any(isinstance(resolve(item), Function | ListOf | Diffeo) for item in items):
+        return TupleOf(duals)
+    return TupleOf((TupleOf(tuple(p[0] for p in pairs)), TupleOf(tuple(p[1] for p in pairs))))
+
+
 def _derivative(type: Type, parameters: frozenset[str]) -> Type:
     """`parameters`: names of the enclosing groups, which get a `d`; variables of integration keep theirs."""
 
@@ -161,7 +169,7 @@ def _derivative(type: Type, parameters: frozenset[str]) -> Type:
         case Dist(variables):
             return TupleOf((Dist(renamed(variables)), Dist(renamed(variables))), dual=True)
         case TupleOf(items):
-            return TupleOf(tuple(_derivative(item, parameters) for item in items))
+            return _paired(items, tuple(_derivative(item, parameters) for item in items))
         case ListOf(item):
             return ListOf(_derivative(item, parameters))
         case Function(group, result):
@@ -172,7 +180,7 @@ def _derivative(type: Type, parameters: frozenset[str]) -> Type:
             )
             return Function(duals, _derivative(result, inner))
         case Diffeo(dims):
-            return UNKNOWN if dims is None else TupleOf((TupleOf((REAL, REAL), dual=True),) * dims)
+            return UNKNOWN if dims is None else TupleOf((TupleOf((REAL,) * dims), TupleOf((REAL,) * dims)))
         case Var():  # a number, for want of better knowledge
             return TupleOf((Real(star=True), Real(star=True)), dual=True)
         case Truth() | Unknown() | Meta():
