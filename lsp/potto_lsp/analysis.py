@@ -1,0 +1,166 @@
+"""The programs of a session: the database, the files in it, and what is to be said about each.
+
+Owns `Analysis`. Everything here is for the one thread that works with the database; `work` sees to that.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import Any
+
+from potto.check import absolute, arranged, definition_diagnostics
+from potto.check import diagnostics as check_file
+from potto.diagnostics import Diagnostic, Severity
+from potto.modules import chunk_start, module_diagnostics, names, open_files, source, statements
+from potto.modules.texts import syntax_diagnostics
+from potto.query import Database, query
+from potto.render import Located
+from potto.types import check_statement
+from potto_lsp.documents import Document
+from potto_lsp.project import Project, read_project
+from potto_lsp.text import Encoding, Text
+from potto_lsp.uris import to_key, to_uri
+
+logger = logging.getLogger(__name__)
+
+
+@query
+def file_diagnostics(db: Database, file: str) -> tuple[Located, ...]:
+    """All that there is to say about a file. As one memo, so that a file that an edit does not reach costs nothing."""
+    return check_file(db, file)
+
+
+class Analysis:
+    """One database and what the client has open."""
+
+    def __init__(self, encoding: Encoding) -> None:
+        self.db = Database()
+        self.files = open_files(self.db)
+        self.encoding = encoding
+        self.projects: tuple[Project, ...] = ()
+        self.settings: Mapping[str, Any] = {}
+        self._documents: dict[str, Document] = {}
+        self._texts: dict[str, Text] = {}
+        self._failing: dict[tuple[str, str], str] = {}
+
+    # What the client has
+
+    def set_folders(self, uris: Iterable[str]) -> None:
+        """The folders of the workspace; their project files are read."""
+        keys = [key for key in map(to_key, uris) if not key.startswith("<")]
+        self.projects = tuple(read_project(key) for key in dict.fromkeys(keys))
+        self.files.set_roots(root for project in self.projects for root in project.roots)
+
+    def reload_projects(self) -> None:
+        """Read the project files again."""
+        self.set_folders([to_uri(project.folder) for project in self.projects])
+
+    def put(self, document: Document) -> str:
+        """A document was opened or changed; its key."""
+        key = to_key(document.uri)
+        self._documents.pop(key, None)
+        self._documents[key] = document
+        self._texts[key] = document.text
+        self.files.set_text(key, document.text.text)
+        return key
+
+    def close(self, document: Document) -> str:
+        """A document was closed: the disk counts again."""
+        key = to_key(document.uri)
+        self._documents.pop(key, None)
+        self._texts.pop(key, None)
+        self.files.close(key)
+        return key
+
+    def document(self, key: str) -> Document | None:
+        """The open document of a file."""
+        return self._documents.get(key)
+
+    @property
+    def documents(self) -> Mapping[str, Document]:
+        """What is open, by key, the longest untouched first."""
+        return self._documents
+
+    def uri(self, key: str) -> str:
+        """The URI of a file, as the client writes it if the file is open."""
+        document = self._documents.get(key)
+        return document.uri if document is not None else to_uri(key)
+
+    def text(self, key: str) -> Text:
+        """The text of a file with its lines; an empty one if there is none."""
+        document = self._documents.get(key)
+        if document is not None:
+            return document.text
+        found = source(self.db, key)
+        written = "" if found is None else found.text
+        known = self._texts.get(key)
+        if known is None or known.text != written:
+            known = self._texts[key] = Text(written, self.encoding)
+        return known
+
+    # What there is to say
+
+    def programs(self) -> tuple[str, ...]:
+        """All programs of the workspace and all that are open."""
+        return tuple(dict.fromkeys([*self._documents, *self.files.all_files()]))
+
+    def diagnostics(self, key: str) -> tuple[Located, ...]:
+        """What is wrong with a file. A bug of ours in one definition costs what is said of that one alone."""
+        try:
+            return file_diagnostics(self.db, key)
+        except Exception:
+            return tuple(Located(key, said) for said in arranged(self._guarded(key)))
+
+    def _guarded(self, key: str) -> list[Diagnostic]:
+        """The diagnostics of a file part by part; a part that fails is logged once for each of its texts."""
+        db, found = self.db, list[Diagnostic]()
+        for part in (syntax_diagnostics, module_diagnostics):
+            try:
+                found += part(db, key)
+            except Exception as error:
+                self._failed(key, part.__name__, error)
+        for name in names(db, key):
+            try:
+                start = chunk_start(db, key, name)
+                found += [absolute(db, key, said, start) for said in definition_diagnostics(db, key, name)]
+            except Exception as error:
+                self._failed(key, name, error)
+        for reference in statements(db, key):
+            try:
+                said = check_statement(db, key, reference.statement)
+                found += [absolute(db, key, one, reference.start) for one in said]
+            except Exception as error:
+                self._failed(key, "statement", error)
+        return found
+
+    def _failed(self, key: str, name: str, error: Exception) -> None:
+        told = f"{type(error).__name__}: {error}"
+        if self._failing.get((key, name)) != told:
+            self._failing[key, name] = told
+            logger.error("the check of %s in %s failed", name, key, exc_info=error)
+
+    def levels(self, key: str) -> Mapping[str, str]:
+        """How lints count in a file: the innermost project's word, then the client's settings."""
+        inside = [p for p in self.projects if key.startswith(os.path.join(p.folder, ""))]
+        project = max(inside, key=lambda p: len(p.folder), default=None)
+        lints = self.settings.get("lints")
+        return {**(project.lints if project is not None else {}), **(lints if isinstance(lints, Mapping) else {})}
+
+
+SEVERITIES: Mapping[str, Severity] = {"error": "error", "warning": "warning", "info": "info", "hint": "hint"}
+
+
+def levelled(found: Iterable[Located], levels: Mapping[str, str]) -> Iterable[Located]:
+    """Diagnostics with the severity that the settings give them. An error stays one."""
+    for located in found:
+        said = located.diagnostic
+        level = levels.get(said.code)
+        if level is None or said.severity == "error":
+            yield located
+        elif (severity := SEVERITIES.get(level)) is not None:
+            yield replace(located, diagnostic=replace(said, severity=severity))
+        elif level != "off":
+            yield located

@@ -1,0 +1,18 @@
+"""An answer that comes later, from somebody else than the thread that owns the database."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from potto_lsp.errors import RequestError
+
+
+@dataclass(frozen=True, slots=True)
+class Deferred:
+    """What an adapter gives instead of an answer. `start(finish)` begins; whoever has the answer, or the error, calls
+    `finish` with it, from any thread. `stop` is called if nobody waits for it any more."""
+
+    start: Callable[[Callable[[Any | RequestError], None]], None]
+    stop: Callable[[], None]

@@ -1,0 +1,169 @@
+"""The server's side of the evaluation process: started when first needed, asked one task at a time.
+
+Owns `Evaluator` and `Task`. A task has a time limit and can be cancelled: the process is interrupted, and ended if it
+does not heed that. One that dies is started again for the next task.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import logging
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from queue import Empty, SimpleQueue
+from threading import Event, Thread
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from potto_lsp.analysis import Analysis
+
+logger = logging.getLogger(__name__)
+LIMIT, LOADING, GRACE = 10.0, 60.0, 0.5  # seconds: for a task, for the start, to heed an interrupt
+
+
+@dataclass(eq=False)
+class Task:
+    """Something to evaluate; `done` is called once, on the evaluator's thread, with `result` or `error` in it."""
+
+    do: str
+    file: str
+    text: str
+    done: Callable[[Mapping[str, Any]], None]
+    more: Mapping[str, Any] = field(default_factory=dict)
+    cancelled: Event = field(default_factory=Event)
+    texts: Mapping[str, str] = field(default_factory=dict)
+    roots: tuple[str, ...] = ()
+    limit: float = LIMIT
+
+
+class Evaluator:
+    """The queue of tasks and the process that does them."""
+
+    def __init__(self, analysis: Analysis) -> None:
+        self._analysis = analysis
+        self._tasks: SimpleQueue[Task | None] = SimpleQueue()
+        self._thread: Thread | None = None
+        self._process: subprocess.Popen[str] | None = None
+        self._said: SimpleQueue[Mapping[str, Any] | None] = SimpleQueue()
+        self._sent: dict[str, str] = {}
+        self._ids = itertools.count(1)
+
+    def put(self, task: Task) -> Task:
+        """Do a task with the texts as they are now. For the thread that owns the database."""
+        analysis = self._analysis
+        task.texts = {key: document.text.text for key, document in analysis.documents.items()}
+        task.roots = analysis.files.roots
+        limit = analysis.settings.get("evaluation.timeLimit")
+        task.limit = float(limit) if isinstance(limit, int | float) and limit > 0 else LIMIT
+        if self._thread is None:
+            self._thread = Thread(target=self._work, name="potto-evaluation", daemon=True)
+            self._thread.start()
+        self._tasks.put(task)
+        return task
+
+    @property
+    def started(self) -> bool:
+        """Whether there ever was a process."""
+        return self._thread is not None
+
+    def close(self) -> None:
+        """End the process."""
+        self._end()
+
+    def _work(self) -> None:
+        while (task := self._tasks.get()) is not None:
+            if task.cancelled.is_set():
+                task.done({"error": "cancelled"})
+                continue
+            try:
+                answer = self._answer(task)
+            except Exception:
+                logger.error("the evaluation failed", exc_info=True)
+                self._end()
+                answer = {"error": "the evaluation process failed"}
+            task.done(answer)
+
+    def _answer(self, task: Task) -> Mapping[str, Any]:
+        process = self._running()
+        if process is None:
+            return {"error": "the evaluation process does not start"}
+        id = next(self._ids)
+        closed = {key: None for key in self._sent if key not in task.texts}
+        texts = {key: text for key, text in task.texts.items() if self._sent.get(key) != text}
+        self._sent = dict(task.texts)
+        message = {"id": id, "do": task.do, "file": task.file, "text": task.text, "roots": task.roots, **task.more}
+        assert process.stdin is not None
+        process.stdin.write(json.dumps({**message, "texts": {**texts, **closed}}) + "\n")
+        process.stdin.flush()
+        return self._await(id, task)
+
+    def _await(self, id: int, task: Task) -> Mapping[str, Any]:
+        deadline = time.monotonic() + task.limit
+        while True:
+            if task.cancelled.is_set():
+                return self._interrupt(id, "cancelled")
+            left = deadline - time.monotonic()
+            if left <= 0:
+                return self._interrupt(id, f"stopped after {task.limit:g} seconds")
+            try:
+                said = self._said.get(timeout=min(left, 0.02))
+            except Empty:
+                continue
+            if said is None:
+                self._end()
+                return {"error": "the evaluation process ended unexpectedly"}
+            if said.get("id") == id:
+                return said
+
+    def _interrupt(self, id: int, why: str) -> Mapping[str, Any]:
+        """Stop what runs; with the process if it does not heed."""
+        import signal
+
+        process = self._process
+        if process is not None and sys.platform != "win32":
+            process.send_signal(signal.SIGINT)
+            deadline = time.monotonic() + GRACE
+            while (left := deadline - time.monotonic()) > 0:
+                try:
+                    said = self._said.get(timeout=left)
+                except Empty:
+                    break
+                if said is None or said.get("id") == id:
+                    return {"error": why}
+        self._end()
+        return {"error": why}
+
+    def _running(self) -> subprocess.Popen[str] | None:
+        """The process, started if need be."""
+        if self._process is not None and self._process.poll() is None:
+            return self._process
+        self._sent, self._said = {}, SimpleQueue()
+        command = [sys.executable, "-m", "potto_lsp.evaluator"]
+        pipe = subprocess.PIPE
+        self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=None, text=True, encoding="utf-8")
+        Thread(target=_listen, args=(self._process, self._said), name="potto-listener", daemon=True).start()
+        try:
+            ready = self._said.get(timeout=LOADING)
+        except Empty:
+            ready = None
+        if ready is None:
+            self._end()
+            return None
+        return self._process
+
+    def _end(self) -> None:
+        process, self._process = self._process, None
+        if process is not None:
+            process.kill()
+            process.wait()
+
+
+def _listen(process: subprocess.Popen[str], said: SimpleQueue[Mapping[str, Any] | None]) -> None:
+    assert process.stdout is not None
+    for line in process.stdout:
+        said.put(json.loads(line))
+    said.put(None)

@@ -1,0 +1,176 @@
+"""The evaluation process: runs programs for the server, so that nothing they do holds it up.
+
+Owns `main`: one JSON object a line on standard input, one a line on standard output. Started by `evaluation`, as
+`python -m potto_lsp.evaluator`. An interrupt ends the task at hand and not the process.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from threading import Thread
+from typing import TYPE_CHECKING, Any, TextIO
+
+from potto.render import ProgramError, render
+
+if TYPE_CHECKING:
+    from potto.world import World
+
+MOST_LINES = 1000  # of what a script shows
+
+
+class Unanswerable(Exception):
+    """A task that cannot be done, and why."""
+
+
+class Interrupts:
+    """An interrupt counts only while a task runs."""
+
+    def __init__(self) -> None:
+        self._running = False
+        signal.signal(signal.SIGINT, self._interrupt)
+
+    def _interrupt(self, number: int, frame: object) -> None:
+        if self._running:
+            self._running = False
+            raise KeyboardInterrupt
+
+    @contextmanager
+    def allowed(self) -> Iterator[None]:
+        self._running = True
+        try:
+            yield
+        finally:
+            self._running = False
+
+
+def main() -> int:
+    """Do tasks until standard input ends."""
+    from potto_lsp.main import take_streams
+
+    reader, writer = take_streams()
+    _end_with(os.getppid())
+    interrupts = Interrupts()
+    tasks, answers = os.fdopen(os.dup(reader.fileno()), encoding="utf-8"), os.fdopen(writer.fileno(), "w")
+    world = _loaded()
+    _say(answers, {"ready": True})
+    for line in tasks:
+        task = json.loads(line)
+        try:
+            with interrupts.allowed():
+                answer = _answer(world, task)
+        except KeyboardInterrupt:
+            answer = {"error": "interrupted"}
+        _say(answers, {"id": task["id"], **answer})
+    return 0
+
+
+def _loaded() -> World:
+    from potto.world import World
+
+    return World()
+
+
+def _say(stream: TextIO, message: Mapping[str, Any]) -> None:
+    stream.write(json.dumps(message) + "\n")
+    stream.flush()
+
+
+def _end_with(parent: int) -> None:
+    """End when the server is gone, also in the middle of a task."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(1.0)
+        os._exit(1)
+
+    Thread(target=watch, name="potto-parent", daemon=True).start()
+
+
+def _answer(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
+    """What becomes of a task: `result`, or `error` as a text for the user."""
+    world.files.set_roots(task["roots"])
+    for key, text in task["texts"].items():
+        if text is None:
+            world.files.close(key)
+        else:
+            world.put(key, text)
+    world.refresh()
+    try:
+        return {"result": TASKS[task["do"]](world, task)}
+    except ProgramError as error:
+        shown = "\n\n".join(render(located, error.sources) for located in error.located)
+        return {"error": shown, "brief": "; ".join(d.message for d in error.diagnostics)}
+    except Unanswerable as error:
+        return {"error": str(error)}
+    except Exception as error:  # a bug of ours: told, and the process lives on
+        import traceback
+
+        traceback.print_exc()
+        return {"error": f"internal error: {type(error).__name__}: {error}"}
+
+
+def _evaluate(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
+    """The value of an expression."""
+    from potto.runtime.shown import estimate_json, format_estimate
+
+    answer = world.evaluate(task["file"], task["text"])
+    remarks = [located.diagnostic.message for located in answer.remarks]
+    estimate = answer.estimate
+    return {"text": format_estimate(estimate), "remarks": remarks, **estimate_json(estimate, answer.type)}
+
+
+def _live(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
+    """The value of a live expression, and whether it is the expected one."""
+    from potto.live import agrees, bounds
+    from potto.runtime.shown import format_bounds, format_estimate
+
+    file, expected = task["file"], task["expected"]
+    estimate = world.evaluate(file, task["text"]).estimate
+    found = {"text": format_estimate(estimate), "holds": None, "expected": expected}
+    if estimate.text is None:
+        found["error"] = format_bounds(bounds(estimate))
+    if expected is not None:
+        wanted = world.evaluate(file, expected).estimate
+        found["holds"] = agrees(estimate, wanted, world.parse(expected))
+    return found
+
+
+def _run(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
+    """What a script shows."""
+    from potto.runtime.script import Shown
+
+    lines: list[str] = []
+    for step in world.run(task["file"]):
+        lines.append(step.text if isinstance(step, Shown) else render(step, world.source))
+        if len(lines) == MOST_LINES:
+            lines.append("...")
+            break
+    return {"text": "\n".join(lines)}
+
+
+def _preview(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
+    """A picture of a function."""
+    from potto_lsp.preview import NoPicture, preview
+
+    try:
+        return preview(world, task["file"], task["text"], task.get("box"))
+    except NoPicture as error:
+        raise Unanswerable(str(error)) from None
+
+
+TASKS: Mapping[str, Callable[[World, Mapping[str, Any]], dict[str, Any]]] = {
+    "evaluate": _evaluate,
+    "live": _live,
+    "run": _run,
+    "preview": _preview,
+}
+
+
+if __name__ == "__main__":
+    sys.exit(main())

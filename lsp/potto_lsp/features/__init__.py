@@ -1,0 +1,135 @@
+"""The table of features: which method is answered by which adapter, and how the client hears of it.
+
+Owns `FEATURES` and `capabilities`. An adapter is a function from an `Ask` to what is sent; its module is loaded when it
+is first asked, so that the greeting waits for none of them. `slow` marks what looks through the whole workspace.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from potto_lsp.asking import Ask
+
+COMMANDS = ("potto.evaluate", "potto.differentiate", "potto.preview")
+# The legend of semantic tokens, which the greeting announces; a test holds it against that of `potto.ide`.
+TOKEN_TYPES = (
+    "namespace", "type", "parameter", "variable", "property", "function", "keyword", "comment", "number", "operator",
+    "macro",
+)  # fmt: skip
+TOKEN_MODIFIERS = (
+    "declaration", "definition", "readonly", "defaultLibrary", "integration", "plain", "diffeo", "documentation",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Feature:
+    """A method, the adapter (`module.function`) and the capability that announces it."""
+
+    method: str
+    adapter: str
+    announces: Mapping[str, Any] = field(default_factory=dict)
+    slow: bool = False
+
+    @cached_property
+    def answer(self) -> Callable[[Ask], Any]:
+        """The adapter."""
+        module, _, function = self.adapter.partition(".")
+        found: Callable[[Ask], Any] = getattr(importlib.import_module(f"potto_lsp.features.{module}"), function)
+        return found
+
+
+_DOCUMENT = "textDocument/"
+_ALL = (
+    Feature(_DOCUMENT + "hover", "hovering.hover", {"hoverProvider": True}),
+    Feature(
+        _DOCUMENT + "completion",
+        "completing.complete",
+        {"completionProvider": {"triggerCharacters": [".", "\\", "("], "resolveProvider": True,
+                                "completionItem": {"labelDetailsSupport": True}}},
+    ),
+    Feature("completionItem/resolve", "completing.resolve"),
+    Feature(
+        _DOCUMENT + "signatureHelp",
+        "signatures.signature_help",
+        {"signatureHelpProvider": {"triggerCharacters": ["(", ",", " "], "retriggerCharacters": [")", "="]}},
+    ),
+    Feature(_DOCUMENT + "definition", "targets.definition", {"definitionProvider": True}),
+    Feature(_DOCUMENT + "declaration", "targets.declaration", {"declarationProvider": True}),
+    Feature(_DOCUMENT + "typeDefinition", "targets.type_definition", {"typeDefinitionProvider": True}),
+    Feature(_DOCUMENT + "implementation", "targets.implementation", {"implementationProvider": True}),
+    Feature(_DOCUMENT + "references", "finding.references", {"referencesProvider": True}, slow=True),
+    Feature(_DOCUMENT + "documentHighlight", "finding.highlights", {"documentHighlightProvider": True}),
+    Feature(_DOCUMENT + "documentSymbol", "outlines.document_symbols", {"documentSymbolProvider": True}),
+    Feature("workspace/symbol", "outlines.workspace_symbols", {"workspaceSymbolProvider": True}, slow=True),
+    Feature(_DOCUMENT + "prepareCallHierarchy", "calling.prepare", {"callHierarchyProvider": True}),
+    Feature("callHierarchy/incomingCalls", "calling.incoming", slow=True),
+    Feature("callHierarchy/outgoingCalls", "calling.outgoing", slow=True),
+    Feature(_DOCUMENT + "rename", "renaming.rename", {"renameProvider": {"prepareProvider": True}}, slow=True),
+    Feature(_DOCUMENT + "prepareRename", "renaming.prepare"),
+    Feature("workspace/willRenameFiles", "renaming.will_rename_files", slow=True),
+    Feature(
+        _DOCUMENT + "codeAction",
+        "acting.code_actions",
+        {"codeActionProvider": {"resolveProvider": True, "codeActionKinds": [
+            "quickfix", "refactor.extract", "refactor.inline", "refactor.rewrite", "source.organizeImports",
+            "source.fixAll"]}},
+    ),
+    Feature("codeAction/resolve", "acting.resolve"),
+    Feature(_DOCUMENT + "codeLens", "lenses.code_lenses", {"codeLensProvider": {"resolveProvider": True}}),
+    Feature("codeLens/resolve", "lenses.resolve", slow=True),
+    Feature(_DOCUMENT + "inlayHint", "hinting.inlay_hints", {"inlayHintProvider": {"resolveProvider": True}}),
+    Feature("inlayHint/resolve", "hinting.resolve"),
+    Feature(_DOCUMENT + "inlineValue", "hinting.inline_values", {"inlineValueProvider": True}),
+    Feature(
+        _DOCUMENT + "semanticTokens/full",
+        "colours.full",
+        {"semanticTokensProvider": {
+            "legend": {"tokenTypes": list(TOKEN_TYPES), "tokenModifiers": list(TOKEN_MODIFIERS)},
+            "full": {"delta": True}, "range": True}},
+    ),
+    Feature(_DOCUMENT + "semanticTokens/full/delta", "colours.delta"),
+    Feature(_DOCUMENT + "semanticTokens/range", "colours.in_range"),
+    Feature(_DOCUMENT + "foldingRange", "folding.folding_ranges", {"foldingRangeProvider": True}),
+    Feature(_DOCUMENT + "selectionRange", "folding.selection_ranges", {"selectionRangeProvider": True}),
+    Feature(_DOCUMENT + "linkedEditingRange", "linking.linked_editing", {"linkedEditingRangeProvider": True}),
+    Feature(_DOCUMENT + "documentLink", "linking.document_links", {"documentLinkProvider": {}}),
+    Feature(_DOCUMENT + "formatting", "formatting.document", {"documentFormattingProvider": True}),
+    Feature(_DOCUMENT + "rangeFormatting", "formatting.in_range", {"documentRangeFormattingProvider": True}),
+    Feature(
+        _DOCUMENT + "onTypeFormatting",
+        "formatting.on_type",
+        {"documentOnTypeFormattingProvider": {"firstTriggerCharacter": "\n", "moreTriggerCharacter": [")"]}},
+    ),
+    Feature(
+        _DOCUMENT + "diagnostic",
+        "diagnosing.document",
+        {"diagnosticProvider": {"identifier": "potto", "interFileDependencies": True, "workspaceDiagnostics": True}},
+        slow=True,
+    ),
+    Feature("workspace/diagnostic", "diagnosing.workspace", slow=True),
+    Feature("workspace/executeCommand", "commands.execute", {"executeCommandProvider": {"commands": list(COMMANDS)}}),
+)  # fmt: skip
+FEATURES = {feature.method: feature for feature in _ALL}
+
+_FILES = {"filters": [{"scheme": "file", "pattern": {"glob": "**/*.{po,diffeo}"}}, {"scheme": "file", "pattern": {
+    "glob": "**", "matches": "folder"}}]}  # fmt: skip
+
+
+def capabilities(encoding: str) -> dict[str, Any]:
+    """What the server can do, as the greeting says it."""
+    found: dict[str, Any] = {
+        "positionEncoding": encoding,
+        "textDocumentSync": {"openClose": True, "change": 2, "save": {"includeText": False}},
+        "workspace": {
+            "workspaceFolders": {"supported": True, "changeNotifications": True},
+            "fileOperations": {"willRename": _FILES, "didRename": _FILES, "didCreate": _FILES, "didDelete": _FILES},
+        },
+    }
+    for feature in _ALL:
+        found.update(feature.announces)
+    return found

@@ -1,0 +1,28 @@
+"""`textDocument/diagnostic`, `workspace/diagnostic`: what is wrong, for clients that ask."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from potto_lsp.asking import Ask
+from potto_lsp.uris import to_key
+
+
+def document(ask: Ask) -> dict[str, Any]:
+    return ask.session.publisher.answer(ask.file, ask.optional("previousResultId"))
+
+
+def workspace(ask: Ask) -> dict[str, Any]:
+    """All programs. What did not change is `unchanged`; what the client knows and is no more, is empty."""
+    known = ask.optional("previousResultIds")
+    ids = {
+        to_key(str(item.get("uri"))): item.get("value")
+        for item in (known if isinstance(known, list) else ())
+        if isinstance(item, Mapping)
+    }
+    publisher, programs = ask.session.publisher, ask.analysis.programs()
+    items = [publisher.workspace_answer(key, ids.get(key)) for key in programs]
+    gone = [key for key in ids if key not in programs]
+    items += [{"uri": ask.analysis.uri(key), "version": None, "kind": "full", "items": []} for key in gone]
+    return {"items": items}

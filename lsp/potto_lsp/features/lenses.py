@@ -1,0 +1,71 @@
+"""`textDocument/codeLens`: what can be done with a definition, above it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, cast
+
+from potto import ide
+from potto.source import Span
+from potto_lsp import convert, protocol
+from potto_lsp.asking import Ask
+from potto_lsp.errors import InvalidParams
+
+COMMANDS = {
+    "evaluate": "potto.evaluate", "run": "potto.evaluate", "differentiate": "potto.differentiate",
+    "showDerivative": "potto.differentiate", "preview": "potto.preview",
+}  # fmt: skip
+REFERENCES = "potto.showReferences"  # of the client; only one that says that it has it is given it
+
+
+def code_lenses(ask: Ask) -> list[protocol.CodeLens]:
+    found: list[protocol.CodeLens] = []
+    for lens in ide.code_lenses(ask.db, ask.file):
+        if lens.command == "differentiate":  # `showDerivative` says more and does the same
+            found += _previews(ask, lens)
+            continue
+        made: protocol.CodeLens = {"range": ask.range(lens.span)}
+        if lens.title:
+            made["command"] = _command(ask, lens)
+        else:
+            made["data"] = [lens.command, *lens.arguments]
+        found.append(made)
+    return found
+
+
+def _previews(ask: Ask, lens: ide.CodeLens) -> list[protocol.CodeLens]:
+    """A function of one or two numbers has a picture."""
+    from potto.types import Real, groups_of, interface, result_of
+
+    kind = interface(ask.db, *lens.arguments).type
+    given = [parameter.type for group in groups_of(kind) for parameter in group]
+    if not (1 <= len(given) <= 2 and all(isinstance(type, Real) for type in (*given, result_of(kind)))):
+        return []
+    arguments = [ask.analysis.uri(lens.arguments[0]), lens.arguments[1]]
+    command: protocol.Command = {"title": "preview", "command": "potto.preview", "arguments": arguments}
+    return [{"range": ask.range(lens.span), "command": command}]
+
+
+def resolve(ask: Ask) -> Any:
+    data = ask.optional("data")
+    if not isinstance(ask.params, Mapping) or not isinstance(data, list) or len(data) < 2:
+        raise InvalidParams("`data` is not as it was given")
+    command, *arguments = map(str, data)
+    lens = ide.CodeLens(Span(0, 0), cast(Any, command), tuple(arguments))
+    return {**ask.params, "command": _command(ask, ide.resolve_code_lens(ask.db, lens))}
+
+
+def _command(ask: Ask, lens: ide.CodeLens) -> protocol.Command:
+    file, *rest = lens.arguments
+    if lens.command == "showReferences":
+        return _references(ask, lens, file, int(rest[1]))
+    return {"title": lens.title, "command": COMMANDS[lens.command], "arguments": [ask.analysis.uri(file), *rest]}
+
+
+def _references(ask: Ask, lens: ide.CodeLens, file: str, offset: int) -> protocol.Command:
+    """A count to be clicked if the client can show places; else just a count."""
+    if not ask.client.lists("experimental.commands.commands", REFERENCES):
+        return {"title": lens.title, "command": ""}
+    places = [convert.place(ask.analysis, place) for place in ide.references(ask.db, file, offset, False)]
+    position = convert.position(ask.analysis.text(file), offset)
+    return {"title": lens.title, "command": REFERENCES, "arguments": [ask.analysis.uri(file), position, places]}

@@ -1,0 +1,70 @@
+"""Starting the server on standard streams or on a socket.
+
+Owns the streams. Once the server has taken standard output, whatever else is printed goes to standard error: one stray
+`print` would break the conversation.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import socket
+import sys
+from typing import BinaryIO
+
+from potto_lsp.server import Server
+
+logger = logging.getLogger(__name__)
+SWITCH = 0.0002  # seconds: with Python's 5 ms a question beside a busy thread takes as long
+
+
+def serve(address: tuple[str, int] | None = None, log: str | None = None) -> int:
+    """Serve one client, on standard streams or as a server on an address; the exit status."""
+    _log_to(log)
+    sys.setswitchinterval(SWITCH)
+    return _serve_streams() if address is None else _serve_socket(address)
+
+
+def _log_to(path: str | None) -> None:
+    """Log to a file in detail, or to standard error what goes wrong."""
+    kind = logging.FileHandler(path, encoding="utf-8") if path is not None else logging.StreamHandler()
+    kind.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
+    root = logging.getLogger()
+    root.addHandler(kind)
+    root.setLevel(logging.INFO if path is not None else logging.WARNING)
+
+
+def _serve_streams() -> int:
+    reader, writer = take_streams()
+    status = Server(reader, writer).run()
+    return _leave(status)
+
+
+def take_streams() -> tuple[BinaryIO, BinaryIO]:
+    """Standard input and output for us alone; what others write to the output goes to the errors."""
+    reader = os.fdopen(os.dup(0), "rb", buffering=1 << 16)
+    writer = os.fdopen(os.dup(1), "wb", buffering=1 << 16)
+    os.dup2(2, 1)
+    null = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(null, 0)
+    os.close(null)
+    sys.stdout = sys.stderr
+    return reader, writer
+
+
+def _serve_socket(address: tuple[str, int]) -> int:
+    with socket.create_server(address) as listener:
+        host, port = listener.getsockname()[:2]
+        print(f"listening on {host}:{port}", file=sys.stderr, flush=True)
+        connection, _ = listener.accept()
+    with connection:
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        status = Server(connection.makefile("rb"), connection.makefile("wb")).run()
+    return _leave(status)
+
+
+def _leave(status: int) -> int:
+    """End at once, whatever the analysis is at."""
+    logging.shutdown()
+    sys.stderr.flush()
+    os._exit(status)

@@ -1,0 +1,30 @@
+"""How the garbage collector behaves in a server: never in the middle of a keystroke.
+
+What is loaded and the memos of the first check live as long as the session, so they are taken out of collections; the
+rest is collected in small steps, the old generation seldom. (With the usual thresholds one edit took 274 ms.)
+"""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+THRESHOLDS = (50_000, 50, 1_000)
+
+
+@contextmanager
+def loading() -> Iterator[None]:
+    """Load code without collections, then leave it out of all later ones."""
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.freeze()
+        gc.set_threshold(*THRESHOLDS)
+        gc.enable()
+
+
+def settle() -> None:
+    """What is there now stays."""
+    gc.freeze()

@@ -1,0 +1,161 @@
+"""What a client tells without asking: documents, files, folders, settings.
+
+Owns `NOTIFICATIONS`: a method to the function that handles it on the thread that reads. Documents change here and now;
+what the analysis must know follows as an edit.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from potto_lsp.uris import to_key
+
+if TYPE_CHECKING:
+    from potto_lsp.server import Server
+
+logger = logging.getLogger(__name__)
+Handler = Callable[["Server", Any], None]
+PATTERNS = ("**/*.{po,diffeo}", "**/potto.toml")
+
+
+def _session(server: Server) -> Any:
+    assert server.session is not None
+    return server.session
+
+
+def initialized(server: Server, params: Any) -> None:
+    """The client is ready to be asked."""
+    session = _session(server)
+    if session.client.can("workspace.didChangeWatchedFiles.dynamicRegistration"):
+        watchers = [{"globPattern": pattern} for pattern in PATTERNS]
+        registration = {
+            "id": "potto-files",
+            "method": "workspace/didChangeWatchedFiles",
+            "registerOptions": {"watchers": watchers},
+        }
+        server.request("client/registerCapability", {"registrations": [registration]})
+    if session.client.can("workspace.didChangeConfiguration.dynamicRegistration"):
+        registration = {
+            "id": "potto-settings",
+            "method": "workspace/didChangeConfiguration",
+            "registerOptions": {"section": "potto"},
+        }
+        server.request("client/registerCapability", {"registrations": [registration]})
+    if session.client.can("workspace.configuration"):
+        _ask_settings(server)
+    assert server.worker is not None
+    server.worker.check_again()
+
+
+def _ask_settings(server: Server) -> None:
+    def reply(result: Any, error: Any) -> None:
+        if isinstance(result, list) and result and isinstance(result[0], Mapping):
+            settings = result[0]
+            server.edit(lambda: _configure(server, settings))
+
+    server.request("workspace/configuration", {"items": [{"section": "potto"}]}, reply)
+
+
+def _configure(server: Server, settings: Any) -> None:
+    session = _session(server)
+    session.configure(settings)
+    session.diagnostics_changed()
+
+
+def did_change_configuration(server: Server, params: Any) -> None:
+    """Settings have changed; a client that can be asked for them is asked."""
+    if _session(server).client.can("workspace.configuration"):
+        _ask_settings(server)
+    else:
+        server.edit(lambda: _configure(server, params.get("settings")))
+
+
+def did_open(server: Server, params: Any) -> None:
+    document = server.documents.open(params)
+    server.edit(lambda: _session(server).analysis.put(document))
+
+
+def did_change(server: Server, params: Any) -> None:
+    document = server.documents.change(params)
+    if document is not None:
+        server.edit(lambda: _session(server).analysis.put(document))
+
+
+def did_close(server: Server, params: Any) -> None:
+    document = server.documents.close(params)
+    if document is None:
+        return
+
+    def close() -> None:
+        session = _session(server)
+        session.publisher.closed(document, session.analysis.close(document))
+
+    server.edit(close)
+
+
+def did_save(server: Server, params: Any) -> None:
+    """What is on disk is looked at again, for clients that watch no files."""
+    if not _session(server).client.can("workspace.didChangeWatchedFiles.dynamicRegistration"):
+        key = to_key(params["textDocument"]["uri"])
+        server.edit(lambda: _session(server).analysis.files.refresh((key,)))
+
+
+def did_change_watched_files(server: Server, params: Any) -> None:
+    """Files have changed on disk, appeared or gone."""
+    changes = params["changes"]
+    keys = [to_key(change["uri"]) for change in changes]
+    only_texts = all(change["type"] == 2 for change in changes)
+
+    def refresh() -> None:
+        session = _session(server)
+        if any(key.endswith("potto.toml") for key in keys):
+            session.analysis.reload_projects()
+            session.projects_changed()
+        session.analysis.files.refresh(keys if only_texts else None)
+        session.diagnostics_changed()
+
+    server.edit(refresh)
+
+
+def files_moved(server: Server, params: Any) -> None:
+    """The client has created, renamed or deleted files."""
+    server.edit(lambda: _session(server).analysis.files.refresh())
+
+
+def did_change_workspace_folders(server: Server, params: Any) -> None:
+    event = params["event"]
+    added = [folder["uri"] for folder in event.get("added", [])]
+    removed = {to_key(folder["uri"]) for folder in event.get("removed", [])}
+
+    def change() -> None:
+        from potto_lsp.uris import to_uri
+
+        session = _session(server)
+        kept = [p.folder for p in session.analysis.projects if p.folder not in removed]
+        session.set_folders([*map(to_uri, kept), *added])
+        session.diagnostics_changed()
+
+    server.edit(change)
+
+
+def ignore(server: Server, params: Any) -> None:
+    """Nothing to be done."""
+
+
+NOTIFICATIONS: Mapping[str, Handler] = {
+    "initialized": initialized,
+    "textDocument/didOpen": did_open,
+    "textDocument/didChange": did_change,
+    "textDocument/didClose": did_close,
+    "textDocument/didSave": did_save,
+    "workspace/didChangeWatchedFiles": did_change_watched_files,
+    "workspace/didChangeWorkspaceFolders": did_change_workspace_folders,
+    "workspace/didChangeConfiguration": did_change_configuration,
+    "workspace/didCreateFiles": files_moved,
+    "workspace/didRenameFiles": files_moved,
+    "workspace/didDeleteFiles": files_moved,
+    "window/workDoneProgress/cancel": ignore,
+    "$/setTrace": ignore,
+}

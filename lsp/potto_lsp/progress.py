@@ -1,0 +1,56 @@
+"""Progress that the client shows while something takes long.
+
+Owns `Progress`, which says nothing at all to clients that show none, and nothing while it is over soon.
+"""
+
+from __future__ import annotations
+
+import itertools
+import time
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    from potto_lsp.session import Session
+
+_tokens = itertools.count(1)
+SOON, PAUSE = 0.2, 0.1  # seconds: before the first word, and between words
+
+
+class Progress:
+    """One thing that goes on."""
+
+    def __init__(self, session: Session, title: str) -> None:
+        self._session, self._title = session, title
+        self._token = f"potto-progress-{next(_tokens)}"
+        self._started = self._told = time.monotonic()
+        self._state: Literal["quiet", "asked", "allowed", "shown"] = "quiet"
+
+    def report(self, done: int, of: int) -> None:
+        """So much is done."""
+        now = time.monotonic()
+        if not self._session.client.can("window.workDoneProgress"):
+            return
+        if self._state == "quiet" and now - self._started > SOON:
+            self._state = "asked"
+            self._session.request("window/workDoneProgress/create", {"token": self._token}, self._allow)
+        elif self._state in ("allowed", "shown") and now - self._told > PAUSE:
+            self._told = now
+            value: dict[str, Any] = {"message": f"{done} of {of} files", "percentage": 100 * done // of}
+            if self._state == "allowed":
+                self._state = "shown"
+                self._tell({"kind": "begin", "title": self._title, "cancellable": False, **value})
+            else:
+                self._tell({"kind": "report", **value})
+
+    def end(self) -> None:
+        """It is done."""
+        if self._state == "shown":
+            self._tell({"kind": "end"})
+        self._state = "asked"
+
+    def _allow(self, result: Any, error: Any) -> None:
+        if error is None:
+            self._state = "allowed"
+
+    def _tell(self, value: dict[str, Any]) -> None:
+        self._session.notify("$/progress", {"token": self._token, "value": value})

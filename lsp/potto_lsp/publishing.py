@@ -1,0 +1,149 @@
+"""What is wrong, told to the client: pushed as it is found, or given when it is asked for.
+
+Owns `Publisher`. Open files come first, the last edited one in front; then the rest of the workspace. What has not
+changed is not sent again. A client that asks itself (`textDocument/diagnostic`) is pushed nothing.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from potto_lsp import convert, protocol
+from potto_lsp.project import NAME, Project
+
+if TYPE_CHECKING:
+    from potto.render import Located
+    from potto_lsp.analysis import Analysis
+    from potto_lsp.client import Client
+    from potto_lsp.documents import Document
+    from potto_lsp.text import Text
+
+Notify = Callable[[str, Any], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """What there is to say about a file, as messages; the same `id` means the same messages."""
+
+    found: tuple[Located, ...]
+    text: Text
+    levels: Mapping[str, str]
+    items: list[protocol.Diagnostic]
+    id: str
+
+
+class Publisher:
+    """The reports of all files and what of them the client has. For the thread that owns the database."""
+
+    def __init__(self, analysis: Analysis, client: Client, notify: Notify) -> None:
+        self._analysis, self._client, self._notify = analysis, client, notify
+        self._reports: dict[str, Report] = {}
+        self._sent: dict[str, tuple[str, Document | None]] = {}
+        self._ids = itertools.count(1)
+        self.whole_workspace = True
+
+    def report(self, key: str) -> Report:
+        """What there is to say about a file now."""
+        from potto_lsp.analysis import levelled
+
+        analysis = self._analysis
+        found, text, levels = analysis.diagnostics(key), analysis.text(key), analysis.levels(key)
+        old = self._reports.get(key)
+        elsewhere = any(located.diagnostic.related for located in found)  # in files that may have changed
+        if old is not None and old.found == found and old.text is text and old.levels == levels and not elsewhere:
+            return old
+        items = convert.diagnostics(analysis, self._client, levelled(found, levels), key)
+        if old is not None and old.items == items:
+            new = Report(found, text, levels, old.items, old.id)
+        else:
+            new = Report(found, text, levels, items, f"potto-{next(self._ids)}")
+        self._reports[key] = new
+        return new
+
+    # Pushing
+
+    def steps(self) -> Iterator[Callable[[], None]]:
+        """Check the files one by one and push what is new."""
+        open_keys = list(self._analysis.documents)[::-1]
+        for key in open_keys:
+            yield lambda key=key: self.push(key)  # type: ignore[misc]
+        if not self.whole_workspace:
+            return
+        for key in self._analysis.programs():
+            if key not in self._analysis.documents:
+                yield lambda key=key: self.push(key)  # type: ignore[misc]
+        yield self._clear_gone
+
+    def push(self, key: str) -> None:
+        """Check a file and tell the client if there is something new. An edited file is always told of: the client
+        moves what it shows by guessing."""
+        report = self.report(key)
+        document = self._analysis.document(key)
+        sent = self._sent.get(key)
+        if sent is not None and sent[0] == report.id and (document is None or document is sent[1]):
+            return
+        if sent is None and not report.items and document is None:
+            return
+        self._sent[key] = (report.id, document)
+        if not self._client.pulls:
+            self._publish(self._analysis.uri(key), report.items, document)
+
+    def closed(self, document: Document, key: str) -> None:
+        """A document was closed: what its URI was told is void, as the disk counts again."""
+        self._sent.pop(key, None)
+        if not self._client.pulls:
+            self._publish(document.uri, [], None)
+
+    def _clear_gone(self) -> None:
+        programs = set(self._analysis.programs())
+        for key in [key for key in self._sent if key not in programs]:
+            del self._sent[key]
+            self._reports.pop(key, None)
+            if not self._client.pulls:
+                self._publish(self._analysis.uri(key), [], None)
+
+    def _publish(self, uri: str, items: list[protocol.Diagnostic], document: Document | None) -> None:
+        params: dict[str, Any] = {"uri": uri, "diagnostics": items}
+        if document is not None and document.version is not None:
+            params["version"] = document.version
+        self._notify("textDocument/publishDiagnostics", params)
+
+    # Being asked
+
+    def answer(self, key: str, previous: object) -> dict[str, Any]:
+        """The answer to `textDocument/diagnostic`."""
+        report = self.report(key)
+        if previous == report.id:
+            return {"kind": "unchanged", "resultId": report.id}
+        return {"kind": "full", "resultId": report.id, "items": report.items}
+
+    def workspace_answer(self, key: str, previous: object) -> dict[str, Any]:
+        """One file's part of the answer to `workspace/diagnostic`."""
+        document = self._analysis.document(key)
+        version = None if document is None else document.version
+        return {"uri": self._analysis.uri(key), "version": version, **self.answer(key, previous)}
+
+    # Project files
+
+    def push_projects(self, projects: tuple[Project, ...]) -> None:
+        """What is wrong with project files; nobody asks for that, so it is pushed to every client."""
+        from os.path import join
+
+        from potto_lsp.uris import to_uri
+
+        for project in projects:
+            items = [
+                {
+                    "range": {"start": {"line": line, "character": 0}, "end": {"line": line + 1, "character": 0}},
+                    "severity": convert.SEVERITIES["error"],
+                    "source": "potto",
+                    "message": message,
+                }
+                for line, message in project.problems
+            ]
+            self._notify(
+                "textDocument/publishDiagnostics", {"uri": to_uri(join(project.folder, NAME)), "diagnostics": items}
+            )

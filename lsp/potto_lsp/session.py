@@ -1,0 +1,120 @@
+"""What a session knows once its client has said hello.
+
+Owns `Session`: the client, the analysis, the publisher, the evaluation process and the way back to the client. All of
+it but `notify` and `request` belongs to the thread that owns the database.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+from potto_lsp import memory
+from potto_lsp.client import Client
+from potto_lsp.progress import Progress
+
+if TYPE_CHECKING:
+    from potto.query import Database
+    from potto_lsp.analysis import Analysis
+    from potto_lsp.evaluation import Evaluator
+    from potto_lsp.live import LiveValues
+    from potto_lsp.publishing import Publisher
+
+Reply = Callable[[Any, Any], None]  # what a client answered, and its error; one of the two is None
+
+
+class Session:
+    """One client and what is known of its programs."""
+
+    analysis: Analysis
+    publisher: Publisher
+    live: LiveValues
+    evaluator: Evaluator
+
+    def __init__(
+        self,
+        client: Client,
+        notify: Callable[[str, Any], None],
+        request: Callable[[str, Any, Reply | None], None],
+        later: Callable[[Callable[[], None]], None],
+    ) -> None:
+        self.client, self.notify, self.request = client, notify, request
+        self.later = later  # do something on the thread that owns the database
+        self.tokens: dict[str, tuple[str, list[int]]] = {}
+        self.checked = False
+        self._progress = Progress(self, "Potto: checking the workspace")
+
+    def load(self) -> Database:
+        """Load what the work needs. Runs on the thread that will own the database, after the greeting was answered."""
+        with memory.loading():
+            from potto_lsp.analysis import Analysis
+            from potto_lsp.evaluation import Evaluator
+            from potto_lsp.live import LiveValues
+            from potto_lsp.publishing import Publisher
+
+            self.analysis = Analysis(self.client.encoding)
+            self.analysis.settings = settings_of(self.client.options)
+            self.publisher = Publisher(self.analysis, self.client, self.notify)
+            self.evaluator = Evaluator(self.analysis)
+            self.live = LiveValues(self)
+            self.set_folders(self.client.folders)
+        return self.analysis.db
+
+    def set_folders(self, uris: list[str]) -> None:
+        """The folders of the workspace."""
+        self.analysis.set_folders(uris)
+        self.projects_changed()
+
+    def projects_changed(self) -> None:
+        """Tell what is wrong with project files."""
+        self.publisher.push_projects(self.analysis.projects)
+
+    def configure(self, settings: Any) -> None:
+        """The client's settings under `potto`."""
+        self.analysis.settings = settings_of(settings)
+        self.publisher.whole_workspace = self.analysis.settings.get("diagnostics.scope") != "openFiles"
+
+    def idle(self) -> Iterator[Callable[[], None]]:
+        """The steps of what is done when there is nothing else to do."""
+        if self.checked:
+            yield from self.publisher.steps()
+        else:
+            yield from self._first_check()
+        yield self.live.refresh
+
+    def _first_check(self) -> Iterator[Callable[[], None]]:
+        """The first check of the whole workspace, which may take a while: with progress."""
+        steps = list(self.publisher.steps())
+        for number, step in enumerate(steps):
+            yield step
+            self._progress.report(number + 1, len(steps))
+        yield self._all_checked
+
+    def _all_checked(self) -> None:
+        self.checked = True
+        self._progress.end()
+        memory.settle()
+
+    def close(self) -> None:
+        """The session ends."""
+        evaluator = getattr(self, "evaluator", None)
+        if evaluator is not None:
+            evaluator.close()
+
+    def diagnostics_changed(self) -> None:
+        """Something else than an edit changed what there is to say."""
+        if self.client.pulls and self.client.can("workspace.diagnostics.refreshSupport"):
+            self.request("workspace/diagnostic/refresh", None, None)
+
+
+def settings_of(settings: Any) -> Mapping[str, Any]:
+    """Settings, with or without the `potto` around them, nested ones also under dotted names."""
+    if isinstance(settings, Mapping) and isinstance(settings.get("potto"), Mapping):
+        settings = settings["potto"]
+    if not isinstance(settings, Mapping):
+        return {}
+    flat = dict(settings)
+    for name, value in settings.items():
+        if isinstance(value, Mapping) and name != "lints":
+            flat.update({f"{name}.{inner}": item for inner, item in value.items()})
+    return flat

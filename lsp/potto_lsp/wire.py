@@ -1,0 +1,92 @@
+"""Messages on a stream: `Content-Length` and JSON, as the base protocol has it.
+
+Owns `messages`, which reads them, and `Outbox`, which writes them from any thread without making it wait: a client that
+does not read for a while must not keep the server from reading, or both would wait for ever.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections.abc import Iterator
+from queue import SimpleQueue
+from threading import Thread
+from typing import Any, BinaryIO
+
+logger = logging.getLogger(__name__)
+MOST_BYTES = 256_000_000  # of one message; a header that says more is broken
+
+
+class BadMessage(ValueError):
+    """A body that is no JSON."""
+
+
+def messages(stream: BinaryIO) -> Iterator[Any]:
+    """The messages of a stream until it ends; for a body that is no JSON, a `BadMessage`."""
+    while (length := _header(stream)) is not None:
+        body = stream.read(length)
+        if len(body) < length:
+            logger.error("the stream ended inside of a message")
+            return
+        try:
+            yield json.loads(body)
+        except (ValueError, RecursionError) as error:
+            yield BadMessage(f"{type(error).__name__}: {error}")
+
+
+def _header(stream: BinaryIO) -> int | None:
+    """The length of the next body; None at the end. Field names are in any case; lines may end in LF alone."""
+    length: int | None = None
+    while line := stream.readline(4096):
+        line = line.strip()
+        if line:
+            name, colon, value = line.partition(b":")
+            if colon and name.strip().lower() == b"content-length":
+                length = _length(value)
+            elif not colon:
+                logger.error("a line that is no header field: %r", line[:80])
+        elif length is not None:
+            return length
+    return None
+
+
+def _length(value: bytes) -> int | None:
+    try:
+        length = int(value)
+    except ValueError:
+        length = -1
+    if not 0 <= length <= MOST_BYTES:
+        logger.error("a message cannot be %r bytes long", value[:40])
+        return None
+    return length
+
+
+class Outbox:
+    """Writes messages in the order in which they are put."""
+
+    def __init__(self, stream: BinaryIO) -> None:
+        self._stream = stream
+        self._queue: SimpleQueue[Any] = SimpleQueue()
+        self._thread = Thread(target=self._write, name="potto-outbox", daemon=True)
+        self._thread.start()
+
+    def put(self, message: dict[str, Any]) -> None:
+        """Send a message some time soon. What it is made of must not change any more."""
+        self._queue.put(message)
+
+    def close(self, seconds: float = 2.0) -> None:
+        """Write what is left, for at most so long."""
+        self._queue.put(None)
+        self._thread.join(seconds)
+
+    def _write(self) -> None:
+        while (message := self._queue.get()) is not None:
+            # Escaped to ASCII: half of a surrogate pair, which JSON may carry, would not go into UTF-8.
+            body = json.dumps(message, separators=(",", ":")).encode("ascii")
+            try:
+                self._stream.write(b"Content-Length: %d\r\n\r\n%b" % (len(body), body))
+                if self._queue.empty():
+                    self._stream.flush()
+            except (OSError, ValueError) as error:
+                logger.info("the client does not listen any more: %s", error)
+                return

@@ -1,0 +1,156 @@
+"""The one thread that owns the database, and the order in which it works.
+
+Owns `Job` and `Worker`. Edits and quick questions are done in the order in which they came. Slow questions (over the
+whole workspace) and the checking of files wait until nothing else is there, and give way to whatever comes: the
+database is cancelled, unwinds at the entry of the next query, and what was found until then is kept.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from itertools import chain
+from queue import Empty, SimpleQueue
+from threading import Lock, Thread
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from potto.query import Database
+
+logger = logging.getLogger(__name__)
+LONG = 0.05  # seconds after which even a quick question gives way to an edit
+
+_claims = Lock()
+
+
+@dataclass(eq=False)
+class Job:
+    """Something to do. Whoever `claim`s it may answer it, and nobody else."""
+
+    kind: Literal["edit", "quick", "slow", "idle"]
+    run: Callable[[], None]
+    outdated: Callable[[], bool] = field(default=lambda: False)
+    drop: Callable[[], None] = field(default=lambda: None)
+    stop: Callable[[], None] = field(default=lambda: None)
+    _claimed: bool = False
+
+    def claim(self) -> bool:
+        """True for the first that asks."""
+        with _claims:
+            claimed, self._claimed = self._claimed, True
+            return not claimed
+
+    @property
+    def claimed(self) -> bool:
+        return self._claimed
+
+
+class Worker:
+    """A queue of jobs and the thread that does them. `idle` gives the steps of what to do when there are none."""
+
+    def __init__(self, start: Callable[[], Database], idle: Callable[[], Iterator[Callable[[], None]]]) -> None:
+        self._start, self._idle = start, idle
+        self._db: Database | None = None
+        self._inbox: SimpleQueue[Job | None] = SimpleQueue()
+        self._quick: deque[Job] = deque()
+        self._slow: deque[Job] = deque()
+        self._steps: Iterator[Callable[[], None]] | None = None
+        self._running: Job | None = None
+        self._since = 0.0
+        self._thread = Thread(target=self._work, name="potto-analysis", daemon=True)
+
+    def start(self) -> None:
+        """Begin; what is put before waits."""
+        self._thread.start()
+
+    def put(self, job: Job) -> None:
+        """Add a job, from any thread. What runs gives way if it is less urgent."""
+        self._inbox.put(job)
+        running, db = self._running, self._db
+        if running is None or db is None or (job.kind == "slow" and running.kind != "idle"):
+            return
+        if running.kind in ("slow", "idle") or (job.kind == "edit" and time.monotonic() - self._since > LONG):
+            db.cancel()
+
+    def cancelled(self, job: Job) -> None:
+        """Nobody waits for a job any more."""
+        if self._running is job and self._db is not None:
+            self._db.cancel()
+
+    def _work(self) -> None:
+        try:
+            self._db = self._start()
+        except BaseException:
+            logger.critical("the analysis cannot start", exc_info=True)
+            raise
+        while True:
+            job = self._next()
+            if job is not None:
+                self._do(job)
+
+    def _next(self) -> Job | None:
+        """The next job; None after a step of what is done in idle time."""
+        self._receive(wait=False)
+        if self._quick:
+            return self._quick.popleft()
+        if self._slow:
+            return self._slow.popleft()
+        if self._steps is None:
+            self._receive(wait=True)
+            return None
+        step = next(self._steps, None)
+        if step is None:
+            self._steps = None
+            return None
+        return Job("idle", step)
+
+    def _receive(self, wait: bool) -> None:
+        try:
+            while True:
+                job = self._inbox.get(block=wait)
+                wait = False
+                if job is None:
+                    self._steps = self._idle()
+                    continue
+                if job.kind == "slow":
+                    self._slow.append(job)
+                else:
+                    self._quick.append(job)
+                if job.kind == "edit":
+                    self._steps = self._idle()
+        except Empty:
+            return
+
+    def check_again(self) -> None:
+        """Begin what is done in idle time anew."""
+        self._inbox.put(None)
+
+    def _do(self, job: Job) -> None:
+        from potto.query import Cancelled
+
+        assert self._db is not None
+        if job.claimed:
+            return
+        if job.kind != "edit" and job.outdated():
+            job.drop()
+            return
+        self._since, self._running = time.monotonic(), job
+        try:
+            with self._db.evaluating():
+                job.run()
+        except Cancelled:
+            self._give_way(job)
+        except Exception:
+            logger.error("a job failed", exc_info=True)
+        finally:
+            self._running = None
+
+    def _give_way(self, job: Job) -> None:
+        """Come back to a job after all that is more urgent; to a step of idle time only if no edit starts them anew."""
+        if job.kind == "idle":
+            self._steps = chain([job.run], self._steps or ())
+        elif not job.claimed:
+            self._slow.appendleft(job)
