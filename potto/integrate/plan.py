@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from potto.calculus.cases import cased
 from potto.calculus.hoist import hidden, hoisted
 from potto.calculus.surfaces import Decide, Resolve, findings
 from potto.calculus.sweep import Cut, Level, sweep
@@ -130,6 +131,7 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve) -> P
             decisions[plain] = decide(plain)
         return decisions[plain]
 
+    term = cased(term)
     found = findings(term.body, known, remember)
     reaches = not (unknown or hidden(term, found, resolve))
     if not reaches:

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from potto.calculus.cases import cased
 from potto.calculus.surfaces import TooDeep
 from potto.core.terms import Global, Integral, Lam, Sum, Term, Var, integral, postorder, substitute, var
 from potto.diagnostics import PottoError
@@ -138,20 +137,11 @@ def counted(sums: Sums, plan: Plan, machine: Machine) -> Sums:
 
 
 def orders(term: Integral) -> Iterator[Integral]:
-    """The integral as it is written, then with other variables innermost, then with its conditions in cases.
+    """The integral as it is written, then with other variables innermost, where the bounds allow it.
 
     A surface that runs along the innermost variable has no section in it; another variable then takes its place.
     """
     yield term
-    yield from _turned(term)
-    taken_apart = cased(term)
-    if taken_apart is not term:
-        yield taken_apart
-        yield from _turned(taken_apart)
-
-
-def _turned(term: Integral) -> Iterator[Integral]:
-    """The integral with each of the other variables innermost, where the bounds allow it."""
     names = set(term.variables)
     if any((lo.free | hi.free) & names for lo, hi in term.bounds):
         return
