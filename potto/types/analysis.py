@@ -25,11 +25,24 @@ from potto.types.lints import lints
 from potto.types.reasons import Reasons
 from potto.types.recursion import endless
 from potto.types.scope import Outside
-from potto.types.types import UNKNOWN, Diffeo, Function, Meta, Parameter, Real, Type, Unknown, groups_of, resolve
+from potto.types.types import UNKNOWN, Diffeo, Dist, Function, Meta, Parameter, Real, Type, Unknown, groups_of, resolve
 from potto.types.unify import close_type, unify
-from potto.types.values import STILL, Closure, Port, Scalar, Source, TupleValue, Value, flat, inputs_of, symbolic
+from potto.types.values import (
+    STILL,
+    Closure,
+    Port,
+    Scalar,
+    Source,
+    TupleValue,
+    Value,
+    flat,
+    inputs_of,
+    larger,
+    symbolic,
+)
 
 MAX_ROUNDS = 20
+MAX_PARTS = 500
 
 Written = nodes.Definition | nodes.DiffeoDefinition
 
@@ -72,6 +85,8 @@ def analyse(
     for _ in range(MAX_ROUNDS if recursive else 1):
         walked = {target: _walk(inferences[target], item, flows) for target, item in items.items()}
         closed = {target: Closing(value).value(value) for target, (_, value) in walked.items()}
+        if any(larger(value, MAX_PARTS) for value in closed.values()):
+            break  # a definition in terms of its own derivative: each round doubles it
         if closed == flows:
             break
         flows = closed
@@ -226,9 +241,8 @@ def local_type(type: Type, value: Value | None) -> Type:
     """A type inside a definition: a number says which variables of integration it varies with."""
     type = resolve(type)
     if isinstance(type, Real) and isinstance(value, Scalar):
-        from potto.types.types import Dist
-
-        names = tuple(dict.fromkeys(source.name for source in value.sources if source.kind == "variable"))
+        varying = sorted((s for s in value.sources if s.kind == "variable"), key=lambda source: source.span)
+        names = tuple(dict.fromkeys(source.name for source in varying))
         return Dist(names) if value.spikes else Real(variables=names)
     if isinstance(value, Closure):
         return Decorating(value).type(close_type(type), value)

@@ -206,6 +206,24 @@ def steps(trail: Trail) -> tuple[Step, ...]:
     return tuple(found)
 
 
+def larger(value: Value, limit: int) -> bool:
+    """Whether a value has more than `limit` parts; counted no further than that."""
+    stack: list[Value] = [value]
+    while stack and limit >= 0:
+        limit -= 1
+        part = stack.pop()
+        match part:
+            case TupleValue(items):
+                stack.extend(items)
+            case ListValue(item):
+                stack.append(item)
+            case Closure(inputs, result):
+                stack.extend((*inputs, result))
+            case _:
+                pass
+    return limit < 0
+
+
 def noted(value: Value, step: Step) -> Value:
     """A value whose dependences have gone one step further."""
     return _each(value, lambda s: {source: then(trail, step) for source, trail in s.items()})
