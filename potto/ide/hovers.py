@@ -251,14 +251,19 @@ def _at_condition(db: Database, chunk: ChunkAt, offset: int) -> Hover | None:
         return None
     innermost = min(around, key=lambda info: len(info.span)).span
     shown = [condition_markdown(info) for info in around if info.span == innermost]
-    return Hover(chunk.absolute(innermost), RULE.join(shown))
+    return Hover(chunk.absolute(_around(chunk.text, innermost)), RULE.join(shown))
 
 
 def _near(text: str, span: Span, at: int) -> bool:
-    """In a condition, or on the bracket around it."""
-    left = span.start - (1 if text[span.start - 1 : span.start] in ("[", "(") and span.start else 0)
-    right = span.end + (1 if text[span.end : span.end + 1] in ("]", ")", "?") else 0)
-    return left <= at <= right
+    around = _around(text, span)
+    return around.start <= at <= around.end
+
+
+def _around(text: str, span: Span) -> Span:
+    """A condition with the bracket around it."""
+    left = text[max(span.start - 1, 0) : span.start]
+    closed = {"[": "]", "(": ")"}.get(left, "")
+    return Span(span.start - 1, span.end + 1) if closed and text[span.end : span.end + 1] == closed else span
 
 
 def _in_comment(db: Database, chunk: ChunkAt, relative: int) -> bool:
