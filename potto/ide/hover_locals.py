@@ -7,7 +7,7 @@ from potto.ide.places import ChunkAt
 from potto.ide.symbols import LocalSymbol, owner
 from potto.query import Database
 from potto.source import Span
-from potto.syntax import nodes, print_expression, walk
+from potto.syntax import nodes, walk
 from potto.types import (
     ListOf,
     Real,
@@ -100,7 +100,7 @@ def _variable(db: Database, chunk: ChunkAt, span: Span, variable: str, name: str
     if isinstance(node, nodes.Integral):
         place = [v.span for v in node.variables].index(span)
         if place < len(node.bounds):
-            parts.append(_domain(node.bounds[place], variable))
+            parts.append(_domain(chunk, node.bounds[place], variable))
     if name is None:
         return parts
     typed = typed_names(db, chunk.file, name)
@@ -116,10 +116,15 @@ def _variable(db: Database, chunk: ChunkAt, span: Span, variable: str, name: str
     return parts
 
 
-def _domain(bounds: nodes.Interval | nodes.MeasureBound, variable: str) -> str:
+def written(chunk: ChunkAt, expr: nodes.Expr) -> str:
+    """An expression as it is written, on one line."""
+    return " ".join(chunk.text[expr.span.start : expr.span.end].split())
+
+
+def _domain(chunk: ChunkAt, bounds: nodes.Interval | nodes.MeasureBound, variable: str) -> str:
     if isinstance(bounds, nodes.Interval):
-        return f"from {code(print_expression(bounds.lo))} to {code(print_expression(bounds.hi))}"
-    arguments = ", ".join(print_expression(a) for a in bounds.arguments)
+        return f"from {code(written(chunk, bounds.lo))} to {code(written(chunk, bounds.hi))}"
+    arguments = ", ".join(written(chunk, a) for a in bounds.arguments)
     return f"distributed as {code(f'{variable} ~ {bounds.measure}({arguments})')}"
 
 
@@ -139,11 +144,11 @@ def _value(db: Database, chunk: ChunkAt, span: Span, type: Type) -> list[str]:
     node = bound_by(db, chunk, span)
     parts: list[str] = []
     match node:
-        case nodes.Binding(value=value) if len(text := print_expression(value)) <= LONG_VALUE:
+        case nodes.Binding(value=value) if len(text := written(chunk, value)) <= LONG_VALUE:
             parts.append(f"is {code(text)}")
         case nodes.Sum(lo=lo, hi=hi):
-            parts.append(f"from {code(print_expression(lo))} to {code(print_expression(hi))}")
-        case nodes.For(iterable=iterable) if len(text := print_expression(iterable)) <= LONG_VALUE:
+            parts.append(f"from {code(written(chunk, lo))} to {code(written(chunk, hi))}")
+        case nodes.For(iterable=iterable) if len(text := written(chunk, iterable)) <= LONG_VALUE:
             parts.append(f"in {code(text)}")
         case _:
             pass

@@ -4,6 +4,7 @@ and nothing outside of the text."""
 from __future__ import annotations
 
 import random
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -48,7 +49,7 @@ def ask_everything(library: Library, file: str, text: str, offsets) -> None:
         for highlight in ide.highlights(db, file, offset):
             inside(highlight.span)
         ranges = ide.selection_ranges(db, file, offset)
-        for inner, outer in zip(ranges, ranges[1:]):
+        for inner, outer in pairwise(ranges):
             assert outer.start <= inner.start <= inner.end <= outer.end
         ide.linked_editing(db, file, offset)
         ide.prepare_rename(db, file, offset)
@@ -63,7 +64,7 @@ def ask_about_file(library: Library, file: str, text: str, whole: Span) -> None:
     db = library.db
     ide.document_symbols(db, file)
     tokens = ide.semantic_tokens(db, file)
-    for before, after in zip(tokens, tokens[1:]):
+    for before, after in pairwise(tokens):
         assert before.span.end <= after.span.start
     for token in tokens:
         assert token.type in ide.TOKEN_TYPES and set(token.modifiers) <= set(ide.TOKEN_MODIFIERS)
@@ -90,7 +91,7 @@ def test_every_feature_at_every_offset(name: str) -> None:
 
 @pytest.mark.parametrize("name", FILES)
 def test_heavy_features_at_every_word(name: str) -> None:
-    library, file, text = opened(name)
+    library, file, _ = opened(name)
     db = library.db
     for symbol in ide.document_symbols(db, file):
         for each in (symbol, *symbol.children):
@@ -112,7 +113,8 @@ def mutated(text: str, rng: random.Random) -> str:
             case 1:
                 text = text[:at] + rng.choice("()[],.;:=?\\~ \nθ'\"#+-*") + text[at:]
             case 2:
-                text = text[:at] + rng.choice([" if ", " integral ", "\ndef ", "diffeo", " d(", "\r\n", "let x = "]) + text[at:]
+                words = [" if ", " integral ", "\ndef ", "diffeo", " d(", "\r\n", "let x = "]
+                text = text[:at] + rng.choice(words) + text[at:]
             case _:
                 text = text[: max(at, 1)]
     return text

@@ -1,0 +1,186 @@
+"""Hover: what the calculus knows, where the cursor is."""
+
+from __future__ import annotations
+
+import pytest
+from ide_fixture import fixture
+
+import potto.ide as ide
+
+PAPER = """
+    # file: half_plane.diffeo
+    # a diffeomorphism of (x, y), with the parameter c
+    cond = \\(x, y) . \\c . (x + y + c, x - y + c)
+    # file: renderer.po
+    from half_plane import cond
+    # Integrates a shader over the half plane.
+    def renderer(c, shader)
+        integral ([0,1], [0,1])
+            ((shader (x,y)) c)
+            *(((cond (x, y)) c)?1:0) d(x,y)
+    drenderer = deriv(renderer)
+    # file: main.po
+    from renderer import drenderer
+    import half_plane as planes
+    shade = deriv(\\(x,y) . c. 1)
+    print(drenderer(dc=(-2,1), $0shade))
+    """
+
+
+def test_function_shows_its_types_its_comment_and_both_terms():
+    f = fixture(PAPER.replace("def renderer", "def $0renderer").replace("print(drenderer(dc=(-2,1), $0", "print(drenderer(dc=(-2,1), "))
+    text = f.hover()
+    assert "renderer : (c: Real, shader: (Real*, Real*) -> Real -> Real) -> Real" in text
+    assert "drenderer : (dc: (Real, Real), " in text
+    assert "Integrates a shader over the half plane." in text
+    assert "- interior: `dshader(x, y)((c, dc))*[x + y + c >= 0]`" in text
+    assert "- boundary: `shader(x, y)(c)*delta(x + y + c)*dc`" in text
+    assert "- `x + y + c = 0` moved by `c`; at `y = -x - c`" in text
+
+
+def test_diffeomorphism_shows_inverse_and_determinant():
+    f = fixture(PAPER.replace("import cond", "import co$0nd").replace("$0shade", "shade"))
+    text = f.hover()
+    assert "(x: Real*, y: Real*) -> (c: Real*) -> Diffeo[2]" in text
+    assert "- inverse: `(u, v) . ((u - 2*c + v)/2, (u - v)/2)`" in text  # by hand: u+v = 2x+2c, u-v = 2y
+    assert "- determinant: `-2`" in text
+    assert "half_plane.diffeo" in text
+
+
+def test_import_shows_the_interface_of_the_module():
+    f = fixture(PAPER)
+    text = f.hover("half_plane")
+    assert "cond : (x: Real*, y: Real*) -> (c: Real*) -> Diffeo[2]" in text
+    assert "a diffeomorphism of" not in text  # that is about `cond`
+    assert f.hover("planes") == text
+
+
+def test_keyword_of_a_derivative_shows_the_dual_of_the_parameter():
+    text = fixture(PAPER).hover("dc=")
+    assert text.startswith("```potto\ndc : (Real, Real)\n")
+    assert "parameter of `renderer`" in text and "moves the surface `x + y + c = 0`" in text
+
+
+@pytest.mark.parametrize("needle", ["[x^2", "x^2 + y^2 <", "]) d("])
+def test_condition_shows_what_completes_it(needle):
+    f = fixture("def quarter(r)\n    integral ([0, 1], [0, 1]) ([x^2 + y^2 < r^2]) d(x, y)\n")
+    by = {"[x^2": 0, "x^2 + y^2 <": 5, "]) d(": 1}[needle]
+    text = f.hover(needle, by)
+    assert "```potto\ndiffeo(r^2 - (x^2 + y^2), x)\n```" in text
+    assert "completed by `x`" in text and "moved by `r`" in text
+    assert "- determinant: `2*y`" in text  # of (r² - x² - y², x) over (x, y): |-2x -2y; 1 0| = 2y
+    assert "- surface: `y = -sqrt((r - x)*(r + x))`" in text
+
+
+def test_condition_without_a_diffeomorphism_says_why():
+    f = fixture("def f(t)\n    integral ([0, 1], [0, 1]) [x^5 + x*y^3 + sin(x*y) + y^5 < t] d(x, y)\n")
+    text = f.hover(" < t", 1)
+    assert text.startswith("**no diffeomorphism** over `x, y`: ")
+
+
+def test_variable_of_integration_shows_its_domain_and_what_varies_with_it():
+    f = fixture(
+        """
+        def f(a, t)
+            integral [a, 2*a] (let s = $0x*a in [s < t]*s) d(x)
+        """
+    )
+    text = f.hover()
+    assert "x : Real[x]" in text and "variable of integration of `f`" in text
+    assert "from `a` to `2*a`" in text
+    assert "varies with it: `s`" in text
+    assert "moved by `a`, `t`" in text
+
+
+def test_variable_of_a_measure_shows_the_measure():
+    f = fixture("def f(m)\n    integral (x ~ normal(m, 2)) x^2 d(x)\n")
+    assert "`x ~ normal(m, 2)`" in f.hover("x^2")
+    text = f.hover("normal")
+    assert "x ~ normal(m, s)" in text and "- mean: `m`" in text and "- variance: `s*s`" in text or "s^2" in text
+
+
+def test_local_name_and_sum_and_loop():
+    f = fixture(
+        """
+        def f(a)
+            b = a*2
+            b + sum i in 1..3 (i*b)
+        for v in [1, 2]:
+            print(f(v))
+        """
+    )
+    assert "is `a*2`" in f.hover("b +") and "b : Real\n" in f.hover("b +")
+    assert "from `1` to `3`" in f.hover("i*b")
+    assert "v : Real" in f.hover("v))") and "in `[1, 2]`" in f.hover("v))")
+
+
+@pytest.mark.parametrize(
+    ("name", "parts"),
+    [
+        ("sqrt", ("sqrt : (x: Real*) -> Real", "d sqrt(x) = ")),
+        ("sin", ("d sin(x) = cos(x)*dx",)),
+        ("max", ("bends where", "…")),
+        ("floor", ("(x: Real) -> Real", "it jumps")),
+        ("deriv", ("duals",)),
+        ("pi", ("Real",)),
+    ],
+)
+def test_builtin_shows_its_rule(name, parts):
+    f = fixture(f"y = {name}\n")
+    text = f.hover(name)
+    for part in parts:
+        assert part in text
+
+
+def test_keywords_and_types_are_explained():
+    f = fixture("def f(a: Real*) -> Real\n    integral [0, a] [x < 0.5] d(x)\n")
+    assert "surfaces" in f.hover("integral") and "moving bound" in f.hover("integral")
+    assert "accepts one that does" in f.hover("Real*")
+    assert "Defines a function" in f.hover("def")
+
+
+def test_plain_parameter_says_so():
+    f = fixture("def f(a, b) if a > 0 then b else 1\n")
+    assert "must not vary: `a`" in f.hover("f(")
+    assert "must not vary" in f.hover("a,") and "must not vary" not in f.hover("b)")
+
+
+def test_shadowing_finds_the_inner_name():
+    f = fixture("x = 3\ndef f(x) (let x = x + 1 in $0x*2) + x\n")
+    assert "is `x + 1`" in f.hover()
+    assert "parameter of `f`" in f.hover("x)", 0)
+    assert f.hover("x = 3").startswith("```potto\nx : Real")
+
+
+def test_re_exported_and_unicode_names():
+    f = fixture(
+        """
+        # file: a.po
+        # The angle.
+        def θ(α) α/2
+        # file: b.po
+        from a import θ as θ_half
+        # file: main.po
+        from b import θ_half
+        y = θ_ha$0lf(1)
+        """
+    )
+    assert "The angle." in f.hover() and "α: Real" in f.hover() and "a.po" in f.hover()
+
+
+def test_broken_text_keeps_what_can_be_read():
+    f = fixture("def g(a, b) a*b\ndef f(a)\n    integral [0, 1] $0g(a, x + ) d(x\n")
+    assert "g : (a: Real*, b: Real*) -> Real" in f.hover()
+    assert f.hover("a, x") != ""
+
+
+def test_a_comment_has_no_hover_but_a_live_expression_has():
+    f = fixture("def f(x) x\n\n# f and integral\n#> f(2)\n")
+    assert f.hover("f and") == "" and f.hover("integral") == ""
+    assert "f : " in f.hover("f(2)")
+
+
+def test_hover_is_one_word():
+    f = fixture("def f(x) x + 1\n")
+    found = ide.hover(f.db, f.file, f.find("x +"))
+    assert found is not None and f.at(found.span) == "x"
