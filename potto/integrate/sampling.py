@@ -13,7 +13,7 @@ scramblings of Sobol points. Samples that fall nowhere count as zero; none is ev
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -54,7 +54,7 @@ def _one(plan: Plan, machine: Any, env: dict[str, Value], method: str) -> Sums:
         et = SIGMAS * tangents.std(axis=0, ddof=1) / np.sqrt(REPLICATES)
     else:
         generator = np.random.default_rng(settings.seed)
-        run = _Run(plan, machine, env, lambda n, d: generator.random((n, d)), False)
+        run = _Run(plan, machine, env, partial(_random, generator), False)
         v, se, t, set_ = run.means(settings.samples)
         e, et = SIGMAS * se, SIGMAS * set_
     return Sums(v[:, None], e[:, None], t[:, :, None], et[:, :, None])
@@ -64,15 +64,26 @@ def _member(i: int) -> Callable[[Array], Array]:
     return lambda a: a[i : i + 1]
 
 
-def _scrambled(seed: int) -> Callable[[int, int], Array]:
+def _random(generator: np.random.Generator, count: int, dims: int) -> Iterator[Array]:
+    for size in _sizes(count):
+        yield generator.random((size, dims))
+
+
+def _scrambled(seed: int) -> Callable[[int, int], Iterator[Array]]:
     return lambda count, dims: _sobol(count, dims, seed)
 
 
-def _sobol(count: int, dims: int, seed: int) -> Array:
+def _sobol(count: int, dims: int, seed: int) -> Iterator[Array]:
     from scipy.stats import qmc
 
-    points: Array = qmc.Sobol(max(dims, 1), scramble=True, seed=seed).random(count)
-    return points[:, :dims]
+    engine = qmc.Sobol(max(dims, 1), scramble=True, seed=seed)
+    for size in _sizes(count):
+        yield engine.random(size)[:, :dims]
+
+
+def _sizes(count: int) -> Iterator[int]:
+    """A number of points in chunks: an interrupt waits for one of them at most, and so does memory."""
+    return (min(CHUNK, count - start) for start in range(0, count, CHUNK))
 
 
 @dataclass
@@ -83,14 +94,38 @@ class _Point:
     volume: Cell
 
 
+class _Moments:
+    """Mean and spread of samples that come in chunks, each put together from those of the chunks (Chan et al.)."""
+
+    def __init__(self) -> None:
+        self.any = False
+        self.counts: list[int] = []
+        self.means: list[Array] = []
+        self.spreads: list[Array] = []
+
+    def add(self, x: Array) -> None:
+        self.any = self.any or bool(x.any())
+        self.counts.append(x.shape[-1])
+        self.means.append(x.mean(axis=-1))
+        self.spreads.append(x.var(axis=-1))
+
+    def mean_and_deviation(self, root: float) -> tuple[Array, Array]:
+        shares = np.array(self.counts) / sum(self.counts)
+        means, spreads = np.stack(self.means, axis=-1), np.stack(self.spreads, axis=-1)
+        mean = (means * shares).sum(axis=-1)
+        variance = (spreads * shares).sum(axis=-1) + ((means - mean[..., None]) ** 2 * shares).sum(axis=-1)
+        return mean, np.sqrt(variance) / root
+
+
 @dataclass
 class _Run:
-    """Means over one set of points. `points(n, d)` gives points of the d-dimensional cube; `exact_inner` as above."""
+    """Means over one set of points. `points(n, d)` gives n points of the d-dimensional cube, in chunks; `exact_inner`
+    as above."""
 
     plan: Plan
     machine: Any
     env: dict[str, Value]
-    points: Callable[[int, int], Array]
+    points: Callable[[int, int], Iterator[Array]]
     exact_inner: bool
 
     def means(self, count: int) -> tuple[Array, Array, Array, Array]:
@@ -117,14 +152,15 @@ class _Run:
         if dims == 0:
             v, t = f(np.zeros((1, 0)))
             return v[:, 0], np.zeros(v.shape[0]), t[..., 0], np.zeros(t.shape[:2])
-        u = self.points(count, dims)
-        parts = [f(u[i : i + CHUNK]) for i in range(0, count, CHUNK)]
-        v = np.concatenate([p[0] for p in parts], axis=-1)
-        t = np.concatenate([p[1] for p in parts], axis=-1)
+        values, tangents = _Moments(), _Moments()
+        for u in self.points(count, dims):
+            v, t = f(u)
+            values.add(v)
+            tangents.add(t)
         root = np.sqrt(max(count - 1, 1))
-        if not v.any() and not t.any():
+        if not values.any and not tangents.any:
             self.machine.note_unfinished("no sample fell where it counts: the error estimate says nothing")
-        return v.mean(axis=-1), v.std(axis=-1) / root, t.mean(axis=-1), t.std(axis=-1) / root
+        return *values.mean_and_deviation(root), *tangents.mean_and_deviation(root)
 
     # The two kinds of means
 

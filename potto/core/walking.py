@@ -1,0 +1,240 @@
+"""Walking terms without recursion: children, rebuilding, postorder, substitution.
+
+Owns what every pass is made of. Only binders recurse, and they nest no deeper than a person writes them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from potto.core.folding import apply
+from potto.core.kinds import (
+    App,
+    Branch,
+    Const,
+    Delta,
+    Deriv,
+    Global,
+    Hole,
+    If,
+    Integral,
+    Lam,
+    ListOf,
+    Prim,
+    Proj,
+    Sum,
+    Term,
+    Tuple,
+    Var,
+    app,
+    branch,
+    delta,
+    deriv,
+    if_,
+    integral,
+    lam,
+    list_of,
+    proj,
+    sum_,
+    tuple_,
+    union_of,
+    var,
+)
+
+
+def children(term: Term) -> tuple[Term, ...]:
+    """The subterms of a term, in the order in which `rebuild` takes them."""
+    match term:
+        case Const() | Var() | Global() | Hole():
+            return ()
+        case Prim(args=args):
+            return args
+        case If():
+            return (term.condition, term.then, term.orelse)
+        case Branch():
+            return (*term.coordinates, term.then, term.orelse)
+        case Tuple(items=items) | ListOf(items=items):
+            return items
+        case Proj():
+            return (term.term,)
+        case Lam():
+            return (term.body,)
+        case App():
+            return (term.function, *term.args)
+        case Integral():
+            return (
+                *(b for pair in term.bounds for b in pair),
+                *(p for points in term.hints for p in points),
+                term.body,
+            )
+        case Delta():
+            return term.coordinates
+        case Sum():
+            return (term.lo, term.hi, term.body)
+        case Deriv():
+            return (term.function,)
+
+
+def rebuild(term: Term, parts: tuple[Term, ...]) -> Term:
+    """The same term over other children, folded by the smart constructors."""
+    if all(new is old for new, old in zip(parts, children(term), strict=True)):
+        return term
+    match term:
+        case Const() | Var() | Global() | Hole():
+            return term
+        case Prim():
+            return apply(term.op, *parts)
+        case If():
+            return if_(*parts)
+        case Branch():
+            return branch(parts[:-2], term.strict, parts[-2], parts[-1])
+        case Tuple():
+            return tuple_(parts)
+        case ListOf():
+            return list_of(parts)
+        case Proj():
+            return proj(parts[0], term.index)
+        case Lam():
+            return lam(term.params, parts[0])
+        case App():
+            return app(parts[0], parts[1:])
+        case Integral():
+            n = len(term.variables)
+            bounds = tuple((parts[2 * i], parts[2 * i + 1]) for i in range(n))
+            rest = iter(parts[2 * n : -1])
+            hints = tuple(tuple(next(rest) for _ in points) for points in term.hints)
+            return integral(term.variables, bounds, parts[-1], hints)
+        case Delta():
+            return delta(parts)
+        case Sum():
+            return sum_(term.variable, *parts)
+        case Deriv():
+            return deriv(parts[0])
+
+
+def postorder(*roots: Term) -> list[Term]:
+    """Every distinct subterm once, children before parents. Does not recurse."""
+    seen: set[Term] = set()
+    order: list[Term] = []
+    stack: list[tuple[Term, bool]] = [(root, False) for root in reversed(roots)]
+    while stack:
+        term, done = stack.pop()
+        if done:
+            order.append(term)
+        elif term not in seen:
+            seen.add(term)
+            stack.append((term, True))
+            stack.extend((child, False) for child in reversed(children(term)) if child not in seen)
+    return order
+
+
+def bound_names(term: Term) -> tuple[str, ...]:
+    match term:
+        case Lam(params=params):
+            return params
+        case Integral(variables=variables):
+            return variables
+        case Sum(variable=variable):
+            return (variable,)
+        case _:
+            return ()
+
+
+def fresh(name: str, taken: Iterable[str]) -> str:
+    """A name like `name` that is not taken: `x`, `x'1`, `x'2`, ..."""
+    taken = set(taken)
+    stem, number, candidate = name.split("'")[0], 0, name
+    while candidate in taken:
+        number += 1
+        candidate = f"{stem}'{number}"
+    return candidate
+
+
+def substitute(term: Term, mapping: Mapping[str, Term]) -> Term:
+    """Replace free variables by terms at once, renaming binders that would capture."""
+    mapping = {name: new for name, new in mapping.items() if name in term.free}
+    if not mapping:
+        return term
+    return _Substitution(mapping).run(term)
+
+
+class _Substitution:
+    """One mapping and what it has made of the terms met so far. Recursion only at binders."""
+
+    def __init__(self, mapping: Mapping[str, Term]) -> None:
+        self.mapping = mapping
+        self.names = frozenset(mapping)
+        self.memo: dict[Term, Term] = {}
+        self.incoming = union_of(mapping.values())
+
+    def run(self, root: Term) -> Term:
+        stack: list[tuple[Term, bool]] = [(root, False)]
+        memo = self.memo
+        while stack:
+            term, ready = stack.pop()
+            if term in memo:
+                continue
+            if not (term.free & self.names):
+                memo[term] = term
+            elif isinstance(term, Var):
+                memo[term] = self.mapping[term.name]
+            elif bound_names(term):
+                memo[term] = self.binder(term)
+            elif ready:
+                memo[term] = rebuild(term, tuple(memo[c] for c in children(term)))
+            else:
+                stack.append((term, True))
+                stack.extend((c, False) for c in children(term) if c not in memo)
+        return memo[root]
+
+    def binder(self, term: Term) -> Term:
+        bound = bound_names(term)
+        inner = {n: t for n, t in self.mapping.items() if n not in bound}
+        clash = [n for n in bound if n in self.incoming]
+        if clash:
+            taken = set(self.incoming) | set(term.free) | set(bound) | {n for c in children(term) for n in c.free}
+            names: dict[str, str] = {}
+            for n in clash:
+                names[n] = fresh(n, taken)
+                taken.add(names[n])
+            term = rename_bound(term, names)
+            return self.binder(term)
+        if isinstance(term, Integral):
+            return self.integral(term)
+        if isinstance(term, Sum):
+            return sum_(term.variable, self.run(term.lo), self.run(term.hi), substitute(term.body, inner))
+        assert isinstance(term, Lam)
+        return lam(term.params, substitute(term.body, inner))
+
+    def integral(self, term: Integral) -> Term:
+        """Bounds of variable k see the variables before k only: the mapping thins as it goes in."""
+        inner = dict(self.mapping)
+        bounds: list[tuple[Term, Term]] = []
+        hints: list[tuple[Term, ...]] = []
+        for name, (lo, hi), points in zip(term.variables, term.bounds, term.hints, strict=True):
+            bounds.append((substitute(lo, inner), substitute(hi, inner)))
+            hints.append(tuple(substitute(p, inner) for p in points))
+            inner.pop(name, None)
+        return integral(term.variables, tuple(bounds), substitute(term.body, inner), tuple(hints))
+
+
+def rename_bound(term: Term, names: Mapping[str, str]) -> Term:
+    """The same binder with other names for (some of) the variables that it binds."""
+    renaming = {old: var(new) for old, new in names.items()}
+    match term:
+        case Lam():
+            return lam(tuple(names.get(p, p) for p in term.params), substitute(term.body, renaming))
+        case Sum():
+            return sum_(names.get(term.variable, term.variable), term.lo, term.hi, substitute(term.body, renaming))
+        case Integral():
+            bounds, hints, seen = [], [], dict[str, Term]()
+            for name, (lo, hi), points in zip(term.variables, term.bounds, term.hints, strict=True):
+                bounds.append((substitute(lo, seen), substitute(hi, seen)))
+                hints.append(tuple(substitute(p, seen) for p in points))
+                if name in renaming:
+                    seen[name] = renaming[name]
+            return integral(
+                tuple(names.get(v, v) for v in term.variables), tuple(bounds), substitute(term.body, seen), tuple(hints)
+            )
+        case _:
+            raise TypeError(f"{type(term).__name__} binds nothing")

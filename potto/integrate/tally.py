@@ -1,0 +1,57 @@
+"""What the integrals of a batch amount to so far, and so how far off each of their pieces may be.
+
+Owns `Tally`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from potto.integrate.maps import Ints
+from potto.integrate.pieces import Pieces
+from potto.kernels.cells import Array
+
+if TYPE_CHECKING:
+    from potto.integrate.work import Work
+
+
+class Tally:
+    """Running totals per integral, by which tolerances are measured: (m * (1 + k), B), and how many pieces there are.
+
+    For the outermost variable the magnitude of the result counts; further in, where results are added up once more,
+    the largest magnitude of what is added up, among all that go into the same answer.
+    """
+
+    def __init__(self, work: Work, p: Pieces) -> None:
+        owner = work.seg.owner[p.segment]
+        self.count = np.bincount(owner, minlength=work.batch)
+        x = self.channels(work, p)
+        self.total = np.empty((x.shape[0], work.batch))
+        for i, row in enumerate(x):
+            self.total[i] = np.bincount(owner, row, minlength=work.batch)
+        self.scale: Array | None = None
+
+    def channels(self, work: Work, p: Pieces) -> Array:
+        x = p.size if work.number else p.integral
+        rows = x.shape[0] // work.width
+        return x.reshape(work.width, rows, -1)[:, : 1 + work.k].reshape(-1, x.shape[-1])
+
+    def replace(self, work: Work, old: Pieces, new: Pieces) -> None:
+        for p, sign in ((old, -1), (new, 1)):
+            owner = work.seg.owner[p.segment]
+            np.add.at(self.count, owner, sign)
+            for i, row in enumerate(self.channels(work, p)):
+                np.add.at(self.total[i], owner, sign * row)
+        self.scale = None
+
+    def shares(self, work: Work, owner: Ints) -> Array:
+        """The error that one piece of each of these integrals may have: (m * (1 + k), P)."""
+        if self.scale is None:
+            scale = np.abs(self.total)
+            if work.number:
+                scale = np.stack([work.parent.siblings(row, work.root) for row in scale])
+            self.scale = np.maximum(work.machine.atol, work.machine.rtol * scale)
+        shares: Array = self.scale[:, owner] / (2 * self.count[owner])
+        return shares
