@@ -22,7 +22,14 @@ class BadMessage(ValueError):
 
 
 def messages(stream: BinaryIO) -> Iterator[Any]:
-    """The messages of a stream until it ends; for a body that is no JSON, a `BadMessage`."""
+    """The messages of a stream until it ends or breaks; for a body that is no JSON, a `BadMessage`."""
+    try:
+        yield from _messages(stream)
+    except OSError as error:
+        logger.info("the client is gone: %s", error)
+
+
+def _messages(stream: BinaryIO) -> Iterator[Any]:
     while (length := _header(stream)) is not None:
         body = stream.read(length)
         if len(body) < length:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import subprocess
 import sys
@@ -126,7 +127,8 @@ class Client:
         elif "id" in message:
             self.asked.put(message)
             empty = [{}] if message["method"] == "workspace/configuration" else None
-            self.send({"jsonrpc": "2.0", "id": message["id"], "result": empty})
+            with contextlib.suppress(BrokenPipeError):  # it may have gone since
+                self.send({"jsonrpc": "2.0", "id": message["id"], "result": empty})
         else:
             self.notes.put(message)
 

@@ -1,0 +1,78 @@
+"""A workspace like a large project of one's own: 200 modules, 42,000 lines, one module of 2,000.
+
+Owns `workspace`. Definitions are of the size of those in the paper and in `examples/`: shaders, small integrals with
+a condition, helpers, documented; a module imports a few others that come before it, so that there are leaves, a middle
+and a top, and no cycles.
+"""
+
+from __future__ import annotations
+
+MODULES, LINES, LARGE = 200, 42_000, 2_000
+LEAF = "m0"
+
+
+def module_name(number: int) -> str:
+    """The name of a module; `large` is the one of 2,000 lines, in the middle."""
+    return "large" if number == MODULES // 2 else f"m{number}"
+
+
+def imports_of(number: int) -> list[int]:
+    """What a module imports: a few of those before it; one in twenty the leaf."""
+    wanted = {number - 1 - (number * 7) % 5, number // 2, (number * 13) % 23}
+    if number % 20 == 1:
+        wanted.add(0)
+    return sorted(other for other in wanted if 0 <= other < number)[:4]
+
+
+def definition(module: int, index: int, imported: list[str]) -> list[str]:
+    """One definition of about seven lines."""
+    name, turn = f"f{index}", (module + index) % 6
+    helper = f"f{index - 1}" if index and index % 3 else None
+    other = imported[index % len(imported)] if imported else None
+    calls = [f"{call}(t, {n + 1}/2)" for n, call in enumerate(c for c in (helper, other) if c) if index % 2 or n]
+    extra = "".join(f" + {call}" for call in calls[:1])
+    head = [f"# {name} of module {module}: what a reader wants to know", "# before using it."]
+    match turn:
+        case 0:
+            body = [f"def {name}(t, k)", f"    a = k^2 + {index}", f"    integral [0, 1] [x < t] * a * x d(x){extra}"]
+        case 1:
+            body = [f"def {name}(t, k)", f"    scale = sqrt(t^2 + {index + 1})", "    shift = k/scale",
+                    f"    scale*exp(-shift){extra}"]
+        case 2:
+            body = [f"def {name}(t, k)", "    width = if k > 0 then k else 1",
+                    f"    integral ([0, 1], [0, 1]) [x + y*width < t] * (x - y) d(x, y){extra}"]
+        case 3:
+            body = [f"{name} = \\(t, k) . 1/(sqrt(2)*(t + k + {index + 2})^2 + 1)"]
+        case 4:
+            body = [f"def {name}(t, k)", "    lo = min(t, k)", "    hi = max(t, k)",
+                    f"    (hi - lo)*sin({index}*t) + cos(k){extra}"]
+        case _:
+            body = [f"def {name}(t, k)", f"    u = t - k/{index + 1}", "    v = if u > 0 then log(1 + u) else u",
+                    f"    integral [0, 2] v*x^2 d(x){extra}"]  # fmt: skip
+    return [*head, *body, ""]
+
+
+def module_text(number: int, lines: int) -> str:
+    """A module of at least so many lines."""
+    imports = imports_of(number)
+    written, imported = [], []
+    for place, other in enumerate(imports):
+        if place % 2:
+            written.append(f"import {module_name(other)} as lib{other}")
+            imported.append(f"lib{other}.f0")
+        else:
+            written.append(f"from {module_name(other)} import f1 as g{other}")
+            imported.append(f"g{other}")
+    written.append("")
+    index = 0
+    while len(written) < lines:
+        written += definition(number, index, imported)
+        index += 1
+    return "\n".join(written) + "\n"
+
+
+def workspace() -> dict[str, str]:
+    """The modules by name."""
+    rest = (LINES - LARGE) // (MODULES - 1)
+    sizes = {n: LARGE if module_name(n) == "large" else rest for n in range(MODULES)}
+    return {module_name(n): module_text(n, lines) for n, lines in sizes.items()}
