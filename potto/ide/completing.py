@@ -18,7 +18,7 @@ from potto.ide.hovers import builtin_markdown, measure_markdown, measure_signatu
 from potto.ide.importing import import_edit, importable
 from potto.ide.model import Completion, CompletionKind, Completions
 from potto.ide.pending import call_at
-from potto.ide.places import ChunkAt, chunk_at
+from potto.ide.places import ChunkAt, chunk_at, writing_at
 from potto.ide.signatures import called_at
 from potto.ide.symbols import LocalSymbol
 from potto.ide.words import KEYWORDS, LETTERS, SPECIALS, TYPES, Keyword
@@ -113,10 +113,10 @@ def _arguments(db: Database, file: str, offset: int, place: Place) -> Iterator[C
 
 
 def _locals(db: Database, file: str, offset: int, place: Place) -> Iterator[Completion]:
-    chunk = chunk_at(db, file, offset)
-    if chunk is None or place.kind == "top":
+    writing = writing_at(db, file, offset)
+    if writing is None or place.kind == "top":
         return
-    relative = offset - chunk.start
+    chunk, relative = writing
     for number, binder in chunk.index(db).visible(relative):
         if binder.span.start <= relative <= binder.span.end:
             continue

@@ -14,27 +14,41 @@ from potto.calculus.diffeo import DiffeoInfo, diffeo_info, exported
 from potto.calculus.explain import DerivativeText, IntegralText, explain_derivative
 from potto.calculus.invert import Inverse, invert
 from potto.calculus.verdict import Problem, Verdict, judge
+from potto.check import has_errors
 from potto.core.printer import format_term
 from potto.core.simplify import simplify
 from potto.core.terms import Hole, Lam, Term, postorder
 from potto.elaborate import core, core_term
-from potto.modules import definition
+from potto.modules import DefinitionTarget, definition, dependencies
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import nodes
+from potto.types import check_definition
 
 LONG = 400  # characters of a formula beyond which a hover leaves it out
 
 
 @query
+def sound(db: Database, file: str, name: str) -> bool:
+    """Whether the types of a definition and of all that it needs are right: else its terms mean nothing."""
+    seen = {DefinitionTarget(file, name)}
+    pending = list(seen)
+    while pending:
+        target = pending.pop()
+        if definition(db, target.file, target.name) is None or has_errors(
+            check_definition(db, target.file, target.name)
+        ):
+            return False
+        fresh = [t for t in dependencies(db, target.file, target.name) if t not in seen]
+        seen.update(fresh)
+        pending += fresh
+    return True
+
+
+@query
 def derivative_text(db: Database, file: str, name: str) -> DerivativeText | None:
-    """The derivative of a definition in symbols; None for one that cannot be read."""
-    if definition(db, file, name) is None:
-        return None
-    term = core_term(db, file, name)
-    if any(isinstance(node, Hole) for node in postorder(term)):
-        return None
-    return explain_derivative(db, file, name)
+    """The derivative of a definition in symbols; None for one with errors."""
+    return explain_derivative(db, file, name) if sound(db, file, name) else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +77,8 @@ class ConditionInfo:
 @query
 def condition_infos(db: Database, file: str, name: str) -> tuple[ConditionInfo, ...]:
     """The conditions of a definition, in the order of the text; also those that calls lead to."""
+    if not sound(db, file, name):
+        return ()
     elaborated = core(db, file, name)
     spans = dict(elaborated.origins)
     found = conditions_of(
@@ -233,6 +249,6 @@ def diffeo_markdown(db: Database, file: str, name: str) -> str | None:
 
 def diffeo_of(db: Database, file: str, name: str) -> DiffeoInfo | None:
     """What is known of a diffeomorphism; None for other definitions."""
-    if not isinstance(definition(db, file, name), nodes.DiffeoDefinition):
+    if not isinstance(definition(db, file, name), nodes.DiffeoDefinition) or not sound(db, file, name):
         return None
     return diffeo_info(db, file, name)

@@ -58,6 +58,24 @@ def chunk_at(db: Database, file: str, offset: int) -> ChunkAt | None:
     return None if place < 0 else chunk_of(file, chunks(db, file)[place])
 
 
+def writing_at(db: Database, file: str, offset: int) -> tuple[ChunkAt, int] | None:
+    """The chunk that goes on if something is typed at an offset, and the place in it (its end, for blanks after it).
+
+    None at the beginning of a line behind a chunk: something new starts there.
+    """
+    chunk = chunk_at(db, file, offset)
+    if chunk is None:
+        return None
+    end = chunk.start + len(chunk.text)
+    if offset <= end:
+        return chunk, offset - chunk.start
+    text = text_of(db, file)
+    new_line = line_start(text, offset) > end
+    if new_line and (line_start(text, offset) == offset or chunk.parsed(db).item is None):
+        return None
+    return chunk, len(chunk.text)
+
+
 def chunk_of(file: str, chunk: ChunkRef) -> ChunkAt:
     """A chunk with its file."""
     return ChunkAt(file, chunk.start, chunk.text, is_diffeo(file))
