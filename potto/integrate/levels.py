@@ -88,7 +88,8 @@ class Iteration:
         assert isinstance(values, tuple)
         for group, value in zip(level.decided, values, strict=True):
             assert isinstance(value, Cell)
-            sides[group] = as_array(value.v, seg.a.size) >= 0
+            at_middle = as_array(value.v, seg.a.size)
+            sides[group] = at_middle >= 0 if self.plan.groups[group].up_at_zero else at_middle > 0
         return sides
 
     def alive(self, sides: dict[int, Mask], seg: Segments) -> Ints | None:

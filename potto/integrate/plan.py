@@ -61,6 +61,12 @@ class Group:
     number: int
     cut: Cut
 
+    @property
+    def up_at_zero(self) -> bool:
+        """On which side a stretch lies along which the canonical surface is 0: that of max(x, 0) > 0 where x < 0."""
+        jump = self.cut.jumps[0]
+        return jump.strict != (jump.orientation > 0)
+
 
 @dataclass(frozen=True)
 class Plan:

@@ -33,7 +33,7 @@ CHUNK = 1 << 15  # points per kernel call: a few buffers of this length fit the 
 NODE_ROUNDING = 0.5
 MOST_HALVINGS = 64
 # Nodes for pieces that were too coarse: first more of them on the same piece, then on halves.
-HIGH_ORDER = 16
+HIGH_ORDER = 14
 HALF_ORDER = 14
 # The relative error of a piece up to which more nodes promise more than halves do.
 PROMISING = 1e-2
@@ -171,7 +171,12 @@ class Work:
         p.tail = np.abs(values[..., -2:]).sum(axis=-1)
         p.floor = 4 * EPS * p.size + spread * shake
         if self.k:
-            p.floor.reshape(self.width, -1, p.u0.size)[:, 1:] *= 3  # speeds are rounded too
+            # speeds are rounded too, and so are the places of the cuts, which matters where they are close together
+            place = 2 * EPS * np.maximum(np.abs(seg.a), np.abs(seg.b)) / (seg.b - seg.a)
+            place = np.where(np.isfinite(place), place, 0.0)
+            tangents = p.floor.reshape(self.width, -1, p.u0.size)[:, 1:]
+            tangents *= 3
+            tangents += place * p.size.reshape(self.width, -1, p.u0.size)[:, 1:]
         if inner is not None:
             p.floor = p.floor + np.abs(inner) @ rule.weights
         broken = ~np.isfinite(p.integral)
