@@ -23,6 +23,7 @@ from potto.core.terms import (
     sub,
 )
 
+_FLAT = ("max", "min", "clamp")
 MOST = 8  # cases that one condition is taken apart into
 
 
@@ -38,9 +39,9 @@ def cased(term: Integral) -> Integral:
 
 
 def _changes(node: Branch) -> bool:
-    """Whether one of the cases of a condition varies with less than the condition."""
-    parts = [part for part in postorder(node.surface) if isinstance(part, Prim) and part.op in ("max", "min")]
-    return any(arg.free != part.free for part in parts for arg in part.args if arg.free)
+    """Whether one of the cases of a condition varies with less than the condition, or not at all."""
+    parts = [part for part in postorder(node.surface) if isinstance(part, Prim) and part.op in _FLAT]
+    return any(arg.free != part.free for part in parts if part.free for arg in part.args)
 
 
 def _apart(node: Term, most: int) -> Term:
