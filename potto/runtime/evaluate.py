@@ -113,7 +113,9 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
     numbers, bounds = numbers_of(value), bounds_of(value)
     tangents, tangent_bounds = tangents_of(value)
     reasons = list(books.unfinished)
-    missed = [_missed(v, e, settings) for v, e in [*_flat(numbers, bounds), *_flat(tangents, tangent_bounds)]]
+    flat = [*_flat(numbers, bounds), *_flat(tangents, tangent_bounds)]
+    scale = max((float(np.max(np.abs(v), initial=0.0, where=np.isfinite(v))) for v, _ in flat), default=0.0)
+    missed = [_missed(v, e, scale, settings) for v, e in flat]
     if not reasons and any(missed):
         reasons.append(next(m for m in missed if m))
     return Estimate(
@@ -176,20 +178,22 @@ def _flat(numbers: Any, bounds: Any) -> list[tuple[Any, Any]]:
     return [(numbers, bounds)]
 
 
-def _missed(value: Any, error: Any, settings: Settings) -> str | None:
+def _missed(value: Any, error: Any, scale: float, settings: Settings) -> str | None:
     """Why an answer is not as accurate as was asked, or None.
 
-    A number that is zero but for rounding has no relative accuracy; what counts there is the size of its neighbours.
+    `scale` is the size of the whole answer: a small tangent beside a large value, or a pixel of a picture that is all
+    but zero by cancellation, is measured against its neighbours.
     """
     v, e = np.abs(np.asarray(value, dtype=float)), np.asarray(error, dtype=float)
     if np.isnan(v).any():
         return "the value is not a number"
     if np.isnan(e).any() or (np.isinf(e) & ~np.isinf(v)).any():
         return "the error is not known"
-    finite = np.where(np.isinf(v), 0.0, v)
     bad = ~(e <= np.maximum(settings.atol, settings.rtol * v)) & ~np.isinf(v)
-    bad &= e > max(1e-12, settings.rtol) * max(float(finite.max(initial=0.0)), 1e-300)
+    bad &= e > max(1e-12, settings.rtol) * max(scale, 1e-300)
     bad &= (v > 1e3 * e) | (e > 1e-10)
     if bad.any():
+        if (e[bad] > 0.1 * v[bad]).any():
+            return "no accuracy was reached: the integral diverges, or its integrand is too rough"
         return "rounding limits the accuracy" if (e[bad] < 1e-6 * v[bad]).all() else "the error estimate is too large"
     return None
