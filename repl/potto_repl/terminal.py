@@ -28,6 +28,7 @@ from prompt_toolkit.styles import DynamicStyle
 
 from potto_repl.beside import Checker, Progress
 from potto_repl.highlight import PottoCompleter, PottoLexer, style
+from potto_repl.keyboard import loud_keys, quiet_keys
 from potto_repl.keys import bindings
 from potto_repl.start import Loader, greeting
 
@@ -99,6 +100,10 @@ class Terminal:
 
     def run(self, file: str | None = None) -> int:
         """Talk until the person leaves; the exit status."""
+        with quiet_keys():
+            return self._run(file)
+
+    def _run(self, file: str | None) -> int:
         self.say(greeting())
         if file is not None:
             self.answer(f":load {file}")
@@ -189,7 +194,8 @@ class Terminal:
             path = Path(folder) / "entry.po"
             path.write_text(text, encoding="utf-8")
             try:
-                done = subprocess.run([*editor(), str(path)], check=False)
+                with loud_keys():
+                    done = subprocess.run([*editor(), str(path)], check=False)
             except OSError as error:
                 self.say(f"error: the editor cannot be started: {error.strerror}")
                 return None

@@ -83,7 +83,10 @@ def _text_to_edit(session: Conversation, text: str) -> str:
 def _edited_file(session: Conversation, path: str) -> list[Part]:
     import subprocess
 
-    subprocess.run([*editor(), path], check=False)
+    from potto_repl.keyboard import loud_keys
+
+    with loud_keys():
+        subprocess.run([*editor(), path], check=False)
     key = session.world.key(path)
     return session.refreshed() if key in session.loaded else session.bring(path)
 
