@@ -102,7 +102,8 @@ class Extraction:
         start = line_start(self.chunk.text, at)
         blanks = self.chunk.text[start:at]
         if blanks.strip():  # the body stands on the line of the head
-            return Edit(Span(at, at), f"\n    {name} = {self.text}\n    ")
+            head = len(self.chunk.text[:at].rstrip(" \t"))
+            return Edit(Span(head, at), f"\n    {name} = {self.text}\n    ")
         return Edit(Span(at, at), f"{name} = {self.text}\n{blanks}")
 
     def local_name_at(self) -> int | None:

@@ -110,6 +110,14 @@ def fixture(text: str) -> Fixture:
         if marks:
             offset = marks.get("0", marks.get("<", 0))
             span = Span(marks.get("<", offset), marks.get(">", offset))
+    folders: dict[str, set[str]] = {}
+    for name in given:
+        path = Path(FOLDER, name)
+        folders.setdefault(str(path.parent), set()).add(path.name)
+        if str(path.parent) != FOLDER:
+            folders.setdefault(FOLDER, set()).add(path.parent.name + "/")
+    for folder, listed in folders.items():
+        library.db.set_input(("folder", folder), tuple(sorted(listed)), 1)
     library.files.set_roots([FOLDER])
     return Fixture(library, asked.rstrip("$"), offset, span, texts)
 

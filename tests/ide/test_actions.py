@@ -1,0 +1,158 @@
+"""Code actions: what they offer, and that the program is right afterwards."""
+
+from __future__ import annotations
+
+import pytest
+from ide_fixture import fixture
+
+import potto.ide as ide
+
+
+def fixed(text: str, title: str) -> str:
+    """The file after an action; it must have no errors that it had not before, and fewer if it had some."""
+    f = fixture(text)
+    before = f.errors()
+    action = f.actions()[title]
+    assert action.change is not None, action
+    after = f.act(title)
+    for name, given in f.after(action.change).items():
+        f.library.files.set_text(f.key(name), given)
+    errors = f.errors()
+    assert errors == [] or len(errors) < len(before), (errors, after)
+    return after
+
+
+def test_plain_condition_becomes_a_bracket():
+    text = "def f(t)\n    integral [0, 1] (if x $0< t then 1 else 0) d(x)\n"
+    assert "(if [x < t] then 1 else 0)" in fixed(text, "Count the jump: `[x < t]`")
+    action = next(iter(fixture(text).actions().values()))
+    assert action.preferred and action.codes == ("P0301",) and action.kind == "quickfix"
+
+
+def test_plain_condition_becomes_a_completed_diffeomorphism():
+    text = "def f(t)\n    integral ([0, 1], [0, 1]) ((x + y $0>= t) ? 1 : 0) d(x, y)\n"
+    assert "((diffeo(x + y - t, x)) ? 1 : 0)" in fixed(text, "Make it the diffeomorphism `diffeo(x + y - t, x)`")
+    text = "def f(t)\n    integral [0, 1] (if x^3 $0< t then 1 else 0) d(x)\n"
+    assert "if diffeo(t - x^3) then" in fixed(text, "Make it the diffeomorphism `diffeo(t - x^3)`")
+
+
+def test_did_you_mean():
+    assert fixed("def f(alpha) $0alpa + 1\n", "Change to `alpha`") == "def f(alpha) alpha + 1\n"
+    files = "# file: shapes.po\ndisc = 1\n# file: main.po\n"
+    assert fixed(files + "from $0shpes import disc\ny = disc\n", "Change to `shapes`").startswith("from shapes import")
+    assert fixed(files + "from shapes import $0dsc\n", "Change to `disc`") == "from shapes import disc\n"
+    assert fixed(files + "import shapes\ny = shapes.$0dsc\n", "Change to `disc`").endswith("y = shapes.disc\n")
+
+
+def test_import_a_name_or_a_module():
+    files = "# file: shapes.po\ndef disc(x) x\n# file: main.po\n"
+    assert fixed(files + "y = $0disc(1)\n", "Import `disc` from `shapes`") == "from shapes import disc\n\ny = disc(1)\n"
+    assert fixed(files + "y = $0shapes.disc(1)\n", "Import the module `shapes`") == "import shapes\n\ny = shapes.disc(1)\n"
+
+
+def test_define_a_missing_name():
+    assert fixed("def f(a) $0gain*a\n", "Define `gain`") == "gain = 0\n\ndef f(a) gain*a\n"
+    after = fixed("def f(a) $0gain(a, 2)(k=1)*a\n", "Define `gain`")
+    assert after == "def gain(a, x)(k)\n    0\n\ndef f(a) gain(a, 2)(k=1)*a\n"
+    assert fixed("def f(a) $0gain*a\n", "Make `gain` a parameter of `f`") == "def f(a, gain) gain*a\n"
+
+
+def test_write_down_the_inverse():
+    text = "diffeo $0turn(x, y; c) = (x + y + c, x - y)\n"
+    after = fixed(text, "Write down the inverse")
+    assert after.startswith(text.replace("$0", "").rstrip() + "\n    inverse (u, v) . (")
+
+
+def test_an_inverse_to_fill_in():
+    text = "diffeo odd(x, y) = ($0x + sin(x + y^3) + y^5, x*y)\n"
+    f = fixture(text)
+    if "P0402" in f.errors():
+        assert "inverse (u, v) . (x, y)" in f.act("Add an `inverse` to fill in")
+
+
+def test_remove_what_is_not_used():
+    files = "# file: m.po\na = 1\nb = 2\n# file: main.po\n"
+    assert fixed(files + "from m import $0a, b\ny = b\n", "Remove the import of `a`") == "from m import b\ny = b\n"
+    assert fixed(files + "from m import a, $0b\ny = a\n", "Remove the import of `b`") == "from m import a\ny = a\n"
+    assert fixed(files + "from m import $0a\ny = 1\n", "Remove the import of `a`") == "y = 1\n"
+    assert fixed("def f(a)\n    $0b = 1\n    a\n", "Remove `b`") == "def f(a)\n    a\n"
+    assert fixed("def f(a) let $0b = 1 in a\n", "Remove `b`") == "def f(a) a\n"
+    assert fixed("def f(a) let c = 2; $0b = 1 in a*c\n", "Remove `b`") == "def f(a) let c = 2 in a*c\n"
+    after = fixed("def f(a)\n    integral [0, 1] a d($0x)\n", "Rename it to `_x`")
+    assert after == "def f(a)\n    integral [0, 1] a d(_x)\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "after"),
+    [
+        ("def f(a) if $0a > 0 then a else -a\n", "def f(a) a > 0 ? a : -a\n"),
+        ("def f(a) 1 + (a $0> 0 ? a : -a)\n", "def f(a) 1 + (if a > 0 then a else -a)\n"),
+        ("def f(a) 2*(if $0a > 0 then (if a > 1 then 1 else 2) else 3)\n", None),
+    ],
+)
+def test_swap_conditionals(text, after):
+    f = fixture(text)
+    title = next(t for t in f.actions() if t.startswith("Write it with"))
+    result = fixed(text, title)
+    assert after is None or result == after
+    f.library.files.set_text(f.file, result)
+    assert not f.errors()
+
+
+def test_extract_a_local_name():
+    text = "def f(a)\n    b = 2\n    a + $<a*b$> + 1\n"
+    assert fixed(text, "Extract to a local name") == "def f(a)\n    b = 2\n    value = a*b\n    a + value + 1\n"
+    text = "def f(a) a + $<a*2$>\n"
+    assert fixed(text, "Extract to a local name") == "def f(a)\n    value = a*2\n    a + value\n"
+    text = "def f(a)\n    integral [0, a] sin($<x*a$>)*x d(x)\n"
+    assert fixed(text, "Extract to a local name") == "def f(a)\n    integral [0, a] let value = x*a in sin(value)*x d(x)\n"
+    text = "y = 1 + $<2*3$>\n"
+    assert fixed(text, "Extract to a local name") == "y = let value = 2*3 in 1 + value\n"
+
+
+def test_extract_a_definition():
+    text = "def f(a)\n    integral [0, a] sin($<x*a$>)*x d(x)\n"
+    after = fixed(text, "Extract to a definition")
+    assert after == "def extracted(a, x)\n    x*a\n\ndef f(a)\n    integral [0, a] sin(extracted(a, x))*x d(x)\n"
+    action = fixture(text).actions()["Extract to a definition"]
+    assert after[action.rename_at :].startswith("extracted(a, x)")
+    assert fixed("value = 1\ny = $<2*pi$>\n", "Extract to a definition") == "value = 1\nextracted = 2*pi\n\ny = extracted\n"
+
+
+def test_inline_a_local_name():
+    assert fixed("def f(a)\n    $0b = a + 1\n    b*2 + b\n", "Inline `b`") == "def f(a)\n    (a + 1)*2 + (a + 1)\n"
+    assert fixed("def f(a) let b = a in $0b*2\n", "Inline `b`") == "def f(a) a*2\n"
+
+
+def test_inline_is_refused_where_it_would_capture():
+    f = fixture("def f(a)\n    $0b = a + 1\n    integral [0, 1] (let a = 2 in a*b*x) d(x)\n")
+    assert f.actions()["Inline `b`"].disabled
+
+
+def test_complete_the_arguments_of_a_dual_call():
+    text = "def g(c, shader) shader(c) + sign(c)\ndg = deriv(g)\ndef shader(x) x^2\nprint(dg($0))\n"
+    assert fixed(text, "Complete the arguments of `dg`").endswith("print(dg(dc=(0, 1), dshader=deriv(shader)))\n")
+    text = "def g(a, b) a*b\nprint(deriv(g)(db=2, $0))\n"
+    assert fixed(text, "Complete the arguments of `dg`").endswith("print(deriv(g)(db=2, da=(0, 1)))\n")
+
+
+def test_imports_in_order():
+    files = "# file: a.po\nx = 1\ny = 2\nunused = 3\n# file: b.po\nz = 1\n# file: main.po\n"
+    text = files + "from b import z\nfrom a import $0y\nfrom a import unused, x\nw = x + y + z\n"
+    after = fixed(text, "Sort the imports")
+    assert after == "from a import unused, x, y\nfrom b import z\nw = x + y + z\n"
+    assert fixed(text, "Remove all unused imports") == "from a import x, y\nfrom b import z\nw = x + y + z\n"
+
+
+def test_kinds_are_filtered():
+    f = fixture("def f(a)\n    $<a + 1$>\n")
+    found = ide.code_actions(f.db, f.file, f.span, ("refactor.extract",))
+    assert found and all(a.kind == "refactor.extract" and a.change is None for a in found)
+    assert ide.code_actions(f.db, f.file, f.span, ("source",)) == ()
+
+
+def test_an_action_of_an_old_text_is_disabled():
+    f = fixture("def f(a) $0gain*a\n")
+    action = next(a for a in ide.code_actions(f.db, f.file, f.span) if a.title == "Define `gain`")
+    f.library.files.set_text(f.file, "def f(a) a\n")
+    assert ide.resolve_code_action(f.db, action).disabled
