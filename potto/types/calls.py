@@ -323,7 +323,7 @@ def _deriv(inference: Inference, node: nodes.Apply) -> Type:
         return UNKNOWN
     if is_known(inference, inner):
         settle(found)
-    return inference.dual(found)
+    return inference.dual(found, inner)
 
 
 def _delta(inference: Inference, node: nodes.Apply) -> Type:

@@ -35,9 +35,10 @@ from potto.types.types import (
     Unknown,
     Var,
     dual_name,
+    dual_of_tuple,
     resolve,
 )
-from potto.types.unify import unify
+from potto.types.unify import settle, unify
 
 STACK = 8000  # frames: two per node, for 200 levels of nesting and what is written between them
 
@@ -95,7 +96,7 @@ class Inference:
         self.mixed: set[int] = set()  # the `and`, `or`, `not` of conditions, where brackets may stand
         self.integrals = 0  # how many integrals are around the place that is looked at
         self._late: list[Callable[[], None]] = []
-        self._duals: list[tuple[Meta, Meta]] = []
+        self._duals: list[tuple[Meta, Meta, nodes.Expr]] = []
 
     # Expressions
 
@@ -190,24 +191,26 @@ class Inference:
 
     # Duals
 
-    def dual(self, type: Type) -> Type:
-        """D of a type, as far as it is known: what is not known yet follows when it is."""
+    def dual(self, type: Type, node: nodes.Expr) -> Type:
+        """D of a type, as far as it is known: what is not known yet follows when it is. `node` is what is derived."""
         type = resolve(type)
         match type:
             case Real() | Dist() | Var():
                 return TupleOf((REAL, REAL), dual=True)
             case TupleOf(items, dual):
-                return TupleOf(tuple(map(self.dual, items)), dual)
+                settle(type)  # its dual is not known before its parts are
+                return dual_of_tuple(tuple(self.dual(item, node) for item in items), dual)
             case ListOf(item):
-                return ListOf(self.dual(item))
+                return ListOf(self.dual(item, node))
             case Function(group, result):
-                duals = (Parameter(None if p.name is None else dual_name(p.name), self.dual(p.type)) for p in group)
-                return Function(tuple(duals), self.dual(result))
+                names = (None if parameter.name is None else dual_name(parameter.name) for parameter in group)
+                duals = (Parameter(name, self.dual(p.type, node)) for name, p in zip(names, group))
+                return Function(tuple(duals), self.dual(result, node))
             case Diffeo(dims):
-                return UNKNOWN if dims is None else TupleOf((TupleOf((REAL, REAL), dual=True),) * dims)
+                return UNKNOWN if dims is None else dual_of_tuple((TupleOf((REAL, REAL), dual=True),) * dims)
             case Meta():
                 derived = Meta(type.level)
-                self._duals.append((type, derived))
+                self._duals.append((type, derived, node))
                 return derived
             case _:
                 return UNKNOWN
@@ -215,21 +218,24 @@ class Inference:
     def settle_duals(self, force: bool = False) -> None:
         """Derive the types that are known by now; `force`: what is not known at the end is a number."""
         pending, self._duals = self._duals, []
+        waiting: list[tuple[Meta, Meta, nodes.Expr]] = []
         while pending:
-            primal, derived = pending.pop()
+            primal, derived, node = pending.pop()
             if isinstance(resolve(primal), Meta):
                 if not force:
-                    self._duals.append((primal, derived))
+                    waiting.append((primal, derived, node))
                     continue
                 unify(primal, REAL)
-            unify(derived, self.dual(primal))
+            if not unify(derived, self.dual(primal, node)):
+                self.report(_misused_derivative(node))
             pending += self._duals
             self._duals = []
+        self._duals = waiting
 
     def primal_of(self, derived: Type) -> Type | None:
         """The type whose dual `derived` is to be, if that is known no better yet."""
         derived = resolve(derived)
-        for primal, dual in self._duals:
+        for primal, dual, _ in self._duals:
             if resolve(dual) is derived:
                 return resolve(primal)
         return None
@@ -246,6 +252,15 @@ class Inference:
         checks, self._late = self._late, []
         for check in checks:
             check()
+
+
+def _misused_derivative(node: nodes.Expr) -> Diagnostic:
+    return kinds.MISMATCH(
+        node.span,
+        "the derivative of this function takes and gives pairs, `(value, tangent)`, but is used otherwise",
+        label="its derivative does not fit",
+        help="take the value or the tangent of the derivative: `fst(…)`, `snd(…)`",
+    )
 
 
 def describe(type: Type) -> str:

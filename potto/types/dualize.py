@@ -1,4 +1,4 @@
-"""The derivative of abstract values: a pair, value and tangent, at each number.
+"""The derivative of abstract values: a pair, value and tangent, for each number; for a tuple, values and tangents.
 
 The tangent of a result varies with all that the result varies with and with the tangents of that; where the result
 jumps, its tangent has deltas. What must be plain is the values alone: a tangent decides nothing.
@@ -44,6 +44,21 @@ def dual(value: Value) -> Value:
             return value
 
 
+def _transposed(duals: tuple[Value, ...]) -> Value:
+    """The dual of a tuple from those of its items: the tuple of values, then the tuple of tangents."""
+    pairs = [dual.items for dual in duals if isinstance(dual, TupleValue) and len(dual.items) == 2]
+    if len(pairs) != len(duals):
+        return TupleValue(duals)
+    return TupleValue((TupleValue(tuple(p[0] for p in pairs)), TupleValue(tuple(p[1] for p in pairs))))
+
+
+def _transposed_ports(duals: tuple[PortTree, ...]) -> PortTree:
+    pairs = [dual.items for dual in duals if isinstance(dual, PortTuple) and len(dual.items) == 2]
+    if len(pairs) != len(duals):
+        return PortTuple(duals)
+    return PortTuple((PortTuple(tuple(p[0] for p in pairs)), PortTuple(tuple(p[1] for p in pairs))))
+
+
 class _Dual:
     """One function being derived: the tangents of its inputs and the ports for tangents."""
 
@@ -65,7 +80,7 @@ class _Dual:
                 tangents: Sources = {self.tangents[source]: None for source in sources}
                 return TupleValue((Scalar(sources), Scalar(tangents)))
             case TupleValue(items):
-                return TupleValue(tuple(map(self.input, items)))
+                return _transposed(tuple(map(self.input, items)))
             case ListValue(item):
                 return ListValue(self.input(item))
             case Abstract(ports, result, taint):
@@ -78,7 +93,7 @@ class _Dual:
             case Port():
                 return PortTuple((tree, self.ports[tree]))
             case PortTuple(items):
-                return PortTuple(tuple(map(self.port, items)))
+                return _transposed_ports(tuple(map(self.port, items)))
             case PortFunction(inputs, result):
                 return PortFunction(tuple(map(self.input, inputs)), self.port(result))
             case NoPort():
@@ -89,7 +104,7 @@ class _Dual:
             case Scalar():
                 return TupleValue((value, self.tangent(value)))
             case TupleValue(items):
-                return TupleValue(tuple(map(self.result, items)))
+                return _transposed(tuple(map(self.result, items)))
             case ListValue(item):
                 return ListValue(self.result(item))
             case Closure():
@@ -126,7 +141,7 @@ def _values_only(tree: PortTree) -> PortTree:
         case Port():
             return PortTuple((tree, NoPort()))
         case PortTuple(items):
-            return PortTuple(tuple(map(_values_only, items)))
+            return _transposed_ports(tuple(map(_values_only, items)))
         case PortFunction(inputs, result):
             return PortFunction(tuple(map(_doubled, inputs)), _values_only(result))
         case NoPort():
@@ -138,7 +153,7 @@ def _doubled(value: Value) -> Value:
         case Scalar(sources):
             return TupleValue((value, Scalar(sources)))
         case TupleValue(items):
-            return TupleValue(tuple(map(_doubled, items)))
+            return _transposed(tuple(map(_doubled, items)))
         case ListValue(item):
             return ListValue(_doubled(item))
         case Abstract():

@@ -147,12 +147,15 @@ def derivative_type(type: Type) -> Type:
     return _derivative(resolve(type), frozenset())
 
 
-def _paired(items: tuple[Type, ...], duals: tuple[Type, ...]) -> Type:
-    """The dual of a tuple of numbers (and tuples of them): the tuple of values, then the tuple of tangents."""
+def dual_of_tuple(duals: tuple[Type, ...], dual: bool = False) -> Type:
+    """The dual of a tuple of numbers (and tuples of them): the tuple of values, then the tuple of tangents.
+
+    What is no tuple of numbers (a list in it, something wrong) keeps its duals side by side.
+    """
     pairs = [d.items for d in duals if isinstance(d, TupleOf) and len(d.items) == 2]
-    if len(pairs) != len(duals) or any(isinstance(resolve(item), Function | ListOf | Diffeo) for item in items):
-        return TupleOf(duals)
-    return TupleOf((TupleOf(tuple(p[0] for p in pairs)), TupleOf(tuple(p[1] for p in pairs))))
+    if len(pairs) != len(duals):
+        return TupleOf(duals, dual)
+    return TupleOf((TupleOf(tuple(p[0] for p in pairs)), TupleOf(tuple(p[1] for p in pairs))), dual)
 
 
 def _derivative(type: Type, parameters: frozenset[str]) -> Type:
@@ -168,8 +171,8 @@ def _derivative(type: Type, parameters: frozenset[str]) -> Type:
             return TupleOf((primal, Dist(renamed(jumps)) if jumps else Real(star, variables)), dual=True)
         case Dist(variables):
             return TupleOf((Dist(renamed(variables)), Dist(renamed(variables))), dual=True)
-        case TupleOf(items):
-            return _paired(items, tuple(_derivative(item, parameters) for item in items))
+        case TupleOf(items, dual):
+            return dual_of_tuple(tuple(_derivative(item, parameters) for item in items), dual)
         case ListOf(item):
             return ListOf(_derivative(item, parameters))
         case Function(group, result):
@@ -180,7 +183,7 @@ def _derivative(type: Type, parameters: frozenset[str]) -> Type:
             )
             return Function(duals, _derivative(result, inner))
         case Diffeo(dims):
-            return UNKNOWN if dims is None else TupleOf((TupleOf((REAL,) * dims), TupleOf((REAL,) * dims)))
+            return UNKNOWN if dims is None else dual_of_tuple((TupleOf((REAL, REAL), dual=True),) * dims)
         case Var():  # a number, for want of better knowledge
             return TupleOf((Real(star=True), Real(star=True)), dual=True)
         case Truth() | Unknown() | Meta():

@@ -239,6 +239,11 @@ def test_duals() -> None:
         #         ^ error[P0307]: `deriv` takes a function, but this is a number
         h = deriv(sin(3))
         #         ^^^^^^ error[P0307]: `deriv` takes a function
+        def j(x) deriv(j)(x, 1)
+        #        ^^^^^^^^^^^^^^ error[P0306]: the result of `j`, as it is used in it, must be `Real`
+        #              ^ error[P0317]: `j` always needs itself again
+        def k(s, t) deriv(s)(t) + 1
+        #                 ^ error[P0306]: the derivative of this function takes and gives pairs
         i = deriv(sin, cos)
         #   ^^^^^^^^^^^^^^^ error[P0308]: `deriv` takes one function
     """)
