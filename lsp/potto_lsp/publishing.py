@@ -43,6 +43,7 @@ class Publisher:
         self._reports: dict[str, Report] = {}
         self._sent: dict[str, tuple[str, Document | None]] = {}
         self._ids = itertools.count(1)
+        self._wrong_projects: set[str] = set()
         self.whole_workspace = True
 
     def report(self, key: str) -> Report:
@@ -135,7 +136,7 @@ class Publisher:
         from potto_lsp.uris import to_uri
 
         for project in projects:
-            items = [
+            items: list[protocol.Diagnostic] = [
                 {
                     "range": {"start": {"line": line, "character": 0}, "end": {"line": line + 1, "character": 0}},
                     "severity": convert.SEVERITIES["error"],
@@ -144,6 +145,6 @@ class Publisher:
                 }
                 for line, message in project.problems
             ]
-            self._notify(
-                "textDocument/publishDiagnostics", {"uri": to_uri(join(project.folder, NAME)), "diagnostics": items}
-            )
+            if items or project.folder in self._wrong_projects:
+                self._publish(to_uri(join(project.folder, NAME)), items, None)
+        self._wrong_projects = {project.folder for project in projects if project.problems}
