@@ -1,0 +1,75 @@
+"""Programs that random testing found wrong, made small. Expected values are closed forms, worked out beside each."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+import potto
+from potto.diagnostics import PottoError
+
+T = 0.65
+CURRIED = "def call(h, v) h(v)\ncurried = \\a . \\b . [a < b]*(a + 2)\n"
+STEP = "def step(u) [u > 0]\n"
+BELOW = "def step(u, w) [u > 0]*w\n"
+
+
+@pytest.mark.parametrize(
+    ("program", "value", "tangent"),
+    [
+        # A jump under an inner integral that does not vary with it: int_0^t e^(2x) dx + (2 - t).
+        (
+            "def f(t) integral [0, 2] exp(integral [-1, 1] [x < t]*x d(y)) d(x)",
+            (math.exp(2 * T) - 1) / 2 + 2 - T,
+            math.exp(2 * T) - 1,
+        ),
+        # The same inside of a call: int_t^1 (1/2)^2 dx.
+        (STEP + "def f(t) integral [0, 1] (integral [0, 1] step(x - t)*y d(y))^2 d(x)", (1 - T) / 4, -0.25),
+        # In a call some of whose arguments vary with it: int_t^1 (x/2)^2 dx.
+        (BELOW + "def f(t) integral [0, 1] (integral [0, 1] step(x - t, x*y) d(y))^2 d(x)", (1 - T**3) / 12, -(T**2) / 4),
+        # In a function that is passed: the same number.
+        (
+            "def g(h, x) integral [0, 1] h(x)*y d(y)\ndef f(t) integral [0, 1] (g(\\a . [a > t]*a, x))^2 d(x)",
+            (1 - T**3) / 12,
+            -(T**2) / 4,
+        ),
+        # In a sum: (n/2)^2 for n = 3, 2, 1 on [0, t/3], [t/3, t/2], [t/2, t].
+        (
+            "def f(t) integral [0, 1] (integral [0, 1] (sum k in 1..3 ([x < t/k]*y)) d(y))^2 d(x)",
+            T * (9 / 3 + 4 * (1 / 2 - 1 / 3) + (1 - 1 / 2)) / 4,
+            (9 / 3 + 4 * (1 / 2 - 1 / 3) + (1 - 1 / 2)) / 4,
+        ),
+        # A bound that jumps: 2 for x < t and 1/2 above; and the same squared.
+        ("def f(t) integral ([0, 1], [0, 1 + [x < t]]) y d(x, y)", 2 * T + (1 - T) / 2, 1.5),
+        ("def f(t) integral [0, 1] (integral [0, 1 + [x < t]] y d(y))^2 d(x)", 4 * T + (1 - T) / 4, 3.75),
+        # A function that was given its first group: (t + 2)(2 - t).
+        (CURRIED + "def f(t) integral [0, 2] call(curried (t), x) d(x)", 4 - T * T, -2 * T),
+        (CURRIED + "def f(t) integral ([0, 2], [0, 1]) call(curried (t), x) d(x, y)", 4 - T * T, -2 * T),
+        # Kinks made of jumps: 1 below t, x - 0.3 above.
+        ("def f(t) integral [0, 1] max([x < t], x - 0.3) d(x)", T + (0.49 - (T - 0.3) ** 2) / 2, 1.3 - T),
+        (STEP + "def f(t) integral [0, 1] max(step(t - x), x - 0.3) d(x)", T + (0.49 - (T - 0.3) ** 2) / 2, 1.3 - T),
+        # Surfaces that run along an axis in one part and along another in the next.
+        ("def f(t) integral ([0, 1], [0, 1]) [max(x, y) < t] d(x, y)", T * T, 2 * T),
+        ("def f(t) integral ([0, 1], [0, 1]) [min(x, y) < t] d(x, y)", 1 - (1 - T) ** 2, 2 * (1 - T)),
+        ("def f(t) integral ([-1, 1], [-1, x]) [max(abs(x), abs(y)) < t] d(x, y)", 2 * T * T, 4 * T),
+        # Surfaces that are 0 on a stretch: strictness decides.
+        ("def f(t) integral [-1, 1] [max(x - t, 0) > 0] d(x)", 1 - T, -1.0),
+        ("def f(t) integral [-1, 1] [max(x - t, 0) <= 0] d(x)", 1 + T, 1.0),
+        ("def f(t) integral [-1, 1] [clamp(x - t, 0, 1) > 0]*x d(x)", (1 - T * T) / 2, -T),
+        (STEP + "def f(t) integral [-1, 1] step(max(x - t, 0)) d(x)", 1 - T, -1.0),
+        ("def step(u) [0 >= u]\ndef f(t) integral [-1, 1] step(max(x - t, 0)) d(x)", 1 + T, 1.0),
+    ],
+)
+def test_a_program_that_was_wrong(program: str, value: float, tangent: float) -> None:
+    answer = potto.deriv(potto.compile(program).f)((T, 1.0))
+    assert answer.converged, answer.reasons
+    # Closed forms of a few operations: good to a few roundings of numbers around 1.
+    assert abs(answer.value - value) <= answer.error + 1e-14 and answer.error < 1e-10
+    assert abs(answer.tangent - tangent) <= answer.tangent_error + 1e-14 and answer.tangent_error < 1e-10
+
+
+def test_a_condition_on_an_integral_whose_surface_moves_is_refused() -> None:
+    with pytest.raises(PottoError) as caught:
+        potto.compile("def f(t) integral [-1, 1] [(integral [0, 1] [y < 2*x + t] d(y)) < t] d(x)")
+    assert caught.value.diagnostics[0].code == "P0402"

@@ -1,0 +1,119 @@
+"""Monte Carlo is unbiased, and its reported error is what it says: four standard errors.
+
+Over many seeds, z = (estimate - exact)/standard error has mean 0 and variance 1. The mean of n such numbers has a
+standard deviation of 1/sqrt(n); a test that allows 4 of those fails for a right estimator once in 16,000 choices of
+seeds, and the seeds are fixed. The exact numbers are closed forms.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+import potto
+from potto.integrate.sampling import SIGMAS
+
+SAMPLES = 2_000
+SEEDS = 60
+T = 0.6
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A function f(t) at t = 0.6, its value and its derivative there."""
+
+    name: str
+    source: str
+    value: float
+    tangent: float
+
+
+PROBLEMS = (
+    # int_0^t x dx + (1 - t)
+    Problem("step", "integral [0, 1] (if [x < t] then x else 1) d(x)", T * T / 2 + 1 - T, T - 1),
+    # int_0^t sin x [x > 1/4] dx
+    Problem("moving bound", "integral [0, t] sin(x)*[x > 0.25] d(x)", math.cos(0.25) - math.cos(T), math.sin(T)),
+    # The integral of exp(-x) over x > t
+    Problem("infinite", "integral [0, inf] exp(-x)*[x > t] d(x)", math.exp(-T), -math.exp(-T)),
+    # P(x < t) for x ~ normal(0, 1)
+    Problem(
+        "normal",
+        "integral (x ~ normal(0, 1)) [x < t] d(x)",
+        (1 + math.erf(T / math.sqrt(2))) / 2,
+        math.exp(-T * T / 2) / math.sqrt(2 * math.pi),
+    ),
+    # int int [x + y < t] x y = t^4/24
+    Problem("triangle", "integral ([0, 1], [0, 1]) [x + y < t]*x*y d(x, y)", T**4 / 24, T**3 / 6),
+    # A quarter of a disc of area pi t/4, and e outside of it
+    Problem(
+        "disc",
+        "integral ([0, 1], [0, 1]) exp([x^2 + y^2 > t]) d(x, y)",
+        math.pi * T / 4 + math.e * (1 - math.pi * T / 4),
+        math.pi / 4 * (1 - math.e),
+    ),
+    # {y < x t} below the diagonal: int_0^1 x t dx, and the bound follows x
+    Problem("wedge", "integral ([0, 1], [0, x]) [y < x*t]*x d(x, y)", T / 3, 1 / 3),
+    # int_0^1 (t x)^2 dx: a function of an inner integral
+    Problem("nested", "integral [0, 1] (integral [0, 1] [y < t*x] d(y))^2 d(x)", T * T / 3, 2 * T / 3),
+    # int_0^t e^(2x) dx + 1 - t: a jump under an inner integral
+    Problem(
+        "constant inside",
+        "integral [0, 1] exp(integral [0, 2] [x < t]*x d(y)) d(x)",
+        (math.exp(2 * T) - 1) / 2 + 1 - T,
+        math.exp(2 * T) - 1,
+    ),
+    Problem("reversed", "integral ([1, 0], [0, 1]) [x*y < t] d(x, y)", -T * (1 - math.log(T)), math.log(T)),
+)
+
+
+def scores(problem: Problem, method: str, seeds: range) -> tuple[list[float], list[float]]:
+    """(estimate - exact)/standard error, of the value and of the derivative."""
+    f = potto.deriv(potto.compile(f"def f(t) {problem.source}").f)
+    values, tangents = [], []
+    for seed in seeds:
+        with potto.settings(method=method, samples=SAMPLES, seed=seed):
+            answer = f((T, 1.0))
+        for got, error, exact, into in (
+            (answer.value, answer.error, problem.value, values),
+            (answer.tangent, answer.tangent_error, problem.tangent, tangents),
+        ):
+            if error > 1e-9 * abs(exact):
+                into.append((got - exact) / (error / SIGMAS))
+            else:  # nothing is left to chance, as where the surface is a point: good to rounding
+                assert abs(got - exact) <= max(error, 1e-9 * abs(exact))
+    return values, tangents
+
+
+def check_mean(found: list[float]) -> None:
+    if found:
+        assert abs(np.mean(found)) < 4 / math.sqrt(len(found)), found
+
+
+@pytest.mark.parametrize("problem", PROBLEMS, ids=lambda p: p.name)
+def test_the_mean_over_seeds_is_the_exact_number(problem: Problem) -> None:
+    values, tangents = scores(problem, "mc", range(SEEDS))
+    check_mean(values)
+    check_mean(tangents)
+    for found in (values, tangents):
+        if found:  # the variance of n scores is 1 within 4 sqrt(2/n)
+            assert abs(np.var(found) - 1) < 4 * math.sqrt(2 / len(found))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["mc", "qmc"])
+@pytest.mark.parametrize("problem", PROBLEMS, ids=lambda p: p.name)
+def test_reported_errors_cover_what_is_wrong(problem: Problem, method: str) -> None:
+    seeds = range(1_000) if method == "mc" else range(0, 200_000, 1_000)
+    values, tangents = scores(problem, method, seeds)
+    for found in (values, tangents):
+        if not found:
+            continue
+        missed = sum(abs(z) > SIGMAS for z in found)
+        # Of normal numbers 1 in 16,000 is beyond 4 sigmas. The scores of qmc are of 16 replicates, so they follow
+        # Student's t with 15 degrees of freedom, of which 1 in 860 is: 4 of 200 has a probability of 1e-4.
+        assert missed <= (1 if method == "mc" else 3), (missed, len(found))
+        if method == "mc":
+            check_mean(found)
