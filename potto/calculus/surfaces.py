@@ -9,7 +9,7 @@ only as deep as its values go.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal
 
@@ -41,6 +41,7 @@ from potto.core.terms import (
 from potto.primitives import PRIMITIVES
 
 DEEPEST = 2000
+_DEEPEST_SURFACE = 12
 
 Kind = Literal["jump", "kink", "edge", "center"]
 # Where a part of the program gets its functions from: a Lam for the head of a call, or None if it is not known here.
@@ -103,7 +104,41 @@ def fitted(args: tuple[Term, ...], arity: int) -> tuple[Term, ...]:
 
 def findings(term: Term, resolve: Resolve, decide: Decide = undecided) -> tuple[Finding, ...]:
     """All surfaces of a term, jumps with the trace that forces them. Raises TooDeep."""
-    return tuple(_Search(resolve, decide).term(term, {}, (), (), 0))
+    found = _Search(resolve, decide).term(term, {}, (), (), 0)
+    return tuple(replace(f, surface=carried_out(f.surface, resolve)) for f in found)
+
+
+def carried_out(surface: Term, resolve: Resolve, depth: int = 0) -> Term:
+    """A surface with the calls in it replaced by what they give, as far as `resolve` knows: then it can be solved.
+
+    A recursion stays a call after a few rounds.
+    """
+    order = postorder(surface)
+    if depth > _DEEPEST_SURFACE or not any(isinstance(node, App) for node in order):
+        return surface
+    memo: dict[Term, Term] = {}
+    for node in order:
+        made = rebuild(node, tuple(memo[c] for c in children(node)))
+        memo[node] = _result(made, resolve, depth) if isinstance(made, App) else made
+    return memo[surface]
+
+
+def _result(call: App, resolve: Resolve, depth: int) -> Term:
+    head, groups = spine(call)
+    function = head if isinstance(head, Lam) else None if isinstance(head, Deriv) else resolve(head)
+    if function is None:
+        return call
+    params, body = uncurry(function, len(groups))
+    args: list[Term] = []
+    shape: Term = function
+    for group in groups:
+        if not isinstance(shape, Lam):
+            return call
+        args.extend(fitted(group, len(shape.params)))
+        shape = shape.body
+    if len(args) != len(params):
+        return call
+    return carried_out(substitute(body, dict(zip(params, args, strict=True))), resolve, depth + 1)
 
 
 @dataclass(frozen=True, slots=True)
