@@ -12,6 +12,7 @@ from potto.core.terms import (
     ONE,
     Const,
     Integral,
+    Prim,
     Term,
     add,
     children,
@@ -80,4 +81,6 @@ def _placed(lo: Term, hi: Term, share: Term) -> tuple[Term, Term]:
 
 
 def _infinite(bound: Term) -> bool:
+    if isinstance(bound, Prim) and bound.op == "neg":
+        bound = bound.args[0]
     return isinstance(bound, Const) and math.isinf(bound.value)

@@ -26,6 +26,25 @@ def respond(session: Conversation, text: str) -> Reply:
 
 def stream(session: Conversation, text: str) -> Iterator[Part]:
     """The answer part by part, as it comes. An interrupt goes through; what was entered so far stays."""
+    recording = session.record
+    said: list[Part] = []
+    try:
+        for part in _guarded(session, text):
+            said.append(part)
+            yield part
+    finally:
+        if recording is not None and recording == session.record:
+            _write_down(recording, text, said)
+
+
+def _write_down(path: str, text: str, said: list[Part]) -> None:
+    """An entry and its answer at the end of a transcript."""
+    prompted = text.rstrip().replace("\n", "\n... ")
+    with open(path, "a", encoding="utf-8") as file:
+        file.write("\n".join([f"po> {prompted}", *(part.plain() for part in said)]) + "\n\n")
+
+
+def _guarded(session: Conversation, text: str) -> Iterator[Part]:
     try:
         if session.watching:
             yield from session.refreshed(quiet=True)

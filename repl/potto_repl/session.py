@@ -123,6 +123,7 @@ class Conversation(Session):
         brought = [o for o in outcomes if isinstance(o, Imported)]
         if not brought:
             self.undoing.pop()
+        self._elaborated()
         for item in brought:
             count = f"{len(item.names)} name{'' if len(item.names) == 1 else 's'}"
             listed = f": {', '.join(item.names[:8])}{', ...' if len(item.names) > 8 else ''}" if item.names else ""
@@ -161,8 +162,6 @@ class Conversation(Session):
 
     def _check_all(self, before: dict[str, str], parts: list[Part]) -> int:
         """Check the files, set aside those that are broken now, elaborate the rest; how many definitions there are."""
-        from potto.elaborate import core
-
         found: dict[str, list[Located]] = {}
         for file in self._files():
             found[file] = list(self.world.diagnostics(file))
@@ -173,12 +172,16 @@ class Conversation(Session):
                 self.broken.add(file)
         for file in self.broken:
             self.world.files.set_text(file, before[file])
-        total = 0
-        for file in self._files():
-            for name in names(self.db, file):
-                total += 1
-                core(self.db, file, name)
-        return total
+        return self._elaborated()
+
+    def _elaborated(self) -> int:
+        """Elaborate every definition of the loaded files and of those that they import; how many there are."""
+        from potto.elaborate import core
+
+        found = [(file, name) for file in self._files() for name in names(self.db, file)]
+        for file, name in found:
+            core(self.db, file, name)
+        return len(found)
 
 
 def plain_names(text: str) -> str:

@@ -73,12 +73,12 @@ def _compared(session: Conversation, called: Called, slope: Slope) -> Iterator[P
     data: dict[str, Any] = {"by": slope.name, "derivative": tangent, "error": error, "differences": other.value,
                             "agree": agree, "discretized": summed}  # fmt: skip
     if summed is not None:
-        sampled = format_number(summed, 1e-4 * max(abs(summed), abs(tangent), 1e-6))
-        rows.append(f"  differentiating the discretized sum ({points}) gives {sampled}; "
-                    f"Potto gives {format_number(tangent, error)}")  # fmt: skip
+        sampled = format_number(summed, 1e-4 * max(abs(summed), abs(tangent), 1e-6) if summed else 0.0)
+        rows.append(f"  differentiating the discretized sum gives {sampled}; "
+                    f"Potto gives {format_number(tangent, error)}   {points}")  # fmt: skip
         missed = slope.parts is not None and abs(float(slope.parts.boundary)) > 1e-9 * max(1.0, abs(tangent))
         if missed and abs(summed - tangent) > 1e-3 * abs(tangent):
-            rows[-1] += ": the sum misses the boundary term"
+            rows.append("  the sum misses the boundary term")
     if not agree:
         rows.append("  the value may have a corner here, so that the derivatives on its two sides differ")
     yield Part("answer", "\n".join(rows), {"check": data})

@@ -22,6 +22,7 @@ from potto_repl.values import seconds
 
 MOST_STEPS = 200
 GRADIENT = 1e-8
+FIRST = 0.25  # of the size of the parameters: how far the first step goes at most, before the curvature is known
 PATIENCE = 0.5  # seconds before progress is shown
 
 Vector = list[float]
@@ -132,7 +133,9 @@ def minimized(objective: Objective, start: Vector) -> Iterator[Fit]:
 def _advance(objective: Objective, state: Fit, direction: Vector) -> bool:
     """Go along a direction until the value has fallen enough (Armijo); False if it never does."""
     slope = dot(direction, state.gradient)
-    step = min(1.0, 1.0 / max(map(abs, direction))) if state.steps == 0 else 1.0
+    size = max(map(abs, state.x))
+    reach = FIRST * max(size, 0.1) if state.steps == 0 else max(size, 1.0)
+    step = min(1.0, reach / max(map(abs, direction)))
     for _ in range(40):
         x = [a + step * d for a, d in zip(state.x, direction, strict=True)]
         value, gradient = objective(x)

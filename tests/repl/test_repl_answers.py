@@ -1,0 +1,173 @@
+"""What the prompt says to definitions, expressions and derivatives. Expected numbers are closed forms."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import pytest
+
+JUMP = "def f(t) integral [0, 1] [x < t] d(x)"  # t for t in [0, 1]
+WEIGHTED = "def g(t) integral [0, 1] [x < t]*t^2 d(x)"  # t^3: interior 2t*t, boundary t^2
+
+
+def test_a_definition_echoes_its_type(talk):
+    assert talk(JUMP).text == "f : (t: Real) -> Real"
+
+
+def test_a_definition_shadows_with_a_note(talk):
+    talk(JUMP)
+    reply = talk("def f(t) t")
+    assert "shadows `f` of <In 1>" in reply.text and not reply.failed
+
+
+def test_a_value_has_an_error_and_a_cost(talk):
+    talk(JUMP)
+    reply = talk("f(0.3)")
+    value, tail = reply.parts
+    assert re.fullmatch(r"_2 = 0\.3 ± \d\.\de-\d+ : Real", value.text)
+    assert re.fullmatch(r"quadrature, \d+ evaluations, .*s", tail.text)
+    assert value.data["value"] == pytest.approx(0.3, rel=1e-12) and 0 < value.data["error"] < 1e-12
+
+
+def test_an_exact_value_has_no_error_and_no_cost(talk):
+    assert talk("1 + 1").text == "_1 = 2 : Real"
+
+
+def test_a_sampled_value_says_its_samples_and_seed(talk):
+    talk.all(JUMP, ":method mc", ":set seed 7", ":set samples 10000")
+    reply = talk("f(0.5)")
+    assert "mc, 10,000 samples, seed 7" in reply.text
+    digits = re.search(r"= (0\.\d+) ±", reply.text)[1]
+    assert len(digits) <= 5  # ten thousand samples don't give more
+
+
+def test_a_derivative_has_its_parts_apart(talk):
+    talk(WEIGHTED)
+    data = talk.data("deriv(g)((0.3, 1))")
+    assert data["value"] == pytest.approx(0.027, rel=1e-12)
+    assert data["tangent"] == pytest.approx(3 * 0.3**2, rel=1e-12)
+    assert data["interior"] == pytest.approx(2 * 0.3 * 0.3, rel=1e-12)
+    assert data["boundary"] == pytest.approx(0.3**2, rel=1e-11)
+
+
+def test_parts_of_a_moving_disc_in_two_dimensions(talk):
+    # the quarter disc of radius r, filled with r: value pi r^3/4, interior pi r^2/4, boundary r * pi r/2
+    talk("def h(r) integral ([0, 2], [0, 2]) r*[x^2 + y^2 < r^2] d(x, y)")
+    data = talk.data("deriv(h)((1, 1))")
+    assert data["tangent"] == pytest.approx(3 * math.pi / 4, rel=1e-8)
+    assert data["interior"] == pytest.approx(math.pi / 4, rel=1e-8)
+    assert data["boundary"] == pytest.approx(math.pi / 2, rel=1e-7)
+
+
+def test_moving_bounds_count_as_boundary(talk):
+    talk("def h(t) integral [0, t] x*t d(x)")  # t^3/2: interior t^2/2, the bound brings t^2
+    data = talk.data("deriv(h)((2, 1))")
+    assert data["interior"] == pytest.approx(2, rel=1e-12) and data["boundary"] == pytest.approx(4, rel=1e-12)
+
+
+def test_parts_of_a_smooth_integrand_have_no_boundary(talk):
+    talk("def h(t) integral [0, 1] sin(t*x) d(x)")
+    data = talk.data("deriv(h)((1, 1))")
+    assert data["boundary"] == 0
+    assert data["interior"] == pytest.approx(math.cos(1) + math.sin(1) - 1, rel=1e-12)  # d/dt (1 - cos t)/t at 1
+
+
+def test_parts_through_a_composition(talk):
+    talk.all(WEIGHTED, "def k(t) sin(g(t)) + t")
+    data = talk.data("deriv(k)((0.3, 1))")
+    outer = math.cos(0.027)
+    assert data["interior"] == pytest.approx(1 + outer * 0.18, rel=1e-12)
+    assert data["boundary"] == pytest.approx(outer * 0.09, rel=1e-10)
+
+
+def test_parts_of_a_remembered_derivative(talk):
+    talk.all(WEIGHTED, "deriv(g)((0.3, 1))")
+    data = talk.data("_")
+    assert data["interior"] == pytest.approx(0.18, rel=1e-12)
+
+
+def test_answers_stay_at_hand(talk):
+    talk.all(JUMP, "f(0.25)")
+    assert talk.data("_ * 4")["value"] == pytest.approx(1, rel=1e-12)
+    assert talk.data("Out[2] + _3")["value"] == pytest.approx(1.25, rel=1e-12)
+
+
+def test_carets_stand_under_what_was_typed(talk):
+    talk(JUMP)
+    talk("f(0.25)")
+    text = talk("Out[2] + nothing").text
+    assert " 1 | Out[2] + nothing\n  |          ^^^^^^^" in " " + text.replace("\n1 |", "\n 1 |")
+
+
+def test_free_names_are_to_be_defined(talk):
+    reply = talk("x + t")
+    assert reply.failed and "`x` is not defined" in reply.text
+    assert "define `x` and `t` first" in reply.text and r"`\(x, t) . x + t`" in reply.text
+
+
+def test_the_rule_is_said_with_the_place_in_the_entry(talk):
+    reply = talk("def f(t)\n    integral [0, 1] (if x < t then 1 else 0) d(x)")
+    assert "error[P0301]" in reply.text and "<In 1>:2:25" in reply.text
+
+
+def test_an_error_in_an_earlier_entry_shows_that_entry(talk):
+    talk("def loop(n) if n > 0 then loop(n + 1) else 0")
+    reply = talk("loop(1)")
+    assert reply.failed and "error[P05" in reply.text
+
+
+def test_near_names_are_offered(talk):
+    talk("def renderer(c) c")
+    assert "did you mean `renderer`?" in talk("rendrer(1)").text
+
+
+def test_a_loop_prints_without_answers(talk):
+    reply = talk("for v in [1, 2]:\n    print(v/4)")
+    assert reply.text.splitlines() == ["0.25", "0.5"]
+
+
+def test_functions_show_their_types(talk):
+    assert talk("\\x . x^2").text.startswith("_1 = <function> : ")
+
+
+def test_infinite_values_have_no_error_bar(talk):
+    assert talk("1/0").text.startswith("_1 = inf : Real")
+
+
+def test_nothing_says_nothing(talk):
+    assert talk("").parts == () and talk("   \n").parts == () and talk("# a comment").parts == ()
+
+
+def test_a_bug_of_ours_ends_no_session(talk, monkeypatch):
+    import potto_repl.answers
+
+    def broken(session, text):
+        raise ZeroDivisionError("ours")
+        yield
+
+    monkeypatch.setattr(potto_repl.answers, "entry_parts", broken)
+    reply = talk("1 + 1")
+    assert reply.failed and "this is a bug in Potto" in reply.text and "report:" in reply.text
+    path = re.search(r"report: +(\S+)", reply.text)[1]
+    with open(path) as file:
+        assert "ZeroDivisionError" in file.read()
+    monkeypatch.undo()
+    assert talk("1 + 1").text.endswith("= 2 : Real")
+
+
+def test_an_interrupt_keeps_what_was_defined(talk, monkeypatch):
+    from potto_repl.respond import stream
+
+    parts = stream(talk.session, "def f(t) 2*t\nprint(f(1))\nprint(f(2))")
+    next(parts)
+    assert next(parts).text == "2"
+    with pytest.raises(KeyboardInterrupt):
+        parts.throw(KeyboardInterrupt)
+    assert talk.data("f(3)")["value"] == 6
+
+
+def test_deep_recursion_is_a_message(talk):
+    talk("def sums(n) if n > 0 then n + sums(n - 1) else 0")
+    assert talk.data("sums(500)")["value"] == 125250
+    assert "P05" in talk("sums(100000)").text

@@ -1,0 +1,365 @@
+"""The commands of the prompt: what each says, and what it says when it is used wrongly."""
+
+from __future__ import annotations
+
+import math
+import re
+import subprocess
+import sys
+
+import pytest
+from potto_repl.registry import COMMANDS
+
+JUMP = "def f(t) integral [0, 1] [x < t] d(x)"
+WEIGHTED = "def g(t) integral [0, 1] [x < t]*t^2 d(x)"
+PROMISED = ["help", "type", "deriv", "eval", "surfaces", "load", "reload", "watch", "edit", "browse", "doc", "explain", "source", "set", "method", "time", "error", "check", "plot", "image", "grad", "fit", "save", "record", "history", "undo", "reset", "quit"]
+
+
+def test_every_promised_command_is_there():
+    assert set(PROMISED) <= set(COMMANDS)
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_every_command_explains_itself(talk, name):
+    text = talk(f":help {name}").text
+    assert text.startswith(f":{name}") and len(text.splitlines()) >= 3
+    assert COMMANDS[name].summary.endswith((".", "`."))
+
+
+@pytest.mark.parametrize("name", sorted(set(COMMANDS) - {"quit"}))
+def test_no_command_breaks_on_nonsense(talk, name):
+    for text in ("", "(", "nothing at all", "1 2 3 4 5 6 7", "\\", "f(", ":", "é ∫ \U0001f600"):
+        reply = talk(f":{name} {text}".rstrip())
+        assert "bug in Potto" not in reply.text, reply.text
+
+
+def test_abbreviations(talk):
+    assert talk(":ty 1").text == talk(":t 1").text == talk(":type 1").text == "1 : Real"
+    ambiguous = talk(":so 1")
+    assert "could be" not in ambiguous.text  # only :source begins so
+    assert "could be" in talk(":re").text and "`:reload`" in talk(":re").text
+    assert "did you mean `:type`?" in talk(":tpye 1").text
+
+
+def test_questions(talk):
+    talk("# the length left of t\n" + JUMP)
+    assert "the length left of t" in talk("f?").text
+    assert "# <In 1>:1" in talk("f??").text and "integral" in talk("f??").text
+    assert "square root" in talk("sqrt?").text.lower()
+    assert "`:type EXPR`" not in talk(":type?").text and ":type EXPR" in talk(":type?").text
+    assert "did you mean `sqrt`?" in talk("sqrtt?").text
+
+
+def test_type_and_browse(talk):
+    talk.all(JUMP, "half = 0.5")
+    assert talk(":type deriv(f)").text == "deriv(f) : (dt: (Real, Real)) -> (Real, Real)"
+    assert talk(":browse").text.splitlines() == ["f : (t: Real) -> Real", "half : Real"]
+    reply = talk(":type f(")
+    assert reply.failed and "^" in reply.text
+
+
+def test_deriv_in_symbols(talk):
+    talk(WEIGHTED)
+    text = talk(":deriv g").text
+    assert "interior" in text and "boundary" in text and "surfaces" in text and "moved by t" in text
+    assert ":grad g(0.3)" in talk(":deriv g(0.3)").text
+    assert talk(":deriv 3").failed
+
+
+def test_unicode_is_an_option(talk):
+    talk(WEIGHTED)
+    assert "∫" in talk(":deriv g").text
+    talk(":set unicode off")
+    assert talk(":deriv g").text.isascii()
+
+
+def test_surfaces(talk):
+    talk.all(JUMP, "def s(x) x^2")
+    assert "x = t" in talk(":surfaces f").text and "moved by t" in talk(":surfaces f").text
+    assert "none" in talk(":surfaces s").text
+
+
+def test_eval_makes_no_entry(talk):
+    talk.all(JUMP, "f(0.25)")
+    assert talk.data(":eval f(0.5)")["value"] == pytest.approx(0.5, rel=1e-12)
+    assert talk.session.number == 2 and talk.data("_")["value"] == pytest.approx(0.25, rel=1e-12)
+
+
+def test_grad_by_every_number(talk):
+    talk("def h(a, b) integral [0, b] a*[x < a] d(x)")  # a^2 for a < b
+    data = talk.data(":grad h(0.5, 2)")["gradient"]
+    assert data["value"] == pytest.approx(0.25, rel=1e-12)
+    assert data["a"] == pytest.approx(1.0, rel=1e-12) and data["b"] == pytest.approx(0.0, abs=1e-12)
+    text = talk(":grad h(0.5, 2)").text
+    assert "interior 0.5, boundary 0.5" in text
+    assert talk(":grad h(b=2, a=0.5)").text.splitlines()[1:] == text.splitlines()[1:]  # but for the time
+    assert talk(":grad h").failed and talk(":grad 3").failed
+
+
+def test_grad_of_a_function_that_takes_a_function(talk):
+    talk.all("def h(c, s) integral [0, 1] s(x)*[x < c] d(x)", "w = \\x . x")
+    assert talk.data(":grad h(0.6, w)")["gradient"]["c"] == pytest.approx(0.6, rel=1e-12)
+
+
+def test_check_names_the_missed_boundary_term(talk):
+    talk(JUMP)
+    data = talk.data(":check f(0.3)")["check"]
+    assert data["agree"] and data["derivative"] == pytest.approx(1, rel=1e-12)
+    assert data["differences"] == pytest.approx(1, rel=1e-9) and data["discretized"] == 0
+    text = talk(":check f(0.3)").text
+    assert "differentiating the discretized sum gives 0; Potto gives 1" in text
+    assert "misses the boundary term" in text
+
+
+def test_check_of_a_smooth_integral_blames_nobody(talk):
+    talk("def h(t) integral [0, 1] sin(t*x) d(x)")
+    text = talk(":check h(1)").text
+    assert "agree" in text and "misses" not in text
+
+
+def test_check_in_two_dimensions_and_without_bounds(talk):
+    talk("def h(r) integral ([0, 2], [0, 2]) [x^2 + y^2 < r^2] d(x, y)")
+    data = talk.data(":check h(1)")["check"]
+    assert data["agree"] and data["discretized"] == 0
+    assert data["differences"] == pytest.approx(math.pi / 2, rel=1e-6)
+    talk("def n(m) integral (x ~ normal(m, 1)) x^2 d(x)")  # m^2 + 1
+    data = talk.data(":check n(0.5)")["check"]
+    assert data["agree"] and data["derivative"] == pytest.approx(1, rel=1e-9)
+    assert data["discretized"] == pytest.approx(1, rel=1e-3)
+
+
+def test_time_has_the_phases(talk):
+    talk(JUMP)
+    data = talk.data(":time f(0.3)")
+    assert list(data["seconds"]) == ["parse", "check", "compile", "link", "evaluate"]
+    assert all(spent >= 0 for spent in data["seconds"].values())
+
+
+def test_error_is_a_work_precision_table(talk):
+    talk("def h(t) integral [0, 1] exp(-t*x^2) d(x)")
+    table = talk.data(":error h(3)")["table"]
+    assert {row["method"] for row in table} == {"quadrature", "mc", "qmc"}
+    assert all(row["actual"] <= row["error"] + 1e-15 for row in table if row["method"] == "quadrature")
+    talk(WEIGHTED)
+    assert "tangent" in talk(":error deriv(g)((0.3, 1))").text
+
+
+def test_settings(talk):
+    assert "rtol       1e-10" in talk(":set").text
+    talk(":set rtol=1e-4")
+    assert talk.session.settings.rtol == 1e-4
+    talk(":set max-evals 1e6")
+    assert talk.session.settings.max_evals == 1_000_000
+    assert talk(":method mc").text == "method mc" and talk.session.settings.method == "mc"
+    assert "must be" in talk(":set seed -1").text
+    assert "did you mean `seed`?" in talk(":set sed 1").text
+    assert "one of emacs, vi" not in talk(":set keys vi").text
+    assert "is one of" in talk(":set keys nano").text
+
+
+def test_explain(talk):
+    talk("nothing")
+    assert talk(":explain").text.startswith("# P0201")
+    assert talk(":explain p0301").text.startswith("# P0301")
+    assert talk(":explain P9999").failed
+
+
+def test_undo_and_reset(talk):
+    talk.all("a = 1", "a = 2")
+    assert "entry 2" in talk(":undo").text
+    assert talk.data("a")["value"] == 1
+    talk(":reset")
+    assert talk("a").failed
+    assert talk(":undo").text == "there is nothing to undo"
+
+
+def test_an_entry_with_an_error_is_not_undone(talk):
+    talk.all("a = 1")
+    talk("b = nothing")
+    assert "entry 1" in talk(":undo").text
+
+
+def test_history(talk):
+    talk.all("a = 1", "a + 1", ":type a")
+    assert [entry["text"] for entry in talk.data(":history")["history"]] == ["a = 1", "a + 1"]
+    assert talk(":history 1").text.split() == ["2", "a", "+", "1"]
+    assert "nothing" in talk(":history zzz").text
+
+
+def test_quit(talk):
+    talk(":quit")
+    assert talk.session.leaving
+
+
+# Files
+
+
+def test_load_and_reload_recompile_what_changed(talk):
+    talk.write("a.po", "from b import h\ndef f(t) h(t) + 1\ndef g(t) 5*t")
+    talk.write("b.po", "def h(t) 2*t\ndef k(t) 7*t")
+    assert "3 names" in talk(":load a.po").text
+    assert talk.data("f(3)")["value"] == 7
+    assert talk(":reload").text == "nothing has changed"
+    talk.write("b.po", "def h(t) 3*t\ndef k(t) 7*t")
+    reply = talk(":reload")
+    assert re.fullmatch(r"1 of 4 recompiled, \d+ ms", reply.text)
+    assert talk.data("f(3)")["value"] == 10
+
+
+def test_a_broken_file_keeps_its_old_definitions_and_says_so(talk):
+    talk.write("a.po", "def f(t) 2*t")
+    talk.all(":load a.po")
+    talk.write("a.po", "def f(t) 2*")
+    reply = talk(":reload")
+    assert reply.failed and "a.po: the definitions of before are kept" in reply.text and "def f(t) 2*" in reply.text
+    assert talk.data("f(3)")["value"] == 6
+    talk.write("a.po", "def f(t) 4*t")
+    assert not talk(":reload").failed
+    assert talk.data("f(3)")["value"] == 12
+
+
+def test_watch_reloads_by_itself(talk):
+    talk.write("a.po", "def f(t) 2*t")
+    talk.all(":load a.po", ":watch")
+    talk.write("a.po", "def f(t) 50*t")
+    reply = talk("f(1)")
+    assert "1 of 1 recompiled" in reply.text and "50" in reply.text
+    talk(":watch off")
+    talk.write("a.po", "def f(t) 6*t + 0")
+    assert "recompiled" not in talk("f(1)").text
+
+
+def test_load_says_what_is_wrong(talk):
+    talk.write("renderer.po", "def f(t) t")
+    assert "did you mean `renderer.po`?" in talk(":load rendrer.po").text
+    assert "1 name" in talk(":load renderer").text
+    assert talk(":load").failed
+    talk.write("wrong.po", "def f(t) nothing")
+    assert "P0201" in talk(":load wrong.po").text
+
+
+def test_edit_needs_a_terminal_and_enters_what_is_saved(talk):
+    assert "no terminal" in talk(":edit").text
+    talk(JUMP)
+    seen = []
+    talk.session.edit = lambda text: seen.append(text) or "def f(t) 3*t"
+    talk(":edit f")
+    assert seen == [JUMP + "\n"] and talk.data("f(2)")["value"] == 6
+    talk.session.edit = lambda text: None
+    assert "nothing was entered" in talk(":edit").text
+
+
+def test_record(talk):
+    talk.all(":record log.txt", "1 + 1")
+    talk("nothing")
+    talk(":record off")
+    talk("2 + 2")
+    text = (talk.folder / "log.txt").read_text()
+    assert "po> 1 + 1\n_1 = 2 : Real\n" in text and "P0201" in text and "2 + 2" not in text
+
+
+SESSION = [
+    JUMP, "f(0.3)", "deriv(f)((0.3, 1))", "_2 * 2", "def f(t) t^2", "f(0.3)", "a = f(2)", "a", "_ + 1", "print(a, f(3))",
+    "for v in [1, 2]:\n    print(v)", "\\x . x", "(a, f(0.5))", "def g(t) f(t) + a", "def a(x) x", "g(1)",
+]  # fmt: skip
+
+
+def potto(folder, *arguments):
+    command = [sys.executable, "-m", "potto", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, cwd=folder, check=False)
+
+
+def test_a_saved_session_is_a_program_whose_live_expressions_hold(talk):
+    talk.all(*SESSION)
+    saved = talk(":save session.po")
+    assert not saved.failed, saved.text
+    done = potto(talk.folder, "test", "session.po")
+    assert done.returncode == 0, done.stderr + (talk.folder / "session.po").read_text()
+    assert "9 live expressions" in done.stdout, (talk.folder / "session.po").read_text()
+    text = (talk.folder / "session.po").read_text()
+    assert "#> deriv(f_1)((0.3, 1))\n#= (0.3, 1)" in text and "answer_2 = f_1(0.3)" in text
+    assert potto(talk.folder, "run", "session.po").stdout.splitlines() == ["4 9", "1", "2"]
+
+
+def test_a_session_over_a_loaded_file_imports_it(talk):
+    talk.write("m.po", "def h(x) 2*x")
+    talk.all(":load m.po", "h(2)", ":save session.po")
+    assert (talk.folder / "session.po").read_text() == "from m import h\n\n#> h(2)\n#= 4\n"
+
+
+def test_save_says_what_it_cannot_write(talk):
+    assert talk(":save").failed and talk(":save session.txt").failed and talk(":save plot.svg").failed
+    talk("1")
+    assert "cannot be written" in talk(":save nowhere/session.po").text
+
+
+# Pictures
+
+
+def test_plot_draws_the_curve_and_its_derivative(talk):
+    talk(WEIGHTED)
+    reply = talk(":plot g, deriv g 0 0.9")
+    plot = reply.parts[0].data["_picture"]
+    assert plot.labels == ("g", "deriv g")
+    for i, (value, slope) in enumerate(zip(*plot.curves, strict=True)):
+        t = 0.9 * i / (len(plot.curves[0]) - 1)
+        assert value == pytest.approx(t**3, abs=1e-5) and slope == pytest.approx(3 * t**2, abs=1e-4)
+    assert any("⠀" <= char <= "⣿" for char in reply.text)
+    assert max(map(len, reply.text.splitlines())) <= 80
+
+
+def test_plot_of_an_expression_over_its_free_name(talk):
+    plot = talk(":plot sin(u)/u 1 6").parts[0].data["_picture"]
+    assert plot.curves[0][-1] == pytest.approx(math.sin(6) / 6, rel=1e-4) and plot.axis == "u"
+
+
+def test_plot_is_ascii_where_symbols_are_off(talk):
+    talk(":set unicode off")
+    assert talk(":plot x^2").text.isascii()
+
+
+def test_plot_has_holes_where_there_is_no_value(talk):
+    plot = talk(":plot sqrt(x) -1 1").parts[0].data["_picture"]
+    assert math.isnan(plot.curves[0][0]) and plot.curves[0][-1] == pytest.approx(1, rel=1e-4)
+
+
+def test_plot_says_what_it_cannot_draw(talk):
+    talk("def h(a, b) a + b")
+    for wrong in (":plot", ":plot h", ":plot a*b", ":plot x 1 0"):
+        assert talk(wrong).failed, wrong
+
+
+def test_pictures_are_saved(talk):
+    talk.all(":plot x^2 -1 1", ":save plot.svg", ":save plot.png")
+    import xml.etree.ElementTree as tree
+
+    root = tree.parse(talk.folder / "plot.svg").getroot()
+    assert root.tag.endswith("svg") and any(node.tag.endswith("polyline") for node in root)
+    data = (talk.folder / "plot.png").read_bytes()
+    assert data.startswith(b"\x89PNG") and data.endswith(b"IEND\xaeB`\x82")
+
+
+def test_image(talk):
+    talk("def h(x, y) [x + y > 1]")
+    image = talk(":image h 8").parts[0].data["_picture"]
+    light = [[pixel[0] == 255 for pixel in row] for row in image.pixels]  # the first row is the top, y near 1
+    assert light == [[(c + 0.5) / 8 + (7.5 - r) / 8 > 1 for c in range(8)] for r in range(8)]
+    assert talk(":image x*y 8 -1 1 -1 1").parts[0].data["low"] == pytest.approx(-((7 / 8) ** 2), rel=1e-6)
+    colour = talk(":image (x, y, 0.5) 4").parts[0].data["_picture"]
+    assert colour.pixels[0][3] == (round(255 * 7 / 8), round(255 * 7 / 8), 128)
+
+
+# Fitting
+
+
+def test_fit_finds_the_minimum_through_a_boundary_term(talk):
+    talk.all(JUMP, "def loss(t) (f(t) - 0.25)^2")
+    data = talk.data(":fit loss t=0.9")
+    assert data["parameters"]["t"] == pytest.approx(0.25, abs=1e-6) and data["converged"]
+
+
+def test_fit_of_two_numbers_with_one_fixed(talk):
+    talk("def rosenbrock(a, b, k) (1 - a)^2 + k*(b - a^2)^2")
+    data = talk.data(":fit rosenbrock a=-1.2, b=1 with k=100")
+    assert data["parameters"] == pytest.approx({"a": 1, "b": 1}, abs=1e-5)
+    assert talk(":fit rosenbrock").failed and talk(":fit rosenbrock z=1").failed
