@@ -1,0 +1,272 @@
+"""The language server against its goals: a real client over standard streams, 200 modules, 42,000 lines.
+
+Run: `python benchmarks/lsp.py [--json] [--quick]`. Times are of the wall clock between a message sent and the answer
+read; on a busy machine the tails are those of the machine.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import random
+import statistics
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import Any
+
+from lsp_workspace import workspace
+
+PUSHED = "textDocument/publishDiagnostics"
+Row = tuple[str, str, float, str, float, float]  # gate, what, value, unit, goal, stretch
+
+
+class Client:
+    """A raw client; everything that arrives is kept with the time of its arrival."""
+
+    def __init__(self, folder: Path) -> None:
+        self.started = time.perf_counter()
+        pipe = subprocess.PIPE
+        self.process = subprocess.Popen([sys.executable, "-m", "potto", "lsp"], stdin=pipe, stdout=pipe)
+        self.inbox: SimpleQueue[tuple[float, dict[str, Any]]] = SimpleQueue()
+        threading.Thread(target=self._read, daemon=True).start()
+        self.folder, self._last, self.versions = folder, 0, dict[str, int]()
+        folders = [{"uri": folder.as_uri(), "name": "bench"}]
+        id = self.begin("initialize", {"capabilities": {}, "workspaceFolders": folders})
+        self.greeted = self.until(lambda m: m.get("id") == id)[0] - self.started
+        self.tell("initialized", {})
+
+    def send(self, message: dict[str, Any]) -> float:
+        body = json.dumps({"jsonrpc": "2.0", **message}).encode()
+        assert self.process.stdin is not None
+        sent = time.perf_counter()
+        self.process.stdin.write(b"Content-Length: %d\r\n\r\n%b" % (len(body), body))
+        self.process.stdin.flush()
+        return sent
+
+    def tell(self, method: str, params: Any) -> float:
+        return self.send({"method": method, "params": params})
+
+    def begin(self, method: str, params: Any) -> int:
+        self._last += 1
+        self.send({"id": self._last, "method": method, "params": params})
+        return self._last
+
+    def ask(self, method: str, params: Any) -> tuple[float, dict[str, Any]]:
+        """Seconds to the answer, and the answer."""
+        sent = time.perf_counter()
+        id = self.begin(method, params)
+        arrived, message = self.until(lambda m: m.get("id") == id and "method" not in m)
+        return arrived - sent, message
+
+    def until(self, wanted: Callable[[dict[str, Any]], bool], seconds: float = 120) -> tuple[float, dict[str, Any]]:
+        end = time.perf_counter() + seconds
+        while True:
+            arrived, message = self.inbox.get(timeout=max(end - time.perf_counter(), 0.01))
+            if wanted(message):
+                return arrived, message
+
+    def quiet(self, seconds: float = 0.3) -> float:
+        """Wait until nothing has come for so long; when the last thing came."""
+        last = time.perf_counter()
+        while True:
+            try:
+                last, _ = self.inbox.get(timeout=seconds)
+            except Empty:
+                return last
+
+    def uri(self, module: str) -> str:
+        return (self.folder / f"{module}.po").as_uri()
+
+    def open(self, module: str, text: str) -> float:
+        self.versions[module] = 1
+        item = {"uri": self.uri(module), "languageId": "potto", "version": 1, "text": text}
+        return self.tell("textDocument/didOpen", {"textDocument": item})
+
+    def change(self, module: str, *changes: dict[str, Any]) -> float:
+        self.versions[module] += 1
+        document = {"uri": self.uri(module), "version": self.versions[module]}
+        return self.tell("textDocument/didChange", {"textDocument": document, "contentChanges": list(changes)})
+
+    def diagnosed(self, module: str) -> float:
+        """When the diagnostics of the present version came."""
+        uri, version = self.uri(module), self.versions[module]
+        return self.until(lambda m: m.get("method") == PUSHED and m["params"]["uri"] == uri
+                          and m["params"].get("version") == version)[0]  # fmt: skip
+
+    def memory(self) -> float:
+        """The resident memory in MB, as Linux tells it."""
+        status = Path(f"/proc/{self.process.pid}/status").read_text()
+        return int(status.partition("VmRSS:")[2].split()[0]) / 1024
+
+    def _read(self) -> None:
+        stream = self.process.stdout
+        assert stream is not None
+        while line := stream.readline():
+            stream.readline()
+            body = stream.read(int(line.split(b":")[1]))
+            self.inbox.put((time.perf_counter(), json.loads(body)))
+
+
+def replace(line: int, start: int, end: int, text: str) -> dict[str, Any]:
+    return {"range": {"start": {"line": line, "character": start}, "end": {"line": line, "character": end}}, "text": text}
+
+
+def quantile(times: list[float], part: float) -> float:
+    return sorted(times)[min(int(part * len(times)), len(times) - 1)] * 1e3
+
+
+def measure(folder: Path, texts: dict[str, str], rounds: int) -> Iterator[Row]:
+    client = Client(folder)
+    large = texts["large"]
+    client.open("large", large)
+    diagnosed = client.diagnosed("large") - client.started
+    yield "G7", "start to `initialize` result", client.greeted * 1e3, "ms", 250, 150
+    yield "G8", "start to diagnostics of the opened 2,000-line file, cold", diagnosed * 1e3, "ms", 700, 450
+    yield "G9", "whole workspace checked cold", checked(client), "s", 2.5, 1.2
+    yield from typing(client, large, rounds)
+    yield from signatures(client, texts, rounds)
+    yield from questions(client, large, rounds)
+    yield "G10", "memory with the whole workspace checked", client.memory(), "MB", 120, 90
+    yield "G12", f"longest pause over {rounds * 50:,} random edits", pauses(client, rounds * 50), "ms", 20, 10
+    client.process.kill()
+
+
+def checked(client: Client) -> float:
+    """Seconds from the start until the whole workspace was pulled through: a symbol search waits behind nothing, so
+    the check is over when the server is quiet and a pull of all finds nothing left to do."""
+    client.ask("workspace/diagnostic", {"previousResultIds": []})
+    return time.perf_counter() - client.started
+
+
+def typing(client: Client, large: str, rounds: int) -> Iterator[Row]:
+    lines = large.split("\n")
+    line = next(n for n in range(len(lines) // 2, len(lines)) if "sin(" in lines[n])
+    column = lines[line].index("sin(")
+    client.quiet()
+    body, broken, top = [], [], []
+    for turn in range(rounds):
+        sent = client.change("large", replace(line, column, column, str(turn % 9 + 1) + "*"))
+        body.append(client.diagnosed("large") - sent)
+        sent = client.change("large", replace(line, column, column + 2, ""))
+        body.append(client.diagnosed("large") - sent)
+    for _ in range(rounds):
+        sent = client.change("large", replace(line, column, column, "("))
+        broken.append(client.diagnosed("large") - sent)
+        sent = client.change("large", replace(line, column, column + 1, ""))
+        broken.append(client.diagnosed("large") - sent)
+        sent = client.change("large", {"range": {"start": {"line": 0, "character": 0}, "end": {"line": 0, "character": 0}},
+                                       "text": "\n"})  # fmt: skip
+        top.append(client.diagnosed("large") - sent)
+        sent = client.change("large", {"range": {"start": {"line": 0, "character": 0}, "end": {"line": 1, "character": 0}},
+                                       "text": ""})  # fmt: skip
+        top.append(client.diagnosed("large") - sent)
+    yield "", "keystroke to diagnostics, body edit, median", statistics.median(body) * 1e3, "ms", 5, 2.5
+    yield "G1", "keystroke to diagnostics, body edit in the 2,000-line module, p95", quantile(body, 0.95), "ms", 5, 2.5
+    yield "G2", "the same while the text is broken, p95", quantile(broken, 0.95), "ms", 5, 2.5
+    yield "G2", "the same with a line inserted at the top, p95", quantile(top, 0.95), "ms", 5, 2.5
+
+
+def signatures(client: Client, texts: dict[str, str], rounds: int) -> Iterator[Row]:
+    """The leaf loses a parameter that its importers fill, and gets it back."""
+    users = [name for name, text in texts.items() if "from m0 import f1 " in text or "import m0 as" in text]
+    opened = users[:3]
+    client.open("m0", texts["m0"])
+    for name in opened:
+        client.open(name, texts[name])
+    client.quiet()
+    near, far = [], []
+    changed = texts["m0"].replace("def f1(t, k)", "def f1(t)").replace("def f0(t, k)", "def f0(t)")
+    for turn in range(max(rounds // 5, 6)):
+        sent = client.change("m0", {"text": texts["m0"] if turn % 2 else changed})
+        uris = {client.uri(name) for name in opened}
+        while uris:
+            arrived, message = client.until(lambda m: m.get("method") == PUSHED)
+            uris.discard(message["params"]["uri"])
+        near.append(arrived - sent)
+        far.append(max(client.quiet(0.15), arrived) - sent)
+    yield "G3", "signature edit in a leaf to diagnostics of its open importers, p95", quantile(near, 0.95), "ms", 10, 3
+    yield "G4", f"the same, to diagnostics of all modules ({len(users)} import it), p95", quantile(far, 0.95), "ms", 40, 15
+
+
+def questions(client: Client, large: str, rounds: int) -> Iterator[Row]:
+    lines = large.split("\n")
+    places = [(n, line.index("sqrt")) for n, line in enumerate(lines) if "sqrt" in line]
+    rng = random.Random(1)
+
+    def hover() -> float:
+        line, column = rng.choice(places)
+        place = {"textDocument": {"uri": client.uri("large")}, "position": {"line": line, "character": column}}
+        return client.ask("textDocument/hover", place)[0]
+
+    for _ in range(50):
+        hover()
+    client.quiet()
+    idle = [hover() for _ in range(rounds * 5)]
+    busy = []
+    for turn in range(rounds * 2):
+        client.change("large", replace(0, 0, 0, "#") if turn % 2 == 0 else replace(0, 0, 1, ""))
+        client.change("m0", replace(0, 0, 0, "#") if turn % 2 == 0 else replace(0, 0, 1, ""))
+        busy.append(hover())
+    yield "G5", "hover p99, idle", quantile(idle, 0.99), "ms", 1, 0.5
+    yield "G5", "hover p99, while everything is re-checked", quantile(busy, 0.99), "ms", 5, 2
+    client.quiet()
+    cancelled = []
+    for _ in range(rounds):
+        id = client.begin("workspace/diagnostic", {"previousResultIds": []})
+        sent = client.tell("$/cancelRequest", {"id": id})
+        cancelled.append(client.until(lambda m, id=id: m.get("id") == id)[0] - sent)  # type: ignore[misc]
+    yield "G6", "a cancelled request is answered RequestCancelled, p95", quantile(cancelled, 0.95), "ms", 5, 2
+
+
+def pauses(client: Client, edits: int) -> float:
+    """The longest time between an edit somewhere and its diagnostics, in ms."""
+    rng, worst = random.Random(2), 0.0
+    text = workspace()["large"]
+    client.change("large", {"text": text})
+    client.diagnosed("large")
+    lines = text.split("\n")
+    for _ in range(edits // 2):
+        line = rng.randrange(len(lines))
+        column = rng.randrange(len(lines[line]) + 1)
+        typed = rng.choice(["x", "(", " ", "1", "+", "\n", "t", ")"])
+        sent = client.change("large", replace(line, column, column, typed))
+        worst = max(worst, client.diagnosed("large") - sent)
+        end = {"line": line + 1, "character": 0} if typed == "\n" else {"line": line, "character": column + 1}
+        back = {"range": {"start": {"line": line, "character": column}, "end": end}, "text": ""}
+        sent = client.change("large", back)
+        worst = max(worst, client.diagnosed("large") - sent)
+    return worst * 1e3
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--json", action="store_true", help="one object a row instead of a table")
+    parser.add_argument("--quick", action="store_true", help="fewer rounds")
+    arguments = parser.parse_args()
+    texts = workspace()
+    with tempfile.TemporaryDirectory(prefix="potto-bench-") as name:
+        for module, text in texts.items():
+            (Path(name) / f"{module}.po").write_text(text)
+        lines = sum(text.count("\n") for text in texts.values())
+        print(f"{len(texts)} modules, {lines:,} lines, one of {texts['large'].count(chr(10)):,}", file=sys.stderr)
+        for row in measure(Path(name), texts, 20 if arguments.quick else 200):
+            show(row, arguments.json)
+
+
+def show(row: Row, as_json: bool) -> None:
+    gate, what, value, unit, goal, stretch = row
+    if as_json:
+        print(json.dumps({"gate": gate, "what": what, "value": value, "unit": unit, "goal": goal, "stretch": stretch}))
+        return
+    verdict = "stretch" if value <= stretch else "goal" if value <= goal else "MISSED"
+    print(f"{gate:<4} {what:<72} {value:9.2f} {unit:<3} {goal:>6g} / {stretch:<6g} {verdict}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
