@@ -27,7 +27,11 @@ BELOW = "def step(u, w) [u > 0]*w\n"
         # The same inside of a call: int_t^1 (1/2)^2 dx.
         (STEP + "def f(t) integral [0, 1] (integral [0, 1] step(x - t)*y d(y))^2 d(x)", (1 - T) / 4, -0.25),
         # In a call some of whose arguments vary with it: int_t^1 (x/2)^2 dx.
-        (BELOW + "def f(t) integral [0, 1] (integral [0, 1] step(x - t, x*y) d(y))^2 d(x)", (1 - T**3) / 12, -(T**2) / 4),
+        (
+            BELOW + "def f(t) integral [0, 1] (integral [0, 1] step(x - t, x*y) d(y))^2 d(x)",
+            (1 - T**3) / 12,
+            -(T**2) / 4,
+        ),
         # In a function that is passed: the same number.
         (
             "def g(h, x) integral [0, 1] h(x)*y d(y)\ndef f(t) integral [0, 1] (g(\\a . [a > t]*a, x))^2 d(x)",
