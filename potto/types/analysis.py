@@ -14,7 +14,8 @@ from potto.diagnostics import Diagnostic
 from potto.modules.lookup import DefinitionTarget
 from potto.source import Span
 from potto.syntax import nodes
-from potto.types import calls, flow_binders, flow_calls, integrals  # noqa: F401  (imported for their rules)
+from potto.types import calls, conditions, flow_binders, flow_calls, flow_rules, integrals  # noqa: F401  (imported for their rules)
+from potto.types.algebra import flat, larger, symbolic
 from potto.types.annotations import written_type
 from potto.types.closing import declared, reasons_of
 from potto.types.context import Inference, ensure_stack, mismatch
@@ -27,19 +28,7 @@ from potto.types.recursion import endless
 from potto.types.scope import Outside
 from potto.types.types import UNKNOWN, Diffeo, Dist, Function, Meta, Parameter, Real, Type, Unknown, groups_of, resolve
 from potto.types.unify import close_type, unify
-from potto.types.values import (
-    STILL,
-    Closure,
-    Port,
-    Scalar,
-    Source,
-    TupleValue,
-    Value,
-    flat,
-    inputs_of,
-    larger,
-    symbolic,
-)
+from potto.types.values import STILL, Closure, Port, Scalar, Source, TupleValue, Value
 
 MAX_ROUNDS = 20
 MAX_PARTS = 500
@@ -247,6 +236,3 @@ def local_type(type: Type, value: Value | None) -> Type:
     if isinstance(value, Closure):
         return Decorating(value).type(close_type(type), value)
     return close_type(type)
-
-
-__all__ = ["Analysis", "Typed", "analyse", "inputs_of", "local_type"]

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
+from potto.types.algebra import flat, inputs_of, join, joined, jumps_of, merge, noted, ports_in, taint, then
 from potto.types.values import (
     NONE,
     STILL,
@@ -32,16 +33,6 @@ from potto.types.values import (
     Surface,
     TupleValue,
     Value,
-    flat,
-    inputs_of,
-    join,
-    joined,
-    jumps_of,
-    merge,
-    noted,
-    ports_in,
-    taint,
-    then,
 )
 
 

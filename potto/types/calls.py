@@ -16,8 +16,8 @@ from potto.primitives import PRIMITIVES
 from potto.syntax import nodes
 from potto.types import kinds
 from potto.types.context import Inference, Plan, comparison, describe, rule
-from potto.types.infer import deriv_argument, is_known, special, strip
-from potto.types.scope import Builtin, Local
+from potto.types.infer import is_known, special, strip
+from potto.types.scope import Builtin
 from potto.types.types import (
     REAL,
     UNKNOWN,
@@ -339,6 +339,3 @@ def _delta(inference: Inference, node: nodes.Apply) -> Type:
             continue
         inference.need_number(type, argument.value, "what `delta` is of")
     return REAL
-
-
-__all__ = ["Local", "callee_name", "deriv_argument"]

@@ -8,6 +8,7 @@ from potto.diagnostics import Related
 from potto.modules.lookup import DefinitionTarget
 from potto.syntax import nodes
 from potto.types import kinds
+from potto.types.algebra import flat, steps
 from potto.types.flow import Walk
 from potto.types.interface import PLAIN_KINDS, Closing, Decorating, chain_of
 from potto.types.reasons import Given, Reason, Reasons
@@ -24,8 +25,6 @@ from potto.types.values import (
     Source,
     TupleValue,
     Value,
-    flat,
-    steps,
 )
 
 

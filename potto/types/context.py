@@ -368,6 +368,3 @@ def _shadowing(local: Local, before: Local) -> Diagnostic:
         related=(Related(before.span, f"the {what} `{before.name}` is bound here"),),
         help="give one of them another name",
     )
-
-
-__all__ = ["RULES", "Inference", "Plan", "comparison", "describe", "ensure_stack", "mismatch", "rule"]

@@ -6,6 +6,7 @@ jumps, its tangent has deltas. What must be plain is the values alone: a tangent
 
 from __future__ import annotations
 
+from potto.types.algebra import flat, inputs_of, merge, ports_in
 from potto.types.values import (
     Abstract,
     Choice,
@@ -24,10 +25,6 @@ from potto.types.values import (
     Spike,
     TupleValue,
     Value,
-    flat,
-    inputs_of,
-    merge,
-    ports_in,
 )
 
 

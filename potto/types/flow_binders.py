@@ -3,22 +3,10 @@
 from __future__ import annotations
 
 from potto.syntax import nodes
+from potto.types.algebra import flat, merge, taint, without
 from potto.types.flow import Walk, walks
 from potto.types.rules import shown_delta
-from potto.types.values import (
-    HAZY,
-    NONE,
-    ListValue,
-    Scalar,
-    Source,
-    Sources,
-    TupleValue,
-    Value,
-    flat,
-    merge,
-    taint,
-    without,
-)
+from potto.types.values import HAZY, NONE, ListValue, Scalar, Source, Sources, TupleValue, Value
 
 
 @walks(nodes.Integral)

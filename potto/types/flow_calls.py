@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from potto.primitives import PRIMITIVES
 from potto.syntax import nodes
 from potto.syntax.printer import print_expression
+from potto.types.algebra import flat, jumps_of, merge
 from potto.types.apply import call
 from potto.types.calls import callee_name
 from potto.types.context import Plan
@@ -16,24 +17,7 @@ from potto.types.infer import strip
 from potto.types.rules import lone_delta, nonlinear
 from potto.types.scope import Builtin
 from potto.types.types import Parameter, groups_of
-from potto.types.values import (
-    HAZY,
-    STILL,
-    Closure,
-    Effect,
-    Port,
-    Scalar,
-    Sink,
-    Source,
-    Spike,
-    Step,
-    TupleValue,
-    Value,
-    flat,
-    jumps_of,
-    merge,
-    noted,
-)
+from potto.types.values import HAZY, STILL, Closure, Effect, Scalar, Sink, Source, Spike, Step, TupleValue, Value
 
 
 @walks(nodes.Apply)
@@ -156,6 +140,3 @@ class _Calling:
             passed = f"passed as `{name}` here" if name else f"passed to {callee_name(self.node)} here"
             notes.append(Step(self.node.arguments[place].value.span, passed, argument=True))
         return values, notes
-
-
-__all__ = ["Port", "builtin_value", "noted"]

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 from potto.diagnostics import Diagnostic
 from potto.measures import MEASURES
+from potto.modules.free import free_references
 from potto.modules.hints import did_you_mean, near_names
 from potto.syntax import nodes
 from potto.types import kinds
@@ -57,8 +58,6 @@ def _bounds(inference: Inference, node: nodes.Integral, place: int, bounds: Boun
 
 def _inner_name(part: nodes.Expr, inside: Sequence[str]) -> nodes.Name | None:
     """The first use of a variable that is bound only further in."""
-    from potto.modules.free import free_references
-
     for reference in free_references(part):
         if isinstance(reference, nodes.Name) and reference.id in inside:
             return reference

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 
 from potto.modules.lookup import DefinitionTarget
+from potto.types.algebra import flat, inputs_of, inputs_of_ports, join, ports_in
 from potto.types.types import (
     UNKNOWN,
-    Diffeo,
     Dist,
     Function,
     ListOf,
@@ -46,10 +46,6 @@ from potto.types.values import (
     Surface,
     TupleValue,
     Value,
-    flat,
-    inputs_of,
-    inputs_of_ports,
-    ports_in,
 )
 
 PLAIN_KINDS: tuple[SinkKind, ...] = ("condition", "jump", "sum", "equality", "declared")
@@ -192,8 +188,6 @@ class Closing:
 
 
 def _both(a: Value, b: Value) -> Value:
-    from potto.types.values import join
-
     both = join(a, b)
     if isinstance(both, Scalar):
         return replace(both, sources=dict(sorted(both.sources.items(), key=lambda item: item[0].number)))
@@ -331,9 +325,3 @@ class Decorating:
 
     def _varies(self, source: Source) -> bool:
         return source.kind == "variable" or (source in self.inputs and source not in self.settled)
-
-
-def diffeo_dims(type: Type) -> int | None:
-    """The dimension of a diffeomorphism's result."""
-    result = result_of(type)
-    return result.dims if isinstance(result, Diffeo) else None

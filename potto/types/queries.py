@@ -17,6 +17,7 @@ from potto.modules.lookup import DefinitionTarget, ModuleTarget
 from potto.modules.texts import chunk_text, definition, is_diffeo, parsed
 from potto.query import Database, query
 from potto.syntax import nodes
+from potto.types.algebra import symbolic
 from potto.types.analysis import Analysis, Typed, analyse, local_type
 from potto.types.context import Inference, ensure_stack
 from potto.types.flow import Walk
@@ -26,11 +27,9 @@ from potto.types.interface import Interface, unknown_interface
 from potto.types.lints import lints
 from potto.types.reasons import Reasons
 from potto.types.scope import Global, Local, Meaning, Member, Module, Outside
-from potto.types.types import UNKNOWN, Type
+from potto.types.types import Type
 from potto.types.unify import open_type
-from potto.types.values import HAZY, Port, Source, Value, symbolic
-
-NOTHING = Analysis(unknown_interface("?"), (), Reasons(), ())
+from potto.types.values import Port, Source, Value
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,16 +153,3 @@ def infer_expression(
     value = walk.value(expr)
     found = (*inference.diagnostics, *walk.diagnostics)
     return Inferred(local_type(type, value), tuple(sorted(found, key=lambda d: (d.span, d.code))))
-
-
-__all__ = [
-    "HAZY",
-    "UNKNOWN",
-    "Inferred",
-    "check_definition",
-    "check_statement",
-    "infer_expression",
-    "interface",
-    "plain_reasons",
-    "typed_names",
-]

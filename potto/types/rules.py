@@ -16,9 +16,10 @@ from potto.source import Span
 from potto.syntax import nodes
 from potto.syntax.printer import print_expression
 from potto.types import kinds
+from potto.types.algebra import steps
 from potto.types.context import Inference
 from potto.types.reasons import Given, Reason
-from potto.types.values import Sink, SinkKind, Source, Trail, steps
+from potto.types.values import Sink, SinkKind, Source, Trail
 
 MAX_STEPS = 6  # steps of a way that a message shows
 MAX_DEPTH = 8  # definitions that it follows
@@ -238,7 +239,3 @@ def shown_delta(expr: nodes.Expr) -> Diagnostic:
         label="outside of an integral",
         help="integrate it over the variables of its deltas",
     )
-
-
-def equality(expr: nodes.Expr) -> str:
-    return print_expression(expr)

@@ -11,7 +11,6 @@ from collections.abc import Callable
 
 from potto.types.types import (
     REAL,
-    UNKNOWN,
     Diffeo,
     Dist,
     Function,
@@ -194,7 +193,3 @@ def settle(type: Type) -> None:
             part.found = REAL
         else:
             stack.extend(parts(part))
-
-
-__all__ = ["MAX_LEAVES", "UNKNOWN", "as_tuple", "close_type", "free_metas", "instantiate", "leaves", "open_type",
-           "parts", "rebuild", "settle", "unify"]  # fmt: skip
