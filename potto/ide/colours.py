@@ -20,6 +20,7 @@ from potto.ide.symbols import (
     ModuleSymbol,
     meaning_of,
     owner,
+    placeless,
 )
 from potto.ide.words import SPECIALS
 from potto.query import Database, query
@@ -38,7 +39,7 @@ def semantic_tokens(db: Database, file: str, span: Span | None = None) -> tuple[
     """The coloured words of a file, or of what touches a span, in order and without overlaps."""
     found: list[SemanticToken] = []
     for chunk in all_chunks(db, file, span):
-        for start, end, type, modifiers in _coloured(db, chunk):
+        for start, end, type, modifiers in _words(db, chunk):
             place = Span(chunk.start + start, chunk.start + end)
             if span is None or (place.start < span.end and span.start < place.end):
                 found.append(SemanticToken(place, type, modifiers))
@@ -48,11 +49,24 @@ def semantic_tokens(db: Database, file: str, span: Span | None = None) -> tuple[
 Word = tuple[int, int, str, tuple[str, ...]]
 
 
-def _coloured(db: Database, chunk: ChunkAt) -> list[Word]:
+def _words(db: Database, chunk: ChunkAt) -> list[Word] | tuple[Word, ...]:
+    name = owner(db, chunk)
+    return _coloured(db, chunk) if name is None else definition_words(db, chunk.file, name)
+
+
+@query
+def definition_words(db: Database, file: str, name: str) -> tuple[Word, ...]:
+    """The coloured words of a definition, relative to its chunk: an edit elsewhere colours it from memory."""
+    chunk = placeless(db, file, name)
+    return () if chunk is None else tuple(_coloured(db, chunk, name))
+
+
+def _coloured(db: Database, chunk: ChunkAt, name: str | None = None) -> list[Word]:
     names: dict[int, Word] = {}
-    plain = _plain(db, chunk)
+    plain = frozenset() if name is None else frozenset(interface(db, chunk.file, name).plain)
+    functions = frozenset() if name is None else functions_in(db, chunk.file, name)
     for occurrence in chunk.index(db).occurrences:
-        coloured = _name(db, chunk, occurrence, plain)
+        coloured = _name(db, chunk, occurrence, plain, functions)
         if coloured is not None:
             names[occurrence.span.start] = (occurrence.span.start, occurrence.span.end, *coloured)
     merged = sorted((*plain_words(db, chunk.text, chunk.diffeo), *names.values()), key=lambda word: (word[0], word[1]))
@@ -97,21 +111,16 @@ def _word(kind: str, text: str, start: int) -> Iterator[Word]:
         yield start, end, "number", ()
 
 
-def _plain(db: Database, chunk: ChunkAt) -> frozenset[str]:
-    name = owner(db, chunk)
-    return frozenset() if name is None else frozenset(interface(db, chunk.file, name).plain)
-
-
 def _name(
-    db: Database, chunk: ChunkAt, occurrence: Occurrence, plain: frozenset[str]
+    db: Database, chunk: ChunkAt, occurrence: Occurrence, plain: frozenset[str], functions: frozenset[int]
 ) -> tuple[str, tuple[str, ...]] | None:
+    if occurrence.role == "keyword":
+        return "property", ()
     symbol = meaning_of(db, chunk, occurrence)
     made: tuple[str, ...] = ("declaration",) if occurrence.role in ("bind", "define", "alias") else ()
     match symbol:
         case LocalSymbol(_, _, binder):
-            if occurrence.role == "keyword":
-                return "property", ()
-            return _local(binder, made, plain, chunk, db)
+            return _local(binder, made, plain, functions)
         case DefinitionSymbol(file, name):
             kind = written_kind(db, file, name)
             made = (*made, "definition") if occurrence.role == "define" else made
@@ -126,7 +135,7 @@ def _name(
         case MeasureSymbol():
             return "type", ("defaultLibrary",)
         case None:
-            return ("property", ()) if occurrence.role == "keyword" else _unknown(occurrence)
+            return _unknown(occurrence)
 
 
 def _unknown(occurrence: Occurrence) -> tuple[str, tuple[str, ...]] | None:
@@ -134,19 +143,14 @@ def _unknown(occurrence: Occurrence) -> tuple[str, tuple[str, ...]] | None:
 
 
 def _local(
-    binder: Binder, made: tuple[str, ...], plain: frozenset[str], chunk: ChunkAt, db: Database
+    binder: Binder, made: tuple[str, ...], plain: frozenset[str], functions: frozenset[int]
 ) -> tuple[str, tuple[str, ...]]:
     if binder.kind in ("variable", "index"):
         return "variable", (*made, "readonly", *(("integration",) if binder.kind == "variable" else ()))
-    type = "parameter" if binder.kind == "parameter" else "variable"
-    if binder.kind == "parameter" and _is_function(db, chunk, binder):
-        type = "function"
-    return type, (*made, "readonly", *(("plain",) if binder.kind == "parameter" and binder.name in plain else ()))
-
-
-def _is_function(db: Database, chunk: ChunkAt, binder: Binder) -> bool:
-    name = owner(db, chunk)
-    return name is not None and binder.span.start in functions_in(db, chunk.file, name)
+    if binder.kind != "parameter":
+        return "variable", (*made, "readonly")
+    type = "function" if binder.span.start in functions else "parameter"
+    return type, (*made, "readonly", *(("plain",) if binder.name in plain else ()))
 
 
 @query

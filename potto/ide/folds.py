@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from potto.ide.model import Fold
-from potto.ide.places import ChunkAt, all_chunks, text_of
+from potto.ide.places import ChunkAt, all_chunks, line_start, text_of
 from potto.query import Database
 from potto.source import Span
 from potto.syntax import nodes, walk
@@ -27,7 +27,7 @@ def folding_ranges(db: Database, file: str) -> tuple[Fold, ...]:
         found.append(Fold(imports[0].cover(imports[-1]), "imports"))
     kept: dict[int, Fold] = {}
     for fold in sorted(found, key=lambda f: (f.span.start, -f.span.end)):
-        line = text.count("\n", 0, fold.span.start)
+        line = line_start(text, fold.span.start)
         if "\n" in text[fold.span.start : fold.span.end] and line not in kept:
             kept[line] = fold
     return tuple(kept.values())

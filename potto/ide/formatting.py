@@ -9,18 +9,40 @@ from potto.ide.edits import minimal
 from potto.ide.model import Edit
 from potto.ide.places import ChunkAt, all_chunks, chunk_at, line_end, line_start, text_of
 from potto.modules import is_diffeo
-from potto.query import Database
+from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import format_source, nodes
 
 _INDENT = "    "
+_MOST_BLANK_LINES = 2
 
 
 def format_document(db: Database, file: str) -> tuple[Edit, ...]:
     """The edits that lay out a file."""
     text = text_of(db, file)
-    mark = len(text) - len(text.removeprefix("\ufeff"))
-    return minimal(text[mark:], format_source(text, is_diffeo(file)), mark)
+    chunks = all_chunks(db, file)
+    if "\r" in text or text.startswith("\ufeff") or not chunks:  # rare, and then all places move
+        mark = len(text) - len(text.removeprefix("\ufeff"))
+        return minimal(text[mark:], format_source(text, is_diffeo(file)), mark)
+    edits, end = list(_gap(text, 0, chunks[0].start, "")), 0
+    for number, chunk in enumerate(chunks):
+        if number:
+            blank_lines = text.count("\n", end, chunk.start) - 1
+            edits += _gap(text, end, chunk.start, "\n" * (1 + min(max(blank_lines, 0), _MOST_BLANK_LINES)))
+        edits += _chunk(db, chunk)
+        end = chunk.start + len(chunk.text)
+    return (*edits, *_gap(text, end, len(text), "\n"))
+
+
+def _gap(text: str, start: int, end: int, wanted: str) -> tuple[Edit, ...]:
+    """What stands between two chunks, as it should be."""
+    return () if text[start:end] == wanted else (Edit(Span(start, end), wanted),)
+
+
+@query(keep=4096)
+def laid_out(db: Database, text: str, diffeo: bool) -> str:
+    """A chunk's text laid out. Kept, so that to format a file again costs what was changed in it."""
+    return format_source(text, diffeo).rstrip("\r\n")
 
 
 def format_range(db: Database, file: str, span: Span) -> tuple[Edit, ...]:
@@ -28,13 +50,12 @@ def format_range(db: Database, file: str, span: Span) -> tuple[Edit, ...]:
     edits: list[Edit] = []
     for chunk in all_chunks(db, file, span):
         if chunk.start <= span.end and span.start <= chunk.start + len(chunk.text):
-            edits += _chunk(chunk)
+            edits += _chunk(db, chunk)
     return tuple(edits)
 
 
-def _chunk(chunk: ChunkAt) -> tuple[Edit, ...]:
-    laid_out = format_source(chunk.text, chunk.diffeo)
-    return minimal(chunk.text, laid_out.rstrip("\r\n"), chunk.start)
+def _chunk(db: Database, chunk: ChunkAt) -> tuple[Edit, ...]:
+    return minimal(chunk.text, laid_out(db, chunk.text, chunk.diffeo), chunk.start)
 
 
 def format_on_type(db: Database, file: str, offset: int, typed: str) -> tuple[Edit, ...]:

@@ -11,7 +11,7 @@ from dataclasses import replace
 from potto.ide.explaining import ConditionInfo, condition_infos, condition_markdown, fence
 from potto.ide.model import Edit, InlayHint
 from potto.ide.places import ChunkAt, all_chunks
-from potto.ide.symbols import home, owner, parameters
+from potto.ide.symbols import owner, parameters, placeless
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import nodes, walk
@@ -38,7 +38,7 @@ def inlay_hints(db: Database, file: str, span: Span) -> tuple[InlayHint, ...]:
 @query
 def definition_hints(db: Database, file: str, name: str) -> tuple[InlayHint, ...]:
     """The hints of a definition, relative to its chunk."""
-    chunk = home(db, file, name)
+    chunk = placeless(db, file, name)
     if chunk is None:
         return ()
     found = [*_types(db, chunk, name), *_result(db, chunk, name), *_conditions(db, chunk, name)]

@@ -221,6 +221,12 @@ def home(db: Database, file: str, name: str) -> ChunkAt | None:
     return None if text is None else ChunkAt(file, chunk_start(db, file, name), text, is_diffeo(file))
 
 
+def placeless(db: Database, file: str, name: str) -> ChunkAt | None:
+    """The chunk of a definition as if it stood at the head of its file: for queries, which must not read places."""
+    text = chunk_text(db, file, name)
+    return None if text is None else ChunkAt(file, 0, text, is_diffeo(file))
+
+
 def owner(db: Database, chunk: ChunkAt) -> str | None:
     """The name that a chunk defines, if it is the definition that counts."""
     item = chunk.parsed(db).item
