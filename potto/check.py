@@ -25,8 +25,10 @@ def diagnostics(db: Database, file: str) -> tuple[Located, ...]:
     """Everything about a file, in the order of its text."""
     found = [*syntax_diagnostics(db, file), *module_diagnostics(db, file)]
     for name in names(db, file):
-        start = chunk_start(db, file, name)
-        found += [absolute(db, file, d, start) for d in definition_diagnostics(db, file, name)]
+        said = definition_diagnostics(db, file, name)
+        if said:  # seldom, and hundreds of definitions are asked at every keystroke
+            start = chunk_start(db, file, name)
+            found += [absolute(db, file, d, start) for d in said]
     for reference in statements(db, file):
         found += [absolute(db, file, d, reference.start) for d in check_statement(db, file, reference.statement)]
     return tuple(Located(file, d) for d in arranged(found))

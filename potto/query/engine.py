@@ -15,8 +15,23 @@ from collections.abc import Callable, Hashable
 from threading import get_ident
 from typing import Any, Final, Literal
 
-from potto.query.nodes import DURABILITIES, FOREVER, GONE, Cancelled, CycleError, Event, Memo, Node, Query, short
+from potto.query.nodes import (
+    DURABILITIES,
+    FOREVER,
+    GONE,
+    Cancelled,
+    CycleError,
+    Event,
+    Leaf,
+    Memo,
+    Node,
+    Query,
+    short,
+)
 
+STEPS: Final = 10
+NOTHING: Final[frozenset[Leaf]] = frozenset()
+LEAVES: Final = 64  # of a memo that are kept: to look at more takes as long as to walk
 SEGMENT: Final = 40  # levels of running queries on one thread: at 20 frames a level still below the limit
 
 
@@ -115,7 +130,7 @@ class Engine:
         might not ask for it any more.
         """
         revision, since, last_changed = self.revision, memo.verified_at, self._last_changed
-        if last_changed[memo.durability] > since:
+        if last_changed[memo.durability] > since and not (places[-1] == 0 and self._stands(memo, STEPS)):
             durability, deps = DURABILITIES, memo.deps
             for place in range(places[-1], len(deps)):
                 dep = deps[place]
@@ -134,10 +149,31 @@ class Engine:
                 if dep.durability < durability:
                     durability = dep.durability
             memo.durability = durability
+            memo.leaves = leaves_of(deps)
         memo.verified_at = revision if memo.durability < DURABILITIES else FOREVER
         if self._logs:
             self._log("reused", memo.query.name, memo.args)
         return False
+
+    def _stands(self, memo: Memo, steps: int) -> bool:
+        """Whether nothing that a memo hangs on has changed, which saves the walk through all that lies between.
+
+        What it hangs on may hang on something else in turn; beyond so many steps that is left to the walk.
+        """
+        since, revision, leaves = memo.verified_at, self.revision, memo.leaves
+        if leaves is None or not steps or memo.index >= 0 or memo.provisional or self._last_changed[1] > since:
+            return False
+        for leaf in leaves:
+            source = leaf.source
+            if source is not None and source.verified_at < revision:
+                if source.verified_at < 0 or source is memo or not self._stands(source, steps - 1):
+                    return False
+                source.verified_at = revision
+                if self._logs:
+                    self._log("reused", source.query.name, source.args)
+            if leaf.changed_at > since:
+                return False
+        return True
 
     def _run_again(self, memo: Memo, asked: bool) -> bool:
         """Run a memo that is found stale; False if that gave no value and it was not asked for by itself."""
@@ -168,8 +204,11 @@ class Engine:
         self._frame = frame
         if self._logs:
             self._log("executed", memo.query.name, memo.args)
+        changed_at = memo.changed_at
         try:
             memo.put(self._answer(memo), self.revision)
+            if not fresh and memo.changed_at == changed_at:
+                memo.cuts = True
             self._depend(memo, frame)
         except BaseException as error:
             self._fail(memo, frame, mark, fresh, isinstance(error, Exception))
@@ -209,6 +248,7 @@ class Engine:
                 durability = dep.durability
         memo.durability = durability
         memo.deps = tuple([dep for dep in frame if dep.durability < DURABILITIES])
+        memo.leaves = leaves_of(memo.deps)
         memo.verified_at = self.revision if durability < DURABILITIES else FOREVER
 
     def _fail(self, memo: Memo, frame: dict[Node, None], mark: int, fresh: bool, failed: bool) -> None:
@@ -274,6 +314,25 @@ class Engine:
         for member in members:
             member.provisional = False
             self._depend(member, outside)
+
+
+def leaves_of(deps: tuple[Node, ...]) -> frozenset[Leaf] | None:
+    """The undurable leaves below some nodes; None if there are more than `LEAVES`, or not all are known."""
+    sets: list[frozenset[Leaf]] = []
+    own: list[Leaf] = []
+    for dep in deps:
+        if dep.durability:
+            continue
+        if not isinstance(dep, Memo) or dep.cuts:
+            own.append(dep)
+        elif dep.leaves is None:
+            return None
+        else:
+            sets.append(dep.leaves)
+    if not own and len(sets) == 1:
+        return sets[0]  # most chains are straight: they share one set
+    found = NOTHING.union(own, *sets)
+    return found if len(found) <= LEAVES else None
 
 
 def drop(table: dict[tuple[Hashable, ...], Memo], memos: list[Memo]) -> int:

@@ -53,17 +53,22 @@ class Memo:
     """The answer of a query for its arguments.
 
     `index` is its place on the stack of running queries, or -1. `low` is the lowest place that it reaches by a cycle,
+    `leaves` are the undurable nodes that it hangs on in the end: inputs, entries of tables, and memos of which it was
+    seen that they cut edits off (`cuts`). As long as none of them and nothing durable changes, it stands. None if they
+    are too many to be worth it, or not known.
     `cyclic` says that a cycle leads back to it, `provisional` that it has finished but its cycle has not.
     """
 
     __slots__ = (
         "args",
         "changed_at",
+        "cuts",
         "cyclic",
         "deps",
         "durability",
         "entries",
         "index",
+        "leaves",
         "low",
         "provisional",
         "query",
@@ -75,6 +80,8 @@ class Memo:
     def __init__(self, query: Query, args: tuple[Hashable, ...]) -> None:
         self.query, self.args, self.value = query, args, GONE
         self.deps: tuple[Node, ...] = ()
+        self.leaves: frozenset[Leaf] | None = None
+        self.cuts = False
         self.verified_at, self.changed_at, self.durability = -1, -1, 0
         self.entries: dict[Any, Entry] | None = None
         self.index, self.low, self.cyclic, self.provisional = -1, 0, False, False
@@ -96,7 +103,7 @@ class Memo:
     def put_error(self, revision: int, durability: int) -> None:
         """It failed: whatever comes next differs from what it was."""
         self.value, self.verified_at, self.changed_at = GONE, -1, revision
-        self.deps, self.durability = (), durability
+        self.deps, self.leaves, self.durability = (), None, durability
         for entry in (self.entries or {}).values():
             entry.value, entry.changed_at = GONE, revision
 
@@ -115,6 +122,7 @@ class Entry:
 
 
 Node = Input | Memo | Entry
+Leaf = Node
 
 
 def same(old: Any, new: Any) -> bool:
