@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from potto.ide.completion_modules import member_items, module_items, name_items
 from potto.ide.completion_place import Place, place_at
-from potto.ide.documents import definition_head, documentation, type_text, written_kind
+from potto.ide.documents import definition_head, documentation, type_text, written_kind, written_kinds
 from potto.ide.explaining import fence
 from potto.ide.hover_locals import TITLES, local_type
 from potto.ide.hovers import builtin_markdown, measure_markdown, measure_signature, module_markdown
@@ -23,7 +23,7 @@ from potto.ide.signatures import called_at
 from potto.ide.symbols import LocalSymbol
 from potto.ide.words import KEYWORDS, LETTERS, SPECIALS, TYPES, Keyword
 from potto.measures import MEASURES
-from potto.modules import DefinitionTarget, ModuleTarget, names, resolve
+from potto.modules import DefinitionTarget, ModuleTarget, resolve
 from potto.modules.lookup import bindings, preludes
 from potto.modules.texts import imports
 from potto.modules.workspace import module_name
@@ -60,7 +60,8 @@ def completions(db: Database, file: str, offset: int, trigger: str = "") -> Comp
             return Completions(place.span, ())
     if trigger == " ":
         return Completions(place.span, ())
-    return _everything(db, file, offset, place)
+    with db.evaluating():
+        return _everything(db, file, offset, place)
 
 
 def _everything(db: Database, file: str, offset: int, place: Place) -> Completions:
@@ -129,8 +130,10 @@ def _locals(db: Database, file: str, offset: int, place: Place) -> Iterator[Comp
 def _file_names(db: Database, file: str, place: Place) -> Iterator[Completion]:
     """The names at the top of the file, and behind an entry of a prompt those of the entries before."""
     for each in (file, *preludes(db, file)):
-        for name in names(db, each):
-            yield definition_item(db, each, name, place.span, _OWN)
+        for name, kind in written_kinds(db, each):
+            if fits(place.word, name):
+                data = ("definition", each, name)
+                yield Completion(name, kind, place.span, name, _OWN + name, data=data)
         for item in imports(db, each):
             for bound, _ in bindings(item):
                 target = resolve(db, each, bound)
@@ -140,6 +143,13 @@ def _file_names(db: Database, file: str, place: Place) -> Iterator[Completion]:
                 elif isinstance(target, ModuleTarget):
                     data = ("module", target.file, target.dotted)
                     yield Completion(bound, "module", place.span, bound, _IMPORTED + bound, data=data)
+
+
+def fits(word: str, name: str) -> bool:
+    """Whether a name has the letters of a word in their order: an editor shows no others. In a file of a thousand
+    definitions to list them all takes longer than to find out."""
+    letters = iter(name.casefold())
+    return all(letter in letters for letter in word.casefold())
 
 
 def definition_item(db: Database, file: str, name: str, span: Span, group: str) -> Completion:

@@ -6,7 +6,8 @@ from typing import Literal
 
 from potto.ide.index import call_head
 from potto.ide.symbols import home
-from potto.modules import chunk_text, chunks, definition, is_diffeo, parsed
+from potto.modules import chunk_text, chunks, is_diffeo, parsed
+from potto.modules.texts import layout
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import ParsedChunk, nodes
@@ -66,12 +67,26 @@ Kind = Literal["function", "diffeo", "constant"]
 @query
 def written_kind(db: Database, file: str, name: str) -> Kind:
     """What a definition is, as far as its text shows: asks for no types."""
-    item = definition(db, file, name)
+    text = chunk_text(db, file, name)
+    return "constant" if text is None else chunk_kind(db, text, is_diffeo(file))
+
+
+@query(keep=16384)
+def chunk_kind(db: Database, text: str, diffeo: bool) -> Kind:
+    """What a chunk's text defines."""
+    item = parsed(db, text, diffeo).item
     if isinstance(item, nodes.DiffeoDefinition):
         return "diffeo"
     function = isinstance(item, nodes.Definition) and (item.groups or isinstance(item.body, nodes.Lambda))
     derived = isinstance(item, nodes.Definition) and call_head(item.body)[2] > 0 and not item.bindings
     return "function" if function or derived else "constant"
+
+
+@query
+def written_kinds(db: Database, file: str) -> tuple[tuple[str, Kind], ...]:
+    """The definitions of a file with their kinds. Runs at every edit: what it asks of a text stands for ever."""
+    diffeo = is_diffeo(file)
+    return tuple((name, chunk_kind(db, text, diffeo)) for name, text in layout(db, file).texts.items())
 
 
 @query

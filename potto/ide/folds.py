@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from potto.ide.model import Fold
 from potto.ide.places import ChunkAt, all_chunks, line_start, text_of
-from potto.query import Database
+from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import nodes, walk
 
+_IMPORTS = ("from", "import", "#", "\ufeff")
 _FOLDED = (nodes.Integral, nodes.Let, nodes.Lambda, nodes.If, nodes.ListLiteral, nodes.Tuple, nodes.Apply, nodes.Paren)
 
 
@@ -17,12 +18,12 @@ def folding_ranges(db: Database, file: str) -> tuple[Fold, ...]:
     found: list[Fold] = []
     imports: list[Span] = []
     for chunk in all_chunks(db, file):
-        item = chunk.parsed(db).item
-        if isinstance(item, nodes.FromImport | nodes.Import):
-            imports.append(chunk.absolute(item.span))
-        else:
-            found += _in_chunk(db, chunk)
-        found += _comments(db, chunk)
+        if "\n" in chunk.text:
+            found += (Fold(chunk.absolute(f.span), f.kind) for f in chunk_folds(db, chunk.text, chunk.diffeo))
+        if chunk.text.startswith(_IMPORTS):
+            item = chunk.parsed(db).item
+            if isinstance(item, nodes.FromImport | nodes.Import):
+                imports.append(chunk.absolute(item.span))
     if imports:
         found.append(Fold(imports[0].cover(imports[-1]), "imports"))
     kept: dict[int, Fold] = {}
@@ -33,9 +34,16 @@ def folding_ranges(db: Database, file: str) -> tuple[Fold, ...]:
     return tuple(kept.values())
 
 
+@query(keep=8192)
+def chunk_folds(db: Database, text: str, diffeo: bool) -> tuple[Fold, ...]:
+    """The folds of a chunk's text."""
+    chunk = ChunkAt("", 0, text, diffeo)
+    return (*_in_chunk(db, chunk), *_comments(db, chunk))
+
+
 def _in_chunk(db: Database, chunk: ChunkAt) -> list[Fold]:
     item = chunk.parsed(db).item
-    if item is None or "\n" not in chunk.text:
+    if item is None or isinstance(item, nodes.FromImport | nodes.Import):
         return []
     found = [Fold(chunk.absolute(item.span), "region")]
     for node in walk(item):

@@ -12,8 +12,8 @@ from potto.ide.importing import exports
 from potto.ide.index import Binder
 from potto.ide.model import DocumentSymbol, Location, SymbolKind, WorkspaceSymbol
 from potto.ide.places import ChunkAt, all_chunks
-from potto.ide.symbols import owner
-from potto.query import Database
+from potto.ide.symbols import owner, placeless
+from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import nodes
 
@@ -25,23 +25,36 @@ def document_symbols(db: Database, file: str) -> tuple[DocumentSymbol, ...]:
     """The definitions of a file in order, each with its parameters and local names; statements of scripts as well."""
     found: list[DocumentSymbol] = []
     for chunk in all_chunks(db, file):
-        symbol = _symbol(db, chunk)
+        name = owner(db, chunk)
+        symbol = _symbol(db, chunk, None) if name is None else definition_symbol(db, file, name)
         if symbol is not None:
-            found.append(symbol)
+            found.append(symbol if name is None else _shifted(symbol, chunk.start))
     return tuple(found)
 
 
-def _symbol(db: Database, chunk: ChunkAt) -> DocumentSymbol | None:
+@query
+def definition_symbol(db: Database, file: str, name: str) -> DocumentSymbol | None:
+    """A definition for an outline, its places relative to its chunk."""
+    chunk = placeless(db, file, name)
+    return None if chunk is None else _symbol(db, chunk, name)
+
+
+def _shifted(symbol: DocumentSymbol, by: int) -> DocumentSymbol:
+    span, selection = symbol.span.shift(by), symbol.selection.shift(by)
+    children = tuple([_shifted(child, by) for child in symbol.children])
+    return DocumentSymbol(symbol.name, symbol.detail, symbol.kind, span, selection, children)
+
+
+def _symbol(db: Database, chunk: ChunkAt, name: str | None) -> DocumentSymbol | None:
     item = chunk.parsed(db).item
     match item:
         case nodes.Definition() | nodes.DiffeoDefinition():
-            name = owner(db, chunk)
             kind = _kind(db, chunk.file, name, item)
             detail = type_text(db, chunk.file, name) if name is not None else "defined again below"
             selection, full = chunk.absolute(item.name_span), chunk.absolute(item.span)
             return DocumentSymbol(item.name, detail, kind, full.cover(selection), selection, _children(db, chunk))
-        case nodes.BrokenItem(span=span, name=str() as name):
-            return DocumentSymbol(name, "cannot be read", "constant", chunk.absolute(span), chunk.absolute(span))
+        case nodes.BrokenItem(span=span, name=str() as guessed):
+            return DocumentSymbol(guessed, "cannot be read", "constant", chunk.absolute(span), chunk.absolute(span))
         case nodes.Print(span=span) | nodes.For(span=span) | nodes.ExpressionStatement(span=span):
             line = chunk.text[span.start : span.end].splitlines()[0] if len(span) else ""
             label = line if len(line) <= LONG_LABEL else line[: LONG_LABEL - 1] + "…"
