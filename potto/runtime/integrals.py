@@ -248,7 +248,7 @@ _lock = threading.Lock()
 
 def plan_for(machine: Machine, term: Integral, linked: Linked) -> Plan:
     """The plan for these functions and plain values; made once."""
-    key = (term.digest, tuple((n, f.digest) for n, f in sorted(linked.functions.items())), id(machine.linker))
+    key = (term.digest, tuple((n, f.digest) for n, f in sorted(linked.functions.items())), machine.linker.reached(term, *linked.functions.values()))
     with _lock:
         candidates = list(_plans.get(key, ()))
     for plan in candidates:

@@ -66,6 +66,7 @@ class Linker:
         self.exactness: dict[Term, bool] = {}
         self.constants: dict[tuple[str, str], Value] = {}
         self.duals: dict[Lam, Lam] = {}
+        self.reaches: dict[tuple[Term, ...], tuple[tuple[str, str, bytes], ...]] = {}
 
     def term(self, module: str, name: str) -> Term:
         key = (module, name)
@@ -88,6 +89,22 @@ class Linker:
                 break
         self.exactness[term] = result
         return result
+
+    def reached(self, *terms: Term) -> tuple[tuple[str, str, bytes], ...]:
+        """The definitions that terms lead to, with the digests of what they are: what a plan depends on."""
+        found = self.reaches.get(terms)
+        if found is None:
+            seen: dict[Global, bytes] = {}
+            todo: list[Term] = list(terms)
+            while todo:
+                for node in postorder(todo.pop()):
+                    if isinstance(node, Global) and node not in seen:
+                        term = self.term(node.module, node.name)
+                        seen[node] = term.digest
+                        todo.append(term)
+            found = tuple(sorted((g.module, g.name, digest) for g, digest in seen.items()))
+            self.reaches[terms] = found
+        return found
 
     def function(self, head: Term) -> Lam | None:
         """The Lam that a Global leads to; through definitions that are other names or derivatives of functions."""
