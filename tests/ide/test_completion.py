@@ -27,7 +27,8 @@ def test_local_names_definitions_imports_builtins_and_keywords():
         assert wanted in labels, wanted
     assert "def" not in labels and "normal" not in labels
     order = sorted(ide.completions(f.db, f.file, f.offset).items, key=lambda item: item.sort)
-    places = [next(n for n, item in enumerate(order) if item.label == name) for name in ("c", "half", "disc", "sin", "if")]
+    labels = [item.label for item in order]
+    places = [labels.index(name) for name in ("c", "half", "disc", "sin", "if")]
     assert places == sorted(places)
 
 
@@ -99,7 +100,8 @@ def test_what_is_defined_here_is_not_imported():
 
 
 def test_keyword_arguments_of_functions_and_derivatives():
-    files = "# file: r.po\ndef render(c, shader) shader(c)\ndrender = deriv(render)\n# file: main.po\nfrom r import drender, render\n"
+    files = "# file: r.po\ndef render(c, shader) shader(c)\ndrender = deriv(render)\n"
+    files += "# file: main.po\nfrom r import drender, render\n"
     assert {"c=", "shader="} <= set(fixture(files + "print(render($0))\n").labels())
     labels = fixture(files + "print(drender(dc=(1, 2), $0))\n").labels()
     assert "dshader=" in labels and "dc=" not in labels
@@ -150,7 +152,8 @@ def test_broken_text_and_unicode_names():
 
 
 def test_a_list_is_fast_in_a_large_workspace():
-    files = "".join(f"# file: m{n}.po\n" + "".join(f"def fun_{n}_{k}(x) x + {k}\n" for k in range(20)) for n in range(100))
+    modules = ["".join(f"def fun_{n}_{k}(x) x + {k}\n" for k in range(20)) for n in range(100)]
+    files = "".join(f"# file: m{n}.po\n{text}" for n, text in enumerate(modules))
     f = fixture(files + "# file: main.po\ndef g(a) a + fun$0\n")
     assert len(f.labels()) >= 100
     times = []

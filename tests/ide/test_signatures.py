@@ -71,6 +71,8 @@ def test_a_parameter_that_is_a_function():
     assert found is not None and found[0].startswith("g(Real") and found[1].startswith("Real")
 
 
-@pytest.mark.parametrize("text", ["y = (1 + $0)", "def f(a, $0)", "y = render(1, 2) + $0", "y = \\(a, $0) . a", "y = nothing($0"])
+@pytest.mark.parametrize(
+    "text", ["y = (1 + $0)", "def f(a, $0)", "y = render(1, 2) + $0", "y = \\(a, $0) . a", "y = nothing($0"]
+)
 def test_no_signature(text):
     assert help_at(text + "\n") is None
