@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from potto.calculus.derivative import NotSmooth
 from potto.calculus.dual import dual_function as symbolic
+from potto.calculus.pivots import NoClosedForm
 from potto.core.terms import Global, Lam, Term
 from potto.diagnostics import PottoError
 from potto.kernels import errors
@@ -35,6 +37,11 @@ def _dual(machine: Machine, function: Lam) -> Lam:
         def resolve(name: Global) -> Term | None:
             return machine.linker.term(name.module, name.name)
 
-        known = symbolic(function, resolve)
+        try:
+            known = symbolic(function, resolve)
+        except (NoClosedForm, NotSmooth) as reason:
+            raise PottoError([errors.NO_MEANING(
+                errors.NOWHERE, f"no second derivative was found: {reason}", help="differentiate only once",
+            )]) from None  # fmt: skip
         machine.linker.duals[function] = known
     return known
