@@ -106,8 +106,8 @@ def indent_before(buffer: Buffer) -> int:
 def hand_in(buffer: Buffer, whole: bool = False) -> None:
     """Enter: the entry is handed in if it is over, else the line is."""
     document = buffer.document
-    at_end = not document.text_after_cursor.strip()
-    if at_end and (is_over(buffer.text) or (whole and is_over(buffer.text + "\n"))):
+    last_line = "\n" not in document.text_after_cursor.rstrip()
+    if last_line and (is_over(buffer.text) or (whole and is_over(buffer.text + "\n"))):
         buffer.validate_and_handle()
     else:
         buffer.insert_text("\n" + indentation(document.text_before_cursor))

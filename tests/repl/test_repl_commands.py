@@ -12,7 +12,11 @@ from potto_repl.registry import COMMANDS
 
 JUMP = "def f(t) integral [0, 1] [x < t] d(x)"
 WEIGHTED = "def g(t) integral [0, 1] [x < t]*t^2 d(x)"
-PROMISED = ["help", "type", "deriv", "eval", "surfaces", "load", "reload", "watch", "edit", "browse", "doc", "explain", "source", "set", "method", "time", "error", "check", "plot", "image", "grad", "fit", "save", "record", "history", "undo", "reset", "quit"]
+PROMISED = [
+    "help", "type", "deriv", "eval", "surfaces", "load", "reload", "watch", "edit", "browse", "doc", "explain",
+    "source", "set", "method", "time", "error", "check", "plot", "image", "grad", "fit", "save", "record",
+    "history", "undo", "reset", "quit",
+]  # fmt: skip
 
 
 def test_every_promised_command_is_there():
@@ -259,8 +263,9 @@ def test_record(talk):
 
 
 SESSION = [
-    JUMP, "f(0.3)", "deriv(f)((0.3, 1))", "_2 * 2", "def f(t) t^2", "f(0.3)", "a = f(2)", "a", "_ + 1", "print(a, f(3))",
-    "for v in [1, 2]:\n    print(v)", "\\x . x", "(a, f(0.5))", "def g(t) f(t) + a", "def a(x) x", "g(1)",
+    JUMP, "f(0.3)", "deriv(f)((0.3, 1))", "_2 * 2", "def f(t) t^2", "f(0.3)", "a = f(2)", "a", "_ + 1",
+    "print(a, f(3))", "for v in [1, 2]:\n    print(v)", "\\x . x", "(a, f(0.5))", "def g(t) f(t) + a", "def a(x) x",
+    "g(1)",
 ]  # fmt: skip
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-
 from potto_repl.complete import candidates
 from potto_repl.editing import indentation, is_over, unprompted
 from potto_repl.symbols import SYMBOLS, ascii_only, expanded, pretty, readable, typed
@@ -56,7 +55,7 @@ def test_every_symbol_is_read_by_potto():
     from potto.syntax import parse_expression
 
     for name, symbol in SYMBOLS.items():
-        if symbol in "∫∂≤≥≠":
+        if symbol in "∫∂≤≥≠λ":
             continue
         word = f"x{symbol}" if name.startswith("_") else symbol
         assert not parse_expression(word).diagnostics, name
