@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from potto_lsp import memory
 from potto_lsp.client import Client
+from potto_lsp.features import FEATURES
 from potto_lsp.progress import Progress
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from potto_lsp.live import LiveValues
     from potto_lsp.publishing import Publisher
 
+TREES = 25  # files after whose check the trees of those that are closed are forgotten
 Reply = Callable[[Any, Any], None]  # what a client answered, and its error; one of the two is None
 
 
@@ -86,9 +88,21 @@ class Session:
         """The first check of the whole workspace, which may take a while: with progress."""
         steps = list(self.publisher.steps())
         for number, step in enumerate(steps):
+            if number == len(self.analysis.documents):  # what is open is told; the next thing is to be asked about it
+                yield self._load_features
             yield step
             self._progress.report(number + 1, len(steps))
+            if number % TREES == TREES - 1:
+                yield self.analysis.forget_trees
+        yield self._load_features
+        yield self.analysis.forget_trees
         yield self._all_checked
+
+    def _load_features(self) -> None:
+        """Load all adapters, so that the first question waits for none."""
+        with memory.loading():
+            for feature in FEATURES.values():
+                assert feature.answer
 
     def _all_checked(self) -> None:
         self.checked = True

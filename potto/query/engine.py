@@ -327,10 +327,10 @@ def leaves_of(deps: tuple[Node, ...]) -> frozenset[Leaf] | None:
             own.append(dep)
         elif dep.leaves is None:
             return None
-        else:
+        elif dep.leaves:
             sets.append(dep.leaves)
-    if not own and len(sets) == 1:
-        return sets[0]  # most chains are straight: they share one set
+    if not own and len(sets) <= 1:
+        return sets[0] if sets else NOTHING  # most chains are straight: they share one set
     found = NOTHING.union(own, *sets)
     return found if len(found) <= LEAVES else None
 

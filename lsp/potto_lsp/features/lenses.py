@@ -51,6 +51,9 @@ def resolve(ask: Ask) -> Any:
     if not isinstance(ask.params, Mapping) or not isinstance(data, list) or len(data) < 2:
         raise InvalidParams("`data` is not as it was given")
     command, *arguments = map(str, data)
+    whole = len(arguments) == 3 and arguments[2].isdecimal() if command == "showReferences" else command in COMMANDS
+    if not whole:
+        raise InvalidParams("`data` is not as it was given")
     lens = ide.CodeLens(Span(0, 0), cast(Any, command), tuple(arguments))
     return {**ask.params, "command": _command(ask, ide.resolve_code_lens(ask.db, lens))}
 
