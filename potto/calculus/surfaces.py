@@ -251,12 +251,22 @@ def pieces(surface: Term) -> tuple[Term, ...]:
     waiting = [surface]
     while waiting:
         term = waiting.pop()
-        inner = next((node for node in postorder(term) if isinstance(node, Branch | If)), None)
+        inner = next((node for node in _outside_binders(term) if isinstance(node, Branch | If)), None)
         if inner is None or len(done) + len(waiting) >= _MOST_PIECES:
             done[term] = None
         else:
             waiting.extend(_in_place(term, inner, case) for case in (inner.orelse, inner.then))
     return tuple(done)
+
+
+def _outside_binders(root: Term) -> Iterator[Term]:
+    """The parts of a term that are not inside an integral, a sum or a function."""
+    waiting = [root]
+    while waiting:
+        node = waiting.pop()
+        yield node
+        if not isinstance(node, Integral | Sum | Lam):
+            waiting.extend(children(node))
 
 
 def _in_place(term: Term, old: Term, new: Term) -> Term:

@@ -53,6 +53,8 @@ BELOW = "def step(u, w) [u > 0]*w\n"
         # Kinks made of jumps: 1 below t, x - 0.3 above.
         ("def f(t) integral [0, 1] max([x < t], x - 0.3) d(x)", T + (0.49 - (T - 0.3) ** 2) / 2, 1.3 - T),
         (STEP + "def f(t) integral [0, 1] max(step(t - x), x - 0.3) d(x)", T + (0.49 - (T - 0.3) ** 2) / 2, 1.3 - T),
+        # A kink of an inner integral that has a condition: max(x/2, 0.3) on [0, t].
+        ("def f(t) integral [0, t] max(integral [0, 2] [y < x]*0.5 d(y), 0.3) d(x)", 0.18 + (T * T - 0.36) / 4, T / 2),
         # Surfaces that run along an axis in one part and along another in the next.
         ("def f(t) integral ([0, 1], [0, 1]) [max(x, y) < t] d(x, y)", T * T, 2 * T),
         ("def f(t) integral ([0, 1], [0, 1]) [min(x, y) < t] d(x, y)", 1 - (1 - T) ** 2, 2 * (1 - T)),
