@@ -24,28 +24,53 @@ from potto.syntax.nodes import Expr
 
 
 def bracket_fixes(place: At, said: Diagnostic) -> Iterator[Offer]:
-    """A bracket around the condition, or the diffeomorphism that the checker makes of it."""
-    chunk = chunk_at(place.db, place.file, said.span.start)
-    item = None if chunk is None else chunk.parsed(place.db).item
-    if chunk is None or item is None:
-        return
-    relative = said.span.shift(-chunk.start)
-    condition = next((n for n in node_at(item, relative.start) if extent(n) == relative and _is_condition(n)), None)
-    if condition is None:
-        return
-    written = place.text[said.span.start : said.span.end]
-    bracketed = Edit(said.span, f"[{written}]")
-    if reads(chunk, [Edit(relative, bracketed.text)]) is not None:
-        title = f"Count the jump: `[{written}]`"
-        yield Offer(title, "quickfix", lambda: one_file(place.file, bracketed), said, True)
-    completed = completed_diffeo(place, chunk, condition)  # type: ignore[arg-type]
+    """A bracket around the condition, or the diffeomorphism that the checker makes of it.
+
+    The condition may be in another definition, to which a variable of integration is given here.
+    """
+    for file, span in ((place.file, said.span), *((r.file or place.file, r.span) for r in said.related)):
+        chunk = chunk_at(place.db, file, span.start)
+        condition = None if chunk is None else condition_at(place, chunk, span.shift(-chunk.start))
+        if chunk is not None and condition is not None:
+            yield from _bracket(place, chunk, condition, said)
+
+
+def condition_at(place: At, chunk: ChunkAt, span: Span) -> Expr | None:
+    """The whole condition of a conditional that a place in a chunk is, or is a part of."""
+    item = chunk.parsed(place.db).item
+    path = () if item is None else node_at(item, span.start)
+    for number, node in enumerate(path):
+        if not isinstance(node, nodes.If):
+            continue
+        for inner in path[number + 1 :]:
+            if inner is node.condition or isinstance(inner, nodes.Paren | nodes.Logic | nodes.Unary | nodes.Compare):
+                whole = _without_parentheses(node.condition)
+                if extent(inner) == span and whole.span.start <= span.start and span.end <= whole.span.end:
+                    return whole
+            else:
+                break
+    return None
+
+
+def _without_parentheses(expr: Expr) -> Expr:
+    while isinstance(expr, nodes.Paren):
+        expr = expr.inner
+    return expr
+
+
+def _bracket(place: At, chunk: ChunkAt, condition: Expr, said: Diagnostic) -> Iterator[Offer]:
+    written = chunk.text[condition.span.start : condition.span.end]
+    item = chunk.parsed(place.db).item
+    where = "" if place.chunk is not None and chunk.start == place.chunk.start else f" in `{getattr(item, 'name', '')}`"
+    if reads(chunk, [Edit(condition.span, f"[{written}]")]) is not None:
+        edit = Edit(chunk.absolute(condition.span), f"[{written}]")
+        title = f"Count the jump{where}: `[{written}]`"
+        yield Offer(title, "quickfix", lambda: one_file(chunk.file, edit), said, True)
+    completed = completed_diffeo(place, chunk, condition)
     if completed is not None:
-        edit = Edit(said.span, completed)
-        yield Offer(f"Make it the diffeomorphism `{completed}`", "quickfix", lambda: one_file(place.file, edit), said)
-
-
-def _is_condition(node: object) -> bool:
-    return isinstance(node, nodes.Compare | nodes.Logic | nodes.Unary | nodes.Name)
+        other = Edit(chunk.absolute(condition.span), completed)
+        title = f"Make it the diffeomorphism `{completed}`"
+        yield Offer(title, "quickfix", lambda: one_file(chunk.file, other), said)
 
 
 def completed_diffeo(place: At, chunk: ChunkAt, condition: Expr) -> str | None:
@@ -55,7 +80,7 @@ def completed_diffeo(place: At, chunk: ChunkAt, condition: Expr) -> str | None:
     visible = [binder for _, binder in chunk.index(place.db).visible(condition.span.start)]
     names = [binder.name for binder in visible]
     bracket = nodes.Bracket(condition.span, condition)
-    term = elaborate_expression(place.db, place.file, bracket, names).term
+    term = elaborate_expression(place.db, chunk.file, bracket, names).term
     if not isinstance(term, Branch) or any(isinstance(node, Hole) for node in postorder(term)):
         return None
     variables = tuple(binder.name for binder in visible if binder.kind == "variable")

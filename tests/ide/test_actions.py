@@ -36,6 +36,15 @@ def test_plain_condition_becomes_a_completed_diffeomorphism():
     assert "if diffeo(t - x^3) then" in fixed(text, "Make it the diffeomorphism `diffeo(t - x^3)`")
 
 
+def test_the_whole_condition_is_bracketed_also_in_another_definition():
+    text = "def f(t)\n    integral [0, 1] (if x < t and $0x > 0.2 then 1 else 0) d(x)\n"
+    assert "if [x < t and x > 0.2] then" in fixed(text, "Count the jump: `[x < t and x > 0.2]`")
+    text = "def f(t)\n    integral [0, 1] (let p = x < t in if $0p then 1 else 0) d(x)\n"
+    assert "if [p] then" in fixed(text, "Count the jump: `[p]`")
+    text = "def step(y) if y > 0 then 1 else 0\n\ndef f(t)\n    integral [0, 1] step($0x - t) d(x)\n"
+    assert fixed(text, "Count the jump in `step`: `[y > 0]`").startswith("def step(y) if [y > 0] then 1 else 0\n")
+
+
 def test_did_you_mean():
     assert fixed("def f(alpha) $0alpa + 1\n", "Change to `alpha`") == "def f(alpha) alpha + 1\n"
     files = "# file: shapes.po\ndisc = 1\n# file: main.po\n"
