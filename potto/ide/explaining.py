@@ -19,11 +19,11 @@ from potto.core.printer import format_term
 from potto.core.simplify import simplify
 from potto.core.terms import Hole, Lam, Term, postorder
 from potto.elaborate import core, core_term
-from potto.modules import DefinitionTarget, definition, dependencies
+from potto.modules import DefinitionTarget, definition, dependencies, is_recursive, references
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import nodes
-from potto.types import check_definition
+from potto.types import check_definition, interface
 
 LONG = 400  # characters of a formula beyond which a hover leaves it out
 
@@ -35,10 +35,10 @@ def sound(db: Database, file: str, name: str) -> bool:
     pending = list(seen)
     while pending:
         target = pending.pop()
-        if definition(db, target.file, target.name) is None or has_errors(
-            check_definition(db, target.file, target.name)
-        ):
+        if interface(db, target.file, target.name).broken or has_errors(check_definition(db, target.file, target.name)):
             return False
+        if (None, "deriv") in references(db, target.file, target.name) and is_recursive(db, target.file, target.name):
+            return False  # it needs the derivative of itself: symbols for that have no end
         fresh = [t for t in dependencies(db, target.file, target.name) if t not in seen]
         seen.update(fresh)
         pending += fresh

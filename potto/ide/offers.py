@@ -22,7 +22,7 @@ from potto.query import Database
 from potto.source import Span
 from potto.syntax import node_at, nodes, parse_chunk
 from potto.syntax.nodes import Node
-from potto.types import check_statement
+from potto.types import check_statement, interface
 
 
 @dataclass(frozen=True)
@@ -68,6 +68,8 @@ def diagnostics_at(db: Database, file: str, span: Span) -> list[Diagnostic]:
         found += (shift(d, chunk.start) for d in parsed(db, chunk.text, chunk.diffeo).diagnostics)
         item = chunk.parsed(db).item
         name = owner(db, chunk)
+        if name is not None and interface(db, file, name).broken:
+            continue  # the parser has spoken; what it guessed means nothing to the calculus
         if name is not None and name in names(db, file):
             found += (absolute(db, file, d, chunk.start) for d in definition_diagnostics(db, file, name))
         elif isinstance(item, nodes.Print | nodes.For | nodes.ExpressionStatement):
