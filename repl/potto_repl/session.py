@@ -16,7 +16,7 @@ from typing import Any
 from potto.diagnostics import Diagnostic
 from potto.modules import imported_files, names
 from potto.render import Located, display_name
-from potto.session import Defined, Imported, Outcome, Said, Session, Valued
+from potto.session import Defined, Imported, Outcome, Said, Session
 from potto.settings import DEFAULTS, Settings
 from potto.source import SourceText
 from potto_repl.options import Options
@@ -70,7 +70,7 @@ class Conversation(Session):
 
     def enter(self, text: str) -> Iterator[Outcome]:
         """Run an entry step by step and remember it."""
-        self.remember(f"entry {self.number + 1}")
+        self.remember(f"entry {self.number + 1}: {text.strip().partition(chr(10))[0]}")
         entry = Entry(self.number + 1, text)
         self.entries.append(entry)
         rewritten = plain_names(text)
@@ -81,8 +81,8 @@ class Conversation(Session):
                 entry.outcomes.append(outcome)
                 yield outcome
         finally:
-            if not any(isinstance(o, Defined | Imported | Valued) for o in entry.outcomes):
-                self.undoing.pop()  # it changed nothing
+            if not any(isinstance(o, Defined | Imported) for o in entry.outcomes):
+                self.undoing.pop()  # nothing means anything else now
 
     def wrong(self, text: str) -> list[Diagnostic]:
         """The errors that an entry would have, without making it one."""

@@ -22,7 +22,7 @@ def history(session: Conversation, text: str) -> Part:
 
 @command("undo", "u")
 def undo(session: Conversation, text: str) -> Part:
-    """Take back the last entry, load or reset of names: what it defined means again what it meant before."""
+    """Take back the last definition, import or load, and the answers since: names mean again what they meant before."""
     label = session.undo()
     if label is None:
         return answer("there is nothing to undo", undone=None)
