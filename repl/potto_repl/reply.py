@@ -6,8 +6,9 @@ with the texts that it is about as they were when it was found, so that it can b
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 from potto.render import Located, Palette, Sources, render, to_json
@@ -111,7 +112,14 @@ def diagnostic(located: Located, sources: Sources) -> Part:
     """A diagnostic with the texts that it is about."""
     files = [located.file, *(related.file for related in located.diagnostic.related)]
     texts = {file: text for file in files if file is not None and (text := sources(file)) is not None}
-    return Part("diagnostic", located=located, sources=texts)
+    return Part("diagnostic", located=_for_a_prompt(located), sources=texts)
+
+
+def _for_a_prompt(located: Located) -> Located:
+    """With options of the command line as they are set here: `--max-evals` is `:set max_evals`."""
+    found = located.diagnostic
+    help = re.sub(r"`--([a-z-]+)`", lambda option: f"`:set {option[1].replace('-', '_')}`", found.help)
+    return located if help == found.help else replace(located, diagnostic=replace(found, help=help))
 
 
 def diagnostics(found: Iterable[Located], sources: Sources) -> list[Part]:

@@ -11,7 +11,6 @@ import re
 from pathlib import Path
 
 import pytest
-
 from potto_repl.script import entries
 
 HERE = Path(__file__).parent
