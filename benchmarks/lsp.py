@@ -114,7 +114,12 @@ class Client:
 
 
 def replace(line: int, start: int, end: int, text: str) -> dict[str, Any]:
-    return {"range": {"start": {"line": line, "character": start}, "end": {"line": line, "character": end}}, "text": text}
+    return between((line, start), (line, end), text)
+
+
+def between(start: tuple[int, int], end: tuple[int, int], text: str) -> dict[str, Any]:
+    places = [{"line": line, "character": character} for line, character in (start, end)]
+    return {"range": {"start": places[0], "end": places[1]}, "text": text}
 
 
 def quantile(times: list[float], part: float) -> float:
@@ -160,11 +165,9 @@ def typing(client: Client, large: str, rounds: int) -> Iterator[Row]:
         broken.append(client.diagnosed("large") - sent)
         sent = client.change("large", replace(line, column, column + 1, ""))
         broken.append(client.diagnosed("large") - sent)
-        sent = client.change("large", {"range": {"start": {"line": 0, "character": 0}, "end": {"line": 0, "character": 0}},
-                                       "text": "\n"})  # fmt: skip
+        sent = client.change("large", between((0, 0), (0, 0), "\n"))
         top.append(client.diagnosed("large") - sent)
-        sent = client.change("large", {"range": {"start": {"line": 0, "character": 0}, "end": {"line": 1, "character": 0}},
-                                       "text": ""})  # fmt: skip
+        sent = client.change("large", between((0, 0), (1, 0), ""))
         top.append(client.diagnosed("large") - sent)
     yield "", "keystroke to diagnostics, body edit, median", statistics.median(body) * 1e3, "ms", 5, 2.5
     yield "G1", "keystroke to diagnostics, body edit in the 2,000-line module, p95", quantile(body, 0.95), "ms", 5, 2.5
@@ -191,7 +194,8 @@ def signatures(client: Client, texts: dict[str, str], rounds: int) -> Iterator[R
         near.append(arrived - sent)
         far.append(max(client.quiet(0.15), arrived) - sent)
     yield "G3", "signature edit in a leaf to diagnostics of its open importers, p95", quantile(near, 0.95), "ms", 10, 3
-    yield "G4", f"the same, to diagnostics of all modules ({len(users)} import it), p95", quantile(far, 0.95), "ms", 40, 15
+    what = f"the same, to diagnostics of all modules ({len(users)} import it), p95"
+    yield "G4", what, quantile(far, 0.95), "ms", 40, 15
 
 
 def questions(client: Client, large: str, rounds: int) -> Iterator[Row]:

@@ -11,7 +11,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-
 from potto_lsp import analysis, server
 from potto_lsp.features import Feature
 

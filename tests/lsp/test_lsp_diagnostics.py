@@ -13,7 +13,7 @@ Server = Callable[..., Client]
 Uri = Callable[[str], str]
 PUSHED = "textDocument/publishDiagnostics"
 PULLS: dict[str, Any] = {
-    "textDocument": {"diagnostic": {"relatedDocumentSupport": True}, "publishDiagnostics": {"relatedInformation": True}},
+    "textDocument": {"diagnostic": {}, "publishDiagnostics": {"relatedInformation": True}},
     "workspace": {"diagnostics": {"refreshSupport": True}},
 }
 PLAIN = "def f(t)\n    integral [0, 1] (if x < t then 1 else 0) d(x)\n"
@@ -25,8 +25,8 @@ def codes(params: Any) -> list[str]:
 
 
 def pull(client: Client, uri: str, previous: str | None = None) -> Any:
-    params = {"textDocument": {"uri": uri}}
-    return client.ask("textDocument/diagnostic", params if previous is None else {**params, "previousResultId": previous})
+    known = {} if previous is None else {"previousResultId": previous}
+    return client.ask("textDocument/diagnostic", {"textDocument": {"uri": uri}, **known})
 
 
 def test_a_diagnostic_says_all_that_is_known(server: Server, uri: Uri) -> None:

@@ -22,7 +22,8 @@ REFRESHES = {"workspace": {"inlayHint": {"refreshSupport": True}}}
 
 
 def run(client: Client, command: str, *arguments: Any) -> dict[str, Any]:
-    return client.answer(client.begin("workspace/executeCommand", {"command": command, "arguments": list(arguments)}), 60)
+    params = {"command": command, "arguments": list(arguments)}
+    return client.answer(client.begin("workspace/executeCommand", params), 60)
 
 
 def hints(client: Client, uri: str) -> dict[int, str]:

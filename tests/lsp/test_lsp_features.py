@@ -44,7 +44,8 @@ def at(uri: str, line: int, character: int) -> dict[str, Any]:
 
 
 def whole(uri: str) -> dict[str, Any]:
-    return {"textDocument": {"uri": uri}, "range": {"start": {"line": 0, "character": 0}, "end": {"line": 99, "character": 0}}}
+    span = {"start": {"line": 0, "character": 0}, "end": {"line": 99, "character": 0}}
+    return {"textDocument": {"uri": uri}, "range": span}
 
 
 def cut(range: dict[str, Any], text: str = TEXT) -> str:
@@ -196,8 +197,9 @@ def test_links_and_formatting(client: Client, uri: Uri) -> None:
 
 
 def test_the_announced_legend_is_that_of_the_tokens() -> None:
-    from potto import ide
     from potto_lsp import features
+
+    from potto import ide
 
     assert features.TOKEN_TYPES == ide.TOKEN_TYPES and features.TOKEN_MODIFIERS == ide.TOKEN_MODIFIERS
 
@@ -205,8 +207,9 @@ def test_the_announced_legend_is_that_of_the_tokens() -> None:
 def test_every_kind_has_a_number() -> None:
     from typing import get_args
 
-    from potto.ide import model
     from potto_lsp.features import completing, outlines
+
+    from potto.ide import model
 
     assert set(completing.KINDS) == set(get_args(model.CompletionKind))
     assert set(outlines.KINDS) == set(get_args(model.SymbolKind))

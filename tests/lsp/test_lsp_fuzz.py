@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 from lsp_client import Client, edit
-
 from potto_lsp.features import FEATURES
 
 Server = Callable[..., Client]
@@ -44,7 +43,8 @@ def params(rng: random.Random, uris: list[str]) -> Any:
 def change(rng: random.Random) -> dict[str, Any]:
     places = sorted((rng.randrange(5), rng.randrange(25)) for _ in range(2))
     whole = {"text": rng.choice(TEXTS)}
-    return whole if rng.random() < 0.1 else edit(*places, rng.choice(["", "x", "\n", "(", "𝄞", "\r", "def g(t) t\n", "] "]))
+    typed = rng.choice(["", "x", "\n", "(", "𝄞", "\r", "def g(t) t\n", "] "])
+    return whole if rng.random() < 0.1 else edit(*places, typed)
 
 
 def storm(client: Client, uris: list[str], rng: random.Random, messages: int) -> None:
@@ -76,7 +76,8 @@ def storm(client: Client, uris: list[str], rng: random.Random, messages: int) ->
 
 def run(server: Server, uri: Uri, seed: int, messages: int) -> None:
     rng = random.Random(seed)
-    client = server(a=TEXTS[0], b=TEXTS[4], capabilities={"general": {"positionEncodings": [rng.choice(["utf-8", "utf-32", "utf-16"])]}})  # fmt: skip
+    encoding = rng.choice(["utf-8", "utf-32", "utf-16"])
+    client = server({"general": {"positionEncodings": [encoding]}}, a=TEXTS[0], b=TEXTS[4])
     storm(client, [uri("a"), uri("b"), uri("c"), "untitled:d"], rng, messages)
     assert client.stop(30) == 0
     assert all(len(answers) == 1 for answers in client.answers.values())

@@ -5,11 +5,10 @@ from __future__ import annotations
 import random
 
 import pytest
-
 from potto_lsp.text import ENCODINGS, Encoding, Text, line_starts
 
-PIECES = ["a", "xyz", " ", "é", "ß", "中", "𝄞", "🙂", "\u2028", "\u2029", "\x0b", "\x0c", "\x1c", "\x85", "\n", "\r", "\r\n",
-          "\n\n", "\ufeff", "\t"]  # fmt: skip
+PIECES = ["a", "xyz", " ", "é", "ß", "中", "𝄞", "🙂", "\u2028", "\u2029", "\x0b", "\x0c", "\x1c", "\x85", "\n", "\r",
+          "\r\n", "\n\n", "\ufeff", "\t"]  # fmt: skip
 CODEC = {"utf-8": ("utf-8", 1), "utf-16": ("utf-16-le", 2), "utf-32": ("utf-32-le", 4)}
 
 

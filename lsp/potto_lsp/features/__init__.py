@@ -35,6 +35,10 @@ class Feature:
     announces: Mapping[str, Any] = field(default_factory=dict)
     slow: bool = False
 
+    def load(self) -> None:
+        """Load the adapter."""
+        _ = self.answer
+
     @cached_property
     def answer(self) -> Callable[[Ask], Any]:
         """The adapter."""
