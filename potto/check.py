@@ -16,7 +16,7 @@ from potto.modules import chunk_start, module_diagnostics, names, statements
 from potto.modules.texts import syntax_diagnostics
 from potto.query import Database, query
 from potto.render import Located
-from potto.types import check_definition, check_statement
+from potto.types import check_definition, check_statement, interface
 
 _ORDER = {"error": 0, "warning": 1, "info": 2, "hint": 3}
 
@@ -37,9 +37,10 @@ def diagnostics(db: Database, file: str) -> tuple[Located, ...]:
 @query
 def definition_diagnostics(db: Database, file: str, name: str) -> tuple[Diagnostic, ...]:
     """What the checks of one definition say, relative to its chunk. What it means is asked only if its types are right:
-    the later checks would repeat in other words what is wrong."""
+    the later checks would repeat in other words what is wrong. Of a text that the parser had to guess at nothing more
+    is asked either: its diagnostics are the parser's."""
     found = check_definition(db, file, name)
-    if has_errors(found):
+    if has_errors(found) or interface(db, file, name).broken:
         return found
     elaborated = core(db, file, name).diagnostics
     if has_errors(elaborated):
