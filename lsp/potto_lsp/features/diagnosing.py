@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from potto_lsp.asking import Ask
+from potto_lsp.session import TREES
 from potto_lsp.uris import to_key
 
 
@@ -22,7 +23,11 @@ def workspace(ask: Ask) -> dict[str, Any]:
         if isinstance(item, Mapping)
     }
     publisher, programs = ask.session.publisher, ask.analysis.programs()
-    items = [publisher.workspace_answer(key, ids.get(key)) for key in programs]
+    items: list[dict[str, Any]] = []
+    for number, key in enumerate(programs):
+        items.append(publisher.workspace_answer(key, ids.get(key)))
+        if number % TREES == TREES - 1 and not ask.session.checked:
+            ask.analysis.forget_trees()
     gone = [key for key in ids if key not in programs]
     items += [{"uri": ask.analysis.uri(key), "version": None, "kind": "full", "items": []} for key in gone]
     return {"items": items}
