@@ -17,6 +17,7 @@ from potto.types.values import (
     Abstract,
     Choice,
     Closure,
+    Effect,
     Joined,
     ListValue,
     NoPort,
@@ -65,22 +66,28 @@ def steps(trail: Trail) -> tuple[Step, ...]:
     return tuple(found)
 
 
-def larger(value: Value, limit: int) -> bool:
-    """Whether a value has more than `limit` parts; counted no further than that."""
-    stack: list[Value] = [value]
-    while stack and limit >= 0:
-        limit -= 1
-        part = stack.pop()
-        match part:
-            case TupleValue(items):
-                stack.extend(items)
-            case ListValue(item):
-                stack.append(item)
-            case Closure(inputs, result):
-                stack.extend((*inputs, result))
-            case _:
-                pass
-    return limit < 0
+def fitted(value: Value, type: Type) -> Value:
+    """A value in the shape of a type, with nothing in it that is deeper than the type.
+
+    For recursion: the flow of a definition in terms of itself then grows in what it varies with only, which is finite.
+    """
+    type = resolve(type)
+    match type, value:
+        case Function(group, result), Closure(inputs, answer, effects) if len(group) == len(inputs):
+            simple = (Effect(effect.to, _simple(effect.value)) for effect in effects)
+            return Closure(inputs, fitted(answer, result), tuple(simple))
+        case TupleOf(items), TupleValue(parts) if len(items) == len(parts):
+            return TupleValue(tuple(map(fitted, parts, items)))
+        case ListOf(item), ListValue(inner):
+            return ListValue(fitted(inner, item))
+        case Diffeo(), TupleValue(parts):
+            return TupleValue(tuple(map(_simple, parts)))
+        case _:
+            return _simple(value)
+
+
+def _simple(value: Value) -> Value:
+    return value if isinstance(value, Scalar) else Scalar(flat(value))
 
 
 def noted(value: Value, step: Step) -> Value:

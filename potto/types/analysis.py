@@ -15,7 +15,7 @@ from potto.modules.lookup import DefinitionTarget
 from potto.source import Span
 from potto.syntax import nodes
 from potto.types import calls, conditions, flow_binders, flow_calls, flow_rules, integrals  # noqa: F401  (imported for their rules)
-from potto.types.algebra import flat, larger, symbolic
+from potto.types.algebra import fitted, flat, symbolic
 from potto.types.annotations import written_type
 from potto.types.closing import declared, reasons_of
 from potto.types.context import Inference, ensure_stack, mismatch
@@ -31,7 +31,6 @@ from potto.types.unify import close_type, unify
 from potto.types.values import STILL, Closure, Port, Scalar, Source, TupleValue, Value
 
 MAX_ROUNDS = 20
-MAX_PARTS = 500
 
 Written = nodes.Definition | nodes.DiffeoDefinition
 
@@ -73,9 +72,9 @@ def analyse(
     flows: dict[DefinitionTarget, Value] = {target: _nothing(skeletons[target]) for target in items if recursive}
     for _ in range(MAX_ROUNDS if recursive else 1):
         walked = {target: _walk(inferences[target], item, flows) for target, item in items.items()}
+        if recursive:
+            walked = {target: (walk, fitted(value, skeletons[target])) for target, (walk, value) in walked.items()}
         closed = {target: Closing(value).value(value) for target, (_, value) in walked.items()}
-        if any(larger(value, MAX_PARTS) for value in closed.values()):
-            break  # a definition in terms of its own derivative: each round doubles it
         if closed == flows:
             break
         flows = closed

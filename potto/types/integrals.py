@@ -44,11 +44,13 @@ def _bounds(inference: Inference, node: nodes.Integral, place: int, bounds: Boun
     parts = (bounds.lo, bounds.hi) if isinstance(bounds, nodes.Interval) else bounds.arguments
     for part in parts:
         inner = _inner_name(part, inside)
-        if inner is not None:
-            inference.report(_inner_bound(inner, node))
-            continue
-        what = "a bound of an integral" if isinstance(bounds, nodes.Interval) else f"a parameter of `{bounds.measure}`"
-        inference.number(part, what)
+        with inference.scope.inside():
+            if inner is not None:
+                inference.report(_inner_bound(inner, node))
+                for name in inside:
+                    inference.scope.bind(Local(name, inner.span, "variable", Unknown()))
+            what = "a bound of an integral"
+            inference.number(part, what if isinstance(bounds, nodes.Interval) else f"a parameter of `{bounds.measure}`")
     if isinstance(bounds, nodes.MeasureBound):
         _measure(inference, bounds)
     if place < len(node.variables):
