@@ -6,7 +6,7 @@ Owns nothing but the list of commands. Each command is one module with `SUMMARY`
 
 from __future__ import annotations
 
-COMMANDS = ("run", "eval", "check", "deriv", "fmt", "test", "explain", "dump", "cache", "repl", "lsp")
+COMMANDS = ("run", "eval", "check", "deriv", "fmt", "test", "explain", "dump", "cache", "repl", "kernel", "lsp")
 LATER = ("render", "fit", "bench")  # they answer that a later release brings them
 
 

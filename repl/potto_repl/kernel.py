@@ -1,0 +1,104 @@
+"""The prompt as a Jupyter kernel: cells are entries, pictures are images. `potto kernel install` makes it known.
+
+Owns `PottoKernel`. Imported by nothing but `python -m potto_repl.kernel`; needs the extra `jupyter`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ipykernel.kernelapp import IPKernelApp
+from ipykernel.kernelbase import Kernel
+
+from potto import __version__
+from potto_repl.complete import candidates
+from potto_repl.editing import indentation, is_over
+from potto_repl.pictures import Image
+from potto_repl.reply import Part
+from potto_repl.respond import respond, stream
+from potto_repl.script import entries
+from potto_repl.session import Conversation
+from potto_repl.symbols import readable
+
+
+class PottoKernel(Kernel):
+    """One notebook's conversation."""
+
+    implementation = "potto"
+    implementation_version = __version__
+    banner = f"Potto {__version__}"
+    language_info = {"name": "potto", "mimetype": "text/x-potto", "file_extension": ".po"}  # noqa: RUF012  (theirs)
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self.conversation = Conversation(["."])
+
+    def do_execute(
+        self, code: str, silent: bool, store_history: bool = True, user_expressions: Any = None,
+        allow_stdin: bool = False, **more: Any,
+    ) -> dict[str, Any]:  # fmt: skip
+        """Answer the entries of a cell; the first error ends it."""
+        try:
+            for text in entries(code.splitlines()):
+                wrong = [part for part in self._answered(text, silent) if part.is_error]
+                if wrong:
+                    return self._failed("PottoError", wrong[0].plain())
+        except KeyboardInterrupt:
+            return self._failed("KeyboardInterrupt", "interrupted; everything that was defined is still there")
+        return {"status": "ok", "execution_count": self.execution_count, "payload": [], "user_expressions": {}}
+
+    def _answered(self, text: str, silent: bool) -> list[Part]:
+        said = []
+        for part in stream(self.conversation, readable(text)):
+            said.append(part)
+            if not silent:
+                self._show(part)
+        return said
+
+    def _show(self, part: Part) -> None:
+        picture = (part.data or {}).get("_picture")
+        if picture is not None:
+            import base64
+
+            data = {"text/plain": part.text}
+            if isinstance(picture, Image):
+                data["image/png"] = base64.b64encode(picture.png()).decode()
+            else:
+                data["image/svg+xml"] = picture.svg()
+            self.send_response(self.iopub_socket, "display_data", {"data": data, "metadata": {}})
+            return
+        stream_name = "stderr" if part.is_complaint else "stdout"
+        self.send_response(self.iopub_socket, "stream", {"name": stream_name, "text": part.plain() + "\n"})
+
+    def _failed(self, name: str, value: str) -> dict[str, Any]:
+        error = {"ename": name, "evalue": value.partition("\n")[0], "traceback": []}
+        self.send_response(self.iopub_socket, "error", error)
+        return {"status": "error", "execution_count": self.execution_count, **error}
+
+    def do_complete(self, code: str, cursor_pos: int) -> dict[str, Any]:
+        """What can stand at the cursor."""
+        found = candidates(self.conversation, code[:cursor_pos])
+        length = found[0].length if found else 0
+        return {"status": "ok", "matches": [item.text for item in found], "cursor_start": cursor_pos - length,
+                "cursor_end": cursor_pos, "metadata": {}}  # fmt: skip
+
+    def do_is_complete(self, code: str) -> dict[str, Any]:
+        """Whether a console should hand the cell in."""
+        return {"status": "complete"} if is_over(code) else {"status": "incomplete", "indent": indentation(code)}
+
+    def do_inspect(
+        self, code: str, cursor_pos: int, detail_level: int = 0, omit_sections: Any = ()
+    ) -> dict[str, Any]:
+        """What the name at the cursor means."""
+        import re
+
+        before = re.search(r"[^\W\d][\w.]*$", code[:cursor_pos])
+        after = re.match(r"\w*", code[cursor_pos:])
+        name = (before[0] if before else "") + (after[0] if after else "")
+        reply = respond(self.conversation, f":{'source' if detail_level else 'doc'} {name}")
+        found = bool(name) and not reply.failed
+        return {"status": "ok", "found": found, "data": {"text/plain": reply.text} if found else {}, "metadata": {}}
+
+
+if __name__ == "__main__":
+    IPKernelApp.launch_instance(kernel_class=PottoKernel)

@@ -1,0 +1,68 @@
+"""Potto in Jupyter: a real kernel, asked through jupyter_client."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+jupyter_client = pytest.importorskip("jupyter_client")
+pytest.importorskip("ipykernel")
+
+
+@pytest.fixture(scope="module")
+def client(tmp_path_factory):
+    import os
+
+    data = tmp_path_factory.mktemp("jupyter")
+    environment = {**os.environ, "JUPYTER_DATA_DIR": str(data)}
+    done = subprocess.run([sys.executable, "-m", "potto", "kernel", "install", "--json"], env=environment,
+                          capture_output=True, text=True, check=True)  # fmt: skip
+    assert json.loads(done.stdout)["installed"]
+    specs = jupyter_client.kernelspec.KernelSpecManager(kernel_dirs=[str(data / "kernels")])
+    manager = jupyter_client.KernelManager(kernel_name="potto", kernel_spec_manager=specs)
+    manager.start_kernel(cwd=str(data))
+    client = manager.client()
+    client.start_channels()
+    client.wait_for_ready(timeout=30)
+    yield client
+    client.stop_channels()
+    manager.shutdown_kernel(now=True)
+
+
+def run(client, code):
+    """The reply to a cell and everything that it shows."""
+    shown = []
+    reply = client.execute_interactive(code, timeout=30, output_hook=shown.append)
+    answers = [(message["msg_type"], message["content"]) for message in shown]
+    return reply["content"], [item for item in answers if item[0] not in ("status", "execute_input")]
+
+
+def test_cells_are_entries(client):
+    reply, shown = run(client, "def f(t)\n    integral [0, 1] [x < t] d(x)\n\nf(0.25)\n:type f")
+    text = "".join(content["text"] for kind, content in shown if kind == "stream")
+    assert reply["status"] == "ok" and "f : (t: Real) -> Real" in text and "= 0.25 ± " in text
+
+
+def test_errors_are_told(client):
+    reply, shown = run(client, "nothing\n1 + 1")
+    assert reply["status"] == "error" and "P0201" in reply["evalue"]
+    assert any(kind == "stream" and content["name"] == "stderr" for kind, content in shown)
+
+
+def test_pictures_are_images(client):
+    _, shown = run(client, ":plot u^2")
+    assert "<svg" in shown[0][1]["data"]["image/svg+xml"]
+    _, shown = run(client, ":image x*y 4")
+    assert shown[0][1]["data"]["image/png"].startswith("iVBOR")
+
+
+def test_completion_inspection_and_completeness(client):
+    run(client, "def renderer(c) c")
+    found = client.complete("1 + rend", reply=True, timeout=30)["content"]
+    assert found["matches"] == ["renderer"] and found["cursor_start"] == 4
+    assert "renderer : " in client.inspect("renderer(1)", 3, reply=True, timeout=30)["content"]["data"]["text/plain"]
+    client.is_complete("def f(t)")
+    assert client.get_shell_msg(timeout=30)["content"] == {"status": "incomplete", "indent": "    "}
