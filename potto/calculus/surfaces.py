@@ -261,9 +261,12 @@ def pieces(surface: Term) -> tuple[Term, ...]:
 
 def _outside_binders(root: Term) -> Iterator[Term]:
     """The parts of a term that are not inside an integral, a sum or a function."""
-    waiting = [root]
+    waiting, seen = [root], set[Term]()
     while waiting:
         node = waiting.pop()
+        if node in seen:
+            continue
+        seen.add(node)
         yield node
         if not isinstance(node, Integral | Sum | Lam):
             waiting.extend(children(node))
