@@ -157,5 +157,6 @@ def _moving(cut: int, function: Lam, variable: str, env: dict[str, Value], root:
     here[variable] = Cell(root, None, (None,) * k + (1.0,))
     value = _call(function, here, machine.with_directions(k + 1))
     slope = 0.0 if value.t[k] is None else value.t[k]
-    t = tuple(None if x is None else -np.asarray(x) / slope for x in value.t[:k])
+    # What stands still does so also where the surface is flat, and 0/0 would say nothing.
+    t = tuple(None if x is None else np.where(np.asarray(x) == 0, 0.0, -np.asarray(x) / slope) for x in value.t[:k])
     return Row(root, t, cut, False)
