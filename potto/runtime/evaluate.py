@@ -101,9 +101,13 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
     }
     notes = tuple(_notes(books))
     common = {
-        "evals": books.evaluations, "seconds": clock.seconds, "compile_seconds": clock.spent, "method": method, "notes": notes,
+        "evals": books.evaluations,
+        "seconds": clock.seconds,
+        "compile_seconds": clock.spent,
+        "method": method,
+        "notes": notes,
         "stats": stats,
-    }  # fmt: skip
+    }
     if isinstance(value, Closure):
         kind = "derivative of a function" if isinstance(value, Derivative) else "function"
         return Estimate(None, None, text=f"<{kind}>", **common)  # type: ignore[arg-type]

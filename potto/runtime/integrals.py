@@ -248,7 +248,8 @@ _lock = threading.Lock()
 
 def plan_for(machine: Machine, term: Integral, linked: Linked) -> Plan:
     """The plan for these functions and plain values; made once."""
-    key = (term.digest, tuple((n, f.digest) for n, f in sorted(linked.functions.items())), machine.linker.reached(term, *linked.functions.values()))
+    functions = tuple((name, f.digest) for name, f in sorted(linked.functions.items()))
+    key = (term.digest, functions, machine.linker.reached(term, *linked.functions.values()))
     with _lock:
         candidates = list(_plans.get(key, ()))
     for plan in candidates:
