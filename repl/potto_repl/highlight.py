@@ -6,7 +6,7 @@ is underlined where the checker, which runs beside, has found it so for exactly 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 
 from prompt_toolkit.completion import CompleteEvent, Completer, Completion
 from prompt_toolkit.document import Document
@@ -47,14 +47,19 @@ class PottoLexer(Lexer):
     def __init__(self, loader: Loader, wrong: Callable[[str], Sequence[Mark]]) -> None:
         self.loader = loader
         self.wrong = wrong
-        self._last: tuple[str, tuple[Mark, ...], list[StyleAndTextTuples]] | None = None
+        self._last: tuple[str, tuple[Mark, ...], bool, list[StyleAndTextTuples]] | None = None
+
+    def invalidation_hash(self) -> Hashable:
+        """Changes when there is something new to underline in the same text, or the parser has been loaded."""
+        text = self._last[0] if self._last is not None else ""
+        return (self.loader.ready, tuple(self.wrong(text)))
 
     def lex_document(self, document: Document) -> Callable[[int], StyleAndTextTuples]:
         text = document.text
         marks = tuple(self.wrong(text))
-        if self._last is None or self._last[:2] != (text, marks):
-            self._last = (text, marks, self._lines(text, marks))
-        lines = self._last[2]
+        if self._last is None or self._last[:3] != (text, marks, self.loader.ready):
+            self._last = (text, marks, self.loader.ready, self._lines(text, marks))
+        lines = self._last[3]
         return lambda number: lines[number] if number < len(lines) else []
 
     def _lines(self, text: str, marks: Sequence[Mark]) -> list[StyleAndTextTuples]:

@@ -167,6 +167,23 @@ def test_ctrl_c_drops_a_half_typed_block(tmp_path):
     assert screen.leave() == 0
 
 
+def test_what_is_wrong_is_underlined_on_the_screen(tmp_path):
+    screen = Screen(tmp_path)
+    screen.say("1 + 2", r"_1 = 3")
+    screen.process.send("4 + nothing")
+    underlined = ""
+    for _ in range(20):
+        screen.process.expect([pexpect.TIMEOUT, "never"], timeout=0.2)
+        row = screen.terminal.buffer[screen.terminal.cursor.y]
+        underlined = "".join(row[column].data for column in range(40) if row[column].underscore)
+        if underlined:
+            break
+    assert underlined == "nothing"
+    screen.process.sendintr()
+    screen.process.expect("po>")
+    assert screen.leave() == 0
+
+
 def test_a_narrow_terminal_and_no_colours(tmp_path):
     screen = Screen(tmp_path, columns=30, NO_COLOR="1")
     screen.say("1 + 2", r"= 3 ")
