@@ -6,7 +6,7 @@ is underlined where the checker, which runs beside, has found it so for exactly 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from prompt_toolkit.completion import CompleteEvent, Completer, Completion
 from prompt_toolkit.document import Document
@@ -48,11 +48,6 @@ class PottoLexer(Lexer):
         self.loader = loader
         self.wrong = wrong
         self._last: tuple[str, tuple[Mark, ...], bool, list[StyleAndTextTuples]] | None = None
-
-    def invalidation_hash(self) -> Hashable:
-        """Changes when there is something new to underline in the same text, or the parser has been loaded."""
-        text = self._last[0] if self._last is not None else ""
-        return (self.loader.ready, tuple(self.wrong(text)))
 
     def lex_document(self, document: Document) -> Callable[[int], StyleAndTextTuples]:
         text = document.text

@@ -72,11 +72,12 @@ class Terminal:
         self.suggests = True
         self.progress = Progress(sys.stdout)
         self.checker = Checker(loader, self._checked)
+        self.lexers = (PottoLexer(loader, self.checker.wrong), PottoLexer(loader, self.checker.wrong))
         self.prompt_session: PromptSession[str] = PromptSession(
             message=self.message,
             multiline=True,
             prompt_continuation=self.continuation,
-            lexer=PottoLexer(loader, self.checker.wrong),
+            lexer=self.lexers[0],
             completer=ThreadedCompleter(PottoCompleter(loader)),
             complete_while_typing=False,
             enable_history_search=True,
@@ -217,8 +218,10 @@ class Terminal:
             self.checker.look(text)
 
     def _checked(self) -> None:
+        """Draw the text again: prompt_toolkit colours the same text anew only for another lexer."""
         app = self.prompt_session.app
         if app.is_running:
+            self.prompt_session.lexer = self.lexers[self.prompt_session.lexer is self.lexers[0]]
             app.invalidate()
 
     async def _watch(self) -> None:
