@@ -158,6 +158,9 @@ def grade(u0: Array, u1: Array, end: Ints, t: Array) -> tuple[Array, Array]:
 def velocity(seg: Segments, label: Array, direction: int) -> tuple[Array, Array]:
     """(v, dv/dx) of the points in one direction: the ends' speeds, linear in between."""
     ta, tb = seg.ta[direction][:, None], seg.tb[direction][:, None]
+    if seg.kind.max(initial=0) < UP:
+        rise = tb - ta
+        return ta + rise * label, rise / (seg.b - seg.a)[:, None]
     low, high = np.isinf(seg.a)[:, None], np.isinf(seg.b)[:, None]
     width = np.where(low | high, np.inf, (seg.b - seg.a)[:, None])
     ta = np.where(low, np.where(high, 0.0, tb), ta)

@@ -63,6 +63,7 @@ class Work:
     root: Ints | None = None
     conflict: bool = False
     width: int = 1
+    forms: Any = None
 
     def __post_init__(self) -> None:
         self.k = self.machine.directions
@@ -354,13 +355,17 @@ class Work:
         self, p: Pieces, ends: tuple[Array, Array] | None
     ) -> tuple[tuple[Array, Array], tuple[Array, Array], Array]:
         """(value, bound) of the tangents in the moving and in the fixed form, and how far they are apart."""
+        if self.forms is not None and self.forms[0] is p:
+            return self.forms[1]  # type: ignore[no-any-return]
         k = self.k
         integral, error = self.added(p.integral, p), self.added(p.error + p.floor, p)
         boundary, rounding = (0.0, 0.0) if ends is None else self.boundary(ends)
         moving = integral[:, 1 : 1 + k], error[:, 1 : 1 + k]
         fixed = integral[:, 1 + k :] + boundary, error[:, 1 + k :] + rounding
         apart = np.abs(moving[0] - fixed[0])
-        return moving, fixed, np.where(np.isfinite(apart), apart, 0.0)
+        found = moving, fixed, np.where(np.isfinite(apart), apart, 0.0)
+        self.forms = (p, found)
+        return found
 
     def added(self, x: Array, p: Pieces) -> Array:
         """Channels of pieces (C, P) added up per integral: (m, channels, B)."""

@@ -31,7 +31,7 @@ from potto.runtime.functions import Closure, Derivative
 if TYPE_CHECKING:
     from potto.runtime.machine import Machine
 
-START_ORDER = 10
+START_ORDER = 11
 ORDERS = (4, 6, 8, 10)
 PILOTS = 64
 BATCH = 4096  # members integrated at once
