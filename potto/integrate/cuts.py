@@ -12,14 +12,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from potto.integrate.maps import Ints, Segments, choose
+from potto.integrate.maps import Segments, choose
 from potto.integrate.plan import LevelPlan
 from potto.integrate.rules import EPS
-from potto.kernels.cells import Array, Cell, Value
-
-Bools = npt.NDArray[np.bool_]
+from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 
 
 @dataclass

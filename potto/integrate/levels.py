@@ -13,12 +13,12 @@ import numpy as np
 from potto.integrate import maps
 from potto.integrate.cuts import Cuts, as_array, frame_rows, segments, standing
 from potto.integrate.edges import report_edges
-from potto.integrate.maps import Ints, Segments
+from potto.integrate.maps import Segments
 from potto.integrate.pieces import Evaluator, Sums, components, gather, still, take
 from potto.integrate.plan import LevelPlan, Plan, vanishes
 from potto.integrate.roots import searched_rows
 from potto.integrate.work import Work
-from potto.kernels.cells import Array, Cell, Mask, Value
+from potto.kernels.cells import Array, Cell, Ints, Mask, Value
 
 
 @dataclass

@@ -11,11 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from potto.kernels.cells import Array
-
-Ints = npt.NDArray[np.int64]
+from potto.kernels.cells import Array, Ints
 
 LINEAR, LEFT, RIGHT, BOTH, UP, DOWN, WHOLE = range(7)
 # Powers by which a piece at the end of its segment is graded once it has shown itself not to be smooth there.

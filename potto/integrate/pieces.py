@@ -11,8 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from potto.core.terms import Lam
-from potto.integrate.maps import Ints
-from potto.kernels.cells import Array, Cell, Mask, Trace, Value, map_arrays
+from potto.kernels.cells import Array, Cell, Ints, Mask, Trace, Value, map_arrays
 from potto.kernels.errors import not_a_number
 
 

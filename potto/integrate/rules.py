@@ -11,11 +11,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 
-from potto.kernels.cells import Array
-
-Ints = npt.NDArray[np.int64]
+from potto.kernels.cells import Array, Ints
 
 EPS = 2.0**-52
 

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from potto.integrate.maps import Ints
 from potto.integrate.pieces import Pieces
-from potto.kernels.cells import Array
+from potto.kernels.cells import Array, Ints
 
 if TYPE_CHECKING:
     from potto.integrate.work import Work

@@ -18,12 +18,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from potto.integrate import maps
-from potto.integrate.maps import Ints, Segments
+from potto.integrate.maps import Segments
 from potto.integrate.pieces import Evaluator, Pieces, Sums, column, gather, joined, spread, still, take
 from potto.integrate.plan import LevelPlan
 from potto.integrate.rules import EPS, gauss, leaning, truncation
 from potto.integrate.tally import Tally
-from potto.kernels.cells import Array, Cell, Mask, Number, Value, pad
+from potto.kernels.cells import Array, Cell, Ints, Mask, Number, Value, pad
 
 if TYPE_CHECKING:
     from potto.integrate.levels import Iteration

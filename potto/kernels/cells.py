@@ -10,14 +10,21 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Protocol, Union
 
 import numpy as np
-import numpy.typing as npt
 
 if TYPE_CHECKING:
     from potto.core.terms import Lam
 
-Array = npt.NDArray[np.float64]
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    Array = npt.NDArray[np.float64]
+    Ints = npt.NDArray[np.int64]
+    Bools = npt.NDArray[np.bool_]
+else:  # numpy's typing module takes longer to import than any of ours
+    Array = Ints = Bools = np.ndarray
+
 Number = float | Array
-Mask = bool | npt.NDArray[np.bool_]
+Mask = bool | Bools
 # A trace: for a branching site of a kernel a mask (forced) or the trace of a callee; sites not named go as they fall.
 Trace = dict[int, Any]
 Pattern = Any

@@ -16,7 +16,6 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from threadpoolctl import ThreadpoolController
 
 from potto.calculus.surfaces import TooDeep
 from potto.core.terms import Global, Integral, Lam, Sum, Term, Var, integral, postorder, substitute, var
@@ -195,7 +194,9 @@ def one_thread() -> AbstractContextManager[object]:
 
 
 @lru_cache(maxsize=1)
-def _threads() -> ThreadpoolController:
+def _threads() -> Any:
+    from threadpoolctl import ThreadpoolController  # ctypes and a look at every library loaded: for batches only
+
     return ThreadpoolController()
 
 
