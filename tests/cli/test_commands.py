@@ -40,7 +40,8 @@ def test_loops_and_names_in_them(potto: Potto) -> None:
 def test_run_as_json(potto: Potto) -> None:
     answer = potto("run", "--json", "main.po", main=HALF + "print(f(0.25))\n").json
     assert answer["output"][0]["text"] == "0.25"
-    assert answer["output"][0]["values"][0]["value"] == 0.25 and answer["diagnostics"] == []
+    value = answer["output"][0]["values"][0]["value"]
+    assert value == pytest.approx(0.25, rel=1e-15, abs=0) and answer["diagnostics"] == []
 
 
 def test_eval_json_of_a_dual(potto: Potto) -> None:
