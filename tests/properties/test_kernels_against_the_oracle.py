@@ -29,7 +29,7 @@ POSITIVE = ("sqrt", "log", "log1p")
 
 
 def leaf(pick: random.Random) -> Term:
-    return pick.choice([*map(core.var, NAMES), core.const(0.5), core.const(-2.0), core.const(0.3), core.PI])
+    return pick.choice([*map(core.var, NAMES), core.const(0.5), core.const(-2.0), core.const(0.3), core.const(3.25)])
 
 
 def term(pick: random.Random, depth: int) -> Term:
