@@ -122,7 +122,7 @@ def test_programs_over_two_variables(number: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("start", range(1000, 1150, 50))
+@pytest.mark.parametrize("start", range(1000, 1500, 50))
 def test_many_programs(start: int) -> None:
     outcomes = [check(number) for number in range(start, start + 50)]
     assert outcomes.count("compared") >= 35, outcomes
