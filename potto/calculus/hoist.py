@@ -15,7 +15,6 @@ from potto.calculus.surfaces import Finding, Resolve, findings
 from potto.core.terms import (
     App,
     Branch,
-    Global,
     Integral,
     Prim,
     Sum,
@@ -83,10 +82,7 @@ def _carried_out(body: Term, resolve: Resolve) -> Term:
             if known is not None:
                 passed[node.name] = known
 
-    def whole(head: Global) -> Term | None:
-        return resolve(head)
-
-    return expanded(substitute(body, passed), whole)
+    return expanded(substitute(body, passed), resolve)
 
 
 def _taken_out(body: Term) -> Term:

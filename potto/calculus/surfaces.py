@@ -45,7 +45,7 @@ _DEEPEST_SURFACE = 12
 
 Kind = Literal["jump", "kink", "edge", "center"]
 # Where a part of the program gets its functions from: a Lam for the head of a call, or None if it is not known here.
-Resolve = Callable[[Term], "Lam | None"]
+Resolve = Callable[[Term], "Lam | Deriv | None"]
 # The value of a plain term (a condition: 1 or 0), or None where it is not decided.
 Decide = Callable[[Term], "float | None"]
 
@@ -102,6 +102,18 @@ def fitted(args: tuple[Term, ...], arity: int) -> tuple[Term, ...]:
     return args
 
 
+def underlying(head: Term, resolve: Resolve) -> tuple[Lam | None, bool]:
+    """The function that is called, or whose derivative is called; and whether it is the derivative."""
+    dual = False
+    function: Term | None = head
+    while function is not None and not isinstance(function, Lam):
+        if isinstance(function, Deriv):
+            function, dual = function.function, True
+        else:
+            function = resolve(function)
+    return function, dual
+
+
 def findings(term: Term, resolve: Resolve, decide: Decide = undecided) -> tuple[Finding, ...]:
     """All surfaces of a term, jumps with the trace that forces them. Raises TooDeep."""
     found = _Search(resolve, decide).term(term, {}, (), (), 0)
@@ -126,7 +138,7 @@ def carried_out(surface: Term, resolve: Resolve, depth: int = 0) -> Term:
 def _result(call: App, resolve: Resolve, depth: int) -> Term:
     head, groups = spine(call)
     function = head if isinstance(head, Lam) else None if isinstance(head, Deriv) else resolve(head)
-    if function is None:
+    if not isinstance(function, Lam):
         return call
     params, body = uncurry(function, len(groups))
     args: list[Term] = []
@@ -221,12 +233,10 @@ class _Search:
         self, site: CallSite, mapping: dict[str, Term], path: tuple[int, ...], calls: tuple[App, ...], depth: int
     ) -> Iterator[Finding]:
         head, before = _spine(substitute(site.head, mapping))
-        dual = isinstance(head, Deriv)
-        while isinstance(head, Deriv):
-            head = head.function
-        function = head if isinstance(head, Lam) else self.resolve(head)
-        if function is None:
+        found, dual = underlying(head, self.resolve)
+        if found is None:
             return
+        function = found
         groups = (*before, *(tuple(substitute(a, mapping) for a in group) for group in site.groups))
         params, body = uncurry(function, len(groups))
         args: list[Term] = []

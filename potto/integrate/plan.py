@@ -22,6 +22,7 @@ from potto.calculus.trace import layout
 from potto.core.terms import (
     Branch,
     Const,
+    Deriv,
     If,
     Integral,
     Lam,
@@ -126,7 +127,7 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve) -> P
     decisions: dict[Term, float | None] = {}
     unknown: set[Term] = set()
 
-    def known(head: Term) -> Lam | None:
+    def known(head: Term) -> Lam | Deriv | None:
         found = resolve(head)
         if found is None:
             unknown.add(head)

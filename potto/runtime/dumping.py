@@ -12,7 +12,7 @@ from potto.settings import DEFAULTS
 def kernel_text(program: Program, file: str, name: str) -> str | None:
     """The kernel of a function that carries one tangent in every number; None for what is no function."""
     term = program.linker.function(program.linker.term(file, name))
-    if term is None:
+    if not isinstance(term, Lam):
         return None
     machine = program.machine(DEFAULTS).with_directions(1)
     groups, body = 0, _body(term)

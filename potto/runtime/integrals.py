@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from potto.calculus.surfaces import TooDeep
-from potto.core.terms import Global, Integral, Lam, Sum, Term, Var, integral, postorder, substitute, var
+from potto.core.terms import Deriv, Global, Integral, Lam, Sum, Term, Var, deriv, integral, postorder, substitute, var
 from potto.diagnostics import PottoError
 from potto.integrate.levels import Iteration
 from potto.integrate.pieces import Sums
@@ -42,7 +42,7 @@ MOST_LEVELS = 3
 class Linked:
     """The functions that an integral calls, as terms whose free variables have names of their own."""
 
-    functions: dict[str, Lam]
+    functions: dict[str, Lam | Deriv]
     env: dict[str, Value]
 
 
@@ -218,10 +218,11 @@ def _shaped(sums: Sums, shape: tuple[int, ...]) -> Value:
 
 
 def link(env: dict[str, Value]) -> Linked:
-    functions: dict[str, Lam] = {}
+    functions: dict[str, Lam | Deriv] = {}
     extended: dict[str, Value] = dict(env)
 
     def add(name: str, function: Closure) -> None:
+        derivative = isinstance(function, Derivative)
         while isinstance(function, Derivative):
             function = function.primal
         renamed: dict[str, Term] = {}
@@ -233,7 +234,7 @@ def link(env: dict[str, Value]) -> Linked:
                 add(own, value)
         linked = substitute(function.lam, renamed)
         assert isinstance(linked, Lam)
-        functions[name] = linked
+        functions[name] = deriv(linked) if derivative else linked
 
     for name, value in env.items():
         if isinstance(value, Closure):
@@ -270,7 +271,7 @@ def plan_for(machine: Machine, term: Integral, linked: Linked) -> Plan:
     return plan
 
 
-def _plainly(head: Var, linked: Linked) -> Lam | None:
+def _plainly(head: Var, linked: Linked) -> Lam | Deriv | None:
     """The function that a name stands for, unless it stands for one on duals."""
     return linked.functions.get(head.name) if type(linked.env.get(head.name)) is Closure else None
 

@@ -106,17 +106,14 @@ class Linker:
             self.reaches[terms] = found
         return found
 
-    def function(self, head: Term) -> Lam | None:
-        """The Lam that a Global leads to; through definitions that are other names or derivatives of functions."""
+    def function(self, head: Term) -> Lam | Deriv | None:
+        """The function, or derivative of one, that a Global leads to, through definitions that are other names."""
         for _ in range(100):
-            if isinstance(head, Lam):
+            if isinstance(head, Lam | Deriv):
                 return head
-            if isinstance(head, Deriv):
-                head = head.function
-            elif isinstance(head, Global):
-                head = self.term(head.module, head.name)
-            else:
+            if not isinstance(head, Global):
                 return None
+            head = self.term(head.module, head.name)
         return None
 
 

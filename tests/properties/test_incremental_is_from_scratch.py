@@ -97,11 +97,11 @@ pytestmark = pytest.mark.filterwarnings("ignore:The recursion limit")
 @quick
 @given(scripts, st.lists(st.booleans(), min_size=1, max_size=4))
 def test_edits(tmp_path_factory: pytest.TempPathFactory, script: list[Edit], asking: list[bool]) -> None:
-    check(str(tmp_path_factory.getbasetemp()), script, asking)
+    check(str(tmp_path_factory.mktemp("edits")), script, asking)
 
 
 @pytest.mark.slow
 @thorough
 @given(scripts, st.lists(st.booleans(), min_size=1, max_size=4))
 def test_many_edits(tmp_path_factory: pytest.TempPathFactory, script: list[Edit], asking: list[bool]) -> None:
-    check(str(tmp_path_factory.getbasetemp()), script, asking)
+    check(str(tmp_path_factory.mktemp("edits")), script, asking)

@@ -1,0 +1,36 @@
+"""A derivative that has a name, is passed on or is called under an integral, with its dual varying there."""
+
+from __future__ import annotations
+
+import pytest
+
+import potto
+
+# q(c) = c^2/2 on [0, 1], so snd dq((x t, x)) = x t x and its integral over [0, 1] is t/3.
+PROGRAM = """
+def q(c) integral [0, 1] y*[y < c] d(y)
+dq = deriv q
+def named(t) integral [0, 1] snd (dq ((x*t, x))) d(x)
+def spelled(t) integral [0, 1] snd ((deriv q) ((x*t, x))) d(x)
+def taking(g, t) integral [0, 1] snd (g ((x*t, x))) d(x)
+def passed(t) taking (dq, t)
+def passed_on(t) taking (deriv q, t)
+"""
+
+
+@pytest.mark.parametrize("name", ["named", "spelled", "passed", "passed_on"])
+def test_its_jump_is_found_in_the_value_of_the_dual(name: str) -> None:
+    m = potto.compile(PROGRAM)
+    got = potto.deriv(getattr(m, name))((0.5, 1.0))
+    # Polynomials on either side of the cut: exact for the rule, up to rounding.
+    assert abs(got.value - 1 / 6) <= 1e-15 and abs(got.tangent - 1 / 3) <= 1e-15
+
+
+def test_a_condition_of_a_derivative_jumps_where_the_primal_says() -> None:
+    m = potto.compile("""
+def step(x, t) [x < t]
+dstep = deriv step
+def f(t) integral [0, 1] fst (dstep ((x, 0), (t, 0))) d(x)
+""")
+    got = potto.deriv(m.f)((0.4, 1.0))
+    assert abs(got.value - 0.4) <= 1e-15 and abs(got.tangent - 1) <= 1e-15
