@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from potto.arguments import Batch, batch_of, misfit, value_of
-from potto.calls import Call, Gradient, gradient
+from potto.calls import Call, Form, Gradient, gradient
 from potto.diagnostics import PottoError
 from potto.kernels.cells import Value
 from potto.kernels.errors import wrong_call
@@ -167,6 +167,8 @@ class Function:
         self._expr = expr
         self._type = type
         self._given = given
+        self._calls: dict[Form, Call] = {}
+        self._groups: tuple[int, tuple[tuple[Parameter, ...], ...]] | None = None
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         given = (*self._given, (args, kwargs))
@@ -181,11 +183,17 @@ class Function:
         return self._call(given).run([value for _, value in arguments], batch)
 
     def _call(self, given: Given) -> Call:
-        return Call(self._world, self._file, self._expr, tuple((len(args), tuple(words)) for args, words in given))
+        form = tuple((len(args), tuple(words)) for args, words in given)
+        if form not in self._calls:
+            self._calls[form] = Call(self._world, self._file, self._expr, form)
+        return self._calls[form]
 
     def _arguments(self, given: Given) -> tuple[builtins.list[tuple[str, Value]], Batch]:
         """The arguments as values, under the names of their parameters. Raises PottoError for what does not fit."""
-        labelled = _labelled(given, groups_of(self._whole))
+        revision = self._world.db.revision
+        if self._groups is None or self._groups[0] != revision:
+            self._groups = revision, groups_of(self._whole)
+        labelled = _labelled(given, self._groups[1])
         for label, argument, type in labelled:
             complaint = None if type is None else misfit(label, argument, type, _type_of(argument))
             if complaint is not None:

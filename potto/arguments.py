@@ -85,6 +85,8 @@ def value_of(name: str, argument: Any, batch: Batch, to_function: ToFunction) ->
     function = to_function(argument)
     if function is not None:
         return function
+    if isinstance(argument, float):
+        return Cell(float(argument))
     if isinstance(argument, bool | np.bool_):
         raise no_kind(name, argument, "write 1.0 or 0.0")
     if isinstance(argument, numbers.Real):
@@ -143,23 +145,29 @@ def misfit(name: str, argument: Any, type: Type, own: Type | None) -> str | None
     `own` is the type of an argument that is a function.
     """
     type = resolve(type)
-    wanted = f"`{name}` is {format_type(type)}"
+    if isinstance(type, Real) and own is None and isinstance(argument, float | int):
+        return None
+    complaint = _complaint(name, argument, type, own)
+    return None if complaint is None else f"`{name}` is {format_type(type)}: {complaint}"
+
+
+def _complaint(name: str, argument: Any, type: Type, own: Type | None) -> str | None:
     match type:
         case Function() | Diffeo():
             if own is None:
-                return f"{wanted}: a function is needed, not {_kind(argument)}"
+                return f"a function is needed, not {_kind(argument)}"
             if _is_dual(result_of(type)) and not _is_dual(result_of(own)):
-                return f"{wanted}: the derivative of a function is needed, `potto.deriv(…)` of the one that is given"
+                return "the derivative of a function is needed, `potto.deriv(…)` of the one that is given"
             return None
         case _ if own is not None:
-            return f"{wanted}: not a function" if isinstance(type, Real | Dist | TupleOf | ListOf) else None
+            return "not a function" if isinstance(type, Real | Dist | TupleOf | ListOf) else None
         case TupleOf(items, dual):
-            return _tuple_misfit(name, argument, items, dual, wanted)
+            return _tuple_misfit(name, argument, items, dual)
         case ListOf():
-            return None if isinstance(argument, list) else f"{wanted}: a list is needed, not {_kind(argument)}"
+            return None if isinstance(argument, list) else f"a list is needed, not {_kind(argument)}"
         case Real() | Dist():
             fits = not isinstance(argument, tuple | list)
-            return None if fits else f"{wanted}: a number is needed, not {_kind(argument)}"
+            return None if fits else f"a number is needed, not {_kind(argument)}"
         case _:
             return None
 
@@ -169,14 +177,14 @@ def _is_dual(type: Type) -> bool:
     return isinstance(type, TupleOf) and (type.dual or all(_is_dual(resolve(item)) for item in type.items))
 
 
-def _tuple_misfit(name: str, argument: Any, items: tuple[Type, ...], dual: bool, wanted: str) -> str | None:
+def _tuple_misfit(name: str, argument: Any, items: tuple[Type, ...], dual: bool) -> str | None:
     if dual and not isinstance(argument, tuple | list):
         return None  # a number given for a dual has tangent 0
     if isinstance(argument, Estimate):
         return None
     if not isinstance(argument, tuple) or len(argument) != len(items):
         what = "a dual `(value, tangent)`" if dual else f"a tuple of {len(items)}"
-        return f"{wanted}: {what} is needed, not {_kind(argument)}"
+        return f"{what} is needed, not {_kind(argument)}"
     return None
 
 

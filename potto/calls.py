@@ -7,7 +7,7 @@ parameters are resolved by elaboration, as in a program. Conversion of Python va
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 from potto.arguments import Batch
@@ -39,6 +39,7 @@ class Call:
     file: str
     expr: nodes.Expr
     form: Form
+    _known: dict[int, Term] = field(default_factory=dict, compare=False, repr=False)
 
     def run(self, values: Sequence[Value], batch: Batch) -> Estimate:
         """The estimate of the call for these arguments. Raises PottoError."""
@@ -64,7 +65,13 @@ class Call:
     @property
     def elaborated(self) -> Term:
         """The call as a function of its arguments; once for the present texts."""
-        return self.world.remember((self.file, self.expr, self.form), self._elaborate)
+        revision = self.world.db.revision
+        term = self._known.get(revision)
+        if term is None:
+            term = self.world.remember((self.file, self.expr, self.form), self._elaborate)
+            self._known.clear()
+            self._known[revision] = term
+        return term
 
     def _elaborate(self) -> Term:
         whole = applied(self.expr, self.form)

@@ -79,9 +79,10 @@ def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, d
     """Cut [lo, hi] at the rows; reversed bounds are turned round and counted negative."""
     low, high = as_array(lo.v, batch), as_array(hi.v, batch)
     tl, th = _tangents(lo.t, batch, directions), _tangents(hi.t, batch, directions)
-    sign = np.where(high < low, -1.0, 1.0)
-    if (sign < 0).any():
-        turn = sign < 0
+    sign = np.ones(batch)
+    turn = high < low
+    if turn.any():
+        sign[turn] = -1.0
         low, high = np.where(turn, high, low), np.where(turn, low, high)
         tl, th = np.where(turn, th, tl), np.where(turn, tl, th)
     count = len(rows)
@@ -110,7 +111,9 @@ def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, d
             edges.extend(_edges(row, root, low, high, tl, th, directions, batch))
     rank = np.zeros((count + 2, batch), dtype=np.int64)
     conflict = False
-    if count:
+    if count == 1:  # in order already
+        rank[1] = _rank(plan, rows[0]) * inside[1]
+    elif count:
         x, t, rank, conflict = _sorted(plan, rows, x, t, inside)
     cuts = _pieces(x, t, rank, sign, beyond, edges, lo, hi, batch)
     cuts.conflict = conflict
@@ -141,9 +144,12 @@ def _edges(
 ) -> list[Edge]:
     """Where a jump lies on a bound (to rounding) and does not move with it."""
     out: list[Edge] = []
-    speed = _tangents(row.t, batch, directions)
     for upper, bound, tb in ((False, low, tl), (True, high, th)):
-        on = (root == bound) & np.isfinite(bound) & (low < high)
+        on = root == bound
+        if not on.any():
+            continue
+        on = on & np.isfinite(bound) & (low < high)
+        speed = _tangents(row.t, batch, directions)
         moves = np.abs(speed - tb) > 64 * EPS * np.maximum(np.abs(speed), np.abs(tb))
         owner = np.nonzero(on & moves.any(axis=0))[0]
         if owner.size:
@@ -202,7 +208,7 @@ def _pieces(
     owner, place = np.nonzero(full.T)
     a, b = a[place, owner], b[place, owner]
     ta, tb = t[:, place, owner], t[:, place + 1, owner]
-    left, right = np.full(a.shape, -np.inf), np.full(a.shape, np.inf)
+    left, right = np.broadcast_to(-np.inf, a.shape), np.broadcast_to(np.inf, a.shape)
     for root, _ in beyond:
         at = root[owner]
         left = np.where((at <= a) & (at > left), at, left)

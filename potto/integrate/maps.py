@@ -48,8 +48,10 @@ class Segments:
 def choose(a: Array, b: Array, left: Array, right: Array) -> Ints:
     """The map for each segment; a turning point further away than the segment is long needs no care."""
     kind = np.zeros(a.shape, dtype=np.int64)
-    low, high = np.isinf(a), np.isinf(b)
     width = b - a
+    if ((a - left > width) & (right - b > width) & (width < np.inf)).all():
+        return kind
+    low, high = np.isinf(a), np.isinf(b)
     near_left, near_right = (a - left <= width) & ~low, (right - b <= width) & ~high
     kind[near_left] = LEFT
     kind[near_right] = RIGHT

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from potto.core.terms import Lam
+from potto.integrate.rules import leaning
 from potto.kernels.cells import Array, Cell, Ints, Mask, Trace, Value, map_arrays
 from potto.kernels.errors import not_a_number
 
@@ -61,8 +62,18 @@ class Pieces:
     ends: Array = field(default_factory=lambda: np.zeros((0, 0)))
     tail: Array = field(default_factory=lambda: np.zeros((0, 0)))
     lean: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    coefficients: Array | None = None
+
+    def settled(self) -> Pieces:
+        """The pieces with what only refinement asks for, which is worked out when it does."""
+        if self.coefficients is not None:
+            worst = self.error.argmax(axis=0)
+            self.lean = leaning(self.coefficients[worst, np.arange(self.u0.size)])
+            self.coefficients = None
+        return self
 
     def pick(self, index: Any) -> Pieces:
+        self.settled()
         return Pieces(self.segment[index], self.u0[index], self.u1[index], self.end[index],
                       self.integral[:, index], self.error[:, index], self.floor[:, index],
                       self.size[:, index], self.most[:, index],
@@ -76,6 +87,7 @@ def joined(parts: list[Pieces]) -> Pieces:
     """Pieces put together; one copy for any number of parts."""
     if len(parts) == 1:
         return parts[0]
+    parts = [p.settled() for p in parts]
     names = ("segment", "u0", "u1", "end", "integral", "error", "floor", "size", "most", "ends", "tail", "lean")
     axes = (0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 0)
     return Pieces(*(np.concatenate([getattr(p, n) for p in parts], axis=a) for n, a in zip(names, axes, strict=True)))

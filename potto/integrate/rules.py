@@ -43,8 +43,8 @@ def gauss(n: int) -> Rule:
     return Rule((x + 1) / 2, w / 2, transform, ends, k * (k + 1.0))
 
 
-def truncation(coefficients: Array) -> Array:
-    """A bound of how far the rule's integral is off, from the decay of its Legendre coefficients (last axis).
+def truncation(size: Array) -> Array:
+    """A bound of how far the rule's integral is off, from the decay of its Legendre coefficients' magnitudes (last axis).
 
     The integral errs by about the 2n-th coefficient. The decay is read off pairs of coefficients (functions even or
     odd on the piece have every other one zero), at the end and over the upper half, and the slower of the two is
@@ -52,7 +52,6 @@ def truncation(coefficients: Array) -> Array:
     orders of magnitude, and for x^a at an end of the piece, where it is algebraic, still safe (measured for a from
     -0.7 to 3.5). A slow decay means that the integrand is not resolved: then the last coefficients themselves.
     """
-    size = np.abs(coefficients)
     n = size.shape[-1]
     middle = max(n // 2 - 2, 0)
     end = size[..., -1] + size[..., -2]

@@ -18,10 +18,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from potto.integrate import maps
+from potto.integrate.forms import Ends, Totals, sums, totals
 from potto.integrate.maps import Segments
 from potto.integrate.pieces import Evaluator, Pieces, Sums, column, gather, joined, spread, still, take
 from potto.integrate.plan import LevelPlan
-from potto.integrate.rules import EPS, gauss, leaning, truncation
+from potto.integrate.rules import EPS, gauss, truncation
 from potto.integrate.tally import Tally
 from potto.kernels.cells import Array, Cell, Ints, Mask, Number, Value, pad
 
@@ -63,7 +64,7 @@ class Work:
     root: Ints | None = None
     conflict: bool = False
     width: int = 1
-    forms: Any = None
+    watched: bool = True
 
     def __post_init__(self) -> None:
         self.k = self.machine.directions
@@ -79,20 +80,44 @@ class Work:
             return Sums(np.zeros(shape), np.zeros(shape), np.zeros((1, self.k, self.batch)),
                         np.zeros((1, self.k, self.batch)))  # fmt: skip
         zero, one = np.zeros(count), np.ones(count)
-        fresh = self.measure(Pieces(np.arange(count), zero, one, np.zeros(count, dtype=np.int64)), self.parent.order)
         ends = self.end_values()
+        self.watched = ends is not None
+        whole = Pieces(np.arange(count), zero, one, np.zeros(count, dtype=np.int64))
+        fresh = self.measure(whole, self.parent.order, True)
         if self.conflict and not self.last:
             self.look_for_steps()
+        found = totals(self, fresh, ends)
+        if self.good_enough(fresh, found, ends):
+            return sums(self, found, ends)
         tally = Tally(self, fresh)
         done = self.refine(fresh, ends, tally)
         for _ in range(DOUBTFUL_ROUNDS):
-            bad = self.doubtful(done, ends)
+            found = totals(self, done, ends)
+            bad = self.doubtful(done, found)
             if bad is None or self.machine.exhausted():
                 break
             halves = self.halve(done.pick(bad))
             halves = self.replaced(done.pick(bad), halves, HALF_ORDER, tally)
             done = done.pick(~bad).join(self.refine(halves, ends, tally))
-        return self.total(done, ends)
+        else:
+            found = totals(self, done, ends)
+        return sums(self, found, ends)
+
+    def good_enough(self, p: Pieces, found: Totals, ends: Ends | None) -> bool:
+        """Whether whole segments do as they are for every member, by the strictest reading of what is asked for."""
+        if self.number and self.root is not None:
+            return False  # what each may err is measured by members of the outermost batch: that takes a tally
+        scale = np.abs(found.size if self.number else found.integral)[:, : 1 + self.k]
+        if self.number:
+            scale = scale.max(axis=-1, keepdims=True)
+        error = found.error[:, : 1 + self.k]
+        if found.fixed is not None:
+            error = np.concatenate((error[:, :1], np.minimum(found.moving[1], found.fixed[1])), axis=1)
+        if not (error <= 0.5 * np.maximum(self.machine.atol, self.machine.rtol * scale)).all():
+            return False
+        if ends is not None and self.missed_peak(p, ends).any():
+            return False
+        return self.doubtful(p, found) is None
 
     def refine(self, fresh: Pieces, ends: Any, tally: Tally) -> Pieces:
         """More nodes, then halves, for what is too coarse until nothing is; what is accepted stays accepted."""
@@ -139,8 +164,11 @@ class Work:
             np.concatenate((left, right)),
         )
 
-    def measure(self, p: Pieces, order: int) -> Pieces:
-        """Integrals, errors and rounding floors of pieces, chunk by chunk, by the rule with `order` nodes."""
+    def measure(self, p: Pieces, order: int, whole: bool = False) -> Pieces:
+        """Integrals, errors and rounding floors of pieces, chunk by chunk, by the rule with `order` nodes.
+
+        `whole`: the pieces are the segments.
+        """
         rows = max(1, CHUNK // order)
         if p.segment.size > rows:
             return joined(
@@ -150,27 +178,33 @@ class Work:
                 ]
             )
         rule = gauss(order)
-        seg = self.seg.pick(p.segment)
-        u, du = maps.grade(p.u0, p.u1, p.end, rule.nodes)
-        x, dx, label = maps.points(seg, u)
-        weight = dx * du
+        if whole:
+            seg = self.seg
+            x, weight, label = maps.points(seg, np.broadcast_to(rule.nodes, (p.u0.size, order)))
+        else:
+            seg = self.seg.pick(p.segment)
+            u, du = maps.grade(p.u0, p.u1, p.end, rule.nodes)
+            x, dx, label = maps.points(seg, u)
+            weight = dx * du
         h, inner = self.values(seg, p.segment, x, label, weight)
         coefficients = h @ rule.transform
-        p.integral = coefficients[..., 0]
-        p.error = truncation(coefficients)
-        worst = p.error.argmax(axis=0)
-        p.lean = leaning(coefficients[worst, np.arange(p.u0.size)])
-        spread = np.abs(coefficients) @ rule.slopes
-        shake = NODE_ROUNDING * EPS * np.abs(x).max(axis=-1) / np.abs(weight).max(axis=-1)
-        shake = np.where(np.isfinite(shake), np.minimum(shake, 1.0), 0.0)
+        size = np.abs(coefficients)
         height = np.abs(h)
+        p.integral = coefficients[..., 0]
+        p.error = truncation(size)
+        p.coefficients = coefficients
+        # the rounding of a node, as a part of the piece
+        shake = NODE_ROUNDING * EPS * np.abs(x).max(axis=-1) / np.abs(weight).max(axis=-1)
+        shake = np.where(shake <= 1.0, shake, np.where(np.isfinite(shake), 1.0, 0.0))
         p.size = height @ rule.weights
-        stride = height.shape[0] // self.width
-        p.most = height[::stride].max(axis=-1)
-        values = coefficients[::stride]
-        p.ends = np.concatenate(np.moveaxis(values @ rule.ends, -1, 0))
-        p.tail = np.abs(values[..., -2:]).sum(axis=-1)
-        p.floor = 4 * EPS * p.size + spread * shake
+        if self.watched:
+            stride = height.shape[0] // self.width
+            p.most = height[::stride].max(axis=-1)
+            p.ends = np.concatenate(np.moveaxis(coefficients[::stride] @ rule.ends, -1, 0))
+            p.tail = size[::stride, :, -2:].sum(axis=-1)
+        else:
+            p.most = p.ends = p.tail = np.empty((0, p.u0.size))
+        p.floor = 4 * EPS * p.size + (size @ rule.slopes) * shake
         if self.k:
             # speeds are rounded too, and so are the places of the cuts, which matters where they are close together
             place = 2 * EPS * np.maximum(np.abs(seg.a), np.abs(seg.b)) / (seg.b - seg.a)
@@ -338,91 +372,16 @@ class Work:
                 bad |= known & plain & (off > MISLED * p.tail[c] + 1e-8 * p.most[c])
         return bad
 
-    def doubtful(self, p: Pieces, ends: tuple[Array, Array] | None) -> Any:
+    def doubtful(self, p: Pieces, found: Totals) -> Any:
         """All pieces of the integrals whose two derivatives do not agree: something between the nodes was missed."""
-        if not self.moving:
+        if found.fixed is None or found.apart is None:
             return None
-        moving, fixed, apart = self.two_forms(p, ends)
-        size = self.added(p.size, p)[:, 1 : 1 + self.k]
-        doubt = (apart > 4 * (moving[1] + fixed[1])) & (apart > 1e-9 * (np.abs(moving[0]) + 1e-3 * size))
+        doubt = found.apart > 4 * (found.moving[1] + found.fixed[1])
+        if not doubt.any():
+            return None
+        doubt &= found.apart > 1e-9 * (np.abs(found.moving[0]) + 1e-3 * found.size[:, 1 : 1 + self.k])
         if not doubt.any():
             return None
         owners = np.asarray(doubt.any(axis=(0, 1)))
         bad = owners[self.seg.owner[p.segment]] & (p.u1 - p.u0 > 1e-14)
         return bad if bad.any() else None
-
-    def two_forms(
-        self, p: Pieces, ends: tuple[Array, Array] | None
-    ) -> tuple[tuple[Array, Array], tuple[Array, Array], Array]:
-        """(value, bound) of the tangents in the moving and in the fixed form, and how far they are apart."""
-        if self.forms is not None and self.forms[0] is p:
-            return self.forms[1]  # type: ignore[no-any-return]
-        k = self.k
-        integral, error = self.added(p.integral, p), self.added(p.error + p.floor, p)
-        boundary, rounding = (0.0, 0.0) if ends is None else self.boundary(ends)
-        moving = integral[:, 1 : 1 + k], error[:, 1 : 1 + k]
-        fixed = integral[:, 1 + k :] + boundary, error[:, 1 + k :] + rounding
-        apart = np.abs(moving[0] - fixed[0])
-        found = moving, fixed, np.where(np.isfinite(apart), apart, 0.0)
-        self.forms = (p, found)
-        return found
-
-    def added(self, x: Array, p: Pieces) -> Array:
-        """Channels of pieces (C, P) added up per integral: (m, channels, B)."""
-        owner = self.seg.owner[p.segment]
-        rows = np.empty((x.shape[0], self.batch))
-        for i, row in enumerate(x):
-            rows[i] = np.bincount(owner, row, minlength=self.batch)
-        return rows.reshape(self.width, -1, self.batch)
-
-    def total(self, p: Pieces, ends: tuple[Array, Array] | None) -> Sums:
-        """Add up the pieces; choose per direction between the moving and the fixed form."""
-        k = self.k
-        integral, error = self.added(p.integral, p), self.added(p.error + p.floor, p)
-        v, e = integral[:, 0], error[:, 0]
-        if ends is not None:
-            e = e + self.cut_rounding(ends)
-        if not k:
-            none = np.zeros((self.width, 0, self.batch))
-            return Sums(v, e, none, none)
-        t, et = integral[:, 1 : 1 + k], error[:, 1 : 1 + k]
-        if self.moving:
-            moving, fixed, apart = self.two_forms(p, ends)
-            better = fixed[1] < moving[1]
-            # two independent values that differ by more than they admit: neither estimate is believed
-            doubt = np.where(apart > 4 * (moving[1] + fixed[1]), apart, 0.0)
-            t = np.where(better, fixed[0], moving[0])
-            et = np.where(better, fixed[1], moving[1]) + doubt
-        return Sums(v, e, t, et)
-
-    def boundary(self, ends: tuple[Array, Array]) -> tuple[Array, Array]:
-        """The fixed form's boundary terms (m, k, B), and their rounding."""
-        seg = self.seg
-        out = np.zeros((self.width, self.k, self.batch))
-        size = np.zeros_like(out)
-        for f, speed, sign, end in ((ends[1], seg.tb, 1.0, seg.b), (ends[0], seg.ta, -1.0, seg.a)):
-            terms = f[:, None, :] * (sign * speed)
-            still_or_infinite = (speed == 0) | np.isinf(end)
-            if still_or_infinite.any():
-                terms = np.where(still_or_infinite, 0.0, terms)
-            for c in range(self.width):
-                for d in range(self.k):
-                    out[c, d] += np.bincount(seg.owner, terms[c, d], minlength=self.batch)
-                    size[c, d] += np.bincount(seg.owner, np.abs(terms[c, d]), minlength=self.batch)
-        finite = np.isfinite(out)
-        return np.where(finite, out, 0.0), np.where(finite, 32 * EPS * size, np.inf)
-
-    def cut_rounding(self, ends: tuple[Array, Array]) -> Array:
-        """What a cut misplaced by rounding costs: the integrand's jump times the rounding of the cut's place."""
-        seg, out = self.seg, np.zeros((self.width, self.batch))
-        if not seg.a.size:
-            return out
-        follows = np.zeros(seg.a.size, dtype=bool)
-        follows[1:] = (seg.owner[1:] == seg.owner[:-1]) & (seg.a[1:] == seg.b[:-1])
-        last = ~np.append(follows[1:], False)
-        for c in range(self.width):
-            low, high = ends[0][c], ends[1][c]
-            jump = np.where(follows, np.abs(low - np.append(0.0, high[:-1])), np.abs(low))
-            cost = 2 * EPS * (jump * np.abs(seg.a) + np.where(last, np.abs(high * seg.b), 0.0))
-            out[c] = np.bincount(seg.owner, np.where(np.isfinite(cost), cost, 0.0), minlength=self.batch)
-        return out

@@ -6,6 +6,7 @@ once; every evaluation has books of its own.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -118,7 +119,7 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
     tangents, tangent_bounds = tangents_of(value)
     reasons = list(books.unfinished)
     flat = [*_flat(numbers, bounds), *_flat(tangents, tangent_bounds)]
-    scale = max((float(np.max(np.abs(v), initial=0.0, where=np.isfinite(v))) for v, _ in flat), default=0.0)
+    scale = max((_largest(v) for v, _ in flat), default=0.0)
     missed = [_missed(v, e, scale, settings) for v, e in flat]
     if not reasons and any(missed):
         reasons.append(next(m for m in missed if m))
@@ -182,12 +183,21 @@ def _flat(numbers: Any, bounds: Any) -> list[tuple[Any, Any]]:
     return [(numbers, bounds)]
 
 
+def _largest(value: Any) -> float:
+    """The largest finite magnitude."""
+    if isinstance(value, float):
+        return abs(value) if math.isfinite(value) else 0.0
+    return float(np.max(np.abs(value), initial=0.0, where=np.isfinite(value)))
+
+
 def _missed(value: Any, error: Any, scale: float, settings: Settings) -> str | None:
     """Why an answer is not as accurate as was asked, or None.
 
     `scale` is the size of the whole answer: a small tangent beside a large value, or a pixel of a picture that is all
     but zero by cancellation, is measured against its neighbours.
     """
+    if isinstance(value, float) and isinstance(error, float) and error <= settings.rtol * abs(value) < np.inf:
+        return None
     v, e = np.abs(np.asarray(value, dtype=float)), np.asarray(error, dtype=float)
     if np.isnan(v).any():
         return "the value is not a number"

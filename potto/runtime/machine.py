@@ -31,8 +31,8 @@ from potto.core.terms import (
 from potto.core.terms import Delta as DeltaTerm
 from potto.diagnostics import PottoError
 from potto.kernels import errors
-from potto.kernels.cells import Array, Cell, Number, Trace, Value, pad, pattern
-from potto.kernels.compile import kernel
+from potto.kernels.cells import Array, Cell, Number, Pattern, Trace, Value, pad, pattern
+from potto.kernels.compile import Kernel, counts, kernel
 from potto.runtime.functions import Closure, Derivative, Paired
 from potto.settings import Settings
 
@@ -67,6 +67,7 @@ class Linker:
         self.constants: dict[tuple[str, str], Value] = {}
         self.duals: dict[Lam, Lam] = {}
         self.reaches: dict[tuple[Term, ...], tuple[tuple[str, str, bytes], ...]] = {}
+        self.kernels: dict[tuple[Lam, tuple[Pattern, ...], int, bool], Kernel] = {}  # the ones met, without a lookup
 
     def term(self, module: str, name: str) -> Term:
         key = (module, name)
@@ -143,11 +144,13 @@ class Machine:
     def with_directions(self, directions: int) -> Machine:
         if directions == self.directions:
             return self
-        return replace(self, directions=directions)
+        return Machine(self.linker, self.settings, self.books, directions, self.rounding, self.root, self.frozen)
 
     def inside(self) -> Machine:
         """The machine for an integrand: rounding is estimated by the integrator, not kept track of."""
-        return replace(self, rounding=False, root=False) if self.rounding or self.root else self
+        if not (self.rounding or self.root):
+            return self
+        return Machine(self.linker, self.settings, self.books, self.directions, False, False, self.frozen)
 
     # Books
 
@@ -175,8 +178,13 @@ class Machine:
 
     def run(self, function: Lam, args: list[Value], trace: Trace | None) -> Value:
         k = self.directions
-        patterns = tuple(pattern(a, k) for a in args)
-        return kernel(function, patterns, k, self.rounding, self).run(self, trace, *args)
+        key = (function, tuple([pattern(a, k) for a in args]), k, self.rounding)
+        found = self.linker.kernels.get(key)
+        if found is None:
+            found = self.linker.kernels[key] = kernel(function, key[1], k, self.rounding, self)
+        else:
+            counts.reused += 1
+        return found.run(self, trace, *args)
 
     def term(self, term: Term, env: dict[str, Value]) -> Value:
         return self.evaluate(lam(tuple(sorted(term.free)), term), env, None)

@@ -1,0 +1,111 @@
+"""What the pieces of a batch of integrals amount to: values, and the two forms of each derivative with their errors.
+
+Owns `Totals`. The fixed form adds what the moving ends of segments sweep to the interior derivative; the moving form
+(Reynolds' transport theorem) has that in its nodes. Both come from the same values, so that each checks the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from potto.integrate.pieces import Pieces, Sums
+from potto.integrate.rules import EPS
+from potto.kernels.cells import Array
+
+if TYPE_CHECKING:
+    from potto.integrate.work import Work
+
+Ends = tuple[Array, Array]
+
+
+@dataclass
+class Totals:
+    """Pieces added up per integral, (m, channels, B) each: integrals, errors with their rounding, magnitudes.
+
+    moving, fixed: (value, bound) of the tangents in the two forms, (m, k, B) each; apart: how far they differ, 0 where
+    that is not known. Without moving ends there is the moving form alone.
+    """
+
+    integral: Array
+    error: Array
+    size: Array
+    moving: tuple[Array, Array]
+    fixed: tuple[Array, Array] | None
+    apart: Array | None
+
+
+def totals(work: Work, p: Pieces, ends: Ends | None) -> Totals:
+    k = work.k
+    integral, error, size = added(work, np.concatenate((p.integral, p.error + p.floor, p.size)), p, 3)
+    moving = integral[:, 1 : 1 + k], error[:, 1 : 1 + k]
+    if not work.moving:
+        return Totals(integral, error, size, moving, None, None)
+    value, bound = integral[:, 1 + k :], error[:, 1 + k :]
+    if ends is not None:
+        swept, rounding = boundary(work, ends)
+        value, bound = value + swept, bound + rounding
+    apart = np.abs(moving[0] - value)
+    return Totals(integral, error, size, moving, (value, bound), np.where(np.isfinite(apart), apart, 0.0))
+
+
+def added(work: Work, x: Array, p: Pieces, count: int) -> Array:
+    """Channels of pieces (count * C, P) added up per integral: (count, m, channels, B)."""
+    owner, batch = work.seg.owner[p.segment], work.batch
+    if batch == 1:
+        rows = x.sum(axis=1)
+    else:
+        place = owner + batch * np.arange(x.shape[0])[:, None]
+        rows = np.bincount(place.reshape(-1), x.reshape(-1), minlength=batch * x.shape[0])
+    shaped: Array = rows.reshape(count, work.width, -1, batch)
+    return shaped
+
+
+def boundary(work: Work, ends: Ends) -> tuple[Array, Array]:
+    """The fixed form's boundary terms (m, k, B), and their rounding."""
+    seg = work.seg
+    sizes = work.width, work.k, work.batch
+    speeds = np.concatenate((seg.tb, -seg.ta), axis=1)
+    terms = np.concatenate((ends[1], ends[0]), axis=1)[:, None, :] * speeds
+    nothing = (speeds == 0) | np.isinf(np.concatenate((seg.b, seg.a)))
+    if nothing.any():
+        terms = np.where(nothing, 0.0, terms)
+    rows = np.concatenate((terms, np.abs(terms))).reshape(2 * work.width * work.k, -1)
+    place = np.concatenate((seg.owner, seg.owner)) + work.batch * np.arange(rows.shape[0])[:, None]
+    sums = np.bincount(place.reshape(-1), rows.reshape(-1), minlength=work.batch * rows.shape[0])
+    out, size = sums.reshape(2, *sizes)
+    finite = np.isfinite(out)
+    return np.where(finite, out, 0.0), np.where(finite, 32 * EPS * size, np.inf)
+
+
+def cut_rounding(work: Work, ends: Ends) -> Array:
+    """What a cut misplaced by rounding costs: the integrand's jump times the rounding of the cut's place; (m, B)."""
+    seg, batch = work.seg, work.batch
+    if not seg.a.size:
+        return np.zeros((work.width, batch))
+    low, high = ends
+    follows = np.zeros(seg.a.size, dtype=bool)
+    follows[1:] = (seg.owner[1:] == seg.owner[:-1]) & (seg.a[1:] == seg.b[:-1])
+    last = ~np.append(follows[1:], False)
+    before = np.zeros_like(high)
+    before[:, 1:] = high[:, :-1]
+    jump = np.abs(low - np.where(follows, before, 0.0))
+    cost = 2 * EPS * (jump * np.abs(seg.a) + np.where(last, np.abs(high * seg.b), 0.0))
+    cost = np.where(np.isfinite(cost), cost, 0.0)
+    return np.stack([np.bincount(seg.owner, row, minlength=batch) for row in cost])
+
+
+def sums(work: Work, found: Totals, ends: Ends | None) -> Sums:
+    """The answer: per direction the better of the two forms."""
+    v, e = found.integral[:, 0], found.error[:, 0]
+    if ends is not None:
+        e = e + cut_rounding(work, ends)
+    if found.fixed is None or found.apart is None:
+        return Sums(v, e, *found.moving)
+    moving, fixed = found.moving, found.fixed
+    better = fixed[1] < moving[1]
+    # two independent values that differ by more than they admit: neither estimate is believed
+    doubt = np.where(found.apart > 4 * (moving[1] + fixed[1]), found.apart, 0.0)
+    return Sums(v, e, np.where(better, fixed[0], moving[0]), np.where(better, fixed[1], moving[1]) + doubt)
