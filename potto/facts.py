@@ -6,10 +6,11 @@ those of the calculus; here they are put together and printed. No numbers are co
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from potto.calculus.boundary import NoClosedForm, at_bounds, jumps, scaled
+from potto.calculus.boundary import NoClosedForm, at_bounds, jumps
 from potto.calculus.conditions import conditions_of, expanded
 from potto.calculus.diffeo import exported
 from potto.calculus.dual import dual
@@ -26,10 +27,8 @@ from potto.core.terms import (
     Lam,
     Term,
     Var,
-    delta,
     deriv,
     integral,
-    mul,
     postorder,
     var,
 )
@@ -39,6 +38,8 @@ from potto.modules import is_recursive
 from potto.query import Database
 from potto.syntax import nodes
 from potto.types import derivative_type, format_type, interface
+
+_COPY = re.compile(r"'\d+")  # the mark of a copy of a bound variable: `x'1` is another x
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +109,8 @@ def _surfaces(db: Database, term: Term) -> dict[str, None]:
            for node in postorder(term) if isinstance(node, Branch | Delta)]  # fmt: skip
     known = [condition.surface for condition in found]
     readable = [surface for surface in own if not any(isinstance(node, App) for node in postorder(surface))]
-    return dict.fromkeys(f"{format_term(simplify(surface))} = 0" for surface in (*known, *readable))
+    texts = (format_term(simplify(surface)) for surface in (*known, *readable))
+    return dict.fromkeys(f"{_COPY.sub('', text)} = 0" for text in texts)
 
 
 def derivative_facts(db: Database, file: str, name: str) -> DerivativeFacts | None:
@@ -167,7 +169,7 @@ def _integral_facts(node: Integral, tangents: Mapping[str, Term]) -> PartFacts:
         slope = rate(node.body)
         interior = "0" if slope is ZERO else over(slope)
         boundary = tuple(
-            over(scaled(jump.jump, mul(jump.rate, delta((jump.surface,)))))
+            over(jump.contribution)
             for jump in jumps(node.body, node.variables, rate)
             if jump.rate is not ZERO
         )
@@ -184,7 +186,7 @@ def _body_facts(body: Term, tangents: Mapping[str, Term]) -> PartFacts:
     try:
         interior = format_term(simplify(dual(body, tangents)[1]))
         boundary = tuple(
-            format_term(simplify(scaled(jump.jump, mul(jump.rate, delta((jump.surface,))))))
+            format_term(simplify(jump.contribution))
             for jump in jumps(body, body.free, lambda term: dual(term, tangents)[1])
             if jump.rate is not ZERO
         )

@@ -18,6 +18,7 @@ from potto.calculus.pivots import NoClosedForm as NoClosedForm
 from potto.calculus.pivots import Root, chosen, conjunction, pivots
 from potto.calculus.ranges import range_of
 from potto.calculus.sides import (
+    NOWHERE,
     Box,
     Flip,
     Flips,
@@ -45,6 +46,7 @@ from potto.core.terms import (
     branch,
     children,
     const,
+    delta,
     fresh,
     if_,
     integral,
@@ -264,11 +266,21 @@ def scaled(value: Term, factor: Term) -> Term:
 
 @dataclass(frozen=True, slots=True)
 class JumpTerm:
-    """What a surface contributes to the derivative of an integrand: jump * rate * delta(surface)."""
+    """What a surface contributes to the derivative of an integrand: jump * rate * delta(surface), for each value of the
+    indices of `sums`."""
 
     surface: Term
     jump: Term
     rate: Term
+    sums: tuple[tuple[str, Term, Term], ...] = ()
+
+    @property
+    def contribution(self) -> Term:
+        """All of it."""
+        found = scaled(self.jump, mul(delta((self.surface,)), self.rate))
+        for name, lo, hi in self.sums:
+            found = sum_(name, lo, hi, found)
+        return found
 
 
 def jumps(body: Term, variables: Iterable[str], rate: Rate) -> list[JumpTerm]:
@@ -284,7 +296,11 @@ def jumps(body: Term, variables: Iterable[str], rate: Rate) -> list[JumpTerm]:
         if speed is ZERO:
             continue
         flips = [Flip(b, const(-o * side), const(o * side)) for b, o in members]
-        positive, negative = forced(body, flips, True), forced(body, flips, False)
+        sums = summed_over(body, first)
+        sided, instances = _instances(body, flips, sums, NOWHERE)
+        positive, negative = sided(True), sided(False)
         if positive is not negative:
-            found.append(JumpTerm(first.surface, difference(positive, negative), speed))
+            surface, speed = substitute(first.surface, instances), substitute(speed, instances)
+            over = tuple((_name(instances[s.variable]), s.lo, s.hi) for s in sums)
+            found.append(JumpTerm(surface, difference(positive, negative), speed, over))
     return found

@@ -38,14 +38,12 @@ from potto.core.terms import (
     app,
     branch,
     children,
-    delta,
     deriv,
     fresh,
     if_,
     integral,
     lam,
     list_of,
-    mul,
     postorder,
     proj,
     rebuild,
@@ -135,7 +133,7 @@ class Differentiator:
         names = {n for t in postorder(body) for n in t.free}
         parts = [tangent]
         for item in jumps(body, names, lambda t: self.dual(t, tangents)[1]):
-            parts.append(scaled(item.jump, mul(item.rate, delta((item.surface,)))))
+            parts.append(item.contribution)
         return total([p for p in parts if p is not ZERO], zero_like(body))
 
     def carried_out(self, term: Term) -> Term:

@@ -8,9 +8,9 @@ stay symbols: `shader (x, y) c` and, for its tangent, `dshader (x, y) (c, dc)`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from potto.calculus.boundary import at_bounds, at_surfaces, jumps, scaled
+from potto.calculus.boundary import at_bounds, at_surfaces, jumps
 from potto.calculus.conditions import Resolve
 from potto.calculus.deltas import without_deltas
 from potto.calculus.derivative import NotSmooth
@@ -37,8 +37,8 @@ from potto.core.terms import (
     app,
     branch,
     children,
-    delta,
     integral,
+    lam,
     mul,
     postorder,
     rebuild,
@@ -48,7 +48,7 @@ from potto.core.terms import (
 from potto.diagnostics import PottoError
 from potto.elaborate import core_term
 from potto.query import Database
-from potto.types import derivative_type, format_type, interface
+from potto.types import Type, derivative_type, format_type, groups_of, interface
 
 WIDTH = 100
 
@@ -86,6 +86,8 @@ class DerivativeText:
     """The derivative of a definition in symbols. `text` is all of it; the fields are for those who lay it out anew.
 
     tangent: the whole of it, deltas integrated out. alone: the definition is its one integral and nothing else.
+    surfaces: where it jumps as a function of its parameters, if there is no integral.
+    by: the name of a definition that is this derivative, if it was asked about that.
     """
 
     name: str
@@ -94,6 +96,8 @@ class DerivativeText:
     alone: bool
     integrals: tuple[IntegralText, ...]
     notes: tuple[str, ...] = ()
+    surfaces: tuple[SurfaceText, ...] = ()
+    by: str = ""
 
     @property
     def text(self) -> str:
@@ -101,10 +105,53 @@ class DerivativeText:
 
 
 def explain_derivative(db: Database, file: str, name: str) -> DerivativeText:
-    """The derivative of a definition, in symbols."""
+    """The derivative of a definition, in symbols. What is a derivative itself is explained by what it is one of."""
+
+    def resolve(target: Global) -> Term:
+        return core_term(db, target.module, target.name)
+
     found = interface(db, file, name)
-    type_text = format_type(derivative_type(found.type))
-    return describe(core_term(db, file, name), name, type_text, lambda g: core_term(db, g.module, g.name))
+    term = core_term(db, file, name)
+    original = _original(term, name, resolve)
+    if original is not None:
+        of, shown = original
+        type = derivative_type(interface(db, of.module, of.name).type) if isinstance(of, Global) else found.type
+        text = describe(resolve(of) if isinstance(of, Global) else of, shown, format_type(type), resolve)
+        return replace(text, by=name)
+    given = _applied(term, found.type)
+    return describe(given, name, format_type(derivative_type(found.type)), resolve)
+
+
+def _original(term: Term, name: str, resolve: Resolve) -> tuple[Term, str] | None:
+    """What a term is the derivative of, and a name for it; None if it is none."""
+    term = _behind(term, resolve)
+    if not isinstance(term, Deriv):
+        return None
+    while isinstance(term, Deriv):
+        term = _behind(term.function, resolve)
+    if isinstance(term, Global):
+        return term, term.name
+    return (term, name.removeprefix("d") or "f") if isinstance(term, Lam) else None
+
+
+def _behind(term: Term, resolve: Resolve) -> Term:
+    """What stands behind other names for it: a derivative, or the name of a definition of its own."""
+    while isinstance(term, Global) and isinstance(found := resolve(term), Deriv | Global):
+        term = found
+    return term
+
+
+def _applied(term: Term, type: Type) -> Term:
+    """With its parameters written: a function that is another one by name, or was given a part of its arguments."""
+    if isinstance(term, Lam):
+        return term
+    groups = [tuple(p.name or f"x{n}" for n, p in enumerate(group, 1)) for group in groups_of(type)]
+    body: Term = term
+    for names in groups:
+        body = app(body, tuple(map(var, names)))
+    for names in reversed(groups):
+        body = lam(names, body)
+    return body
 
 
 def describe(term: Term, name: str, type_text: str, resolve: Resolve) -> DerivativeText:
@@ -128,9 +175,12 @@ def describe(term: Term, name: str, type_text: str, resolve: Resolve) -> Derivat
         notes.extend(d.message for d in problem.diagnostics)
     known = [work.carried_out(i) for i in _outermost(body)]
     integrals = tuple(_integral(i, work, tangents, functions) for i in known if isinstance(i, Integral))
+    surfaces: tuple[SurfaceText, ...] = ()
     if not integrals and not notes:
-        tangent = _with_deltas(work.carried_out(body), work, tangents, functions, tangent)
-    return DerivativeText(name, type_text, tangent, isinstance(body, Integral), integrals, tuple(notes))
+        plain = work.carried_out(body)
+        tangent = _with_deltas(plain, work, tangents, functions, tangent)
+        surfaces = _own_surfaces(plain, tangents)
+    return DerivativeText(name, type_text, tangent, isinstance(body, Integral), integrals, tuple(notes), surfaces)
 
 
 def _outermost(term: Term) -> list[Integral]:
@@ -149,10 +199,13 @@ def _with_deltas(
     plain: Term, work: Differentiator, tangents: Mapping[str, Term], functions: Mapping[str, str], tangent: str
 ) -> str:
     """A function that jumps over its parameters: its derivative is a distribution over what they are filled with."""
-    parts = [] if tangent == "0" else [tangent]
-    for item in jumps(plain, tangents, lambda t: work.dual(t, tangents)[1]):
-        parts.append(_text(scaled(item.jump, mul(delta((item.surface,)), item.rate)), functions))
-    return " + ".join(parts) or "0"
+    found = jumps(plain, tangents, lambda t: work.dual(t, tangents)[1])
+    if not found:
+        return tangent
+    smooth = _text(work.dual(plain, tangents)[1], functions)  # calls carried out here too: else they count twice
+    parts = [] if smooth == "0" else [smooth]
+    parts += [_text(item.contribution, functions) for item in found]
+    return " + ".join(parts)
 
 
 def _integral(
@@ -169,7 +222,7 @@ def _integral(
     try:
         interior = _text(rate(node.body), functions)
         for item in jumps(node.body, node.variables, rate):
-            deltas.append(_text(scaled(item.jump, mul(delta((item.surface,)), item.rate)), functions))
+            deltas.append(_text(item.contribution, functions))
         plain = without_deltas(node)
         if isinstance(plain, Integral):
             bounds = [_text(t, functions) for t in at_bounds(plain, rate)]
@@ -206,12 +259,26 @@ def _surfaces(node: Integral, tangents: Mapping[str, Term]) -> tuple[SurfaceText
                     roots.append(f"{root.variable} = {format_term(simplify(root.at))}{each}")
             except NoClosedForm:
                 pass
-            equation = format_term(branch((factor,), False, ONE, ZERO))[1:-1].replace(">=", "=").replace("<=", "=")
-            found[canonical] = SurfaceText(equation, tuple(sorted(factor.free & tangents.keys())), tuple(roots))
+            found[canonical] = SurfaceText(equation(factor), tuple(sorted(factor.free & tangents.keys())), tuple(roots))
+    return tuple(found.values())
+
+
+def _own_surfaces(body: Term, tangents: Mapping[str, Term]) -> tuple[SurfaceText, ...]:
+    """Where a body without an integral jumps."""
+    found: dict[Term, SurfaceText] = {}
+    for item in branches_of(body, tangents):
+        canonical = normalized_surface(item.surface)[0]
+        moved = tuple(name for name in tangents if name in item.surface.free)
+        found.setdefault(canonical, SurfaceText(equation(item.surface), moved, ()))
     return tuple(found.values())
 
 
 # Text
+
+
+def equation(surface: Term) -> str:
+    """Where a surface is, as people write it: `x = t` for t - x."""
+    return format_term(branch((surface,), False, ONE, ZERO))[1:-1].replace(">=", "=").replace("<=", "=")
 
 
 def _text(term: Term, functions: Mapping[str, str]) -> str:
@@ -261,7 +328,7 @@ def _shown(arg: Term, primal: bool, originals: Mapping[str, str]) -> Term:
 
 
 def _lines(found: DerivativeText) -> list[str]:
-    lines = [f"d{found.name} : {found.type}", ""]
+    lines = [f"{found.by or 'd' + found.name} : {found.type}", ""]
     if not found.alone and found.tangent:
         lines += [*_wrapped(f"D {found.name} = ", found.tangent), ""]
     for number, item in enumerate(found.integrals, 1):
@@ -269,6 +336,7 @@ def _lines(found: DerivativeText) -> list[str]:
         lines += [*_of_integral(title, item), ""]
     if found.alone and found.tangent:
         lines += ["integrated:", *_wrapped(f"  D {found.name} = ", found.tangent), ""]
+    lines += [f"note: `{found.by}` is the derivative of `{found.name}`"] if found.by else []
     lines += [f"note: {note}" for note in found.notes]
     while lines and not lines[-1]:
         lines.pop()

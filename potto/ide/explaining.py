@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from potto.calculus.conditions import conditions_of
 from potto.calculus.diffeo import DiffeoInfo, diffeo_info, exported
-from potto.calculus.explain import DerivativeText, IntegralText, explain_derivative
+from potto.calculus.explain import DerivativeText, IntegralText, equation, explain_derivative
 from potto.calculus.invert import Inverse, invert
 from potto.calculus.verdict import Problem, Verdict, judge
 from potto.check import has_errors
@@ -56,12 +56,13 @@ class ConditionInfo:
     """What is known of a condition over variables of integration. `span` is relative to the definition's chunk.
 
     `problem` says why it can't be integrated over; then the rest is empty. `missing` are the coordinates that were left
-    out. `whole`: as many coordinates as variables, so that it is a diffeomorphism.
+    out. `equation` says where it changes.
     """
 
     span: Span
     variables: tuple[str, ...]
     coordinates: tuple[str, ...]
+    equation: str
     missing: tuple[str, ...] = ()
     pivot: str = ""
     roots: tuple[str, ...] = ()
@@ -112,10 +113,12 @@ def _info(
     moved: tuple[str, ...],
     calls: tuple[str, ...],
 ) -> ConditionInfo:
-    shown = _terms(coordinates)
+    shown, where = _terms(coordinates), _plain(equation(simplify(coordinates[0])))
     if isinstance(verdict, Problem):
         said = (*verdict.notes, *([verdict.help] if verdict.help else []))
-        return ConditionInfo(span, variables, shown, problem=verdict.message, notes=said, moved_by=moved, calls=calls)
+        return ConditionInfo(
+            span, variables, shown, where, problem=verdict.message, notes=said, moved_by=moved, calls=calls
+        )
     completed = (*coordinates, *verdict.completion)
     inverse = verdict.inverse
     if inverse is None and len(completed) == len(variables):
@@ -126,6 +129,7 @@ def _info(
         span,
         variables,
         shown,
+        where,
         _terms(verdict.completion),
         verdict.pivot,
         roots,
@@ -172,16 +176,26 @@ def derivative_markdown(db: Database, file: str, name: str) -> str | None:
     return None if found is None else fence(found.text)
 
 
-def derivative_parts(found: DerivativeText) -> list[str]:
-    """The interior and boundary terms, and the surfaces with what moves each."""
-    lines: list[str] = []
+def derivative_parts(found: DerivativeText, conditions: Iterable[ConditionInfo] = ()) -> list[str]:
+    """The interior and boundary terms, and the surfaces with what moves each: those of its own integrals, or of
+    `conditions`, which it leaves to others."""
+    lines = [f"the derivative of {code(found.name)}"] if found.by else []
     for number, item in enumerate(found.integrals, 1):
         title = f"of integral {number}" if len(found.integrals) > 1 else ""
         lines.append(_integral(item, title))
     if not found.integrals and found.tangent:
         lines.append(f"**derivative** {code(f'd{found.name} = {found.tangent}')}")
+        moved = {surface.equation: surface.moved_by for surface in found.surfaces}
+        moved.update({info.equation: info.moved_by for info in conditions if not info.problem})
+        if moved:
+            listed = [f"- {code(where)} {_moved(by)}" for where, by in moved.items()]
+            lines.append("\n".join(["**surfaces**", "", *listed]))
     lines += [f"*{note}*" for note in found.notes]
     return lines
+
+
+def _moved(by: tuple[str, ...]) -> str:
+    return f"moved by {', '.join(map(code, by))}" if by else "moved by no parameter"
 
 
 def _integral(item: IntegralText, title: str) -> str:
@@ -196,10 +210,8 @@ def _integral(item: IntegralText, title: str) -> str:
     if item.surfaces:
         lines += ["", "**surfaces**", ""]
     for surface in item.surfaces:
-        moved = ", ".join(code(name) for name in surface.moved_by)
-        what = f"moved by {moved}" if moved else "moved by no parameter"
         where = "; at " + ", ".join(code(root) for root in surface.roots) if surface.roots else ""
-        lines.append(f"- {code(surface.equation)} {what}{where}")
+        lines.append(f"- {code(surface.equation)} {_moved(surface.moved_by)}{where}")
     return "\n".join(lines)
 
 
@@ -213,11 +225,7 @@ def condition_markdown(info: ConditionInfo) -> str:
     lines = [fence(f"diffeo({all_of_it})"), f"a diffeomorphism of {code(over)}"]
     if info.missing:
         lines[-1] += f", completed by {code(', '.join(info.missing))}"
-    facts: list[str] = []
-    if info.moved_by:
-        facts.append(f"- moved by {', '.join(code(name) for name in info.moved_by)}")
-    else:
-        facts.append("- moved by no parameter: it adds nothing to a derivative")
+    facts = [f"- {_moved(info.moved_by)}" + ("" if info.moved_by else ": it adds nothing to a derivative")]
     for root in info.roots:
         facts.append(f"- surface: {code(f'{info.pivot} = {root}')}")
     for branch in info.inverse:

@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
 from potto.ide.explaining import code, condition_infos, fence
 from potto.ide.places import ChunkAt
-from potto.ide.symbols import LocalSymbol, owner
+from potto.ide.symbols import LocalSymbol, owner, parameters
 from potto.query import Database
 from potto.source import Span
-from potto.syntax import nodes, walk
+from potto.syntax import live_expressions, nodes, parse_expression, walk
+from potto.syntax.live import Live
 from potto.types import (
     ListOf,
     Real,
     Type,
     Unknown,
     derivative_type,
+    expression_names,
     format_type,
+    groups_of,
     infer_expression,
     interface,
     typed_names,
 )
+from potto.types.analysis import Typed
 
 LONG_VALUE = 120
 TITLES = {
@@ -49,7 +56,7 @@ def local_markdown(db: Database, symbol: LocalSymbol, file: str) -> str:
     match binder.kind:
         case "variable":
             parts += _variable(db, chunk, binder.span, binder.name, name)
-        case "parameter" if name is not None:
+        case "parameter" if name is not None and live_at(chunk, binder.span.start) is None:
             parts += _parameter(db, chunk, name, binder.name)
         case "local" | "loop" | "index":
             parts += _value(db, chunk, binder.span, type)
@@ -57,51 +64,91 @@ def local_markdown(db: Database, symbol: LocalSymbol, file: str) -> str:
 
 
 def local_type(db: Database, symbol: LocalSymbol) -> Type:
-    """The type of a local name where it is bound."""
-    name = owner(db, symbol.chunk)
-    if name is not None:
-        for typed in typed_names(db, symbol.chunk.file, name):
-            if typed.span.start == symbol.binder.span.start:
-                return typed.type
-    return _statement_type(db, symbol)
+    """The type of a local name where it is bound; of a parameter, what it accepts."""
+    chunk, binder = symbol.chunk, symbol.binder
+    name = owner(db, chunk)
+    inside = live_at(chunk, binder.span.start)
+    if name is None or inside is not None:
+        return _typed_at(_names_of(db, chunk, inside), binder.span.start)
+    if binder.kind == "parameter" and any(p.span.start == binder.span.start for p in _written(db, chunk.file, name)):
+        public = {p.name: p.type for group in groups_of(interface(db, chunk.file, name).type) for p in group}
+        if binder.name in public:
+            return public[binder.name]
+    return _typed_at(typed_names(db, chunk.file, name), binder.span.start)
 
 
-def _statement_type(db: Database, symbol: LocalSymbol) -> Type:
-    """In a statement: the type of an item of the list, or of what a name was bound to."""
-    item = symbol.chunk.parsed(db).item
-    if item is None:
-        return Unknown()
-    for node in walk(item):
-        if isinstance(node, nodes.For) and node.variable.span == symbol.binder.span:
-            found = infer_expression(db, symbol.chunk.file, node.iterable).type
-            return found.item if isinstance(found, ListOf) else Unknown()
-        if isinstance(node, nodes.Integral | nodes.Sum) and symbol.binder.kind in ("variable", "index"):
-            return Real(variables=(symbol.binder.name,) if symbol.binder.kind == "variable" else ())
-    return Unknown()
+def _written(db: Database, file: str, name: str) -> tuple[nodes.Parameter, ...]:
+    return tuple(parameter for group in parameters(db, file, name) for parameter in group)
 
 
-def bound_by(db: Database, chunk: ChunkAt, span: Span) -> nodes.Node | None:
-    """The node that binds the name at a place: an integral, a sum, a binding, a loop, a lambda."""
+def _typed_at(names: Iterable[Typed], start: int) -> Type:
+    return next((typed.type for typed in names if typed.span.start == start), Unknown())
+
+
+def live_at(chunk: ChunkAt, place: int) -> Live | None:
+    """The live expression of a chunk that a place in it is in."""
+    if "#>" not in chunk.text:
+        return None
+    found = (live for live in live_expressions(chunk.text) if live.text_span.start <= place <= live.text_span.end)
+    return next(found, None)
+
+
+def _names_of(db: Database, chunk: ChunkAt, live: Live | None) -> Iterator[Typed]:
+    """The names that a live expression or the statement of a chunk binds."""
+    if live is not None:
+        for typed in expression_names(db, chunk.file, parse_expression(live.text).expr):
+            yield replace(typed, span=typed.span.shift(live.text_span.start))
+        return
     item = chunk.parsed(db).item
-    for node in () if item is None else walk(item):
+    if isinstance(item, nodes.For | nodes.Print | nodes.ExpressionStatement):
+        yield from _statement_names(db, chunk.file, item, ())
+
+
+def _statement_names(
+    db: Database, file: str, item: nodes.Statement, loops: tuple[tuple[str, Type], ...]
+) -> Iterator[Typed]:
+    match item:
+        case nodes.For(variable=variable, iterable=iterable, body=body):
+            yield from expression_names(db, file, iterable, loops)
+            found = infer_expression(db, file, iterable, loops).type
+            type = found.item if isinstance(found, ListOf) else Unknown()
+            yield Typed(variable.span, variable.name, type)
+            for inner in body:
+                yield from _statement_names(db, file, inner, (*loops, (variable.name, type)))
+        case nodes.Print(arguments=arguments):
+            for argument in arguments:
+                yield from expression_names(db, file, argument, loops)
+        case nodes.ExpressionStatement(value=value):
+            yield from expression_names(db, file, value, loops)
+        case _:
+            pass
+
+
+def bound_by(db: Database, chunk: ChunkAt, span: Span) -> tuple[nodes.Node, str] | None:
+    """The node that binds the name at a place (an integral, a sum, a binding, a loop), and the text that it is of."""
+    live = live_at(chunk, span.start)
+    root: nodes.Node | None = chunk.parsed(db).item if live is None else parse_expression(live.text).expr
+    text = chunk.text if live is None else live.text
+    span = span if live is None else span.shift(-live.text_span.start)
+    for node in () if root is None else walk(root):
         match node:
             case nodes.Integral(variables=variables) if any(v.span == span for v in variables):
-                return node
+                return node, text
             case nodes.Sum(variable=variable) | nodes.For(variable=variable) if variable.span == span:
-                return node
+                return node, text
             case nodes.Binding(targets=targets) if any(t.span == span for t in targets):
-                return node
+                return node, text
     return None
 
 
 def _variable(db: Database, chunk: ChunkAt, span: Span, variable: str, name: str | None) -> list[str]:
-    node = bound_by(db, chunk, span)
+    node, text = bound_by(db, chunk, span) or (None, "")
     parts: list[str] = []
     if isinstance(node, nodes.Integral):
-        place = [v.span for v in node.variables].index(span)
+        place = [v.name for v in node.variables].index(variable)
         if place < len(node.bounds):
-            parts.append(_domain(chunk, node.bounds[place], variable))
-    if name is None:
+            parts.append(_domain(text, node.bounds[place], variable))
+    if name is None or live_at(chunk, span.start) is not None:
         return parts
     typed = typed_names(db, chunk.file, name)
     varying = dict.fromkeys(
@@ -109,22 +156,22 @@ def _variable(db: Database, chunk: ChunkAt, span: Span, variable: str, name: str
     )
     if varying:
         parts.append("varies with it: " + ", ".join(code(v) for v in varying))
-    surfaces = [info for info in condition_infos(db, chunk.file, name) if variable in info.variables]
-    for info in surfaces:
-        moved = f", moved by {', '.join(code(m) for m in info.moved_by)}" if info.moved_by else ""
-        parts.append(f"- surface {code(info.coordinates[0] + ' = 0')}{moved}")
+    surfaces = {i.equation: i.moved_by for i in condition_infos(db, chunk.file, name) if variable in i.variables}
+    for where, by in surfaces.items():
+        moved = f", moved by {', '.join(code(m) for m in by)}" if by else ""
+        parts.append(f"- surface {code(where)}{moved}")
     return parts
 
 
-def written(chunk: ChunkAt, expr: nodes.Expr) -> str:
+def written(text: str, expr: nodes.Expr) -> str:
     """An expression as it is written, on one line."""
-    return " ".join(chunk.text[expr.span.start : expr.span.end].split())
+    return " ".join(text[expr.span.start : expr.span.end].split())
 
 
-def _domain(chunk: ChunkAt, bounds: nodes.Interval | nodes.MeasureBound, variable: str) -> str:
+def _domain(text: str, bounds: nodes.Interval | nodes.MeasureBound, variable: str) -> str:
     if isinstance(bounds, nodes.Interval):
-        return f"from {code(written(chunk, bounds.lo))} to {code(written(chunk, bounds.hi))}"
-    arguments = ", ".join(written(chunk, a) for a in bounds.arguments)
+        return f"from {code(written(text, bounds.lo))} to {code(written(text, bounds.hi))}"
+    arguments = ", ".join(written(text, a) for a in bounds.arguments)
     return f"distributed as {code(f'{variable} ~ {bounds.measure}({arguments})')}"
 
 
@@ -135,20 +182,20 @@ def _parameter(db: Database, chunk: ChunkAt, name: str, parameter: str) -> list[
         parts.append("must not vary: it decides a plain condition, or jumps")
     if parameter in found.varies:
         parts.append(f"the result of {code(name)} varies with it")
-    moved = [i for i in condition_infos(db, chunk.file, name) if parameter in i.moved_by]
-    parts += [f"- moves the surface {code(i.coordinates[0] + ' = 0')}" for i in moved]
+    moved = dict.fromkeys(i.equation for i in condition_infos(db, chunk.file, name) if parameter in i.moved_by)
+    parts += [f"- moves the surface {code(where)}" for where in moved]
     return parts
 
 
 def _value(db: Database, chunk: ChunkAt, span: Span, type: Type) -> list[str]:
-    node = bound_by(db, chunk, span)
+    node, source = bound_by(db, chunk, span) or (None, "")
     parts: list[str] = []
     match node:
-        case nodes.Binding(value=value) if len(text := written(chunk, value)) <= LONG_VALUE:
+        case nodes.Binding(value=value) if len(text := written(source, value)) <= LONG_VALUE:
             parts.append(f"is {code(text)}")
         case nodes.Sum(lo=lo, hi=hi):
-            parts.append(f"from {code(written(chunk, lo))} to {code(written(chunk, hi))}")
-        case nodes.For(iterable=iterable) if len(text := written(chunk, iterable)) <= LONG_VALUE:
+            parts.append(f"from {code(written(source, lo))} to {code(written(source, hi))}")
+        case nodes.For(iterable=iterable) if len(text := written(source, iterable)) <= LONG_VALUE:
             parts.append(f"in {code(text)}")
         case _:
             pass

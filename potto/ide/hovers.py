@@ -95,7 +95,7 @@ def definition_markdown(db: Database, file: str, name: str) -> str:
         parts.append(known if known is not None else "*no diffeomorphism: the diagnostics say why*")
     elif item is not None:
         derivative = derivative_text(db, file, name)
-        parts += [] if derivative is None else derivative_parts(derivative)
+        parts += [] if derivative is None else derivative_parts(derivative, condition_infos(db, file, name))
     return "\n\n".join(parts)
 
 

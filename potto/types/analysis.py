@@ -204,7 +204,7 @@ def _conclude(
         diffeo=isinstance(item, nodes.DiffeoDefinition),
     )
     found = _sorted((*inference.diagnostics, *walk.diagnostics, *lints(inference, walk, item)))
-    return Analysis(interface, found, reasons_of(value, closing, decorating), _typed(inference, walk))
+    return Analysis(interface, found, reasons_of(value, closing, decorating), typed(inference, walk))
 
 
 def _named(sources: object, decorating: Decorating) -> tuple[str, ...]:
@@ -218,7 +218,7 @@ def _varying(value: Value) -> set[object]:
     return set(flat(chain[-1].result)) if chain else set()
 
 
-def _typed(inference: Inference, walk: Walk) -> tuple[Typed, ...]:
+def typed(inference: Inference, walk: Walk) -> tuple[Typed, ...]:
     """The names that are bound in a definition, with the types they have there."""
     return tuple(
         Typed(local.span, local.name, local_type(local.type, walk.locals.get(local))) for local in inference.locals

@@ -18,7 +18,7 @@ from potto.modules.texts import chunk_text, definition, is_diffeo, parsed
 from potto.query import Database, query
 from potto.syntax import nodes
 from potto.types.algebra import symbolic
-from potto.types.analysis import Analysis, Typed, analyse, local_type
+from potto.types.analysis import Analysis, Typed, analyse, local_type, typed
 from potto.types.context import Inference, ensure_stack
 from potto.types.flow import Walk
 from potto.types.flow_binders import walk_statement
@@ -138,6 +138,19 @@ def infer_expression(
     db: Database, file: str, expr: nodes.Expr, locals: tuple[tuple[str, Type], ...] = ()
 ) -> Inferred:
     """The type of an expression in a file's scope. `locals`: further names that have a type, innermost last."""
+    return _inferred(db, file, expr, locals)[0]
+
+
+def expression_names(
+    db: Database, file: str, expr: nodes.Expr, locals: tuple[tuple[str, Type], ...] = ()
+) -> tuple[Typed, ...]:
+    """The names that an expression binds, with their types there."""
+    return _inferred(db, file, expr, locals)[1]
+
+
+def _inferred(
+    db: Database, file: str, expr: nodes.Expr, locals: tuple[tuple[str, Type], ...]
+) -> tuple[Inferred, tuple[Typed, ...]]:
     ensure_stack()
     inference = Inference(_outside(db, file, _used(expr)), {})
     given: dict[Local, Value] = {}
@@ -152,4 +165,5 @@ def infer_expression(
     walk.locals.update(given)
     value = walk.value(expr)
     found = (*inference.diagnostics, *walk.diagnostics)
-    return Inferred(local_type(type, value), tuple(sorted(found, key=lambda d: (d.span, d.code))))
+    answer = Inferred(local_type(type, value), tuple(sorted(found, key=lambda d: (d.span, d.code))))
+    return answer, typed(inference, walk)

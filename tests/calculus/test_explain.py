@@ -87,3 +87,56 @@ def test_a_boundary_found_by_numbers_says_so() -> None:
 def test_a_recursion_is_not_followed() -> None:
     found = explain("def fact(n)\n    if n > 0 then n*fact(n - 1) else 1", "fact")
     assert "dfact" in found.tangent
+
+
+def test_a_derivative_is_explained_by_what_it_is_one_of() -> None:
+    text = """
+        def f(t)
+            integral [0, 1] [x < t] d(x)
+
+        df = deriv(f)
+        again = df
+        dg = deriv(\\x . 1/x)
+    """
+    for name in ("df", "again"):
+        found = explain(text, name)
+        assert (found.name, found.by) == ("f", name)
+        assert found.integrals[0].deltas == ("delta(t - x)*dt",)
+        assert f"`{name}` is the derivative of `f`" in found.text
+    assert explain(text, "dg").tangent == "-1/x^2*dx"
+
+
+def test_a_function_that_lacks_some_arguments_still_has_parameters() -> None:
+    text = """
+        def k(a)(b)
+            a*[b > a]
+
+        half = k(0.5)
+        same = half
+    """
+    assert explain(text, "half").tangent == "0.5*delta(b - 0.5)*db"
+    assert explain(text, "same").tangent == "dhalf((b, db))"
+
+
+def test_a_jump_in_a_call_counts_once() -> None:
+    text = """
+        def step(y)
+            [y > 0]
+
+        def twice(y)
+            step(2*y)
+    """
+    assert explain(text, "twice").tangent == "2*delta(2*y)*dy"
+
+
+def test_each_surface_of_a_sum_has_its_own_index() -> None:
+    """The delta stands inside of the sum over the surfaces: outside of it `k` means nothing."""
+    text = """
+        def stairs(t)
+            integral [0, 1] (sum k in 1..3 ([x > t*k])) d(x)
+    """
+    ((item,),) = [explain(text, "stairs").integrals]
+    (boundary,) = item.deltas
+    assert boundary.startswith("sum k") and boundary.endswith(")")
+    inside = boundary[boundary.index("(") :]
+    assert "delta(" in inside and inside.count("(") == inside.count(")")

@@ -178,7 +178,7 @@ def test_explain(potto: Potto) -> None:
 def test_deriv(potto: Potto) -> None:
     ran = potto("deriv", "main.po", "f", main=HALF)
     assert ran.status == 0
-    assert "f : (t: Real) -> Real" in ran.out and "dt*delta(t - x)" in ran.out and "t - x = 0" in ran.out
+    assert "f : (t: Real) -> Real" in ran.out and "delta(t - x)*dt" in ran.out and "t - x = 0" in ran.out
     ran = potto("deriv", "main.po", "g")
     assert ran.status == 1 and "P0232" in ran.err
     assert potto("deriv", "--json", "main.po", "f").json["surfaces"] == ["t - x = 0"]
@@ -186,7 +186,7 @@ def test_deriv(potto: Potto) -> None:
 
 def test_deriv_of_what_jumps_outside_of_an_integral(potto: Potto) -> None:
     ran = potto("deriv", "main.po", "step", main="def step(y) [y > 0]\n")
-    assert "(Real, Dist[dy])" in ran.out and "dy*delta(y)" in ran.out and "y = 0" in ran.out
+    assert "(Real, Dist[dy])" in ran.out and "delta(y)*dy" in ran.out and "y = 0" in ran.out
 
 
 def test_deriv_keeps_bounds_that_move_apart(potto: Potto) -> None:

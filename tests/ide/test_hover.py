@@ -184,3 +184,41 @@ def test_hover_is_one_word():
     f = fixture("def f(x) x + 1\n")
     found = ide.hover(f.db, f.file, f.find("x +"))
     assert found is not None and f.at(found.span) == "x"
+
+
+def test_a_derivative_shows_what_it_is_the_derivative_of():
+    text = "def f(t) integral [0, 1] [x < t] d(x)\nd$0f = deriv(f)\n"
+    shown = fixture(text).hover()
+    assert "the derivative of `f`" in shown and "boundary: `delta(t - x)*dt`" in shown
+    assert "= 0`" not in shown.replace("- interior", "")
+
+
+def test_a_function_without_integrals_lists_its_surfaces():
+    shown = fixture("def $0disc(x, y, r) [x^2 + y^2 < r^2]\n").hover()
+    assert "**surfaces**" in shown and "moved by `x`, `y`, `r`" in shown
+
+
+def test_surfaces_are_written_alike_everywhere():
+    f = fixture("def f(t) integral [0, 1] [x < t]*[2*x < 2*t] d(x)\n")
+    assert "`x = t` moved by `t`" in f.hover("f(t)")
+    assert f.hover("t)").count("moves the surface `x = t`") == 1
+    assert f.hover("x <").count("surface `x = t`, moved by `t`") == 1
+
+
+def test_a_parameter_shows_what_it_accepts():
+    f = fixture("def f(a, n) if n > 0 then a else 1\n")
+    assert "a : Real*" in f.hover("a, n") and "n : Real\n" in f.hover("n)")
+
+
+def test_names_in_live_expressions_and_statements_have_types():
+    f = fixture(
+        """
+        #> integral (x ~ uniform(1, 4)) x^2 d(x)
+        #> (\\y . exp(y))(1)
+        for v in [1, 2]:
+            print((\\z . z*v)(2))
+        """
+    )
+    assert "x : Real[x]" in f.hover("x^2") and "distributed as `x ~ uniform(1, 4)`" in f.hover("x^2")
+    assert "y : Real" in f.hover("y . exp")
+    assert "z : Real" in f.hover("z*v") and "v : Real" in f.hover("v)")
