@@ -152,6 +152,11 @@ def _member(world: World, file: str, expr: nodes.Expr) -> Any:
     return Call(world, file, expr, ()).run((), Batch(None))
 
 
+def expression(module: Module, text: str) -> Any:
+    """What an expression in a module's names stands for: a function, or an estimate. Raises PottoError."""
+    return _member(module._world, module._file, module._world.parse(text))
+
+
 class Function:
     """A function of Potto, to be called with numbers, tuples, numpy arrays (which broadcast) and other functions.
 

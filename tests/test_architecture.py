@@ -36,7 +36,8 @@ FORBIDDEN: dict[str, tuple[str, ...]] = {
 # Who may import a package that is not ours; nobody else may, at the top of a module or inside of a function.
 OUTSIDERS: dict[str, tuple[str, ...]] = {
     "lark": ("potto.syntax",),
-    "numpy": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.arguments", "potto_lsp.preview"),
+    "numpy": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.arguments", "potto_lsp.preview",
+              "potto_lsp.sampling"),
     "scipy": ("potto.kernels", "potto.integrate", "potto.runtime"),
     "mpmath": ("potto.core.reference",),
     "pygls": ("potto_lsp",),

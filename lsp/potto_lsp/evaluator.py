@@ -164,11 +164,22 @@ def _preview(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
         raise Unanswerable(str(error)) from None
 
 
+def _sample(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
+    """The values of a function over a grid."""
+    from potto_lsp.sampling import NoSamples, sample
+
+    try:
+        return sample(world, task["file"], task["text"], task["axes"], task["values"], task["wrt"], task["rtol"])
+    except NoSamples as error:
+        raise Unanswerable(str(error)) from None
+
+
 TASKS: Mapping[str, Callable[[World, Mapping[str, Any]], dict[str, Any]]] = {
     "evaluate": _evaluate,
     "live": _live,
     "run": _run,
     "preview": _preview,
+    "sample": _sample,
 }
 
 

@@ -49,6 +49,7 @@ from potto.ide.model import (
 from potto.ide.moving import rename_files
 from potto.ide.outlines import document_symbols, workspace_symbols
 from potto.ide.renaming import prepare_rename, rename
+from potto.ide.scenes import Scene, SceneParameter, scenes
 from potto.ide.selecting import selection_ranges
 from potto.ide.signatures import signature_help
 from potto.ide.targets import declaration, definition, implementation, type_definition
@@ -79,6 +80,8 @@ __all__ = [
     "ParameterText",
     "Refused",
     "Renaming",
+    "Scene",
+    "SceneParameter",
     "SemanticToken",
     "Signature",
     "SignatureHelp",
@@ -112,6 +115,7 @@ __all__ = [
     "resolve_code_lens",
     "resolve_completion",
     "resolve_inlay_hint",
+    "scenes",
     "selection_ranges",
     "semantic_tokens",
     "signature_help",

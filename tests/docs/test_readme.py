@@ -7,6 +7,7 @@ import shlex
 from pathlib import Path
 
 import pytest
+from potto_lsp.features import FEATURES
 
 from potto.__main__ import main
 from potto.world import World
@@ -63,7 +64,7 @@ def test_links_and_files_that_pages_name_exist(page: Path) -> None:
     for target in re.findall(r"\]\(([^)#:]+)\)", text):
         assert (page.parent / target).exists(), target
     for name in re.findall(r"`((?:potto|docs|examples|tests|lsp|repl)/[\w./-]*)`", text):
-        assert "xxx" in name or (ROOT / name).exists(), name
+        assert "xxx" in name or name in FEATURES or (ROOT / name).exists(), name
 
 
 EXAMPLES = sorted((ROOT / "examples").rglob("*.po"))

@@ -116,6 +116,8 @@ _ALL = (
         slow=True,
     ),
     Feature("workspace/diagnostic", "diagnosing.workspace", slow=True),
+    Feature("potto/scenes", "previewing.scenes"),
+    Feature("potto/sample", "previewing.sample"),
     Feature("workspace/executeCommand", "commands.execute", {"executeCommandProvider": {"commands": list(COMMANDS)}}),
 )  # fmt: skip
 FEATURES = {feature.method: feature for feature in _ALL}

@@ -30,8 +30,8 @@ def execute(ask: Ask) -> Any:
 
 def _evaluate(ask: Ask, file: str, arguments: list[Any]) -> Deferred:
     if not arguments:
-        return _task(ask, "run", file, "")
-    return _task(ask, "evaluate", file, _text(arguments))
+        return task(ask, "run", file, "")
+    return task(ask, "evaluate", file, _text(arguments))
 
 
 def _differentiate(ask: Ask, file: str, arguments: list[Any]) -> dict[str, Any]:
@@ -50,7 +50,7 @@ def _differentiate(ask: Ask, file: str, arguments: list[Any]) -> dict[str, Any]:
 def _preview(ask: Ask, file: str, arguments: list[Any]) -> Deferred:
     """A picture over a box: `[[x0, x1], [y0, y1]]`, the unit square if none is given."""
     box = arguments[1] if len(arguments) > 1 else None
-    return _task(ask, "preview", file, _text(arguments), {"box": box})
+    return task(ask, "preview", file, _text(arguments), {"box": box})
 
 
 def _text(arguments: list[Any]) -> str:
@@ -59,7 +59,8 @@ def _text(arguments: list[Any]) -> str:
     return arguments[0]
 
 
-def _task(ask: Ask, do: str, file: str, text: str, more: Mapping[str, Any] | None = None) -> Deferred:
+def task(ask: Ask, do: str, file: str, text: str, more: Mapping[str, Any] | None = None) -> Deferred:
+    """What the evaluation process answers, when it does."""
     waiting: list[Task] = []
 
     def start(finish: Callable[[Any | RequestError], None]) -> None:

@@ -1,0 +1,61 @@
+"""`potto/scenes` and `potto/sample`: what a preview may show, and the numbers that it draws.
+
+Beyond the protocol: a client that draws for itself asks for numbers, others for the picture of `potto.preview`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from potto import ide
+from potto_lsp.asking import Ask
+from potto_lsp.deferred import Deferred
+from potto_lsp.errors import InvalidParams
+from potto_lsp.features.commands import task
+
+MOST = 512 * 512  # places in one answer
+
+
+def scenes(ask: Ask) -> list[dict[str, Any]]:
+    """The functions of a file that can be drawn."""
+    return [
+        {
+            "name": scene.name, "range": ask.range(scene.span), "components": scene.components,
+            "axes": list(scene.axes), "parameters": [_parameter(parameter) for parameter in scene.parameters],
+        }
+        for scene in ide.scenes(ask.db, ask.file)
+    ]  # fmt: skip
+
+
+def _parameter(parameter: ide.SceneParameter) -> dict[str, Any]:
+    return {
+        "name": parameter.name, "kind": parameter.kind, "type": parameter.type, "size": parameter.size,
+        "value": list(parameter.value), "fits": list(parameter.fits),
+    }  # fmt: skip
+
+
+def sample(ask: Ask) -> Deferred:
+    """The values of a function over a grid, computed by the evaluation process."""
+    name = ask.string("name")
+    axes = ask.items("axes")
+    if not axes or len(axes) > 2 or not all(map(_is_axis, axes)):
+        raise InvalidParams("`axes` are one or two objects with a name, `from`, `to` and a count")
+    places = 1
+    for axis in axes:
+        places *= axis["count"]
+    if places > MOST:
+        raise InvalidParams(f"at most {MOST} places are sampled at once")
+    values, wrt, rtol = ask.optional("values"), ask.optional("wrt"), ask.optional("rtol")
+    if not isinstance(values, Mapping | None) or not isinstance(wrt, str | None):
+        raise InvalidParams("`values` is an object, and `wrt` the name of a parameter")
+    if not isinstance(rtol, int | float | None) or (rtol is not None and not 0 < rtol < 1):
+        raise InvalidParams("`rtol` is between 0 and 1")
+    return task(ask, "sample", ask.file, name, {"axes": axes, "values": values or {}, "wrt": wrt, "rtol": rtol})
+
+
+def _is_axis(axis: Any) -> bool:
+    if not isinstance(axis, Mapping) or not isinstance(axis.get("name"), str):
+        return False
+    ends, count = (axis.get("from"), axis.get("to")), axis.get("count")
+    return all(isinstance(end, int | float) for end in ends) and isinstance(count, int) and 0 < count <= MOST
