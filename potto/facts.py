@@ -11,9 +11,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from potto.calculus.boundary import NoClosedForm, at_bounds, jumps
-from potto.calculus.conditions import conditions_of, expanded
+from potto.calculus.conditions import conditions_of
 from potto.calculus.diffeo import exported
 from potto.calculus.dual import dual
+from potto.calculus.expand import expanded
 from potto.core.printer import format_term
 from potto.core.simplify import simplify
 from potto.core.terms import (

@@ -1,18 +1,22 @@
 """The conditions that vary under the integrals of a definition, also those that calls lead to.
 
-Owns `conditions_of` and `expanded`. A function exports what `skeleton` keeps of it: its branches, deltas and calls,
+Owns `conditions_of` and `skeleton`. A function exports what `skeleton` keeps of it: its branches, deltas and calls,
 over its parameters; so a caller's check reads no more of a callee than that. Conditions that a callee has over its own
 variables of integration alone are the callee's to check, unless a function that the caller passed brought them in.
+
+So a call is only entered if a variable of integration or a function goes in with its arguments, and a call of what
+leads to no condition is not exported: a definition costs by its own size and not by all that lies below its calls.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
+from potto.calculus.expand import DEEPEST, Resolve, arguments_of, expanded
 from potto.calculus.sampling import sample_value
-from potto.calculus.surfaces import fitted, uncurry
+from potto.calculus.surfaces import uncurry
 from potto.calculus.trace import spine
 from potto.core.terms import (
     ONE,
@@ -44,12 +48,7 @@ from potto.core.terms import (
     var,
 )
 
-# The term of another definition: its skeleton, or all of it.
-Resolve = Callable[[Global], "Term | None"]
-# The dual of a function.
-Derive = Callable[[Lam], Lam]
-
-DEEPEST = 60  # calls inside calls
+MOST_CALLS = 1000  # that are entered for one definition: calls with ever new arguments may double at each level
 _TWICE = 2  # how often one definition may stand on the path of calls: a recursion repeats its conditions
 
 
@@ -78,20 +77,23 @@ class Condition:
         return tuple(v for v in self.box if any(v in c.free for c in self.coordinates))
 
 
-def skeleton(term: Term) -> Term:
-    """What others need to know of a definition: its conditions and calls over its parameters."""
+def skeleton(term: Term, leads_on: Callable[[Global], bool] = lambda _: True) -> Term:
+    """What others need to know of a definition: its conditions and calls over its parameters.
+
+    `leads_on`: whether a definition that is called has conditions, or calls that lead to some.
+    """
     groups: list[tuple[str, ...]] = []
     body = term
     while isinstance(body, Lam):
         groups.append(body.params)
         body = body.body
-    kept = _kept(body)
+    kept = _kept(body, leads_on)
     for params in reversed(groups):
         kept = lam(params, kept)
     return kept
 
 
-def _kept(term: Term) -> Term:
+def _kept(term: Term, leads_on: Callable[[Global], bool]) -> Term:
     items: dict[Term, None] = {}
     for node in _outside_binders(term):
         match node:
@@ -100,18 +102,36 @@ def _kept(term: Term) -> Term:
             case Delta() if node.free:
                 items[node] = None
             case App():
-                items[node] = None
+                called = called_definition(node)
+                if called is None or leads_on(called):
+                    items[node] = None
             case Integral():
-                inner = _kept(node.body)
+                inner = _kept(node.body, leads_on)
                 if inner.free:
                     items[integral(node.variables, node.bounds, inner)] = None
             case Sum():
-                inner = _kept(node.body)
+                inner = _kept(node.body, leads_on)
                 if inner.free:
                     items[sum_(node.variable, node.lo, node.hi, inner)] = None
             case _:
                 pass
     return tuple_(items)
+
+
+def called_definition(call: App) -> Global | None:
+    """The definition that a call, or a call of its derivative, is of."""
+    head: Term = call
+    while isinstance(head, App | Deriv):
+        head = head.function
+    return head if isinstance(head, Global) else None
+
+
+def has_conditions(exported: Term | None) -> bool:
+    """Whether a skeleton has conditions, or calls that might lead to some."""
+    body = exported
+    while isinstance(body, Lam):
+        body = body.body
+    return isinstance(exported, Lam) and not (isinstance(body, Tuple) and not body.items)
 
 
 def _outside_binders(root: Term) -> list[Term]:
@@ -147,15 +167,18 @@ def conditions_of(term: Term, skeletons: Resolve, whole: Resolve) -> tuple[Condi
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """Where the walk is: what parameters stand for, which functions were passed, the calls that led here."""
+    """Where the walk is: what parameters stand for, which functions were passed, the calls that led here.
+
+    `caller`: the variables of integration around the call that was entered first, or around that of a function that was
+    passed; None outside of calls.
+    """
 
     mapping: Mapping[str, Term]
     functions: Mapping[str, Term]
     calls: tuple[str, ...]
     path: tuple[Global, ...]
     anchor: Term | None
-    caller: frozenset[str] = frozenset()
-    foreign: bool = False
+    caller: frozenset[str] | None = None
 
 
 class _Walk:
@@ -168,9 +191,12 @@ class _Walk:
 
     def term(self, term: Term, place: _Place) -> Iterator[Condition]:
         nodes = postorder(term)
+        self.taken |= term.free
         for node in nodes:
-            self.taken |= node.free
-            if isinstance(node, Integral):
+            if isinstance(node, Lam | Sum):
+                self.taken |= node.body.free
+            elif isinstance(node, Integral):
+                self.taken.update(node.variables)
                 for name, (lo, hi) in zip(node.variables, node.bounds, strict=True):
                     self.box[name] = (_number(lo, -math.inf), _number(hi, math.inf))
         heads = {node.function for node in nodes if isinstance(node, App)}
@@ -182,14 +208,16 @@ class _Walk:
 
     def condition(self, node: Branch | Delta, place: _Place) -> Iterator[Condition]:
         coordinates = node.coordinates
+        over = self.box.keys() if place.caller is None else place.caller
+        if over.isdisjoint(_reached(coordinates[:1], place)):
+            return
         if isinstance(coordinates[0], Proj) and coordinates[0].index == 0 and len(coordinates) == 1:
             whole = self.seen_through(coordinates[0].term, place)
             coordinates = whole.items if isinstance(whole, Tuple) else (self.seen_through(coordinates[0], place),)
         else:
             coordinates = tuple(self.seen_through(c, place) for c in coordinates)
         surface = coordinates[0]
-        inside = surface.free & self.box.keys()
-        if not inside or (place.calls and not place.foreign and not inside & place.caller):
+        if over.isdisjoint(surface.free):
             return
         if any(isinstance(part, App) for part in postorder(surface)):
             return  # a function parameter decides: the caller who passes it checks
@@ -209,12 +237,16 @@ class _Walk:
 
     def call(self, node: App, place: _Place) -> Iterator[Condition]:
         head, groups = spine(node)
-        foreign = place.foreign
+        caller = place.caller
         dual = isinstance(head, Deriv)
         while isinstance(head, Deriv):
             head = head.function
         if isinstance(head, Var) and head.name in place.functions:
-            head, foreign = place.functions[head.name], True
+            head, caller = place.functions[head.name], frozenset(self.box)
+        if caller is None:
+            caller = frozenset(self.box)
+        if caller.isdisjoint(head.free) and not self.goes_in(groups, caller, place):
+            return
         name, path = "a function", place.path
         function: Term | None = head
         if isinstance(head, Global):
@@ -228,23 +260,31 @@ class _Walk:
         given = tuple(tuple(substitute(a, known) for a in group) for group in groups)
         if dual:
             given = tuple(tuple(_primal(a) for a in group) for group in given)
-        key = (head, given, foreign)
-        if key in self.seen:
+        key = (head, given, caller)
+        if key in self.seen or len(self.seen) >= MOST_CALLS:
             return
         self.seen.add(key)
         inner = self.entered(function, given, place)
         if inner is not None:
             body, mapping, functions = inner
-            caller = place.caller or frozenset(self.box)
-            there = _Place(mapping, functions, (*place.calls, name), path, place.anchor or node, caller, foreign)
+            there = _Place(mapping, functions, (*place.calls, name), path, place.anchor or node, caller)
             yield from self.term(body, there)
+
+    def goes_in(self, groups: tuple[tuple[Term, ...], ...], caller: frozenset[str], place: _Place) -> bool:
+        """Whether a variable of integration or a function is given to a call; else the rest is the callee's."""
+        flat = [item for group in groups for arg in group for item in (arg.items if isinstance(arg, Tuple) else (arg,))]
+        if any(isinstance(arg, Lam | Global | Deriv) for arg in flat):
+            return True
+        if place.functions and any(isinstance(arg, Var) and arg.name in place.functions for arg in flat):
+            return True
+        return not caller.isdisjoint(_reached(flat, place))
 
     def entered(
         self, function: Lam, given: tuple[tuple[Term, ...], ...], place: _Place
     ) -> tuple[Term, dict[str, Term], dict[str, Term]] | None:
         """The callee's body with names of its own, and what its parameters stand for."""
         params, body = uncurry(function, len(given))
-        args = _arguments(function, given)
+        args = arguments_of(function, given)
         if args is None or len(args) != len(params):
             return None
         for arg in args:
@@ -276,6 +316,15 @@ class _Walk:
         return body, tuple(own)
 
 
+def _reached(terms: Iterable[Term], place: _Place) -> set[str]:
+    """The names that terms have free once parameters are what they stand for."""
+    found: set[str] = set()
+    for name in {name for term in terms for name in term.free}:
+        stands_for = place.mapping.get(name) or place.functions.get(name)
+        found.update((name,) if stands_for is None else stands_for.free)
+    return found
+
+
 def _renamed(term: Term, names: Mapping[str, str]) -> Term:
     """Bound variables under other names, everywhere. Names of binders in one definition are distinct."""
     memo: dict[Term, Term] = {}
@@ -304,73 +353,3 @@ def _number(term: Term, otherwise: float) -> float:
         return term.value
     value = sample_value(term, {}) if not term.free else math.nan
     return value if value == value else otherwise
-
-
-def expanded(term: Term, resolve: Resolve, derive: Derive | None = None) -> Term:
-    """The term with calls of known functions carried out; of derivatives too, if it is said how.
-
-    A call of a definition inside itself stays a call: how deep it goes is decided by values.
-    """
-    return _Expansion(resolve, derive).run(term, ())
-
-
-class _Expansion:
-    """One expansion; a call with the same arguments is carried out once."""
-
-    def __init__(self, resolve: Resolve, derive: Derive | None) -> None:
-        self.resolve = resolve
-        self.derive = derive
-        self.known: dict[tuple[Lam, tuple[Term, ...]], Term] = {}
-
-    def run(self, term: Term, path: tuple[Term, ...]) -> Term:
-        memo: dict[Term, Term] = {}
-        for node in postorder(term):
-            if isinstance(node, Proj):
-                memo[node] = proj(memo[node.term], node.index)
-                continue
-            new = rebuild(node, tuple(memo[c] for c in children(node)))
-            memo[node] = self.applied(new, path) if isinstance(new, App) else new
-        return memo[term]
-
-    def applied(self, call: App, path: tuple[Term, ...]) -> Term:
-        head, groups = spine(call)
-        named = head
-        while isinstance(named, Deriv):
-            named = named.function
-        if named in path or len(path) > DEEPEST:
-            return call
-        function = known_function(head, self.resolve, self.derive)
-        if function is None:
-            return call
-        params, body = uncurry(function, len(groups))
-        args = _arguments(function, groups)
-        if args is None or len(args) != len(params):
-            return call
-        key = (function, args)
-        if key not in self.known:
-            inner = (*path, named) if isinstance(named, Global) else path
-            self.known[key] = self.run(substitute(body, dict(zip(params, args, strict=True))), inner)
-        return self.known[key]
-
-
-def _arguments(function: Lam, groups: tuple[tuple[Term, ...], ...]) -> tuple[Term, ...] | None:
-    """The arguments of all groups, each group as its parameters take it; None if there are more than it has."""
-    args: list[Term] = []
-    shape: Term = function
-    for group in groups:
-        if not isinstance(shape, Lam):
-            return None
-        args.extend(fitted(group, len(shape.params)))
-        shape = shape.body
-    return tuple(args)
-
-
-def known_function(head: Term, resolve: Resolve, derive: Derive | None) -> Lam | None:
-    """The function that the head of a call is, if it is known."""
-    if isinstance(head, Global):
-        found = resolve(head)
-        return found if isinstance(found, Lam) else None
-    if isinstance(head, Deriv) and derive is not None:
-        inner = known_function(head.function, resolve, derive)
-        return None if inner is None else derive(inner)
-    return head if isinstance(head, Lam) else None

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
-from potto.calculus.conditions import Condition, conditions_of, expanded, skeleton
+from potto.calculus.conditions import Condition, conditions_of, has_conditions, skeleton
 from potto.calculus.deltas import without_deltas
 from potto.calculus.derivative import NotSmooth
 from potto.calculus.dual import Differentiator
+from potto.calculus.expand import expanded
 from potto.calculus.invert import Failure, Inverse, invert
 from potto.calculus.isolate import Guard
 from potto.calculus.linear import affine
@@ -61,6 +63,7 @@ from potto.source import Span
 from potto.syntax import nodes
 
 Box = Mapping[str, tuple[float, float]]
+_Bounds = tuple[tuple[str, tuple[float, float]], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,10 +115,15 @@ def diffeo_info(db: Database, file: str, name: str) -> DiffeoInfo | None:
     return _studied(db, file, name).info
 
 
-@query
+def _exported_in_cycle(db: Database, file: str, name: str) -> Term | None:
+    """Of a recursive definition nothing is left out."""
+    return skeleton(core_term(db, file, name))
+
+
+@query(cycle=_exported_in_cycle)
 def exported(db: Database, file: str, name: str) -> Term | None:
     """The conditions and calls of a definition over its parameters: what a caller's check reads."""
-    return skeleton(core_term(db, file, name))
+    return skeleton(core_term(db, file, name), lambda g: has_conditions(exported(db, g.module, g.name)))
 
 
 def _whole(db: Database, target: Global) -> Term | None:
@@ -132,13 +140,20 @@ def _judged(found: Iterable[Condition], spans: Mapping[Term, Span], fallback: Sp
             continue  # a diagnostic has said what is wrong there
         condition = _readable(condition)
         own = isinstance(condition.anchor, Branch) and condition.anchor.coordinates == condition.coordinates
-        problem = judge(condition.coordinates, condition.variables, condition.box, own)
-        if isinstance(problem, Problem):
+        problem = _verdict(condition.coordinates, condition.variables, tuple(condition.box.items()), own)
+        if problem is not None:
             span = spans.get(condition.anchor, fallback)
             key = (problem.kind.code, span, problem.message)
             if key not in said:
                 said.add(key)
                 yield _diagnostic(problem, span, condition.calls)
+
+
+@lru_cache(maxsize=4096)
+def _verdict(coordinates: tuple[Term, ...], variables: tuple[str, ...], box: _Bounds, whole: bool) -> Problem | None:
+    """What is wrong with a condition. Most edits leave most conditions as they are."""
+    found = judge(coordinates, variables, dict(box), whole)
+    return found if isinstance(found, Problem) else None
 
 
 def _products(

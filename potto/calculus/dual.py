@@ -11,9 +11,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from potto.calculus.boundary import at_bounds, at_surfaces, jumps, scaled, total, vanishes
-from potto.calculus.conditions import Resolve, expanded, known_function
 from potto.calculus.deltas import without_deltas
 from potto.calculus.derivative import partial, zero_like
+from potto.calculus.expand import Resolve, expanded, known_function
 from potto.calculus.trace import spine
 from potto.core.terms import (
     ZERO,

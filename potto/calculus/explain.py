@@ -11,10 +11,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from potto.calculus.boundary import at_bounds, at_surfaces, jumps
-from potto.calculus.conditions import Resolve
 from potto.calculus.deltas import without_deltas
 from potto.calculus.derivative import NotSmooth
 from potto.calculus.dual import Differentiator, heads_of
+from potto.calculus.expand import Resolve
 from potto.calculus.pivots import NoClosedForm, pivots
 from potto.calculus.sides import branches_of
 from potto.calculus.solve import factors

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from potto.calculus.conditions import expanded
+from potto.calculus.expand import expanded
 from potto.calculus.surfaces import Finding, Resolve, findings
 from potto.core.terms import (
     App,

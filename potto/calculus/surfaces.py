@@ -199,7 +199,7 @@ class _Search:
         """What a surface is on either side of the conditions inside of it, also of those that calls lead to."""
         surface = substitute(surface, mapping)
         if any(isinstance(part, App) for part in postorder(surface)):
-            from potto.calculus.conditions import expanded
+            from potto.calculus.expand import expanded
 
             surface = expanded(surface, self.resolve)
         return (piece for piece in pieces(surface) if piece.free)

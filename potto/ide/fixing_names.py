@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from itertools import islice
 
 from potto.diagnostics import Diagnostic
 from potto.ide.edits import one_file
@@ -17,6 +18,7 @@ from potto.source import Span
 from potto.syntax import nodes, walk
 
 _NAME = re.compile(r"[^\W\d]\w*")
+MOST_MODULES = 5  # that are offered to import a name from
 
 
 def undefined_fixes(place: At, said: Diagnostic) -> Iterator[Offer]:
@@ -31,7 +33,7 @@ def undefined_fixes(place: At, said: Diagnostic) -> Iterator[Offer]:
         return
     if not _NAME.fullmatch(name) or place.text[said.span.start - 1 : said.span.start] == ".":
         return
-    found = [file for file in definers(place.db, name) if file != place.file]
+    found = list(islice((file for file in definers(place.db, name) if file != place.file), MOST_MODULES))
     for target in found:
         module = module_name(place.db, place.file, target)
         if module is not None:

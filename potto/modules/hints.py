@@ -67,7 +67,7 @@ def looked_in(db: Database, file: str, dotted: str) -> tuple[str, ...]:
     return (f"looked for {wanted} in {', '.join(places)}",)
 
 
-def elsewhere(db: Database, file: str, name: str) -> tuple[str, ...]:
-    """The modules of the workspace that define a name, as they would be written in `file`."""
+def elsewhere(db: Database, file: str, name: str) -> str | None:
+    """A module of the workspace that defines a name, as it would be written in `file`."""
     found = (module_name(db, file, other) for other in definers(db, name) if other != file)
-    return tuple(dict.fromkeys(module for module in found if module is not None))
+    return next((module for module in found if module is not None), None)

@@ -154,7 +154,7 @@ def _not_in_module(
 ) -> Diagnostic:
     last = search.steps[-1]
     near = near_names(last.name, names(db, last.file))
-    others = elsewhere(db, file, last.name)
+    other = elsewhere(db, file, last.name)
     message = f"the module `{item.module}` has no `{imported.name}`"
     label = "not defined there"
     if isinstance(meaning(db, last.file, last.name), Imported):
@@ -162,8 +162,8 @@ def _not_in_module(
     elif len(search.steps) > 1:
         message = f"{message}: it is to come from `{_stem(last.file)}`, which does not define `{last.name}`"
     helps = [did_you_mean(near)] if near else []
-    if others:
-        helps.append(f"it is defined in the module `{others[0]}`: `from {others[0]} import {last.name}`")
+    if other is not None:
+        helps.append(f"it is defined in the module `{other}`: `from {other} import {last.name}`")
     return NOT_IN_MODULE(imported.name_span, message, label=label, help="; ".join(helps))
 
 

@@ -1,18 +1,26 @@
 """Questions over all files of the workspace, for hints only: who defines a name, who imports one from here.
 
-Each file is asked by itself and by its text first, so that a keystroke asks again only the file it is in, and nothing
-is parsed that does not even mention the name.
+Tables over all files say which of them are worth a question; they are made from texts alone and stand still at most
+edits. So a keystroke asks again only the file it is in, and nothing is parsed that does not even mention the name.
 """
 
 from __future__ import annotations
 
 import os.path
 import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 from potto.modules.lookup import SUFFIXES, bindings, find_module, folders
 from potto.modules.texts import chunk_references, chunks, content, imports, is_diffeo, names
 from potto.query import Database, query
 from potto.syntax import nodes
+
+_HEADS = re.compile(
+    r"^\f*(?:(?P<imports>(?:from|import)\b.*(?:\n[ \t]+\S.*)*)|(?:(?:def|diffeo)[ \t]+)?(?P<name>[^\W\d]\w*))",
+    re.MULTILINE,
+)
+_WORD = re.compile(r"[^\W\d]\w*")
 
 
 def files(db: Database) -> tuple[str, ...]:
@@ -28,10 +36,52 @@ def mentions(db: Database, file: str, name: str) -> bool:
     return isinstance(text, str) and name in text and re.search(rf"\b{re.escape(name)}\b", text) is not None
 
 
+def definers(db: Database, name: str) -> Iterator[str]:
+    """The files of the workspace that define a name, one after the other: to know for sure, each is parsed."""
+    return (file for file in db.entry(_by_definition, (), name) or () if name in names(db, file))
+
+
 @query
-def definers(db: Database, name: str) -> tuple[str, ...]:
-    """The files of the workspace that define a name."""
-    return tuple(file for file in files(db) if mentions(db, file, name) and name in names(db, file))
+def _by_definition(db: Database) -> dict[str, list[str]]:
+    """The files that may define each name; a table, to be read by entry."""
+    return _table(db, lambda file: _words_at(db, file).defined)
+
+
+@query
+def _by_import(db: Database) -> dict[str, list[str]]:
+    """The files in whose imports each name occurs, as a module or as what is taken from one; to be read by entry."""
+    return _table(db, lambda file: _words_at(db, file).imported)
+
+
+def _table(db: Database, words: Callable[[str], frozenset[str]]) -> dict[str, list[str]]:
+    table: dict[str, list[str]] = {}
+    for file in files(db):
+        for word in words(file):
+            table.setdefault(word, []).append(file)
+    return table
+
+
+@dataclass(frozen=True, slots=True)
+class _Words:
+    """Words of a file by where they stand: where a definition's name does, and in imports."""
+
+    defined: frozenset[str]
+    imported: frozenset[str]
+
+
+@query
+def _words_at(db: Database, file: str) -> _Words:
+    """What a file may define and import, from its text alone. Stands still while the body of a definition is edited."""
+    text = content(db, file)
+    if not isinstance(text, str):
+        return _Words(frozenset(), frozenset())
+    defined, imported = set[str](), set[str]()
+    for found in _HEADS.finditer(text):
+        if found["name"] is not None:
+            defined.add(found["name"])
+        else:
+            imported.update(_WORD.findall(found["imports"]))
+    return _Words(frozenset(defined), frozenset(imported))
 
 
 @query
@@ -49,7 +99,9 @@ def module_name(db: Database, file: str, target: str) -> str | None:
 @query
 def is_reexported(db: Database, file: str, name: str) -> bool:
     """Whether another file of the workspace takes the name `name` from this one, which may itself import it."""
-    return any(other != file and mentions(db, other, name) and _takes(db, other, file, name) for other in files(db))
+    module = os.path.splitext(os.path.basename(file))[0]
+    candidates = {other for word in (name, module) for other in db.entry(_by_import, (), word) or () if other != file}
+    return any(mentions(db, other, name) and _takes(db, other, file, name) for other in sorted(candidates))
 
 
 def _takes(db: Database, other: str, file: str, name: str) -> bool:

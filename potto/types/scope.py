@@ -143,9 +143,9 @@ def undefined(outside: Outside, scope: Iterable[str], node: nodes.Name) -> Diagn
         )
     near = near_names(name, (*scope, *_file_names(outside), *builtin_names()))
     help = did_you_mean(near)
-    modules = elsewhere(outside.db, outside.file, name)
-    if modules:
-        help = f"the module `{modules[0]}` defines it: add `from {modules[0]} import {name}`"
+    module = elsewhere(outside.db, outside.file, name)
+    if module is not None:
+        help = f"the module `{module}` defines it: add `from {module} import {name}`"
     return NOT_DEFINED(node.span, f"`{name}` is not defined", label="not defined here", help=help)
 
 

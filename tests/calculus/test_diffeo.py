@@ -6,8 +6,9 @@ import textwrap
 
 import pytest
 
-from potto.calculus.conditions import expanded
-from potto.calculus.diffeo import DiffeoInfo, check_conditions, diffeo_info
+from potto.calculus.conditions import has_conditions
+from potto.calculus.diffeo import DiffeoInfo, check_conditions, diffeo_info, exported
+from potto.calculus.expand import expanded
 from potto.core.printer import format_term
 from potto.core.terms import Branch, global_, lam, postorder, var
 from potto.diagnostics import Diagnostic
@@ -255,6 +256,47 @@ def test_a_callee_that_keeps_its_conditions_rechecks_nobody() -> None:
     ran = {e.query.rpartition(".")[2] for e in events if e.kind == "executed"}
     assert "core" in ran and "exported" in ran  # of `step`, which has changed
     assert "check_conditions" not in ran
+
+
+def test_a_call_that_no_variable_of_integration_goes_into_is_not_looked_into() -> None:
+    before = """
+        def edge(y)
+            integral [0, 1] [x < y] d(x)
+
+        def f(t)
+            integral [0, 1] [x < t]*x d(x) + edge(t) + edge(2*t)
+    """
+    db = database(before)
+    assert check_conditions(db, FILE, "f") == ()
+    db.set_input(("overlay", FILE), textwrap.dedent(before).strip("\n").replace("x < y", "x^2 < y") + "\n")
+    with db.recording() as events:
+        assert check_conditions(db, FILE, "f") == ()
+    assert not [e for e in events if e.kind == "executed" and e.query in ("exported", "check_conditions")]
+
+
+def test_what_leads_to_no_condition_is_not_exported() -> None:
+    db = database("def a(x)\n    x + 1\n\ndef b(x)\n    a(x)*[x < 1] + a(2*x)\n\ndef c(x)\n    a(x) + sin(x)\n")
+    shown = {name: format_term(skeleton) for name in "abc" if (skeleton := exported(db, FILE, name)) is not None}
+    assert [has_conditions(exported(db, FILE, name)) for name in "abc"] == [False, True, False], shown
+    assert "a(" not in shown["b"]
+
+
+def test_recursive_definitions_export_their_conditions() -> None:
+    db = database("def a(x, n)\n    if n > 0 then b(x, n - 1) else [x < 1]\n\ndef b(x, n)\n    a(x/2, n)\n")
+    assert all(has_conditions(exported(db, FILE, name)) for name in "ab")
+
+
+def test_calls_that_double_at_every_level_are_followed_to_an_end() -> None:
+    levels = [f"def f{n}(x)\n    f{n - 1}(2*x) + f{n - 1}(x/3)\n" for n in range(1, 30)]
+    text = "\n".join(["def f0(x)\n    [x < 1]\n", *levels, "def g(t)\n    integral [0, 1] f29(x*t) d(x)\n"])
+    assert check(text) == []  # there are 2^29 conditions
+
+
+def test_a_condition_that_a_passed_function_brings_is_the_callers() -> None:
+    area = "def area(h)\n    integral [0, 1] h(x) d(x)\n\n"
+    (said,) = check(area + "def f(t)\n    area(\\x . [x*sin(x)*exp(x) < t])\n")
+    assert said.code == "P0402"
+    assert check(area + "def f(t)\n    area(\\x . [x < t])\n") == []
 
 
 # Calls carried out

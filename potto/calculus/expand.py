@@ -1,0 +1,89 @@
+"""Calls carried out: a term in which known functions are replaced by what they do.
+
+Owns `expanded` and `known_function`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from potto.calculus.surfaces import fitted, uncurry
+from potto.calculus.trace import spine
+from potto.core.terms import App, Deriv, Global, Lam, Proj, Term, children, postorder, proj, rebuild, substitute
+
+# The term of another definition: its skeleton, or all of it.
+Resolve = Callable[[Global], "Term | None"]
+# The dual of a function.
+Derive = Callable[[Lam], Lam]
+
+DEEPEST = 60  # calls inside calls
+
+
+def expanded(term: Term, resolve: Resolve, derive: Derive | None = None) -> Term:
+    """The term with calls of known functions carried out; of derivatives too, if it is said how.
+
+    A call of a definition inside itself stays a call: how deep it goes is decided by values.
+    """
+    return _Expansion(resolve, derive).run(term, ())
+
+
+class _Expansion:
+    """One expansion; a call with the same arguments is carried out once."""
+
+    def __init__(self, resolve: Resolve, derive: Derive | None) -> None:
+        self.resolve = resolve
+        self.derive = derive
+        self.known: dict[tuple[Lam, tuple[Term, ...]], Term] = {}
+
+    def run(self, term: Term, path: tuple[Term, ...]) -> Term:
+        memo: dict[Term, Term] = {}
+        for node in postorder(term):
+            if isinstance(node, Proj):
+                memo[node] = proj(memo[node.term], node.index)
+                continue
+            new = rebuild(node, tuple(memo[c] for c in children(node)))
+            memo[node] = self.applied(new, path) if isinstance(new, App) else new
+        return memo[term]
+
+    def applied(self, call: App, path: tuple[Term, ...]) -> Term:
+        head, groups = spine(call)
+        named = head
+        while isinstance(named, Deriv):
+            named = named.function
+        if named in path or len(path) > DEEPEST:
+            return call
+        function = known_function(head, self.resolve, self.derive)
+        if function is None:
+            return call
+        params, body = uncurry(function, len(groups))
+        args = arguments_of(function, groups)
+        if args is None or len(args) != len(params):
+            return call
+        key = (function, args)
+        if key not in self.known:
+            inner = (*path, named) if isinstance(named, Global) else path
+            self.known[key] = self.run(substitute(body, dict(zip(params, args, strict=True))), inner)
+        return self.known[key]
+
+
+def arguments_of(function: Lam, groups: tuple[tuple[Term, ...], ...]) -> tuple[Term, ...] | None:
+    """The arguments of all groups, each group as its parameters take it; None if there are more than it has."""
+    args: list[Term] = []
+    shape: Term = function
+    for group in groups:
+        if not isinstance(shape, Lam):
+            return None
+        args.extend(fitted(group, len(shape.params)))
+        shape = shape.body
+    return tuple(args)
+
+
+def known_function(head: Term, resolve: Resolve, derive: Derive | None) -> Lam | None:
+    """The function that the head of a call is, if it is known."""
+    if isinstance(head, Global):
+        found = resolve(head)
+        return found if isinstance(found, Lam) else None
+    if isinstance(head, Deriv) and derive is not None:
+        inner = known_function(head.function, resolve, derive)
+        return None if inner is None else derive(inner)
+    return head if isinstance(head, Lam) else None
