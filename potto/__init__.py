@@ -13,6 +13,7 @@ from potto.settings import settings
 
 if TYPE_CHECKING:
     from potto.api import Function, Module, Workspace, compile, deriv, grad, load
+    from potto.fitting import fit
     from potto.runtime.estimate import Estimate
 
 __version__ = "0.1.0"
@@ -25,12 +26,13 @@ __all__ = [
     "__version__",
     "compile",
     "deriv",
+    "fit",
     "grad",
     "load",
     "settings",
 ]
 
-_HOMES = {"Estimate": "potto.runtime.estimate"}
+_HOMES = {"Estimate": "potto.runtime.estimate", "fit": "potto.fitting"}
 
 
 def __getattr__(name: str) -> Any:

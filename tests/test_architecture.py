@@ -15,6 +15,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     ("potto_lsp", "potto_repl", "potto.__main__", "potto.cli"),
     (
         "potto.ide", "potto.session", "potto.api", "potto.calls", "potto.arguments", "potto.live", "potto.world",
+        "potto.fitting",
     ),
     ("potto.runtime",),
     ("potto.kernels", "potto.integrate"),
@@ -36,9 +37,9 @@ FORBIDDEN: dict[str, tuple[str, ...]] = {
 # Who may import a package that is not ours; nobody else may, at the top of a module or inside of a function.
 OUTSIDERS: dict[str, tuple[str, ...]] = {
     "lark": ("potto.syntax",),
-    "numpy": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.arguments", "potto_lsp.preview",
-              "potto_lsp.sampling"),
-    "scipy": ("potto.kernels", "potto.integrate", "potto.runtime"),
+    "numpy": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.arguments", "potto.fitting",
+              "potto_lsp.preview", "potto_lsp.sampling"),
+    "scipy": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.fitting"),
     "mpmath": ("potto.core.reference",),
     "pygls": ("potto_lsp",),
     "lsprotocol": ("potto_lsp",),
