@@ -7,13 +7,13 @@ import sys
 from collections.abc import Iterator, Sequence
 
 from potto.library import NO_PROGRAMS
+from potto.modules.folders import HEAVY, is_translation
 from potto.modules.kinds import UNREADABLE
 from potto.modules.lookup import SUFFIXES
 from potto.render import Located
 from potto.source import Span
 
 STDIN = "<stdin>"
-SKIPPED = {"__pycache__", "node_modules", "build", "dist"}
 
 
 def expand(paths: Sequence[str]) -> tuple[list[str], list[Located]]:
@@ -35,12 +35,14 @@ def expand(paths: Sequence[str]) -> tuple[list[str], list[Located]]:
 
 
 def walk(folder: str) -> Iterator[str]:
-    """The programs in a folder and below, in order; hidden folders and environments are left out."""
+    """The programs in a folder and below, in order; hidden folders, those that tools fill, and gettext's translations,
+    which are called `.po` as well, are left out."""
     for where, folders, names in os.walk(folder):
-        folders[:] = sorted(f for f in folders if not f.startswith(".") and f not in SKIPPED)
+        folders[:] = sorted(f for f in folders if not f.startswith(".") and f not in HEAVY)
         for name in sorted(names):
-            if name.endswith(SUFFIXES):
-                yield os.path.join(where, name)
+            path = os.path.join(where, name)
+            if name.endswith(SUFFIXES) and not (name.endswith(".po") and is_translation(path)):
+                yield path
 
 
 def missing(path: str) -> Located:

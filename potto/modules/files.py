@@ -11,18 +11,17 @@ Durability: texts on disk 1, open files 0, so that typing verifies nothing of fi
 
 from __future__ import annotations
 
-import itertools
 import os
 import stat
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
 
+from potto.modules.folders import Programs, list_folder
 from potto.modules.lookup import SUFFIXES
 from potto.modules.texts import Unreadable
 from potto.query import Database
 
 MAX_BYTES = 16_000_000
-MAX_FILES, MAX_FOLDERS = 20_000, 5_000  # a root may be somebody's home folder
 DISK, OPEN = 1, 0
 Stamp = tuple[int, int, int] | None
 
@@ -76,6 +75,7 @@ class Files:
     def __init__(self, db: Database, roots: Iterable[str | os.PathLike[str]] = ()) -> None:
         self.db = db
         self._stamps: dict[str, Stamp] = {}
+        self._found = Programs()
         db.on_missing_input = self._load_input
         self.set_roots(roots)
 
@@ -140,7 +140,7 @@ class Files:
         return tuple(differ)
 
     def all_files(self) -> tuple[str, ...]:
-        """All programs under the roots, and those that are open, sorted."""
+        """The programs under the roots (see `folders` for which), and those that are open, sorted."""
         found: tuple[str, ...] = self.db.get_input(("workspace",), ())
         return found
 
@@ -183,7 +183,7 @@ class Files:
             for key in self.db.input_keys()
             if isinstance(key, tuple) and key[0] == "overlay" and self.db.get_input(key) is not None
         ]
-        return tuple(sorted({*walk_programs(self.roots), *(key for key in unsaved if key.endswith(SUFFIXES))}))
+        return tuple(sorted({*self._found.under(self.roots), *(key for key in unsaved if key.endswith(SUFFIXES))}))
 
 
 def open_files(db: Database, roots: Iterable[str | os.PathLike[str]] = ()) -> Files:
@@ -196,33 +196,6 @@ def load_file(db: Database, path: str | os.PathLike[str]) -> str:
     key = Files.key(path)
     db.set_input(("file", key), load(key).content, DISK)
     return key
-
-
-def list_folder(path: str) -> tuple[str, ...]:
-    """The names in a folder that a module could be called by: programs, and folders (ending with `/`), sorted."""
-    try:
-        with os.scandir(path) as entries:
-            names = [
-                entry.name + ("/" if entry.is_dir() else "")
-                for entry in entries
-                if not entry.name.startswith(".") and (entry.is_dir() or entry.name.endswith(SUFFIXES))
-            ]
-    except (OSError, ValueError):  # no such folder, or not ours to look into: nothing is there to be imported
-        return ()
-    return tuple(sorted(names))
-
-
-def walk_programs(roots: Sequence[str]) -> list[str]:
-    """The programs under some folders; hidden folders and links to folders are passed by."""
-    found: list[str] = []
-    visits = itertools.count()
-    for root in roots:
-        for folder, folders, names in os.walk(root):
-            folders[:] = sorted(name for name in folders if not name.startswith("."))
-            found += (os.path.join(folder, name) for name in sorted(names) if name.endswith(SUFFIXES))
-            if len(found) >= MAX_FILES or next(visits) >= MAX_FOLDERS:
-                return found[:MAX_FILES]
-    return found
 
 
 def _reason(error: Exception) -> str:
