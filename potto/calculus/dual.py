@@ -73,9 +73,12 @@ def dual(term: Term, tangents: Mapping[str, Term], resolve: Resolve = nothing_kn
     return Differentiator(resolve).dual(term, tangents)
 
 
-def dual_function(function: Lam, resolve: Resolve = nothing_known) -> Lam:
-    """The function over duals: each parameter becomes a pair, or a dual function where it is applied; so the result."""
-    return Differentiator(resolve).function(function)
+def dual_function(function: Lam, resolve: Resolve = nothing_known, frozen: bool = False) -> Lam:
+    """The function over duals: each parameter becomes a pair, or a dual function where it is applied; so the result.
+
+    frozen: surfaces and bounds stand still, so that the tangent is the interior alone.
+    """
+    return Differentiator(resolve, frozen=frozen).function(function)
 
 
 def split_pairs(value: Term, tangent: Term) -> Term:
@@ -83,11 +86,15 @@ def split_pairs(value: Term, tangent: Term) -> Term:
 
 
 class Differentiator:
-    """One derivation. `singular`: a jump becomes a delta, because an integral is around it."""
+    """One derivation. singular: a jump becomes a delta, for an integral is around it; frozen: it stands still."""
 
-    def __init__(self, resolve: Resolve, singular: bool = False, pairs: Callable[[Term, Term], Term] | None = None):
+    def __init__(
+        self, resolve: Resolve, singular: bool = False, pairs: Callable[[Term, Term], Term] | None = None,
+        frozen: bool = False,
+    ) -> None:  # fmt: skip
         self.resolve = resolve
         self.singular = singular
+        self.frozen = frozen
         self.pair = pairs or split_pairs
 
     def dual(self, term: Term, tangents: Mapping[str, Term]) -> Dual:
@@ -138,7 +145,7 @@ class Differentiator:
 
     def carried_out(self, term: Term) -> Term:
         """Calls of known functions carried out, derivatives of known functions too, with deltas for jumps."""
-        inside = Differentiator(self.resolve, True)
+        inside = Differentiator(self.resolve, not self.frozen, frozen=self.frozen)
         return expanded(term, self.resolve, inside.function)
 
 
@@ -370,11 +377,9 @@ class _Pass:
             """The tangent of a term as the parameters move; the variables of integration stand still."""
             return _Pass(self.owner, moving).run(term)[1]
 
-        parts = [
-            _over(plain, rate(plain.body)),
-            *at_bounds(plain, rate),
-            *at_surfaces(plain, frozenset(moving), rate),
-        ]
+        parts = [_over(plain, rate(plain.body))]
+        if not self.owner.frozen:
+            parts += [*at_bounds(plain, rate), *at_surfaces(plain, frozenset(moving), rate)]
         return plain, total([p for p in parts if p is not ZERO], zero_like(plain.body))
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from potto.calculus.again import moving_deltas
 from potto.calculus.boundary import at_bounds, at_surfaces, jumps
 from potto.calculus.deltas import without_deltas
 from potto.calculus.derivative import NotSmooth
@@ -223,6 +224,7 @@ def _integral(
         interior = _text(rate(node.body), functions)
         for item in jumps(node.body, node.variables, rate):
             deltas.append(_text(item.contribution, functions))
+        deltas += [_text(t, functions) for t in moving_deltas(node, rate)]
         plain = without_deltas(node)
         if isinstance(plain, Integral):
             bounds = [_text(t, functions) for t in at_bounds(plain, rate)]

@@ -133,7 +133,7 @@ class _Run:
         k = self.machine.directions
         dims = len(self.plan.levels) - (1 if self.exact_inner else 0)
         v, se, t, set_ = self.mean(count, dims, self.interior)
-        if k:
+        if k and not self.machine.frozen:
             inner = len(self.plan.levels) - 1
             for number, level in enumerate(self.plan.levels):
                 if self.exact_inner and number == inner:
@@ -249,7 +249,7 @@ class _Run:
         assert isinstance(values, tuple)
         lo, hi = values[0], values[1]
         assert isinstance(lo, Cell) and isinstance(hi, Cell)
-        return lo, hi
+        return (_held(lo), _held(hi)) if self.machine.frozen else (lo, hi)
 
     def sections(self, level: LevelPlan, env: dict[str, Value], n: int) -> tuple[Cell, Cell, list[Any]]:
         values = self.machine.evaluate(level.frame, {p: env[p] for p in level.frame.params}, None)
@@ -283,6 +283,11 @@ class _Run:
 
     def width(self) -> int:
         return 1
+
+
+def _held(bound: Cell) -> Cell:
+    """A bound that stands still."""
+    return Cell(bound.v, bound.e, (None,) * len(bound.t))
 
 
 def _full(x: Any, n: int) -> Array:

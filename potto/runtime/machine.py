@@ -30,6 +30,7 @@ from potto.core.terms import (
 )  # fmt: skip
 from potto.core.terms import Delta as DeltaTerm
 from potto.diagnostics import PottoError
+from potto.integrate.pieces import still
 from potto.kernels import errors
 from potto.kernels.cells import Array, Cell, Number, Pattern, Trace, Value, pad, pattern
 from potto.kernels.compile import Kernel, counts, kernel
@@ -65,7 +66,7 @@ class Linker:
         self.terms: dict[tuple[str, str], Term] = {}
         self.exactness: dict[Term, bool] = {}
         self.constants: dict[tuple[str, str], Value] = {}
-        self.duals: dict[Lam, Lam] = {}
+        self.duals: dict[tuple[Lam, bool], Lam] = {}
         self.reaches: dict[tuple[Term, ...], tuple[tuple[str, str, bytes], ...]] = {}
         self.kernels: dict[tuple[Lam, tuple[Pattern, ...], int, bool], Kernel] = {}  # the ones met, without a lookup
 
@@ -122,7 +123,7 @@ class Linker:
 class Machine:
     """One evaluation, carrying `directions` tangents; `rounding` where rounding errors are kept track of.
 
-    frozen: surfaces and bounds stand still, so that tangents are those of the integrands alone (by quadrature).
+    frozen: surfaces, bounds and deltas stand still, so that tangents are those of the integrands alone.
     """
 
     linker: Linker
@@ -311,8 +312,11 @@ class Machine:
 
     def integral(self, term: Integral, env: dict[str, Value]) -> Value:
         from potto.runtime.integrals import integrate
-        from potto.runtime.prepare import prepared
+        from potto.runtime.prepare import held, prepared
 
+        if self.frozen:
+            term, stopped = held(term)
+            env = {**env, **{new: pad(still(env[old]), self.directions) for old, new in stopped}}
         ready = prepared(term)
         if ready is not term:
             return self.evaluate(lam(tuple(sorted(ready.free)), ready), {n: env[n] for n in ready.free}, None)

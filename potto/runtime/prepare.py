@@ -2,7 +2,7 @@
 
 Owns `prepared`: deltas are integrated out, a sum under an integral becomes a sum of integrals, and an integrand that
 is a sum with many surfaces is taken apart, so that each part is cut along its own surfaces only. That keeps n
-conditions added up at a cost proportional to n.
+conditions added up at a cost proportional to n. Owns `held` too: deltas that stand still.
 """
 
 from __future__ import annotations
@@ -10,7 +10,23 @@ from __future__ import annotations
 from functools import lru_cache
 
 from potto.calculus.deltas import without_deltas
-from potto.core.terms import Branch, Delta, Integral, Prim, Sum, Term, add, integral, neg, postorder, sum_
+from potto.core.terms import (
+    Branch,
+    Delta,
+    Integral,
+    Prim,
+    Sum,
+    Term,
+    add,
+    children,
+    integral,
+    neg,
+    postorder,
+    rebuild,
+    substitute,
+    sum_,
+    var,
+)
 
 FEW = 4  # branches that one integrand may have before its summands are integrated apart
 
@@ -30,6 +46,25 @@ def prepared(term: Integral) -> Term:
     if isinstance(body, Prim) and body.op == "add":
         return _apart(term, body)
     return term
+
+
+@lru_cache(maxsize=1024)
+def held(term: Integral) -> tuple[Integral, tuple[tuple[str, str], ...]]:
+    """The integral with what places its deltas under names of its own, to be given values without tangents.
+
+    The names are those of the parameters, with the new ones.
+    """
+    deltas = [node for node in postorder(term.body) if isinstance(node, Delta)]
+    bound = {name for node in postorder(term) if isinstance(node, Integral) for name in node.variables}
+    names = sorted({name for node in deltas for name in node.coordinates[0].free} - bound)
+    renamed = {name: var(f"{name}@still") for name in names}
+    memo: dict[Term, Term] = {}
+    for node in postorder(term):
+        new = rebuild(node, tuple(memo[child] for child in children(node)))
+        memo[node] = substitute(new, renamed) if isinstance(new, Delta) else new
+    result = memo[term]
+    assert isinstance(result, Integral)
+    return result, tuple((name, f"{name}@still") for name in names)
 
 
 def _over(term: Integral, body: Term) -> Integral:

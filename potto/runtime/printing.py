@@ -22,7 +22,7 @@ def format_number(value: float, error: float = 0.0) -> str:
         return "nan" if math.isnan(value) else ("inf" if value > 0 else "-inf")
     if math.isnan(error) or math.isinf(error):
         return f"{_shorten(f'{value:.3g}')} (error unknown)"
-    if error <= abs(value) * ROUNDING:
+    if error == 0 or error < abs(value) * 2.0**-54:
         return _shorten(repr(value))
     place = math.ceil(math.log10(2 * error) - 1e-9)  # the power of ten of the last digit
     return _rounded(value, place)
@@ -33,7 +33,7 @@ def _rounded(value: float, place: int) -> str:
         return "0" if place <= -9 else _plain(0.0, place)
     size = math.floor(math.log10(abs(value)))
     digits = size - place + 1  # significant ones
-    if digits >= 16:
+    if digits >= 17:
         return _shorten(repr(value))
     if digits <= 0:
         return "0" if place <= -9 else _plain(0.0, place)

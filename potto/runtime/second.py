@@ -31,17 +31,17 @@ def dual_function(machine: Machine, function: Closure) -> Closure:
 
 
 def _dual(machine: Machine, function: Lam) -> Lam:
-    known = machine.linker.duals.get(function)
+    known = machine.linker.duals.get((function, machine.frozen))
     if known is None:
 
         def resolve(name: Global) -> Term | None:
             return machine.linker.term(name.module, name.name)
 
         try:
-            known = symbolic(function, resolve)
+            known = symbolic(function, resolve, machine.frozen)
         except (NoClosedForm, NotSmooth) as reason:
             raise PottoError([errors.NO_MEANING(
                 errors.NOWHERE, f"no second derivative was found: {reason}", help="differentiate only once",
             )]) from None  # fmt: skip
-        machine.linker.duals[function] = known
+        machine.linker.duals[function, machine.frozen] = known
     return known

@@ -6,8 +6,14 @@ define for names that mean nothing.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
+from potto.calculus.again import NoText, first_derivative
+from potto.calculus.explain import describe
+from potto.core.printer import format_term
+from potto.core.terms import App, Deriv, Global, Lam, Term
+from potto.elaborate import elaborate_expression
 from potto.modules import statements
 from potto.runtime.estimate import Estimate
 from potto.runtime.shown import as_dual
@@ -16,9 +22,11 @@ from potto.source import Span
 from potto.syntax import nodes
 from potto_repl.reply import Part, answer, diagnostic, note
 from potto_repl.session import Conversation
+from potto_repl.symbols import pretty
 from potto_repl.values import is_dual, parts_of, value_parts
 
 NOT_DEFINED = "P0201"
+LONG = 100  # characters of a formula that an answer still shows
 
 
 def entry_parts(session: Conversation, text: str) -> Iterator[Part]:
@@ -57,8 +65,11 @@ def _valued(session: Conversation, outcome: Valued) -> Iterator[Part]:
         return
     name = outcome.names[-1] if outcome.names else ""
     if not outcome.estimates:
-        plain = Estimate(None, None, text=outcome.text)
+        shown, tangent = _in_symbols(session, name) if outcome.text.startswith("<") else ("", "")
+        plain = Estimate(None, None, text=shown or outcome.text)
         yield from value_parts(plain, outcome.type, session.settings, name=name)
+        if tangent:
+            yield Part("answer", f"  tangent     {pretty(tangent, session.options.unicode)}", {"tangent_text": tangent})
         return
     estimate = outcome.estimates[0]
     file, expr = _expression(session, name)
@@ -67,6 +78,33 @@ def _valued(session: Conversation, outcome: Valued) -> Iterator[Part]:
         estimate = as_dual(estimate)
         parts = parts_of(session.world, file, expr, estimate, session.settings)
     yield from value_parts(estimate, outcome.type, session.settings, name=name, parts=parts)
+
+
+def _in_symbols(session: Conversation, name: str) -> tuple[str, str]:
+    """A function as it is written, and the tangent of a derivative with its deltas; nothing where they are too long."""
+    term = elaborate_expression(session.db, session.file, nodes.Name(Span(0, 0), name)).term
+    while isinstance(term, Global):
+        known = session.world.lookup(term.module, term.name)
+        if isinstance(known, Lam) and not re.fullmatch("_[0-9]*", term.name):
+            break  # a function that has a name
+        term = known
+    text, head = format_term(term), term
+    while isinstance(head, App):
+        head = head.function
+    tangent = ""
+    if isinstance(head, Deriv):
+        tangent = _tangent(session, head.function)
+    return (text if len(text) <= LONG else "", tangent if len(tangent) <= LONG else "")
+
+
+def _tangent(session: Conversation, function: Term) -> str:
+    def resolve(target: Global) -> Term:
+        return session.world.lookup(target.module, target.name)
+
+    try:
+        return describe(first_derivative(function, resolve), "", "", resolve).tangent
+    except NoText:
+        return ""
 
 
 def _expression(session: Conversation, name: str) -> tuple[str, nodes.Expr]:

@@ -91,7 +91,7 @@ def _filled(group: tuple[Parameter, ...], arguments: tuple[nodes.Argument, ...])
     values = iter(rest)
     filled = []
     for place, parameter in enumerate(group):
-        name = parameter.name or f"argument {place + 1}"
+        name = parameter.name or ("x" if len(group) == 1 else f"x{place + 1}")
         value = by_name[name] if name in by_name else next(values, None)
         if value is None:
             raise Refusal(f"no value is given for `{name}`")

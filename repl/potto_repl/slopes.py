@@ -11,11 +11,13 @@ from dataclasses import dataclass
 from potto.runtime.estimate import Estimate
 from potto.runtime.shown import as_dual
 from potto.syntax import nodes, print_expression
-from potto.types.types import Diffeo, Function, Parameter, Real, TupleOf, resolve
+from potto.types.types import Diffeo, Function, ListOf, Parameter, TupleOf, resolve
 from potto_repl.expressions import Called, checked
 from potto_repl.reply import Refusal
 from potto_repl.session import Conversation
 from potto_repl.values import Parts, parts_of
+
+_NO_NUMBERS = (Function, Diffeo, TupleOf, ListOf)
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,8 +46,9 @@ def slopes(session: Conversation, called: Called) -> Iterator[Slope]:
 
 def numbers_of(called: Called) -> list[str]:
     """The parameters that are numbers."""
-    types = {parameter.name: resolve(parameter.type) for group in called.head.groups for parameter in group}
-    return [name for name, _ in called.given if isinstance(types.get(name), Real)]
+    parameters = [parameter for group in called.head.groups for parameter in group]
+    pairs = zip(parameters, called.given, strict=True)
+    return [name for parameter, (name, _) in pairs if not isinstance(resolve(parameter.type), _NO_NUMBERS)]
 
 
 def dual_text(called: Called, wrt: str) -> str:

@@ -6,11 +6,12 @@ which surfaces and bounds stand still.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from potto.core.terms import App, Delta, Deriv, Global, Term, postorder
+from potto.core.terms import App, Delta, Global, Integral, Term, postorder
 from potto.diagnostics import PottoError
 from potto.elaborate import elaborate_expression
 from potto.runtime.estimate import Estimate
@@ -70,13 +71,17 @@ def is_dual(world: World, file: str, expr: nodes.Expr) -> bool:
 
 
 def parts_of(world: World, file: str, expr: nodes.Expr, dual: Estimate, settings: Settings) -> Parts | None:
-    """The tangent of a derivative as interior and boundary; None where it cannot be taken apart."""
-    if dual.method != "quadrature" or dual.seconds > SLOW or dual.tangent is None:
+    """The tangent of a derivative as interior and boundary; None where it cannot be taken apart.
+
+    Of a second derivative the interior is the integral of the integrand's second derivative, and the rest the boundary.
+    Samples are the same in both evaluations, so that their difference has the noise of the boundary alone.
+    """
+    if dual.seconds > SLOW or dual.tangent is None:
         return None
     term = _called(world, elaborate_expression(world.db, file, expr).term)
-    if term is None:
-        return None
     program = world.program
+    if term is None or not program.linker.inexact(term):
+        return None  # no integral, no parts
     machine = replace(program.machine(settings), frozen=True)
     try:
         with Clock() as clock:
@@ -84,14 +89,16 @@ def parts_of(world: World, file: str, expr: nodes.Expr, dual: Estimate, settings
         still = as_dual(report(value, machine, clock))
     except PottoError:
         return None  # the derivative has a value, its interior alone has none
-    if still.tangent is None or machine.books.second:
+    if still.tangent is None:
         return None
-    error = _combined(dual.tangent_error, still.tangent_error)
-    return Parts(still.tangent, still.tangent_error, *_difference(dual.tangent, still.tangent, error))
+    sampled = dual.method == "mc"
+    error = _combined(dual.tangent_error, still.tangent_error, sampled)
+    smallest = 0.0 if "mc" in dual.method else 1.0
+    return Parts(still.tangent, still.tangent_error, *_difference(dual.tangent, still.tangent, error, smallest))
 
 
 def _called(world: World, term: Term) -> Term | None:
-    """The call of a derivative behind names; None if a delta in it makes its parts hard to tell."""
+    """The call of a derivative behind names; None if a delta in a function of its own makes its parts hard to tell."""
     for _ in range(100):
         if not isinstance(term, Global):
             break
@@ -101,8 +108,11 @@ def _called(world: World, term: Term) -> Term | None:
     seen: set[Term] = set()
     todo: list[Term] = [term]
     while todo:
-        for node in postorder(todo.pop()):
-            if isinstance(node, Delta) or (isinstance(node, Deriv) and isinstance(node.function, Deriv)):
+        nodes = postorder(todo.pop())
+        integrals = [node for node in nodes if isinstance(node, Integral)]
+        known = {inner for node in integrals for inner in postorder(node.body) if inner.free & set(node.variables)}
+        for node in nodes:
+            if isinstance(node, Delta) and node not in known:
                 return None
             if isinstance(node, Global) and node not in seen:
                 seen.add(node)
@@ -110,19 +120,20 @@ def _called(world: World, term: Term) -> Term | None:
     return term
 
 
-def _combined(a: Any, b: Any) -> Any:
-    if isinstance(a, tuple):
-        return tuple(_combined(x, y) for x, y in zip(a, b, strict=True))
-    return a + b
-
-
-def _difference(whole: Any, part: Any, error: Any) -> tuple[Any, Any]:
-    """What is left of the whole, nothing but rounding counting as nothing."""
+def _combined(whole: Any, part: Any, sampled: bool) -> Any:
+    """The error of the difference. Samples of two parts that were drawn apart: the squares of their errors add up."""
     if isinstance(whole, tuple):
-        pairs = [_difference(w, p, e) for w, p, e in zip(whole, part, error, strict=True)]
+        return tuple(_combined(x, y, sampled) for x, y in zip(whole, part, strict=True))
+    return math.sqrt(max(whole**2 - part**2, 0.0)) if sampled else whole + part
+
+
+def _difference(whole: Any, part: Any, error: Any, share: float) -> tuple[Any, Any]:
+    """What is left of the whole. What is nothing but rounding, or that share of its error, counts as nothing."""
+    if isinstance(whole, tuple):
+        pairs = [_difference(w, p, e, share) for w, p, e in zip(whole, part, error, strict=True)]
         return tuple(p[0] for p in pairs), tuple(p[1] for p in pairs)
     rest = whole - part
-    if abs(rest) <= max(error, TINY * max(abs(whole), abs(part))):
+    if abs(rest) <= max(share * error, TINY * max(abs(whole), abs(part))):
         return 0.0, 0.0
     return rest, error
 

@@ -19,6 +19,8 @@ from potto.runtime.printing import format_error, format_number, holds, written_t
         (0.49987, 2e-3, "0.50"),  # +-0.002 leaves the second decimal certain to half a unit
         (0.0886123456789, 1.2e-14, "0.0886123456789"),
         (3.0, 0.0, "3"),
+        (0.1 + 0.2, 5.6e-17, "0.3"),  # the last digits of the double are rounding
+        (math.sqrt(2), 2.3e-16, "1.414213562373095"),
         (-0.0, 0.0, "0"),
         (0.0, 1e-17, "0"),
         (1e-17, 1e-15, "0"),

@@ -73,6 +73,49 @@ def test_parts_of_a_smooth_integrand_have_no_boundary(talk):
     assert data["interior"] == pytest.approx(math.cos(1) + math.sin(1) - 1, rel=1e-12)  # d/dt (1 - cos t)/t at 1
 
 
+@pytest.mark.parametrize("method", ["mc", "qmc"])
+def test_parts_of_a_sampled_derivative(talk, method):
+    # t*x over x*y < t: the inner integral is min(1, t/x), so the value is t^2 - t^3/2
+    talk.all("def q(t) integral ([0, 1], [0, 1]) [x*y < t]*t*x d(x, y)", f":method {method}")
+    data = talk.data("deriv(q)((0.3, 1))")
+    assert data["interior"] == pytest.approx(0.3 - 0.3**2 / 2, abs=5e-3)
+    assert data["boundary"] == pytest.approx(0.3 * (1 - 0.3), abs=5e-3)
+    assert data["interior"] + data["boundary"] == pytest.approx(data["tangent"], rel=1e-12)
+
+
+def test_parts_of_sampled_moving_bounds(talk):
+    talk.all("def h(t) integral [0, t] x*t d(x)", ":method mc")
+    data = talk.data("deriv(h)((2, 1))")
+    assert data["interior"] == pytest.approx(2, abs=0.05) and data["boundary"] == pytest.approx(4, abs=0.1)
+
+
+def test_parts_of_a_second_derivative(talk):
+    # t^3 again: inside, the second derivative of t^2 is 2 over x < t; the rest of 6t is boundary
+    talk(WEIGHTED)
+    data = talk.data("deriv(deriv(g))(((0.3, 1), (1, 0)))")
+    assert data["tangent"] == pytest.approx([0.27, 1.8], rel=1e-12)
+    assert data["interior"] == pytest.approx([0.18, 0.6], rel=1e-12)
+    assert data["boundary"] == pytest.approx([0.09, 1.2], rel=1e-10)
+
+
+def test_parts_of_a_moving_delta(talk):
+    talk("def h(t) integral [0, 1] t*delta(x - t)*x^2 d(x)")  # t*t^2: inside t^2, the delta's place brings t*2t
+    data = talk.data("deriv(h)((0.3, 1))")
+    assert data["interior"] == pytest.approx(0.09, rel=1e-12) and data["boundary"] == pytest.approx(0.18, rel=1e-12)
+    text = talk(":deriv h").text
+    assert "delta(x - t)*x^2*dt       # interior" in text and "-t*x^2*dt*delta'(x - t)   # boundary" in text
+    assert talk.data(":check h(0.3)")["check"]["agree"]
+
+
+def test_a_second_derivative_in_symbols(talk):
+    talk.all(WEIGHTED, "second = deriv(deriv(g))")
+    assert "cos(t)*ddt - dt^2*sin(t)" in talk(":deriv deriv(\\t . sin(t))").text
+    for text in (":deriv deriv(g)", ":deriv second"):
+        assert "delta(t - x)" in talk(text).text and "D it = 0" not in talk(text).text
+    talk("def h(t, u) integral [0, 1] u(x)*[x < t] d(x)")
+    assert "no parameter is a function" in talk(":deriv deriv(h)").text
+
+
 def test_parts_through_a_composition(talk):
     talk.all(WEIGHTED, "def k(t) sin(g(t)) + t")
     data = talk.data("deriv(k)((0.3, 1))")
@@ -128,7 +171,12 @@ def test_a_loop_prints_without_answers(talk):
 
 
 def test_functions_show_their_types(talk):
-    assert talk("\\x . x^2").text.startswith("_1 = <function> : ")
+    assert talk("\\x . x^2").text == "_1 = \\x . x^2 : (x: Real*) -> Real"
+
+
+def test_a_distribution_shows_its_deltas(talk):
+    text = talk("deriv(\\t . \\x . [x < t])((0.3, 1))").text
+    assert "Dist[dx]" in text and "tangent     delta(t - x)*(dt - dx)" in text
 
 
 def test_infinite_values_have_no_error_bar(talk):

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import difflib
 import os
+from dataclasses import replace
 
 from potto import pages
+from potto.calculus.again import NoText, first_derivative
 from potto.calculus.explain import DerivativeText, describe, explain_derivative
-from potto.core.terms import Deriv
+from potto.core.terms import Deriv, Global, Term
 from potto.elaborate import core_term, elaborate_expression
 from potto.facts import surfaces
 from potto.modules import DefinitionTarget, ModuleTarget, chunk_start, names, resolve
@@ -61,7 +63,15 @@ def derivative_text(session: Conversation, asked: Asked) -> DerivativeText:
             return explain_derivative(session.db, target.file, target.name)
     term = elaborate_expression(session.db, session.file, asked.expr).term
     type = format_type(derivative_type(asked.type))
-    return describe(term, "it", type, lambda g: core_term(session.db, g.module, g.name))
+
+    def resolve(target: Global) -> Term:
+        return core_term(session.db, target.module, target.name)
+
+    try:
+        found = describe(first_derivative(term, resolve), "it", type, resolve)
+    except NoText as problem:
+        found = DerivativeText("it", type, "", False, (), (str(problem),))
+    return replace(found, by="its derivative")
 
 
 @command("surfaces", argument="EXPR", completes="expression")

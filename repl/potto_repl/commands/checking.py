@@ -12,7 +12,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from potto.core.terms import Global, Term, postorder
+from potto.core.terms import Delta, Global, Term, postorder
+from potto.diagnostics import PottoError
 from potto.elaborate import elaborate_expression
 from potto.runtime.evaluate import Program
 from potto.runtime.printing import format_error, format_number
@@ -101,7 +102,7 @@ def _exact_difference(session: Conversation, term: Term) -> Difference | None:
 
     try:
         value = evaluate(term, None, session.world.lookup, digits=DIGITS)
-    except (NotAccurate, ArithmeticError, ValueError, TypeError):
+    except (NotAccurate, PottoError, ArithmeticError, ValueError, TypeError):
         return None  # the reference evaluator cannot vouch for it; extrapolation can
     if not isinstance(value, tuple) or len(value) != 2 or isinstance(value[1], tuple | list) or callable(value[1]):
         return None
@@ -111,16 +112,23 @@ def _exact_difference(session: Conversation, term: Term) -> Difference | None:
 
 def _depth(session: Conversation, term: Term) -> int:
     """The variables of integration inside each other, followed through definitions."""
-    seen: set[Term] = set()
-    todo, most = [term], 0
+    return sum(map(dimensions, _reached(session, term)))
+
+
+def _reached(session: Conversation, term: Term) -> list[Term]:
+    """The term and those of all definitions that it leads to."""
+    found: dict[Term, Term] = {term: term}
+    todo = [term]
     while todo:
-        at = todo.pop()
-        most += dimensions(at)
-        for node in postorder(at):
-            if isinstance(node, Global) and node not in seen:
-                seen.add(node)
-                todo.append(session.world.lookup(node.module, node.name))
-    return most
+        for node in postorder(todo.pop()):
+            if isinstance(node, Global) and node not in found:
+                found[node] = session.world.lookup(node.module, node.name)
+                todo.append(found[node])
+    return list(found.values())
+
+
+def _has_deltas(session: Conversation, term: Term) -> bool:
+    return any(isinstance(node, Delta) for each in _reached(session, term) for node in postorder(each))
 
 
 def _extrapolated(session: Conversation, called: Called, slope: Slope) -> Difference:
@@ -172,6 +180,8 @@ def _discretized(session: Conversation, slope: Slope) -> tuple[float | None, str
     if not depth:
         return None, ""
     points = points_of(depth)
+    if _has_deltas(session, term):
+        return None, ""  # the points of a sum never meet a delta
     program = Program(lambda file, name: discretized(session.world.lookup(file, name), points))
     estimate = as_dual(program.evaluate(discretized(term, points), session.settings))
     summed = None if estimate.tangent is None or isinstance(estimate.tangent, tuple) else float(estimate.tangent)
