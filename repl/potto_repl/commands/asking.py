@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 import os
-from dataclasses import replace
 
 from potto import pages
 from potto.calculus.again import NoText, first_derivative
@@ -25,6 +24,8 @@ from potto_repl.registry import COMMANDS, command
 from potto_repl.reply import Part, Refusal, answer
 from potto_repl.session import Conversation
 from potto_repl.symbols import pretty
+
+UNNAMED = "it"  # what a function without a name is called
 
 
 @command("type", "t", argument="EXPR", completes="expression")
@@ -50,8 +51,9 @@ def show_derivative(session: Conversation, text: str) -> Part:
     if not isinstance(asked.type, Function | Diffeo):
         raise Refusal(f"`{text.strip()}` is no function, so there is nothing to differentiate by")
     found = derivative_text(session, asked)
-    data = {"name": found.name, "type": found.type, "tangent": found.tangent, "text": found.text}
-    return Part("answer", pretty(found.text, session.options.unicode), data)
+    shown = found.text.replace(f"d{UNNAMED} :", "its derivative :", 1) if found.name == UNNAMED else found.text
+    data = {"name": found.name, "type": found.type, "tangent": found.tangent, "text": shown}
+    return Part("answer", pretty(shown, session.options.unicode), data)
 
 
 def derivative_text(session: Conversation, asked: Asked) -> DerivativeText:
@@ -68,10 +70,9 @@ def derivative_text(session: Conversation, asked: Asked) -> DerivativeText:
         return core_term(session.db, target.module, target.name)
 
     try:
-        found = describe(first_derivative(term, resolve), "it", type, resolve)
+        return describe(first_derivative(term, resolve), UNNAMED, type, resolve)
     except NoText as problem:
-        found = DerivativeText("it", type, "", False, (), (str(problem),))
-    return replace(found, by="its derivative")
+        return DerivativeText(UNNAMED, type, "", False, (), (str(problem),))
 
 
 @command("surfaces", argument="EXPR", completes="expression")
