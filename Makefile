@@ -3,8 +3,9 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.stamp
+VSCODE := editors/vscode
 
-.PHONY: demo test quick check format clean
+.PHONY: demo test quick check format clean vsix
 
 demo: $(STAMP)  ## the paper's programs, evaluated and differentiated
 	@PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python examples/demo.py
@@ -20,10 +21,14 @@ check: $(STAMP)  ## lints, types, floors
 	$(BIN)/mypy
 	$(BIN)/python -m pytest tests/test_architecture.py
 
+vsix: $(VSCODE)/node_modules/.stamp  ## the extension for Visual Studio Code, checked, tested and packaged
+	cd $(VSCODE) && npm run --silent check && npm run --silent test && npm run --silent package
+
 format: $(STAMP)  ## what ruff can put right by itself
 	$(BIN)/ruff check --fix .
 
 clean:  ## start over
+	rm -rf $(VSCODE)/node_modules $(VSCODE)/e2e/node_modules $(VSCODE)/dist
 	rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache .hypothesis
 
 $(STAMP): pyproject.toml
@@ -31,3 +36,8 @@ $(STAMP): pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[dev]'
 	touch $(STAMP)
+
+$(VSCODE)/node_modules/.stamp: $(VSCODE)/package-lock.json
+	@command -v npm >/dev/null || { echo "make vsix needs npm (Node.js 20 or newer)"; exit 1; }
+	cd $(VSCODE) && npm ci --no-audit --no-fund --loglevel=error
+	touch $@
