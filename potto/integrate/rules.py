@@ -44,7 +44,7 @@ def gauss(n: int) -> Rule:
 
 
 def truncation(size: Array) -> Array:
-    """A bound of how far the rule's integral is off, from the decay of its Legendre coefficients' magnitudes (last axis).
+    """A bound of how far the rule's integral is off, from the decay of its Legendre coefficients (last axis).
 
     The integral errs by about the 2n-th coefficient. The decay is read off pairs of coefficients (functions even or
     odd on the piece have every other one zero), at the end and over the upper half, and the slower of the two is
