@@ -22,7 +22,7 @@ from potto.syntax import nodes
 from potto.world import World
 from potto_repl.reply import Part
 
-SLOW = 1.0  # seconds; of a derivative that took longer the parts are not looked for
+SLOW = 5.0  # seconds; of a derivative that took longer the parts are not looked for, which would take as long again
 TINY = 1e-13
 
 
