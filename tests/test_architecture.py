@@ -15,7 +15,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     ("potto_lsp", "potto_repl", "potto.__main__", "potto.cli"),
     (
         "potto.ide", "potto.session", "potto.api", "potto.calls", "potto.arguments", "potto.live", "potto.world",
-        "potto.fitting",
+        "potto.fitting", "potto.bench",
     ),
     ("potto.runtime",),
     ("potto.kernels", "potto.integrate"),
@@ -38,8 +38,11 @@ FORBIDDEN: dict[str, tuple[str, ...]] = {
 OUTSIDERS: dict[str, tuple[str, ...]] = {
     "lark": ("potto.syntax",),
     "numpy": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.arguments", "potto.fitting",
-              "potto_lsp.preview", "potto_lsp.sampling"),
-    "scipy": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.fitting"),
+              "potto.bench", "potto_lsp.preview", "potto_lsp.sampling"),
+    "scipy": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.fitting", "potto.bench"),
+    "jax": ("potto.bench.peers",),
+    "vegas": ("potto.bench.peers",),
+    "matplotlib": ("potto.bench.plotting",),
     "mpmath": ("potto.core.reference",),
     "pygls": ("potto_lsp",),
     "lsprotocol": ("potto_lsp",),

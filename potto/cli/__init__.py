@@ -6,8 +6,10 @@ Owns nothing but the list of commands. Each command is one module with `SUMMARY`
 
 from __future__ import annotations
 
-COMMANDS = ("run", "eval", "check", "deriv", "fmt", "test", "explain", "dump", "cache", "repl", "kernel", "lsp")
-LATER = ("render", "fit", "bench")  # they answer that a later release brings them
+COMMANDS = (
+    "run", "eval", "check", "deriv", "fmt", "test", "bench", "explain", "dump", "cache", "repl", "kernel", "lsp",
+)  # fmt: skip
+LATER = ("render", "fit")  # they answer that a later release brings them
 
 
 def module_of(command: str) -> str:

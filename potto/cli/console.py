@@ -45,6 +45,12 @@ class Console:
         """A line for the person: errors, notes, progress."""
         self.err.write(text + "\n")
 
+    def progress(self, text: str) -> None:
+        """A line that is overwritten by the next one, for a person who waits; nothing where nobody does."""
+        if self.err.isatty():
+            self.err.write(f"\r\x1b[K{text}")
+            self.err.flush()
+
     def palette(self, stream: TextIO) -> Palette:
         from potto.render import COLORS, PLAIN
 

@@ -1,0 +1,68 @@
+"""Our own methods as adapters: quadrature, Monte Carlo, quasi-Monte Carlo.
+
+Owns `OURS`. A program is compiled before the clock starts; a rung is the accuracy asked for, or the number of points.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from potto.api import Workspace, deriv
+from potto.bench.adapter import Answer, Solve
+from potto.bench.problems import Problem, Quantity
+from potto.runtime.estimate import Estimate
+from potto.settings import settings
+
+MOST_QUADRATURE = 3  # dimensions in which rules that are products pay
+TOLERANCES = (1e-1, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
+POINTS = tuple(2.0**k for k in range(7, 21))
+MOST_EVALUATIONS = 5_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Ours:
+    """One of our methods. `dial` is the name of the setting that is turned."""
+
+    method: str
+    dial: str
+    random: bool
+    package: str | None = None
+
+    @property
+    def name(self) -> str:
+        return f"potto {self.method}"
+
+    def missing(self) -> str | None:
+        return None
+
+    def ladder(self, problem: Problem) -> Sequence[float]:
+        if self.method == "qmc" and problem.dimensions == 1:
+            return ()  # the innermost variable is integrated exactly: nothing is left to sample
+        if self.random:
+            return POINTS
+        return TOLERANCES if problem.dimensions <= MOST_QUADRATURE else ()
+
+    def prepare(self, problem: Problem, quantity: Quantity) -> Solve:
+        f = Workspace().compile(problem.program).f
+        derived = deriv(f)
+
+        def solve(rung: float, seed: int) -> Answer:
+            turned = {"samples": int(rung)} if self.dial == "samples" else {"rtol": rung}
+            with settings(method=self.method, seed=seed, max_evals=MOST_EVALUATIONS, **turned):
+                if quantity == "value":
+                    found = f(problem.at)
+                    return Answer(found.value, found.evals, _reported(found, found.error))
+                found = derived((problem.at, 1.0))
+                return Answer(found.tangent, found.evals, _reported(found, found.tangent_error))
+
+        return solve
+
+
+def _reported(found: Estimate, error: float) -> float:
+    """The error that an estimate admits: unknown where no sample fell on anything."""
+    return math.inf if error == 0 and not found.converged else error
+
+
+OURS = (Ours("quadrature", "rtol", False), Ours("qmc", "samples", True), Ours("mc", "samples", True))
