@@ -43,7 +43,7 @@ class Call:
 
     def run(self, values: Sequence[Value], batch: Batch) -> Estimate:
         """The estimate of the call for these arguments. Raises PottoError."""
-        machine = self.world.program.machine(current())
+        machine = self.world.program.machine(current(self.world.settings(self.file)))
         with Clock() as clock:
             value = self.value(values, machine)
         estimate = report(value, machine, clock)
@@ -56,7 +56,7 @@ class Call:
         program = self.world.program
         term = self.elaborated
         if machine is None:
-            machine = program.machine(current())
+            machine = program.machine(current(self.world.settings(self.file)))
         if not values:
             return program.value(machine, term)
         assert isinstance(term, Lam) and len(term.params) == len(values)
@@ -120,7 +120,7 @@ def gradient(call: Call, arguments: Sequence[tuple[str, Value]], wrt: tuple[str,
         if name not in given:
             raise wrong_call(f"`{name}` is given no value, so there is nothing to differentiate by")
     directions = sum(_size(name, given[name]) for name in wrt)
-    machine = call.world.program.machine(current()).with_directions(directions)
+    machine = call.world.program.machine(current(call.world.settings(call.file))).with_directions(directions)
     numbers = iter(range(directions))
     seeded = {name: _seeded(given[name], numbers, directions) for name in wrt}
     values = [seeded[name] if name in seeded else pad(value, directions) for name, value in arguments]

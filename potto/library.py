@@ -14,8 +14,10 @@ from potto.modules import Unreadable, module_diagnostics, open_files, source
 from potto.modules.files import MAX_BYTES, decode
 from potto.modules.import_checks import unreadable
 from potto.modules.texts import content
+from potto.project import Project, Projects, levelled, problems_of
 from potto.query import Database
 from potto.render import Located, ProgramError
+from potto.settings import DEFAULTS, Settings
 from potto.source import SourceText, Span
 
 NOWHERE = Span(0, 0)
@@ -29,6 +31,9 @@ class Library:
     def __init__(self, roots: Sequence[str | os.PathLike[str]] = ()) -> None:
         self.db = Database()
         self.files = open_files(self.db, roots)
+        self.projects = Projects()
+        for root in self.files.roots:
+            self._adopt(root)
 
     def key(self, path: str | os.PathLike[str]) -> str:
         """How the database calls a file."""
@@ -47,6 +52,29 @@ class Library:
         self.put(key, text)
         return None
 
+    def project(self, file: str) -> Project | None:
+        """The project of a file, or of the folder that a pseudo file stands for: the first root's."""
+        if not os.path.isabs(file):
+            file = next(iter(self.files.roots), "")
+        return self.projects.of(file)
+
+    def settings(self, file: str) -> Settings:
+        """How numbers are asked for in a file where nothing else is said."""
+        project = self.project(file)
+        return DEFAULTS if project is None else project.settings
+
+    def project_problems(self, file: str) -> tuple[Located, ...]:
+        """What is wrong with the project file that counts for a file."""
+        project = self.project(file)
+        return () if project is None else problems_of(project)
+
+    def _adopt(self, path: str) -> None:
+        """Let modules be found in the roots of a file's project."""
+        project = self.projects.of(path)
+        missing = [] if project is None else [root for root in project.roots if root not in self.files.roots]
+        if missing:
+            self.files.set_roots([*self.files.roots, *missing])
+
     def unreadable(self, key: str) -> Located | None:
         """What keeps a file from being read as a program, if anything does."""
         if isinstance(content(self.db, key), str):
@@ -54,13 +82,16 @@ class Library:
         return Located(key, module_diagnostics(self.db, key)[0])
 
     def must_exist(self, key: str) -> None:
-        """Raise ProgramError if a file cannot be read as a program."""
+        """Raise ProgramError if a file cannot be read as a program, or its project file is wrong."""
+        self._adopt(key)
         problem = self.unreadable(key)
-        if problem is not None:
-            raise ProgramError([problem], self.source)
+        problems = self.project_problems(key) if problem is None else (problem,)
+        if problems:
+            raise ProgramError(problems, self.source)
 
     def refresh(self) -> bool:
         """Read again what has changed on disk; True if anything had."""
+        self.projects.forget()
         return bool(self.files.refresh())
 
     def source(self, file: str) -> SourceText | None:
@@ -68,11 +99,12 @@ class Library:
         return source(self.db, file)
 
     def diagnostics(self, file: str) -> tuple[Located, ...]:
-        """Everything there is to say about a file."""
-        return diagnostics(self.db, file)
+        """Everything there is to say about a file, lints as its project says."""
+        found, project = diagnostics(self.db, file), self.project(file)
+        return found if project is None or not project.lints else tuple(levelled(found, project.lints))
 
     def require(self, file: str) -> None:
         """Raise ProgramError if there is an error in a file."""
-        wrong = errors_of(self.diagnostics(file))
+        wrong = errors_of(diagnostics(self.db, file))
         if wrong:
             raise ProgramError(wrong, self.source)

@@ -101,6 +101,8 @@ class Session:
         self.number += 1
         entry = f"<In {self.number}>"
         self._put(entry, text, self.prelude)
+        if self.number == 1:
+            yield from map(Said, self.world.project_problems(entry))
         said = [Said(located) for located in self.world.diagnostics(entry) if not _is_idle(located)]
         yield from said
         if any(item.is_error for item in said):

@@ -7,10 +7,11 @@ obeys them: the runtime reads them, the faces set them.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, fields, replace
+from types import MappingProxyType
 from typing import Literal, get_args
 
 from potto.diagnostics import PottoError, declare
@@ -42,12 +43,13 @@ class Settings:
 
 
 DEFAULTS = Settings()
-_current: ContextVar[Settings] = ContextVar("potto_settings", default=DEFAULTS)
+_changes: ContextVar[Mapping[str, object]] = ContextVar("potto_settings", default=MappingProxyType({}))
 
 
-def current() -> Settings:
-    """The settings in force in this thread or task."""
-    return _current.get()
+def current(base: Settings = DEFAULTS) -> Settings:
+    """The settings in force in this thread or task; `base` counts where nothing is set, as a project says it."""
+    changes = _changes.get()
+    return replace(base, **changes) if changes else base  # type: ignore[arg-type]
 
 
 def problem(name: str, value: object) -> str | None:
@@ -73,8 +75,8 @@ def settings(**changes: object) -> Iterator[Settings]:
         complaint = problem(name, value)
         if complaint is not None:
             raise PottoError([BAD_SETTING(Span(0, 0), complaint)])
-    token = _current.set(replace(_current.get(), **changes))  # type: ignore[arg-type]
+    token = _changes.set({**_changes.get(), **changes})
     try:
-        yield _current.get()
+        yield current()
     finally:
-        _current.reset(token)
+        _changes.reset(token)

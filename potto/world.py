@@ -98,7 +98,7 @@ class World(Library):
     def run(self, file: str, settings: Settings | None = None) -> Iterator[Shown | Located]:
         """Run a script's statements. Raises ProgramError if the file has errors."""
         self.require(file)
-        return Script(self.db, file, self.program, settings or current()).run()
+        return Script(self.db, file, self.program, settings or current(self.settings(file))).run()
 
     def evaluate(self, file: str, text: str, settings: Settings | None = None) -> Answer:
         """The value of an expression with a file's names in scope. Raises ProgramError."""
@@ -109,7 +109,7 @@ class World(Library):
         self._stop(inferred.diagnostics, sources)
         elaborated = elaborate_expression(self.db, file, parsed.expr)
         self._stop(elaborated.diagnostics, sources)
-        chosen = settings or current()
+        chosen = settings or current(self.settings(file))
         try:
             estimate = self.program.evaluate(elaborated.term, chosen)
             if gives_dual(elaborated.term, self.program.linker):

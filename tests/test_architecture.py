@@ -25,7 +25,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     ("potto.types",),
     ("potto.modules", "potto.primitives", "potto.diffeos", "potto.measures"),
     ("potto.syntax", "potto.core"),
-    ("potto.render", "potto.excerpt", "potto.settings", "potto.pages"),
+    ("potto.render", "potto.excerpt", "potto.settings", "potto.project", "potto.pages"),
     ("potto.source", "potto.diagnostics", "potto.query"),
 )
 # What a package must not import although its floor would let it.

@@ -6,21 +6,19 @@ Owns `Analysis`. Everything here is for the one thread that works with the datab
 from __future__ import annotations
 
 import logging
-import os
 from collections.abc import Hashable, Iterable, Mapping
-from dataclasses import replace
 from typing import Any
 
 from potto.check import absolute, arranged, definition_diagnostics
 from potto.check import diagnostics as check_file
-from potto.diagnostics import Diagnostic, Severity
+from potto.diagnostics import Diagnostic
 from potto.modules import chunk_start, module_diagnostics, names, open_files, source, statements
 from potto.modules.texts import syntax_diagnostics
+from potto.project import Project, Projects, read_project
 from potto.query import Database, query
 from potto.render import Located
 from potto.types import check_statement
 from potto_lsp.documents import Document
-from potto_lsp.project import Project, read_project
 from potto_lsp.text import Encoding, Text
 from potto_lsp.uris import to_key, to_uri
 
@@ -41,6 +39,7 @@ class Analysis:
         self.files = open_files(self.db)
         self.encoding = encoding
         self.projects: tuple[Project, ...] = ()
+        self._found, self.folders = Projects(), tuple[str, ...]()
         self.settings: Mapping[str, Any] = {}
         self._documents: dict[str, Document] = {}
         self._texts: dict[str, Text] = {}
@@ -51,12 +50,19 @@ class Analysis:
     def set_folders(self, uris: Iterable[str]) -> None:
         """The folders of the workspace; their project files are read."""
         keys = [key for key in map(to_key, uris) if not key.startswith("<")]
-        self.projects = tuple(read_project(key) for key in dict.fromkeys(keys))
-        self.files.set_roots(root for project in self.projects for root in project.roots)
+        self.folders = tuple(dict.fromkeys(keys))
+        self.reload_projects()
 
     def reload_projects(self) -> None:
         """Read the project files again."""
-        self.set_folders([to_uri(project.folder) for project in self.projects])
+        self._found.forget()
+        around = [self._found.of(key) or read_project(key) for key in self.folders]
+        inside = [self._found.of(key) for key in self._documents]
+        self.projects = tuple(
+            {project.folder: project for project in (*around, *inside) if project is not None}.values()
+        )
+        roots = [root for project in self.projects for root in project.roots]
+        self.files.set_roots([*roots, *self.folders])
 
     def put(self, document: Document) -> str:
         """A document was opened or changed; its key."""
@@ -66,6 +72,14 @@ class Analysis:
         self._texts[key] = document.text
         self.files.set_text(key, document.text.text)
         return key
+
+    def finds_project(self, key: str) -> bool:
+        """Whether a file belongs to a project that was not known yet."""
+        project = self._found.of(key)
+        known = project is None or any(project.folder == other.folder for other in self.projects)
+        if not known:
+            self.reload_projects()
+        return not known
 
     def close(self, document: Document) -> str:
         """A document was closed: the disk counts again."""
@@ -154,23 +168,6 @@ class Analysis:
 
     def levels(self, key: str) -> Mapping[str, str]:
         """How lints count in a file: the innermost project's word, then the client's settings."""
-        inside = [p for p in self.projects if key.startswith(os.path.join(p.folder, ""))]
-        project = max(inside, key=lambda p: len(p.folder), default=None)
+        project = self._found.of(key)
         lints = self.settings.get("lints")
         return {**(project.lints if project is not None else {}), **(lints if isinstance(lints, Mapping) else {})}
-
-
-SEVERITIES: Mapping[str, Severity] = {"error": "error", "warning": "warning", "info": "info", "hint": "hint"}
-
-
-def levelled(found: Iterable[Located], levels: Mapping[str, str]) -> Iterable[Located]:
-    """Diagnostics with the severity that the settings give them. An error stays one."""
-    for located in found:
-        said = located.diagnostic
-        level = levels.get(said.code)
-        if level is None or said.severity == "error":
-            yield located
-        elif (severity := SEVERITIES.get(level)) is not None:
-            yield replace(located, diagnostic=replace(said, severity=severity))
-        elif level != "off":
-            yield located

@@ -74,7 +74,13 @@ def did_change_configuration(server: Server, params: Any) -> None:
 
 def did_open(server: Server, params: Any) -> None:
     document = server.documents.open(params)
-    server.edit(lambda: _session(server).analysis.put(document))
+
+    def opened() -> None:
+        session = _session(server)
+        if session.analysis.finds_project(session.analysis.put(document)):
+            session.projects_changed()
+
+    server.edit(opened)
 
 
 def did_change(server: Server, params: Any) -> None:
@@ -133,7 +139,7 @@ def did_change_workspace_folders(server: Server, params: Any) -> None:
         from potto_lsp.uris import to_uri
 
         session = _session(server)
-        kept = [p.folder for p in session.analysis.projects if p.folder not in removed]
+        kept = [folder for folder in session.analysis.folders if folder not in removed]
         session.set_folders([*map(to_uri, kept), *added])
         session.diagnostics_changed()
 

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from potto_lsp import convert, protocol
-from potto_lsp.project import NAME, Project
+from potto_lsp.uris import to_uri
 
 if TYPE_CHECKING:
+    from potto.project import Project
     from potto.render import Located
     from potto_lsp.analysis import Analysis
     from potto_lsp.client import Client
@@ -48,7 +49,7 @@ class Publisher:
 
     def report(self, key: str) -> Report:
         """What there is to say about a file now."""
-        from potto_lsp.analysis import levelled
+        from potto.project import levelled
 
         analysis = self._analysis
         found, text, levels = analysis.diagnostics(key), analysis.text(key), analysis.levels(key)
@@ -131,10 +132,6 @@ class Publisher:
 
     def push_projects(self, projects: tuple[Project, ...]) -> None:
         """What is wrong with project files; nobody asks for that, so it is pushed to every client."""
-        from os.path import join
-
-        from potto_lsp.uris import to_uri
-
         for project in projects:
             items: list[protocol.Diagnostic] = [
                 {
@@ -146,5 +143,5 @@ class Publisher:
                 for line, message in project.problems
             ]
             if items or project.folder in self._wrong_projects:
-                self._publish(to_uri(join(project.folder, NAME)), items, None)
+                self._publish(to_uri(project.path), items, None)
         self._wrong_projects = {project.folder for project in projects if project.problems}

@@ -61,7 +61,7 @@ def gather(world: Library, paths: list[str]) -> tuple[list[Located], int]:
             found += world.diagnostics(opened(world, path))
         except ProgramError as error:
             found += error.located
-    return found, len(files)
+    return list(dict.fromkeys(found)), len(files)
 
 
 def _wait(world: Library, paths: list[str]) -> None:

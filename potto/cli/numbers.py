@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import fields
+import os
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING
 
 from potto.cli.console import Console
+from potto.project import Projects
 from potto.settings import DEFAULTS, METHODS, Settings, problem
 
 if TYPE_CHECKING:
@@ -15,12 +17,12 @@ if TYPE_CHECKING:
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("numbers")
-    group.add_argument("--method", choices=METHODS, default=DEFAULTS.method, help="how integrals are estimated")
-    group.add_argument("--rtol", type=_number, default=DEFAULTS.rtol, help="relative accuracy asked for")
-    group.add_argument("--atol", type=_number, default=DEFAULTS.atol, help="absolute accuracy asked for")
-    group.add_argument("--samples", type=_whole, default=DEFAULTS.samples, help="points of a Monte Carlo estimate")
-    group.add_argument("--seed", type=_whole, default=DEFAULTS.seed, help="where its random numbers start")
-    group.add_argument("--max-evals", type=_whole, default=DEFAULTS.max_evals, help="the most evaluations")
+    group.add_argument("--method", choices=METHODS, help=_help("how integrals are estimated", "method"))
+    group.add_argument("--rtol", type=_number, help=_help("relative accuracy asked for", "rtol"))
+    group.add_argument("--atol", type=_number, help=_help("absolute accuracy asked for", "atol"))
+    group.add_argument("--samples", type=_whole, help=_help("points of a Monte Carlo estimate", "samples"))
+    group.add_argument("--seed", type=_whole, help=_help("where its random numbers start", "seed"))
+    group.add_argument("--max-evals", type=_whole, help=_help("the most evaluations", "max_evals"))
     group.add_argument("--stats", action="store_true", help="say what the evaluation cost")
 
 
@@ -41,15 +43,22 @@ def _whole(text: str) -> int:
     raise argparse.ArgumentTypeError(f"{text!r} is not a whole number")
 
 
+def _help(what: str, name: str) -> str:
+    return f"{what} (otherwise as `potto.toml` says, or {getattr(DEFAULTS, name)})"
+
+
 def settings_of(options: argparse.Namespace, console: Console) -> Settings | None:
-    """The settings that the options ask for; None after a complaint."""
-    chosen = {field.name: getattr(options, field.name) for field in fields(Settings)}
+    """The settings that the options ask for, over those of the project; None after a complaint."""
+    given = {field.name: getattr(options, field.name) for field in fields(Settings)}
+    chosen = {name: value for name, value in given.items() if value is not None}
     for name, value in chosen.items():
         complaint = problem(name, value)
         if complaint is not None:
             console.complain(f"potto: --{name.replace('_', '-')}: {complaint}")
             return None
-    return Settings(**chosen)
+    where = getattr(options, "file", None)
+    project = Projects().of(os.path.abspath(where if where and where != "-" else os.getcwd()))
+    return replace(DEFAULTS if project is None else project.settings, **chosen)
 
 
 def show_stats(estimates: list[Estimate], console: Console) -> None:
