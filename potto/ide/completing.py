@@ -6,6 +6,7 @@ documentation are looked up when an item is resolved, so that a list costs no in
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -18,9 +19,9 @@ from potto.ide.hovers import builtin_markdown, measure_markdown, measure_signatu
 from potto.ide.importing import import_edit, importable
 from potto.ide.model import Completion, CompletionKind, Completions
 from potto.ide.pending import call_at
-from potto.ide.places import ChunkAt, chunk_at, writing_at
+from potto.ide.places import chunk_at, text_of, writing_at
 from potto.ide.signatures import called_at
-from potto.ide.symbols import LocalSymbol
+from potto.ide.symbols import LocalSymbol, owner
 from potto.ide.words import KEYWORDS, LETTERS, SPECIALS, TYPES, Keyword
 from potto.measures import MEASURES
 from potto.modules import DefinitionTarget, ModuleTarget, resolve
@@ -30,12 +31,17 @@ from potto.modules.workspace import module_name
 from potto.primitives import PRIMITIVES
 from potto.query import Database
 from potto.source import Span
-from potto.types import format_type, groups_of
+from potto.types import TupleOf, format_type, groups_of
 
 MOST_IMPORTS = 100  # proposals from other modules in one list
 
 # Groups of proposals in the order of their likelihood.
 _ARGUMENT, _LOCAL, _OWN, _IMPORTED, _BUILTIN, _WORD, _OTHER = "0123456"
+_CLAUSE, _TOP = "00", "0"  # in front of all: what closes an open `if`, what begins a line at the top
+_OPERAND = re.compile(r"(?<![^\W\d])(?!(?:if|then|else|in|and|or|not|let|integral|sum)\s*$)(?:\w+|[)\]])\s+$")
+_OPENERS = {
+    "then": r"\bif\b", "else": r"\bthen\b", "in": r"\b(?:let|for|sum)\b", "d": r"\bintegral\b|∫",
+}  # fmt: skip
 
 
 def completions(db: Database, file: str, offset: int, trigger: str = "") -> Completions:
@@ -107,10 +113,13 @@ def _arguments(db: Database, file: str, offset: int, place: Place) -> Iterator[C
     for group in groups_of(called.type)[called.given :]:
         for number, parameter in enumerate(group):
             if parameter.name is not None and parameter.name not in call.keywords:
-                label = f"{parameter.name}="
-                sort = f"{_ARGUMENT}{number:02}"
+                label, sort = f"{parameter.name}=", f"{_ARGUMENT}{number:02}"
+                dual = isinstance(parameter.type, TupleOf) and parameter.type.dual
+                written = f"{label}(${{1:0}}, ${{2:1}})" if dual else label
                 detail = format_type(parameter.type)
-                yield Completion(label, "argument", place.span, label, sort, parameter.name, detail=detail)
+                yield Completion(
+                    label, "argument", place.span, written, sort, parameter.name, snippet=dual, detail=detail
+                )
 
 
 def _locals(db: Database, file: str, offset: int, place: Place) -> Iterator[Completion]:
@@ -129,9 +138,11 @@ def _locals(db: Database, file: str, offset: int, place: Place) -> Iterator[Comp
 
 def _file_names(db: Database, file: str, place: Place) -> Iterator[Completion]:
     """The names at the top of the file, and behind an entry of a prompt those of the entries before."""
+    here = writing_at(db, file, place.span.start)
+    own = None if here is None else owner(db, here[0])  # a constant cannot be made of itself
     for each in (file, *preludes(db, file)):
         for name, kind in written_kinds(db, each):
-            if fits(place.word, name):
+            if fits(place.word, name) and not (each == file and name == own and kind == "constant"):
                 data = ("definition", each, name)
                 yield Completion(name, kind, place.span, name, _OWN + name, data=data)
         for item in imports(db, each):
@@ -171,14 +182,21 @@ def builtin_items(place: Place) -> Iterator[Completion]:
 
 def _keywords(db: Database, file: str, offset: int, place: Place) -> Iterator[Completion]:
     chunk = chunk_at(db, file, offset)
+    before = "" if chunk is None else text_of(db, file)[chunk.start : offset - len(place.word)]
+    goes_on = bool(_OPERAND.search(before)) and place.kind != "top"
     for keyword in KEYWORDS.values():
-        if keyword.where == "top" and place.kind != "top" and keyword.name != "diffeo":
-            continue
-        if keyword.where == "clause" and not _fits(keyword.name, chunk, offset):
-            continue
+        group = _WORD
+        if keyword.where == "top":
+            if place.kind != "top" and keyword.name != "diffeo":
+                continue
+            group = _TOP if place.kind == "top" else _WORD
+        if keyword.where == "clause":
+            if not _fits(keyword.name, before, chunk is not None and chunk.diffeo):
+                continue
+            group = _CLAUSE if goes_on and keyword.name in _OPENERS else _WORD
         if keyword.name == "diffeo" and place.kind != "top":
             keyword = replace(keyword, snippet="diffeo(${0:x})")
-        yield _keyword(keyword, place, _WORD)
+        yield _keyword(keyword, place, group)
 
 
 def _keyword(keyword: Keyword, place: Place, group: str) -> Completion:
@@ -189,22 +207,15 @@ def _keyword(keyword: Keyword, place: Place, group: str) -> Completion:
     )  # fmt: skip
 
 
-def _fits(word: str, chunk: ChunkAt | None, offset: int) -> bool:
-    """Whether a word that goes on something can stand here, by what stands before."""
-    before = "" if chunk is None else chunk.text[: offset - chunk.start]
-    match word:
-        case "then" | "else":
-            return "if" in before
-        case "in":
-            return "let" in before or "for" in before or "sum" in before
-        case "inverse" | "where":
-            return "diffeo" in before or (chunk is not None and chunk.diffeo and bool(before.strip()))
-        case "d":
-            return "integral" in before or "∫" in before
-        case "as":
-            return False
-        case _:
-            return bool(before.strip())
+def _fits(word: str, before: str, diffeo: bool) -> bool:
+    """Whether a word that goes on something can stand here: what it closes is open in front of it."""
+    opener = _OPENERS.get(word)
+    if opener is not None:
+        closer = r"\bd\s*\(" if word == "d" else rf"\b{word}\b"
+        return len(re.findall(opener, before)) > len(re.findall(closer, before))
+    if word in ("inverse", "where"):
+        return re.search(r"\bdiffeo\b", before) is not None or (diffeo and bool(before.strip()))
+    return word != "as" and bool(before.strip())
 
 
 def _others(db: Database, file: str, place: Place, items: dict[str, Completion]) -> list[Completion]:

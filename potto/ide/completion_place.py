@@ -23,8 +23,9 @@ _MODULE_ONLY = re.compile(r"^from\s+[\w.]+\s+(\w*)$")
 _ALIAS = re.compile(r"^(?:from|import)\b.*\bas\s+\w*$")
 _MEMBER = re.compile(r"((?:[^\W\d]\w*\.)+)(\w*)$")
 _MEASURE = re.compile(r"~\s*(\w*)$")
-_NEW = re.compile(r"(?:^(?:def|diffeo)\s+|\bfor\s+|\blet\s+|\bsum\s+|^def\s+\w+[^=]*?\(\s*(?:[\w:*\[\] ]*,\s*)*)\w*$")
-_TYPE = re.compile(r"^def\s[^\n]*(?::|->)\s*[(\[]?\s*(?:Real\*?,\s*)*\w*$")
+_NEW = re.compile(r"(?:\bfor\s+|\blet\s+|\bsum\s+|\\\s*\((?:\s*\w+\s*,)*\s*)\w*$")
+_HEAD = re.compile(r"(def|diffeo)\s+\w*")
+_RESULT = re.compile(r"\s*->\s*[(\[]?\s*(?:Real\*?,\s*)*\w*$")
 _NUMBER = re.compile(r"(?:^|[^\w.])[0-9][\w.]*$")
 _IMPORT_LINES = re.compile(r"(?:^|\n)(from\s[^\n]*(?:,|import)[ \t]*(?:\r?\n[ \t]+[^\n]*)*)$")
 
@@ -90,8 +91,45 @@ def _expression(line: str, span: Span, word: str) -> Place:
         return Place("member", span, member.group(2), member.group(1).rstrip("."))
     if _MEASURE.search(line):
         return Place("measure", span, word)
-    if _TYPE.search(line):
-        return Place("type", span, word)
+    headed = _in_head(line)
+    if headed is not None:
+        return Place(headed, span, word)
     if _NEW.search(line):
         return Place("new", span, word)
     return Place("top" if line == word else "expression", span, word)
+
+
+def _in_head(line: str) -> Kind | None:
+    """What the head of a definition asks for at the end of a line: a new name or a type; None behind it."""
+    head = _HEAD.match(line)
+    if head is None:
+        return None
+    rest = line[head.end() :]
+    if not rest:
+        return "new"
+    while rest.startswith("("):
+        end = _closing(rest)
+        if end is None:
+            return "type" if ":" in _last_parameter(rest[1:]) else "new"
+        rest = rest[end + 1 :]
+    return "type" if head.group(1) == "def" and _RESULT.match(rest) else None
+
+
+def _closing(text: str) -> int | None:
+    """Where the parenthesis that a text begins with is closed."""
+    depth = 0
+    for place, char in enumerate(text):
+        depth += (char == "(") - (char == ")")
+        if depth == 0:
+            return place
+    return None
+
+
+def _last_parameter(text: str) -> str:
+    """What follows the last comma outside of brackets."""
+    depth = start = 0
+    for place, char in enumerate(text):
+        depth += (char in "([") - (char in ")]")
+        if char in ",;" and depth == 0:
+            start = place + 1
+    return text[start:]

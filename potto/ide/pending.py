@@ -1,6 +1,6 @@
 """The call that the cursor is in, found in the text alone: while it is typed, there is no tree of it yet.
 
-Owns `call_at`.
+Owns `call_at` and `juxtaposed_at`.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from potto.ide.places import ChunkAt, chunk_at
+from potto.ide.places import ChunkAt, chunk_at, text_of
 from potto.query import Database
 from potto.source import Span
 from potto.syntax import RESERVED, nodes, parse_expression
@@ -54,6 +54,21 @@ def call_at(db: Database, file: str, offset: int) -> PendingCall | None:
                 return _call(chunk, text, start, position, at)
         position = _open_before(text, position)
     return None
+
+
+def juxtaposed_at(db: Database, file: str, offset: int) -> PendingCall | None:
+    """What is applied by writing its argument behind it: the cursor is behind a blank, as in `f (1, 2) |`."""
+    chunk = chunk_at(db, file, offset)
+    end = 0 if chunk is None else len(text_of(db, file)[chunk.start : offset].rstrip(" \t"))
+    if chunk is None or end == offset - chunk.start or end > len(chunk.text):
+        return None
+    text = _blank_comments(db, chunk)[:end]
+    start = _function_start(text, end)
+    if start is None:
+        return None
+    function = parse_expression(text[start:end]).expr
+    where = Span(chunk.start + start, chunk.start + end)
+    return PendingCall(function, where, offset, offset, 0, 0, (), None, True, False)
 
 
 def _blank_comments(db: Database, chunk: ChunkAt) -> str:

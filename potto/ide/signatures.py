@@ -13,7 +13,7 @@ from potto.ide.hover_locals import local_type
 from potto.ide.hovers import builtin_parameters, builtin_signature
 from potto.ide.index import call_head
 from potto.ide.model import ParameterText, Signature, SignatureHelp
-from potto.ide.pending import PendingCall, call_at
+from potto.ide.pending import PendingCall, call_at, juxtaposed_at
 from potto.ide.places import chunk_at
 from potto.ide.symbols import LocalSymbol, callee
 from potto.ide.words import SPECIALS
@@ -39,6 +39,10 @@ class Called:
 
 def signature_help(db: Database, file: str, offset: int) -> SignatureHelp | None:
     """The signatures of the call at an offset, group by group."""
+    beside = juxtaposed_at(db, file, offset)
+    applied = None if beside is None else called_at(db, file, beside)
+    if beside is not None and applied is not None and (found := _groups(applied, beside)) is not None:
+        return found
     call = call_at(db, file, offset)
     if call is None:
         return None

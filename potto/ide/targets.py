@@ -59,6 +59,9 @@ def implementation(db: Database, file: str, offset: int) -> Links | None:
     if chunk is None or item is None:
         return None
     for node in reversed(node_at(item, offset - chunk.start)):
+        if isinstance(node, nodes.InlineDiffeo):  # it is written where it is used
+            here = chunk.absolute(node.span)
+            return _links(here, (Location(file, here, here),))
         if isinstance(node, nodes.If):
             return _links(chunk.absolute(node.condition.span), _maps_in(db, chunk, node.condition))
     return None

@@ -163,3 +163,47 @@ def test_a_list_is_fast_in_a_large_workspace():
         ide.completions(f.db, f.file, f.offset + 4 + (n > 9))
         times.append(time.perf_counter() - start)
     assert sorted(times)[len(times) // 2] < 0.02  # the goal is 0.005 on an idle machine
+
+
+def first(text: str, count: int = 1) -> list[str]:
+    """The first proposals in their order."""
+    f = fixture(text)
+    items = sorted(ide.completions(f.db, f.file, f.offset).items, key=lambda item: item.sort)
+    return [item.label for item in items[:count]]
+
+
+def test_what_an_open_conditional_or_integral_still_needs_comes_first():
+    assert first("def f(a)\n    if a > 0 $0\n") == ["then"]
+    assert first("def f(a)\n    if a > 0 then 1 $0\n") == ["else"]
+    assert first("def f(a)\n    integral [0, 1] a*x $0\n") == ["d"]
+    assert first("def f(a)\n    let b = a $0\n") == ["in"]
+    assert "then" not in fixture("def f(a)\n    a + $0\n").labels()
+    assert "else" not in fixture("diffeo t(x; c) = (x + c, $0)\n").labels()
+
+
+def test_a_line_at_the_top_begins_with_a_statement():
+    assert first("$0\n", 2) == ["def", "diffeo"]
+
+
+def test_a_body_on_the_line_of_the_head_is_an_expression():
+    for text in ("def f(a) sin($0)\n", "def f(a) sum i in 1..3 ($0)\n", "def f(a) a > 0 ? 1 : $0\n",
+                 "diffeo t(a; c) = ($0, 1)\n", "def f(a: (Real, Real) -> Real)(b) $0\n"):  # fmt: skip
+        assert {"a", "sin"} <= set(fixture(text).labels()), text
+
+
+def test_in_a_head_there_are_new_names_and_types():
+    for text in ("def f($0", "def f(a, $0", "def f(a)($0", "def f(a: Real, $0", "diffeo t(x; $0", "y = \\(a, $0"):
+        assert fixture(text + "\n").labels() == [], text
+    for text in ("def f(a: $0", "def f(a, b: (Real, $0", "def f(a) -> $0"):
+        assert fixture(text + "\n").labels() == ["Real", "Real*", "Diffeo[2]"], text
+
+
+def test_a_constant_is_not_proposed_for_itself():
+    assert "y" not in fixture("y = $0\n").labels()
+    assert "f" in fixture("def f(n) if n > 0 then $0 else 1\n").labels()
+
+
+def test_the_name_of_a_dual_brings_its_two_parts():
+    f = fixture("def f(a, n) a^n\ny = deriv(f)($0)\n")
+    item, after = f.complete("da=")
+    assert item.snippet and after.endswith("y = deriv(f)(da=(${1:0}, ${2:1}))\n")

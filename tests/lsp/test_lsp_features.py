@@ -106,6 +106,14 @@ def test_rename_reaches_other_files(client: Client, uri: Uri) -> None:
     assert client.error("textDocument/rename", {**at(uri("main"), 4, 13), "newName": "not a name"}) == -32803
 
 
+def test_a_module_is_renamed_with_its_file(client: Client, uri: Uri, server: Server) -> None:
+    change = client.ask("textDocument/rename", {**at(uri("main"), 1, 9), "newName": "forms"})
+    assert change["documentChanges"][-1] == {"kind": "rename", "oldUri": uri("shapes"), "newUri": uri("forms")}
+    poor = server({})
+    poor.open(uri("main"), TEXT)
+    assert poor.error("textDocument/rename", {**at(uri("main"), 1, 9), "newName": "forms"}) == -32803
+
+
 def test_files_that_are_renamed(client: Client, uri: Uri) -> None:
     files = [{"oldUri": uri("shapes"), "newUri": uri("forms")}]
     change = client.ask("workspace/willRenameFiles", {"files": files})
@@ -119,6 +127,13 @@ def test_completion_and_its_details(client: Client, uri: Uri) -> None:
     assert item["textEdit"]["newText"].startswith("f")
     resolved = client.ask("completionItem/resolve", item)
     assert "->" in str(resolved.get("detail", "")) + str(resolved.get("documentation", ""))
+
+
+def test_a_client_without_snippets_is_proposed_plain_words(server: Server, uri: Uri) -> None:
+    client = server({})
+    client.open(uri("main"), "def f(t)\n    \n")
+    items = {item["label"]: item for item in client.ask("textDocument/completion", at(uri("main"), 1, 4))["items"]}
+    assert items["integral"]["textEdit"]["newText"] == "integral" and items["if"]["insertTextFormat"] == 1
 
 
 def test_signature_help(client: Client, uri: Uri) -> None:

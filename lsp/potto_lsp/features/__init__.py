@@ -53,7 +53,7 @@ _ALL = (
     Feature(
         _DOCUMENT + "completion",
         "completing.complete",
-        {"completionProvider": {"triggerCharacters": [".", "\\", "("], "resolveProvider": True,
+        {"completionProvider": {"triggerCharacters": [".", "\\", "(", "~"], "resolveProvider": True,
                                 "completionItem": {"labelDetailsSupport": True}}},
     ),
     Feature("completionItem/resolve", "completing.resolve"),
@@ -107,7 +107,7 @@ _ALL = (
     Feature(
         _DOCUMENT + "onTypeFormatting",
         "formatting.on_type",
-        {"documentOnTypeFormattingProvider": {"firstTriggerCharacter": "\n", "moreTriggerCharacter": [")"]}},
+        {"documentOnTypeFormattingProvider": {"firstTriggerCharacter": "\n", "moreTriggerCharacter": [")", "]"]}},
     ),
     Feature(
         _DOCUMENT + "diagnostic",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from potto import ide
@@ -21,8 +22,13 @@ def complete(ask: Ask) -> protocol.CompletionList:
     typed = ask.optional("context", "triggerCharacter")
     found = ide.completions(ask.db, ask.file, ask.offset, typed if isinstance(typed, str) else "")
     can_snippet = ask.client.can("textDocument.completion.completionItem.snippetSupport")
-    items = [_item(ask, item) for item in found.items if can_snippet or not item.snippet]
+    items = [_item(ask, item if can_snippet else _plain(item)) for item in found.items]
     return {"isIncomplete": found.incomplete, "items": items}
+
+
+def _plain(item: ide.Completion) -> ide.Completion:
+    """For a client that knows no snippets: the word alone."""
+    return replace(item, snippet=False, insert=item.label) if item.snippet else item
 
 
 def _item(ask: Ask, item: ide.Completion) -> protocol.CompletionItem:

@@ -23,6 +23,8 @@ def rename(ask: Ask) -> protocol.WorkspaceEdit:
     found = ide.rename(ask.db, ask.file, ask.offset, ask.string("newName"))
     if isinstance(found, ide.Refused):
         raise Refusal(found.message)
+    if found.renames and not ask.client.lists("workspace.workspaceEdit.resourceOperations", "rename"):
+        raise Refusal("this editor cannot be asked to rename a file, and a module is named by its file")
     return convert.workspace_edit(ask.analysis, ask.client, found)
 
 
