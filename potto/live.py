@@ -10,12 +10,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from potto.diagnostics import declare
 from potto.render import ProgramError
 from potto.runtime.estimate import Estimate
 from potto.runtime.printing import holds, written_tolerance
 from potto.runtime.shown import format_bounds, format_estimate
 from potto.syntax import live_expressions, nodes
 from potto.world import World
+
+DOES_NOT_HOLD = declare("P0530", "a live expression that does not give what is written behind it")
 
 
 @dataclass(frozen=True, slots=True)

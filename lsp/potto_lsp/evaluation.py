@@ -14,7 +14,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from queue import Empty, SimpleQueue
+from queue import Empty, PriorityQueue, SimpleQueue
 from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 LIMIT, LOADING, GRACE = 10.0, 60.0, 0.5  # seconds: for a task, for the start, to heed an interrupt
+PATIENCE = 0.3  # seconds that a task may run on while a more urgent one waits
+COMMAND, LIVE, POINTS = 0, 1, 2  # how urgent a task is: what a user asked for comes first
 
 
 @dataclass(eq=False)
@@ -38,6 +40,11 @@ class Task:
     texts: Mapping[str, str] = field(default_factory=dict)
     roots: tuple[str, ...] = ()
     limit: float = LIMIT
+    urgency: int = COMMAND
+
+
+class GivesWay(Exception):
+    """A task has been stopped in favour of one that is more urgent."""
 
 
 class Evaluator:
@@ -45,12 +52,12 @@ class Evaluator:
 
     def __init__(self, analysis: Analysis) -> None:
         self._analysis = analysis
-        self._tasks: SimpleQueue[Task | None] = SimpleQueue()
+        self._tasks: PriorityQueue[tuple[int, int, Task]] = PriorityQueue()
         self._thread: Thread | None = None
         self._process: subprocess.Popen[str] | None = None
         self._said: SimpleQueue[Mapping[str, Any] | None] = SimpleQueue()
         self._sent: dict[str, str] = {}
-        self._ids = itertools.count(1)
+        self._ids, self._order = itertools.count(1), itertools.count(1)
 
     def put(self, task: Task) -> Task:
         """Do a task with the texts as they are now. For the thread that owns the database."""
@@ -62,8 +69,11 @@ class Evaluator:
         if self._thread is None:
             self._thread = Thread(target=self._work, name="potto-evaluation", daemon=True)
             self._thread.start()
-        self._tasks.put(task)
+        self._add(task)
         return task
+
+    def _add(self, task: Task) -> None:
+        self._tasks.put((task.urgency, next(self._order), task))
 
     @property
     def started(self) -> bool:
@@ -75,12 +85,16 @@ class Evaluator:
         self._end()
 
     def _work(self) -> None:
-        while (task := self._tasks.get()) is not None:
+        while True:
+            task = self._tasks.get()[-1]
             if task.cancelled.is_set():
                 task.done({"error": "cancelled"})
                 continue
             try:
                 answer = self._answer(task)
+            except GivesWay:
+                self._add(task)
+                continue
             except Exception:
                 logger.error("the evaluation failed", exc_info=True)
                 self._end()
@@ -102,10 +116,14 @@ class Evaluator:
         return self._await(id, task)
 
     def _await(self, id: int, task: Task) -> Mapping[str, Any]:
-        deadline = time.monotonic() + task.limit
+        begun = time.monotonic()
+        deadline = begun + task.limit
         while True:
             if task.cancelled.is_set():
                 return self._interrupt(id, "cancelled")
+            if self._is_pressed(task) and time.monotonic() - begun > PATIENCE:
+                self._interrupt(id, "")
+                raise GivesWay
             left = deadline - time.monotonic()
             if left <= 0:
                 return self._interrupt(id, f"stopped after {task.limit:g} seconds")
@@ -118,6 +136,11 @@ class Evaluator:
                 return {"error": "the evaluation process ended unexpectedly"}
             if said.get("id") == id:
                 return said
+
+    def _is_pressed(self, task: Task) -> bool:
+        """Whether something more urgent waits."""
+        with self._tasks.mutex:
+            return bool(self._tasks.queue) and self._tasks.queue[0][0] < task.urgency
 
     def _interrupt(self, id: int, why: str) -> Mapping[str, Any]:
         """Stop what runs; with the process if it does not heed."""

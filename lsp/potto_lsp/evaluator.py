@@ -13,12 +13,15 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from threading import Thread
 from typing import TYPE_CHECKING, Any, TextIO
 
-from potto.render import ProgramError, render
+from potto.render import Located, ProgramError, render
+from potto.source import Span
 
 if TYPE_CHECKING:
+    from potto.runtime.estimate import Estimate
     from potto.world import World
 
 MOST_LINES = 1000  # of what a script shows
@@ -104,8 +107,7 @@ def _answer(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
     try:
         return {"result": TASKS[task["do"]](world, task)}
     except ProgramError as error:
-        shown = "\n\n".join(render(located, error.sources) for located in error.located)
-        return {"error": shown, "brief": "; ".join(d.message for d in error.diagnostics)}
+        return {"error": _rendered(error), "brief": "; ".join(d.message for d in error.diagnostics)}
     except Unanswerable as error:
         return {"error": str(error)}
     except Exception as error:  # a bug of ours: told, and the process lives on
@@ -126,18 +128,78 @@ def _evaluate(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _live(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
-    """The value of a live expression, and whether it is the expected one."""
-    from potto.live import agrees, bounds
+    """The value of a live expression, whether it is the expected one, and what there is to say about it."""
+    from potto.live import DOES_NOT_HOLD, agrees, bounds
     from potto.runtime.shown import format_bounds, format_estimate
 
     file, expected = task["file"], task["expected"]
-    estimate = world.evaluate(file, task["text"]).estimate
+    try:
+        answer = world.evaluate(file, task["text"])
+    except ProgramError as error:  # what the checker sees is said without us
+        whole = Span(0, len(task["text"]))
+        said = [
+            one if one.file == "<expression>" else Located("<expression>", replace(one.diagnostic, span=whole))
+            for one in error.located
+            if one.diagnostic.code.startswith("P05") and one.diagnostic.code != "P0504"
+        ]
+        return {"text": "?", "holds": None, "expected": expected, "tooltip": _rendered(error), "said": _said(said)}
+    estimate = answer.estimate
     found = {"text": format_estimate(estimate), "holds": None, "expected": expected}
     if estimate.text is None:
         found["error"] = format_bounds(bounds(estimate))
-    if expected is not None:
-        wanted = world.evaluate(file, expected).estimate
+    said = list(answer.remarks)
+    if expected is not None and (wanted := _wanted(world, file, expected)) is not None:
         found["holds"] = agrees(estimate, wanted, world.parse(expected))
+        if not found["holds"]:
+            message = f"this is {found['text']}, not {expected}"
+            help = "put right the program, or what it is expected to give"
+            note = f"the error is {found['error']}" if "error" in found else ""
+            whole = Span(0, len(expected))
+            failed = DOES_NOT_HOLD(whole, message, notes=(note,) if note else (), help=help)
+            said.append(Located("<expected>", failed))
+    return {**found, "said": _said(said)}
+
+
+def _wanted(world: World, file: str, expected: str) -> Estimate | None:
+    """What a live expression should give; None if that cannot be evaluated."""
+    try:
+        return world.evaluate(file, expected).estimate
+    except ProgramError:
+        return None
+
+
+def _said(found: list[Located]) -> list[dict[str, Any]]:
+    """Diagnostics of an expression, or of what it is expected to give, as plain data."""
+    return [
+        {
+            "where": located.file, "code": said.code, "severity": said.severity, "message": said.message,
+            "span": [said.span.start, said.span.end], "notes": list(said.notes), "help": said.help,
+        }
+        for located in found
+        if (said := located.diagnostic) and located.file in ("<expression>", "<expected>")
+    ]  # fmt: skip
+
+
+def _rendered(error: ProgramError) -> str:
+    return "\n\n".join(render(located, error.sources) for located in error.located)
+
+
+def _point(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
+    """A value, and the slopes by each parameter where they are numbers; all with error bars."""
+    from potto.runtime.shown import format_bounds, format_estimate, format_numbers
+
+    estimate = world.evaluate(task["file"], task["text"]).estimate
+    found: dict[str, Any] = {"text": format_estimate(estimate), "slopes": []}
+    if estimate.text is None:
+        found["error"] = format_bounds(estimate.error)
+    for parameter, expression in task["slopes"]:
+        try:
+            dual = world.evaluate(task["file"], expression).estimate
+        except ProgramError:  # its derivative is no number: it jumps with this parameter
+            continue
+        if dual.tangent is not None:
+            text, error = format_numbers(dual.tangent, dual.tangent_error), format_bounds(dual.tangent_error)
+            found["slopes"].append({"by": parameter, "text": text, "error": error})
     return found
 
 
@@ -177,6 +239,7 @@ def _sample(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
 TASKS: Mapping[str, Callable[[World, Mapping[str, Any]], dict[str, Any]]] = {
     "evaluate": _evaluate,
     "live": _live,
+    "point": _point,
     "run": _run,
     "preview": _preview,
     "sample": _sample,

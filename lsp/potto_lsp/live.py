@@ -1,28 +1,36 @@
-"""The values of live expressions (`#> e`), kept until what they mean changes.
+"""The values of live expressions (`#> e`) and of the points at which definitions are looked at.
 
-Owns `LiveValues`. Evaluated is only what an editor shows: the files for which inlay hints were asked. A value is known
-by the digests of all that its expression reaches, so that an edit elsewhere evaluates nothing.
+Owns `LiveValues`. Evaluated is only what an editor shows: live expressions of the files for which inlay hints were
+asked, then a point of each of their definitions. A value is known by the digests of all that its expression reaches, so
+that an edit elsewhere evaluates nothing.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+import time
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from potto import ide
 from potto.core.terms import Global, Term, postorder
+from potto.diagnostics import Diagnostic
 from potto.elaborate import core, elaborate_expression
+from potto.modules import names
 from potto.query import Database, query
+from potto.render import Located
+from potto.source import Span
 from potto.syntax import live_expressions, parse_expression
-from potto_lsp.evaluation import Task
+from potto_lsp.evaluation import LIVE, POINTS, Task
 
 if TYPE_CHECKING:
     from potto.syntax.live import Live
     from potto_lsp.session import Session
 
-Key = tuple[str, str, str | None, bytes]
 MOST = 200  # live expressions of one file that are evaluated
+MOST_ASKED = 50  # definitions of other files whose points are kept
+PAUSE = 0.15  # seconds between two requests to the client to ask for its hints again
 
 
 @query
@@ -35,6 +43,7 @@ def _reached(term: Term) -> tuple[bytes, tuple[tuple[str, str], ...]]:
     return term.digest, tuple((node.module, node.name) for node in postorder(term) if isinstance(node, Global))
 
 
+@query(keep=4096)
 def fingerprint(db: Database, file: str, text: str) -> bytes:
     """What the value of an expression depends on."""
     digest, reached = _reached(elaborate_expression(db, file, parse_expression(text).expr).term)
@@ -48,81 +57,170 @@ def fingerprint(db: Database, file: str, text: str) -> bytes:
 
 
 @dataclass(frozen=True, slots=True)
+class Key:
+    """Something to evaluate. The meaning is the digest of all that it reaches."""
+
+    do: str
+    file: str
+    text: str
+    more: tuple[tuple[str, Any], ...]
+    meaning: bytes
+
+
+@dataclass(frozen=True, slots=True)
 class Value:
     """What is known of a live expression: an answer of the evaluation process."""
 
     answer: Mapping[str, Any]
 
     @property
+    def result(self) -> Mapping[str, Any]:
+        found = self.answer.get("result")
+        return found if isinstance(found, Mapping) else {}
+
+    @property
     def label(self) -> str:
-        result = self.answer.get("result")
-        if result is None:
-            return "= ?"
-        if result["holds"] is False:
-            return f"= {result['text']}, not {result['expected']}"
-        return f"= {result['text']}"
+        text = self.result.get("text", "?")
+        return f"= {text}, not {self.result['expected']}" if self.result.get("holds") is False else f"= {text}"
 
     @property
     def tooltip(self) -> str:
-        result = self.answer.get("result")
-        if result is None:
-            return f"```text\n{self.answer.get('error', '')}\n```"
-        error = f"error at most {result['error']}" if "error" in result else ""
-        held = {True: "as expected", False: "not as expected", None: ""}[result["holds"]]
+        if not self.result or "tooltip" in self.result:
+            return f"```text\n{self.result.get('tooltip') or self.answer.get('error', '')}\n```"
+        error = f"error at most {self.result['error']}" if "error" in self.result else ""
+        held = {True: "as expected", False: "not as expected", None: ""}[self.result["holds"]]
         return "; ".join(part for part in (error, held) if part)
 
 
+def shown(point: ide.Point, value: Value) -> str:
+    """A point in markdown: the value and the slopes there, with error bars; nothing if there is no value."""
+    if not value.result or value.result.get("error") is None:
+        return ""
+    lines = [f"- `{point.text}` = {value.result['text']} ± {value.result['error']}"]
+    lines += [f"    - by `{s['by']}`: {s['text']} ± {s['error']}" for s in value.result["slopes"]]
+    return "\n".join(lines)
+
+
 class LiveValues:
-    """What the live expressions of the shown files give. For the thread that owns the database."""
+    """What the expressions of the shown files give. For the thread that owns the database."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
         self._values: dict[Key, Value] = {}
         self._waiting: dict[Key, Task] = {}
         self._shown: set[str] = set()
+        self._asked: dict[tuple[str, str], None] = {}
+        self._told = 0.0
+
+    # What is known
 
     def values(self, file: str) -> list[tuple[Live, Value | None]]:
         """The live expressions of a file with the values that are known; they are evaluated from now on."""
-        found = [(live, self._values.get(key)) for live, key in self._keys(file)]
+        found = [(live, self._values.get(key)) for live, key in self._live(file)]
         if found and file not in self._shown:
             self._shown.add(file)
             self.refresh()
         return found
 
-    def _keys(self, file: str) -> list[tuple[Live, Key]]:
+    @property
+    def enabled(self) -> bool:
+        """Whether anything is evaluated unasked."""
+        return self._session.analysis.settings.get("live.enabled") is not False
+
+    def at_points(self, file: str, name: str) -> list[tuple[ide.Point, Value]]:
+        """What is known of a definition at its points; they are evaluated from now on."""
+        found = [(point, self._values.get(key)) for point, key in self._points(file, name)]
+        if any(value is None for _, value in found) and (file, name) not in self._asked:
+            self._asked[file, name] = None
+            if len(self._asked) > MOST_ASKED:
+                del self._asked[next(iter(self._asked))]
+            self.refresh()
+        return [(point, value) for point, value in found if value is not None]
+
+    def diagnostics(self, file: str) -> tuple[Located, ...]:
+        """What is wrong with the live expressions of an open file: as the checker sees them, and what came out."""
+        analysis = self._session.analysis
+        document = analysis.document(file)
+        if document is None or "#>" not in document.text.text:
+            return ()
+        found = list(ide.live_diagnostics(analysis.db, file))
+        for live, value in ((live, self._values.get(key)) for live, key in self._live(file)):
+            found += () if value is None else _said(live, value)
+        return tuple(Located(file, said) for said in found)
+
+    # What is to be known
+
+    def _live(self, file: str) -> list[tuple[Live, Key]]:
         text = self._session.analysis.text(file).text
         if "#>" not in text:
             return []
         db = self._session.analysis.db
         return [
-            (live, (file, live.text, live.expected, fingerprint(db, file, live.text)))
+            (live, Key("live", file, live.text, (("expected", live.expected),), fingerprint(db, file, live.text)))
             for live in live_expressions(text)[:MOST]
         ]
 
+    def _points(self, file: str, name: str) -> Iterator[tuple[ide.Point, Key]]:
+        db = self._session.analysis.db
+        if name in names(db, file) and ide.is_sound(db, file, name):
+            for point in ide.points(db, file, name):
+                if point.chosen:  # nobody asked about this one
+                    continue
+                more = (("slopes", point.slopes),)
+                yield point, Key("point", file, point.text, more, fingerprint(db, file, point.text))
+
+    def _wanted(self) -> tuple[dict[Key, None], dict[Key, None]]:
+        """The live expressions of the shown files in the order of the text, and the points of their definitions and of
+        those that were asked about."""
+        live = {key: None for file in self._shown for _, key in self._live(file)}
+        db = self._session.analysis.db
+        asked = [*self._asked, *((file, name) for file in self._shown for name in names(db, file))]
+        return live, {key: None for each in asked for _, key in self._points(*each)}
+
     def refresh(self) -> None:
         """Evaluate what is shown and not known; forget what nobody shows any more."""
-        analysis = self._session.analysis
-        if analysis.settings.get("live.enabled") is False:
+        if not self.enabled or not (self._shown or self._asked):
             return
+        analysis = self._session.analysis
         self._shown &= set(analysis.documents)
-        wanted = {key for file in self._shown for _, key in self._keys(file)}
-        for key in [key for key in self._waiting if key not in wanted]:
+        live, points = self._wanted()
+        for key in [key for key in self._waiting if key not in live and key not in points]:
             self._waiting.pop(key).cancelled.set()
-        self._values = {key: value for key, value in self._values.items() if key in wanted}
-        for key in wanted - self._values.keys() - self._waiting.keys():
-            self._waiting[key] = self._evaluate(key)
+        self._values = {key: value for key, value in self._values.items() if key in live or key in points}
+        for urgency, keys in ((LIVE, live), (POINTS, points)):
+            for key in keys:
+                if key not in self._values and key not in self._waiting:
+                    self._waiting[key] = self._evaluate(key, urgency)
 
-    def _evaluate(self, key: Key) -> Task:
-        file, text, expected, _ = key
-
+    def _evaluate(self, key: Key, urgency: int) -> Task:
         def done(answer: Mapping[str, Any]) -> None:
             self._session.later(lambda: self._arrived(key, answer))
 
-        return self._session.evaluator.put(Task("live", file, text, done, {"expected": expected}))
+        return self._session.evaluator.put(Task(key.do, key.file, key.text, done, dict(key.more), urgency=urgency))
 
     def _arrived(self, key: Key, answer: Mapping[str, Any]) -> None:
         if self._waiting.pop(key, None) is None:
             return
         self._values[key] = Value(answer)
-        if not self._waiting and self._session.client.can("workspace.inlayHint.refreshSupport"):
+        if key.do != "live":
+            return
+        before = self._session.publisher.known(key.file)
+        self._session.publisher.push(key.file)
+        if self._session.publisher.known(key.file) != before:
+            self._session.diagnostics_changed()
+        now = time.monotonic()
+        last = not any(waiting.do == "live" for waiting in self._waiting)
+        if (last or now - self._told > PAUSE) and self._session.client.can("workspace.inlayHint.refreshSupport"):
+            self._told = now
             self._session.request("workspace/inlayHint/refresh", None, None)
+
+
+def _said(live: Live, value: Value) -> Iterator[Diagnostic]:
+    """What came out of a live expression as diagnostics of its file."""
+    for said in value.result.get("said", ()):
+        place = live.expected_span if said["where"] == "<expected>" else live.text_span
+        if place is not None:
+            start, end = said["span"]
+            span = Span(place.start + start, place.start + end)
+            notes = tuple(said["notes"])
+            yield Diagnostic(said["code"], said["severity"], said["message"], span, notes=notes, help=said["help"])

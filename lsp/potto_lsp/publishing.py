@@ -46,13 +46,15 @@ class Publisher:
         self._ids = itertools.count(1)
         self._wrong_projects: set[str] = set()
         self.whole_workspace = True
+        self.further: Callable[[str], tuple[Located, ...]] = lambda key: ()  # what others have to say about a file
 
     def report(self, key: str) -> Report:
         """What there is to say about a file now."""
         from potto.project import levelled
 
         analysis = self._analysis
-        found, text, levels = analysis.diagnostics(key), analysis.text(key), analysis.levels(key)
+        found = (*analysis.diagnostics(key), *self.further(key))
+        text, levels = analysis.text(key), analysis.levels(key)
         old = self._reports.get(key)
         elsewhere = any(located.diagnostic.related for located in found)  # in files that may have changed
         if old is not None and old.found == found and old.text is text and old.levels == levels and not elsewhere:
@@ -64,6 +66,11 @@ class Publisher:
             new = Report(found, text, levels, items, f"potto-{next(self._ids)}")
         self._reports[key] = new
         return new
+
+    def known(self, key: str) -> str:
+        """The id of the last report of a file."""
+        report = self._reports.get(key)
+        return "" if report is None else report.id
 
     # Pushing
 

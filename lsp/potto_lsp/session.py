@@ -59,6 +59,7 @@ class Session:
             self.publisher = Publisher(self.analysis, self.client, self.notify)
             self.evaluator = Evaluator(self.analysis)
             self.live = LiveValues(self)
+            self.publisher.further = self.live.diagnostics
             self.set_folders(self.client.folders)
         return self.analysis.db
 

@@ -9,6 +9,7 @@ from potto.ide.calling import incoming_calls, outgoing_calls, prepare_call_hiera
 from potto.ide.colours import semantic_tokens
 from potto.ide.completing import completions, resolve_completion
 from potto.ide.explaining import derivative_markdown
+from potto.ide.explaining import sound as is_sound
 from potto.ide.finding import highlights, references
 from potto.ide.folds import folding_ranges
 from potto.ide.formatting import format_document, format_on_type, format_range
@@ -16,6 +17,7 @@ from potto.ide.hints import inlay_hints, resolve_inlay_hint
 from potto.ide.hovers import hover
 from potto.ide.lenses import code_lenses, resolve_code_lens
 from potto.ide.linking import document_links, linked_editing
+from potto.ide.living import live_diagnostics
 from potto.ide.model import (
     TOKEN_MODIFIERS,
     TOKEN_TYPES,
@@ -48,10 +50,12 @@ from potto.ide.model import (
 )
 from potto.ide.moving import rename_files
 from potto.ide.outlines import document_symbols, workspace_symbols
+from potto.ide.points import Point, point_of, points
 from potto.ide.renaming import prepare_rename, rename
 from potto.ide.scenes import Scene, SceneParameter, scenes
 from potto.ide.selecting import selection_ranges
 from potto.ide.signatures import signature_help
+from potto.ide.symbols import definition_at
 from potto.ide.targets import declaration, definition, implementation, type_definition
 from potto.ide.values import inline_values
 
@@ -78,6 +82,7 @@ __all__ = [
     "Links",
     "Location",
     "ParameterText",
+    "Point",
     "Refused",
     "Renaming",
     "Scene",
@@ -91,6 +96,7 @@ __all__ = [
     "completions",
     "declaration",
     "definition",
+    "definition_at",
     "derivative_markdown",
     "document_links",
     "document_symbols",
@@ -104,8 +110,12 @@ __all__ = [
     "incoming_calls",
     "inlay_hints",
     "inline_values",
+    "is_sound",
     "linked_editing",
+    "live_diagnostics",
     "outgoing_calls",
+    "point_of",
+    "points",
     "prepare_call_hierarchy",
     "prepare_rename",
     "references",

@@ -95,6 +95,13 @@ def symbol_at(db: Database, file: str, offset: int) -> Found | None:
     return Found(chunk.absolute(occurrence.span), occurrence, chunk, meaning_of(db, chunk, occurrence))
 
 
+def definition_at(db: Database, file: str, offset: int) -> tuple[str, str] | None:
+    """The definition that is named at an offset: its file and its name."""
+    found = symbol_at(db, file, offset)
+    symbol = None if found is None else found.symbol
+    return (symbol.file, symbol.name) if isinstance(symbol, DefinitionSymbol) else None
+
+
 def meaning_of(db: Database, chunk: ChunkAt, occurrence: Occurrence) -> Symbol | None:
     """What an occurrence means."""
     file, name = chunk.file, occurrence.name

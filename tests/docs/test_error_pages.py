@@ -122,3 +122,12 @@ def test_a_budget_that_is_too_small_is_said(tmp_path: Path, capsys: pytest.Captu
     waves.write_text("def wave(t)\n    integral [0, 1] sin(1e5*t*x)/(x + 0.001) d(x)\n")
     assert main(["eval", str(waves), "wave(3)", "--max-evals", "100"]) == 0
     assert "warning[P0501]" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("written", "status"), [("0.34", 1), ("0.33", 0)])
+def test_a_live_expression_holds_to_the_digits_that_were_written(written: str, status: int, tmp_path: Path) -> None:
+    """P0530, whose page shows a command."""
+    thirds = tmp_path / "thirds.po"
+    thirds.write_text(f"def third(x) x/3\n#> third(1)\n#= {written}\n")
+    assert f"#= {written}" in PAGES["P0530"].text
+    assert main(["test", str(thirds)]) == status

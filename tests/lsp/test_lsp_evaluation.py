@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import base64
-import os
+import re
 import signal
-import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
+from queue import SimpleQueue
+from threading import Event, Timer
 from typing import Any
 
 import pytest
 from lsp_client import Client
+from potto_lsp.analysis import Analysis
+from potto_lsp.evaluation import LIVE, Evaluator, Task
 
 Server = Callable[..., Client]
 Uri = Callable[[str], str]
 TEXT = "def f(t)\n    integral [0, 1] [x < t] * x d(x)\n#> f(0.5)\n#= 0.125\n#> f(0.5)\n#= 0.5\n#> 1/\n"
 # t^2/2 at 1/2 is 1/8: the first expectation holds, the second does not, and the third is no expression.
+PUSHED = "textDocument/publishDiagnostics"
+# A sum that takes minutes.
+HEAVY = "sum i in 1..50000 (integral ([0,1],[0,1],[0,1]) [x*y + z*i < 1/i] * sin(x*y*z*i) d(x,y,z))"
 REFRESHES = {"workspace": {"inlayHint": {"refreshSupport": True}}}
 
 
@@ -31,6 +36,14 @@ def hints(client: Client, uri: str) -> dict[int, str]:
     span = {"start": {"line": 0, "character": 0}, "end": {"line": 99, "character": 0}}
     found = client.ask("textDocument/inlayHint", {"textDocument": {"uri": uri}, "range": span})
     return {hint["position"]["line"]: hint["label"] for hint in found if hint["label"].startswith("=")}
+
+
+def shown(client: Client, uri: str, lines: set[int]) -> dict[int, str]:
+    """The live hints when there are some on all of these lines; asked for again when the server says so."""
+    while not lines <= (found := hints(client, uri)).keys():
+        while client.asked.get(timeout=60)["method"] != "workspace/inlayHint/refresh":
+            pass
+    return found
 
 
 def test_evaluate_an_unsaved_text(server: Server, uri: Uri) -> None:
@@ -76,8 +89,7 @@ def test_live_values_are_hints(server: Server, uri: Uri) -> None:
     client = server(REFRESHES)
     client.open(uri("main"), TEXT)
     assert hints(client, uri("main")) == {}
-    assert client.asked.get(timeout=60)["method"] == "workspace/inlayHint/refresh"
-    found = hints(client, uri("main"))
+    found = shown(client, uri("main"), {2, 4, 6})
     assert found[2].startswith("= 0.125") and "not" not in found[2]
     assert found[4].startswith("= 0.125") and found[4].endswith("not 0.5")
     assert found[6] == "= ?"
@@ -86,29 +98,137 @@ def test_live_values_are_hints(server: Server, uri: Uri) -> None:
 def test_an_edit_elsewhere_evaluates_nothing(server: Server, uri: Uri) -> None:
     client = server(REFRESHES)
     client.open(uri("main"), TEXT)
-    hints(client, uri("main"))
-    client.asked.get(timeout=60)
+    shown(client, uri("main"), {2, 4, 6})
     client.change(uri("main"), 2, {"text": "# above\n" + TEXT + "def other(t) t\n"})
     assert hints(client, uri("main"))[3].startswith("= 0.125")
     client.change(uri("main"), 3, {"text": TEXT.replace("* x d", "* x^2 d")})
-    hints(client, uri("main"))
-    client.asked.get(timeout=60)
-    assert hints(client, uri("main"))[2].startswith("= 0.04166")  # t^3/3 at 1/2
+    assert shown(client, uri("main"), {2})[2].startswith("= 0.04166")  # t^3/3 at 1/2
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="finds the process in /proc")
-def test_an_evaluation_that_dies_is_started_again(server: Server, uri: Uri) -> None:
-    client = server()
+def test_a_value_that_is_not_the_expected_one_is_an_error(server: Server, uri: Uri) -> None:
+    client = server(REFRESHES)
     client.open(uri("main"), TEXT)
+    hints(client, uri("main"))
+    while True:
+        found = {said["code"]: said for said in client.note(PUSHED, uri=uri("main"))["diagnostics"]}
+        if "P0530" in found:
+            break
+    assert (found["P0530"]["severity"], found["P0530"]["range"]["start"]) == (1, {"line": 5, "character": 3})
+    assert "not 0.5" in found["P0530"]["message"] and found["P0101"]["range"]["start"]["line"] == 6
+    client.change(uri("main"), 2, {"text": TEXT.replace("#= 0.5", "#= 0.125")})
+    assert "P0530" not in [said["code"] for said in client.note(PUSHED, uri=uri("main"), version=2)["diagnostics"]]
+
+
+def test_a_client_that_pulls_is_told_to_pull_again(server: Server, uri: Uri) -> None:
+    client = server({"textDocument": {"diagnostic": {}}, "workspace": {"diagnostics": {"refreshSupport": True}}})
+    client.open(uri("main"), TEXT)
+    hints(client, uri("main"))
+    document = {"textDocument": {"uri": uri("main")}}
+    while "P0530" not in str(client.ask("textDocument/diagnostic", document)):
+        assert client.asked.get(timeout=60)["method"] == "workspace/diagnostic/refresh"
+
+
+def test_what_comes_out_can_be_written_down(server: Server, uri: Uri) -> None:
+    """The action takes the place of a wrong expectation, or adds one; then nothing is left to say."""
+    text = "def f(t) t/8\n#> f(2)\n#= 3\n#> f(4)\n"
+    client = server(REFRESHES)
+    client.open(uri("main"), text)
+    shown(client, uri("main"), {1, 3})
+    for line, title in ((3, "Expect 0.5"), (2, "Expect 0.25")):
+        place = {"start": {"line": line, "character": 3}, "end": {"line": line, "character": 3}}
+        params = {"textDocument": {"uri": uri("main")}, "range": place, "context": {"diagnostics": []}}
+        action = next(a for a in client.ask("textDocument/codeAction", params) if a["title"] == title)
+        (edit,) = action["edit"]["changes"][uri("main")]
+        lines = text.splitlines(keepends=True)
+        start, end = edit["range"]["start"], edit["range"]["end"]
+        lines[line] = lines[line][: start["character"]] + edit["newText"] + lines[line][end["character"] :]
+        text = "".join(lines)
+    assert text == "def f(t) t/8\n#> f(2)\n#= 0.25\n#> f(4)\n#= 0.5\n"
+    client.change(uri("main"), 2, {"text": text})
+    assert client.note(PUSHED, uri=uri("main"), version=2)["diagnostics"] == []
+
+
+def test_hover_shows_values_and_slopes_with_error_bars(server: Server, uri: Uri) -> None:
+    client = server(REFRESHES)
+    client.open(uri("main"), TEXT)
+    params = {"textDocument": {"uri": uri("main")}, "position": {"line": 0, "character": 4}}
+    shown(client, uri("main"), {2})
+    until = time.monotonic() + 60
+    while "**values**" not in (text := client.ask("textDocument/hover", params)["contents"]["value"]):
+        assert time.monotonic() < until
+        time.sleep(0.02)
+    values = text.partition("**values**")[2]
+    assert re.search(r"`f\(0\.5\)` = 0\.125\d* ± \d", values)
+    assert re.search(r"by `t`: 0\.(5|4999)\d* ± \d", values)  # d/dt t^2/2 = t
+    on_comment = {"textDocument": {"uri": uri("main")}, "position": {"line": 2, "character": 1}}
+    assert "as expected" in client.ask("textDocument/hover", on_comment)["contents"]["value"]
+
+
+def test_nothing_is_evaluated_unasked_when_that_is_switched_off(server: Server, uri: Uri) -> None:
+    client = server(REFRESHES)
+    client.tell("workspace/didChangeConfiguration", {"settings": {"potto": {"live": {"enabled": False}}}})
+    client.open(uri("main"), TEXT)
+    assert hints(client, uri("main")) == {}
+    time.sleep(0.5)
+    assert hints(client, uri("main")) == {} and client.asked.empty()
     assert "result" in run(client, "potto.evaluate", uri("main"), "f(0.5)")
-    children = Path(f"/proc/{client.process.pid}/task/{client.process.pid}/children").read_text()
-    tasks = Path(f"/proc/{client.process.pid}/task").iterdir()
-    children = " ".join((task / "children").read_text() for task in tasks)
-    (child,) = map(int, children.split())
-    os.kill(child, signal.SIGKILL)
-    time.sleep(0.2)
-    assert "result" in run(client, "potto.evaluate", uri("main"), "f(0.5)")
-    client.stop()
+
+
+def ask(evaluator: Evaluator, text: str, **more: Any) -> Any:
+    """What an evaluator answers."""
+    answers: SimpleQueue[Any] = SimpleQueue()
+    evaluator.put(Task("evaluate", "<text>", text, answers.put, **more))
+    answer = answers.get(timeout=60)
+    return {"text": answer["result"]["text"]} if "result" in answer else answer
+
+
+def test_an_evaluation_that_dies_is_started_again() -> None:
+    evaluator = Evaluator(Analysis("utf-16"))
+    assert ask(evaluator, "1 + 1") == {"text": "2"}
+    assert evaluator._process is not None
+    evaluator._process.kill()
+    evaluator._process.wait()
+    assert ask(evaluator, "2 + 3") == {"text": "5"}
+    evaluator.close()
+
+
+def test_an_evaluation_that_dies_at_work_costs_one_answer() -> None:
+    evaluator = Evaluator(Analysis("utf-16"))
+    assert ask(evaluator, "1 + 1") == {"text": "2"}
+    process = evaluator._process
+    assert process is not None
+    Timer(0.3, process.kill).start()
+    assert "ended unexpectedly" in ask(evaluator, HEAVY)["error"]
+    assert ask(evaluator, "2 + 3") == {"text": "5"}
+    evaluator.close()
+
+
+@pytest.mark.parametrize("deaf", [False, True], ids=["interrupted", "killed"])
+def test_an_evaluation_that_hangs_is_ended(deaf: bool) -> None:
+    """Also one that does not heed an interrupt: stopped, as a process that waits for something for ever."""
+    evaluator = Evaluator(Analysis("utf-16"))
+    evaluator._analysis.settings = {"evaluation.timeLimit": 0.5}
+    assert ask(evaluator, "1 + 1") == {"text": "2"}
+    if deaf:
+        assert evaluator._process is not None
+        evaluator._process.send_signal(signal.SIGSTOP)
+    assert "stopped after 0.5 seconds" in ask(evaluator, HEAVY)["error"]
+    assert ask(evaluator, "2 + 3") == {"text": "5"}
+    evaluator.close()
+
+
+def test_what_a_user_asks_for_does_not_wait_for_what_is_shown() -> None:
+    """A live expression that takes long gives way and is done afterwards."""
+    evaluator = Evaluator(Analysis("utf-16"))
+    evaluator._analysis.settings = {"evaluation.timeLimit": 4}
+    assert ask(evaluator, "1 + 1") == {"text": "2"}
+    done: list[str] = []
+    ended = Event()
+    evaluator.put(Task("evaluate", "<text>", HEAVY, lambda a: (done.append("shown"), ended.set()), urgency=LIVE))
+    time.sleep(0.1)
+    assert ask(evaluator, "2 + 3") == {"text": "5"} and done == []
+    assert ended.wait(60) and done == ["shown"]
+    evaluator.close()
 
 
 # n integrals with a surface in three variables: of 50,000 each test waits for none to end.

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, cast
 
 from potto import ide
+from potto.source import Span
 from potto_lsp import convert, protocol
 from potto_lsp.asking import Ask
+
+_DIGITS = frozenset("0123456789.e+-(), ")  # of numbers and tuples of them: all else is no value to write down
 
 
 def code_actions(ask: Ask) -> list[protocol.CodeAction]:
@@ -15,7 +18,25 @@ def code_actions(ask: Ask) -> list[protocol.CodeAction]:
     wanted = [str(kind) for kind in kinds] if isinstance(kinds, list) else []
     diagnostics = ask.optional("context", "diagnostics")
     given = diagnostics if isinstance(diagnostics, list) else []
-    return [_action(ask, action, given) for action in ide.code_actions(ask.db, ask.file, ask.span, wanted)]
+    found = [_action(ask, action, given) for action in ide.code_actions(ask.db, ask.file, ask.span, wanted)]
+    return [*found, *(_action(ask, action, given) for action in _expecting(ask, wanted))]
+
+
+def _expecting(ask: Ask, wanted: list[str]) -> Iterator[ide.CodeAction]:
+    """For a live expression whose value is known: to expect that, where it is not what is expected now."""
+    if "#>" not in ask.text.text or (wanted and "quickfix" not in wanted):
+        return
+    span = ask.span
+    for live, value in ask.session.live.values(ask.file):
+        end = live.span.end if live.expected_span is None else live.expected_span.end
+        if value is None or not (span.start <= end and live.span.start <= span.end):
+            continue
+        text = value.result.get("text", "")
+        if not text or not set(text) <= _DIGITS or (live.expected is not None and value.result["holds"] is not False):
+            continue
+        edit = ide.Edit(live.expected_span or Span(end, end), text if live.expected_span else f"\n#= {text}")
+        change = ide.Change((ide.FileEdits(ask.file, (edit,)),))
+        yield ide.CodeAction(f"Expect {text}", "quickfix", change, ("P0530",) if live.expected_span else ())
 
 
 def _action(ask: Ask, action: ide.CodeAction, given: list[Any]) -> protocol.CodeAction:

@@ -1,14 +1,40 @@
-"""`textDocument/hover`."""
+"""`textDocument/hover`: what is known by symbols, and the values where live expressions give some."""
 
 from __future__ import annotations
 
 from potto import ide
+from potto.syntax import live_expressions
 from potto_lsp import convert, protocol
 from potto_lsp.asking import Ask
+from potto_lsp.live import shown
 
 
 def hover(ask: Ask) -> protocol.Hover | None:
-    found = ide.hover(ask.db, ask.file, ask.offset)
+    offset = ask.offset
+    found = ide.hover(ask.db, ask.file, offset)
     if found is None:
+        return _live(ask, offset)
+    values = _values(ask, offset)
+    markdown = f"{found.markdown}\n\n**values**\n\n{values}" if values else found.markdown
+    return {"contents": convert.markdown(markdown), "range": ask.range(found.span)}
+
+
+def _values(ask: Ask, offset: int) -> str:
+    """The values of the definition that is named at an offset."""
+    named = ide.definition_at(ask.db, ask.file, offset) if ask.session.live.enabled else None
+    if named is None:
+        return ""
+    return "\n".join(filter(None, (shown(*each) for each in ask.session.live.at_points(*named))))
+
+
+def _live(ask: Ask, offset: int) -> protocol.Hover | None:
+    """A live expression: its value, with what it is off by."""
+    if "#>" not in ask.text.text:
         return None
-    return {"contents": convert.markdown(found.markdown), "range": ask.range(found.span)}
+    if all(not live.span.start <= offset <= live.span.end for live in live_expressions(ask.text.text)):
+        return None
+    for live, value in ask.session.live.values(ask.file):
+        if value is not None and live.span.start <= offset <= live.span.end:
+            told = convert.markdown(f"`{live.text}` {value.label}\n\n{value.tooltip}")
+            return {"contents": told, "range": ask.range(live.span)}
+    return None

@@ -1,0 +1,209 @@
+"""The points at which definitions are looked at: calls in live expressions and statements, and how they change there.
+
+Owns `Point`, `points` and `point_of`. Only texts are made here; numbers are for who evaluates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from potto.ide.documents import kind_of
+from potto.ide.places import all_chunks
+from potto.ide.symbols import callee
+from potto.modules import names
+from potto.query import Database, query
+from potto.syntax import children, live_expressions, nodes, parse_expression
+from potto.types import Function, Parameter, Real, TupleOf, Type, Var, groups_of, interface, result_of
+from potto.types.types import resolve
+
+MOST = 3  # points of one definition
+USUAL = "0.5"  # where nothing is said
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """A call with all its arguments. `slopes`: parameters, each with an expression whose tangent is the derivative by
+    it. `chosen`: nobody wrote this call, it stands for one."""
+
+    text: str
+    slopes: tuple[tuple[str, str], ...] = ()
+    chosen: bool = False
+
+
+@query
+def points(db: Database, file: str, name: str) -> tuple[Point, ...]:
+    """The points of a definition in its own file, a constant's being its name; one that we choose if there are none."""
+    kind = kind_of(db, file, name)
+    if kind != "function":
+        return (Point(name),) if kind == "constant" else ()
+    found: dict[str, Point] = {}
+    for text, call in calls(db, file):
+        made = _point(db, file, text, call)
+        if made is not None and made[0] == (file, name):
+            found.setdefault(made[1].text, made[1])
+            if len(found) == MOST:
+                break
+    return tuple(found.values()) or _chosen(db, file, name)
+
+
+@query
+def calls(db: Database, file: str) -> tuple[tuple[str, nodes.Apply], ...]:
+    """The calls outside of definitions that name nothing of their own, each with the text that its places are of."""
+    found: list[tuple[str, nodes.Apply]] = []
+    for chunk in all_chunks(db, file):
+        for live in live_expressions(chunk.text) if "#>" in chunk.text else ():
+            found += ((live.text, call) for call in _calls(parse_expression(live.text).expr))
+        match chunk.parsed(db).item:
+            case nodes.Print(arguments=arguments):
+                found += ((chunk.text, call) for argument in arguments for call in _calls(argument))
+            case nodes.ExpressionStatement(value=value):
+                found += ((chunk.text, call) for call in _calls(value))
+            case _:
+                pass
+    return tuple(found)
+
+
+def _calls(node: nodes.Node) -> Iterator[nodes.Apply]:
+    """The calls in a tree, the outer ones first; not those inside of what binds names."""
+    if isinstance(node, nodes.Lambda | nodes.Let | nodes.Integral | nodes.Sum):
+        return
+    if isinstance(node, nodes.Apply):
+        yield node
+    for child in children(node):
+        yield from _calls(child)
+
+
+def point_of(db: Database, file: str, text: str) -> Point | None:
+    """A call in a file's scope as a point; None if it is no call of a definition with all its arguments."""
+    tree = parse_expression(text).expr
+    while isinstance(tree, nodes.Paren):
+        tree = tree.inner
+    made = _point(db, file, text, tree) if isinstance(tree, nodes.Apply) else None
+    return None if made is None else made[1]
+
+
+def _chosen(db: Database, file: str, name: str) -> tuple[Point, ...]:
+    groups = groups_of(interface(db, file, name).type)
+    if not all(_is_number(parameter.type) for group in groups for parameter in group):
+        return ()
+    written = "".join(f"({', '.join([USUAL] * len(group))})" for group in groups)
+    point = point_of(db, file, name + written) if name in names(db, file) else None
+    return () if point is None else (Point(point.text, point.slopes, chosen=True),)
+
+
+def _is_number(type: Type) -> bool:
+    return isinstance(resolve(type), Real | Var)
+
+
+# One call
+
+
+def _point(db: Database, file: str, text: str, call: nodes.Apply) -> tuple[tuple[str, str], Point] | None:
+    """A call, or a call of a derivative, as a point of the definition that it calls."""
+    head, groups = _chain(call)
+    called = callee(db, file, head)
+    if called is None or called.given or called.derived > 1:
+        return None
+    type = interface(db, called.file, called.name).type
+    wanted = groups_of(type)
+    function = _function_text(head, text, called.name if called.file == file else None, called.derived)
+    if function is None or len(groups) != len(wanted):
+        return None
+    given = [_placed(p, group, text, called.derived) for p, group in zip(wanted, groups)]
+    whole = [group for group in given if group is not None]
+    if len(whole) != len(given):
+        return None
+    value = function + "".join(f"({', '.join(group)})" for group in whole)
+    slopes = tuple(_slopes(function, wanted, whole)) if _has_numbers(result_of(type)) else ()
+    return (called.file, called.name), Point(value, slopes)
+
+
+def _chain(call: nodes.Expr) -> tuple[nodes.Expr, list[tuple[nodes.Argument, ...]]]:
+    """The function of a chain of calls, and what it is given group by group."""
+    groups: list[tuple[nodes.Argument, ...]] = []
+    while True:
+        if isinstance(call, nodes.Paren):
+            call = call.inner
+        elif isinstance(call, nodes.Apply) and not _is_deriv(call):
+            groups.insert(0, call.arguments)
+            call = call.function
+        else:
+            return call, groups
+
+
+def _is_deriv(node: nodes.Apply) -> bool:
+    return isinstance(node.function, nodes.Name) and node.function.id == "deriv" and len(node.arguments) == 1
+
+
+def _function_text(head: nodes.Expr, text: str, name: str | None, derived: int) -> str | None:
+    """The text of the function itself, where `head` may be its derivative."""
+    if not derived:
+        return text[head.span.start : head.span.end]
+    if isinstance(head, nodes.Apply):
+        span = head.arguments[0].value.span
+        return text[span.start : span.end]
+    return name  # another name for its derivative
+
+
+def _placed(
+    parameters: tuple[Parameter, ...], group: tuple[nodes.Argument, ...], text: str, derived: int
+) -> list[str] | None:
+    """The texts of arguments, without tangents, in the order of the parameters; None if they do not fill them."""
+    texts: dict[str | None, str] = {}
+    rest: list[str] = []
+    for argument in group:
+        value = _primal(argument.value) if derived else argument.value
+        if value is None:
+            return None
+        shown = text[value.span.start : value.span.end]
+        if argument.name is None:
+            rest.append(shown)
+        else:
+            texts[argument.name[derived:]] = shown
+    free = [parameter.name for parameter in parameters if parameter.name is None or parameter.name not in texts]
+    if len(free) != len(rest) or len(texts) + len(rest) != len(parameters):
+        return None
+    left = iter(rest)
+    return [texts[p.name] if p.name in texts else next(left) for p in parameters]
+
+
+def _primal(value: nodes.Expr) -> nodes.Expr | None:
+    """The value of a dual that is written out; None if it is not."""
+    match value:
+        case nodes.Paren(inner=inner):
+            return _primal(inner)
+        case nodes.Tuple(items=(first, _)):
+            return first
+        case nodes.Number() | nodes.Unary() | nodes.Chain() | nodes.Power():
+            return value
+        case nodes.Name(id=("pi" | "inf")):
+            return value
+        case nodes.Apply(arguments=(argument,)) if _is_deriv(value):
+            return argument.value
+        case _:
+            return None
+
+
+def _has_numbers(type: Type) -> bool:
+    type = resolve(type)
+    return isinstance(type, Real | Var) or (isinstance(type, TupleOf) and all(map(_has_numbers, type.items)))
+
+
+def _slopes(
+    function: str, wanted: tuple[tuple[Parameter, ...], ...], given: list[list[str]]
+) -> Iterator[tuple[str, str]]:
+    """For each parameter that is a number, the dual call in which it alone moves."""
+    for moving in (parameter for parameters in wanted for parameter in parameters):
+        if moving.name is None or not _is_number(moving.type):
+            continue
+        written = ""
+        for parameters, texts in zip(wanted, given):
+            written += f"({', '.join(_dual(text, p, p is moving) for text, p in zip(texts, parameters))})"
+        yield moving.name, f"deriv({function}){written}"
+
+
+def _dual(text: str, parameter: Parameter, moves: bool) -> str:
+    if isinstance(resolve(parameter.type), Function):
+        return f"deriv({text})"
+    return f"({text}, 1)" if moves else text
