@@ -87,13 +87,13 @@ class Outbox:
         self._thread.join(seconds)
 
     def _write(self) -> None:
-        while (message := self._queue.get()) is not None:
-            # Escaped to ASCII: half of a surrogate pair, which JSON may carry, would not go into UTF-8.
-            body = json.dumps(message, separators=(",", ":")).encode("ascii")
-            try:
+        try:
+            while (message := self._queue.get()) is not None:
+                # Escaped to ASCII: half of a surrogate pair, which JSON may carry, would not go into UTF-8.
+                body = json.dumps(message, separators=(",", ":")).encode("ascii")
                 self._stream.write(b"Content-Length: %d\r\n\r\n%b" % (len(body), body))
                 if self._queue.empty():
                     self._stream.flush()
-            except (OSError, ValueError) as error:
-                logger.info("the client does not listen any more: %s", error)
-                return
+            self._stream.flush()  # what came just before the end
+        except (OSError, ValueError) as error:
+            logger.info("the client does not listen any more: %s", error)
