@@ -35,6 +35,7 @@ from potto.core.terms import (
     postorder,
     tuple_,
 )  # fmt: skip
+from potto.integrate.boxes import Box, box_of
 from potto.kernels.cells import Mask, Trace, Value
 
 
@@ -75,6 +76,7 @@ class Plan:
 
     decisions: plain terms and the values that they had when the plan was made; it holds where they are the same.
     reaches: whether every jump can be forced; if not, boundary terms may be missing.
+    box: how members of a batch are recognized that no surface cuts, where that can be told.
     """
 
     term: Integral
@@ -84,6 +86,7 @@ class Plan:
     vanishing: Any
     decisions: tuple[tuple[Term, float | None], ...]
     reaches: bool = True
+    box: Box | None = None
 
     @cached_property
     def single(self) -> bool:
@@ -159,7 +162,9 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve) -> P
     numbers = {j.path: (g.number, j.orientation) for g in groups for j in g.cut.jumps}
     vanishing = _vanishing(term.body, numbers)
     kept = tuple((t, v) for t, v in decisions.items() if not isinstance(t, Const))
-    return Plan(term, tuple(levels), tuple(groups), function_of(term.body), vanishing, kept, reaches)
+    body = function_of(term.body)
+    box = box_of(term, found, body) if reaches else None
+    return Plan(term, tuple(levels), tuple(groups), body, vanishing, kept, reaches, box)
 
 
 def _level(level: Level, decided: tuple[int, ...], groups: list[Group]) -> LevelPlan:

@@ -20,6 +20,7 @@ import numpy as np
 from potto.calculus.surfaces import TooDeep
 from potto.core.terms import Deriv, Global, Integral, Lam, Sum, Term, Var, deriv, integral, postorder, substitute, var
 from potto.diagnostics import PottoError
+from potto.integrate.boxes import uncut
 from potto.integrate.levels import Iteration
 from potto.integrate.pieces import Sums
 from potto.integrate.plan import Plan, make
@@ -34,6 +35,7 @@ START_ORDER = 11
 ORDERS = (4, 6, 8, 10)
 PILOTS = 64
 BATCH = 4096  # members integrated at once
+FEW = 64  # members for which it does not pay to look for those that nothing cuts
 MOST_PLANS = 1024
 MOST_LEVELS = 3
 
@@ -156,7 +158,25 @@ def orders(term: Integral) -> Iterator[Integral]:
 
 
 def in_parts(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> Sums:
-    """Quadrature, a bounded number of members of the batch at a time."""
+    """Quadrature: whole boxes first, where there are many, then a bounded number of members of the batch at a time."""
+    if batch < FEW or plan.box is None:
+        return iterated(plan, machine, env, batch)
+    with one_thread():
+        found = uncut(plan.box, machine, env, batch)
+    if found is None:
+        return iterated(plan, machine, env, batch)
+    done, sums = found
+    rest = np.nonzero(~done)[0]
+    if rest.size:
+        here = {n: map_arrays(v, operator.itemgetter(rest)) for n, v in env.items()}
+        part = iterated(plan, machine, here, rest.size)
+        for name in ("v", "e", "t", "et"):
+            getattr(sums, name)[..., rest] = getattr(part, name)
+    return sums
+
+
+def iterated(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> Sums:
+    """Iterated quadrature with cuts."""
     if batch <= BATCH:
         return Iteration(plan, machine, START_ORDER).run(0, env, batch, {}, machine)
     with one_thread():

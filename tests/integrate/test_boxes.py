@@ -1,0 +1,80 @@
+"""Pictures: pixels that no surface crosses are integrated whole; they must agree with pixels that are cut."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import potto
+from potto.runtime import integrals
+
+PROGRAM = """
+def line(a, b, t) integral ([a, a + 1/16], [b, b + 1/16]) exp(x*y)*[x + 2*y >= t] d(x, y)
+def saddle(a, b, t) integral ([a, a + 1/16], [b, b + 1/16]) (x + y)*[(x - t)*(y - 1/3) >= 0] d(x, y)
+def disc(a, b, t) integral ([a, a + 1/16], [b, b + 1/16]) [x*x + y*y <= t] d(x, y)
+def root(a, b, t) integral ([a, a + 1/16], [b, b + 1/16]) sqrt(x)*abs(y - t)/(1 + x) d(x, y)
+def peak(a, b, t) integral ([a, a + 1/16], [b, b + 1/16]) exp(-1000000*(x - t)^2) d(x, y)
+def wave(a, b, t) integral ([a, a + 1/16], [b, b + 1/16]) sin(200*t*x*y) d(x, y)
+def solid(a, b, t) integral ([a, a + 1/16], [b, b + 1/16], [0, 1]) x*y/(1 + z)*[z <= t + x] d(x, y, z)
+def strip(a, b, t) integral [a, a + b/16] cos(x)*[x >= t] d(x)
+def moving(a, b, t) integral ([a, a + t/16], [b, b + 1/16]) x*y d(x, y)
+def turned(a, b, t) integral ([a + 1/16, a], [b, b + 1/16]) exp(x*y)*[x + 2*y >= t] d(x, y)
+def pair(a, b, t) integral ([a, a + 1/16], [b, b + 1/16]) (x*[x > t], y*t) d(x, y)
+"""
+NAMES = ["line", "saddle", "disc", "root", "peak", "wave", "solid", "strip", "moving", "turned", "pair"]
+
+
+def picture(name: str, t: float) -> potto.Estimate:
+    m = potto.compile(PROGRAM)
+    a, b = np.meshgrid(np.arange(16) / 16, np.arange(16) / 16)
+    found: potto.Estimate = potto.deriv(getattr(m, name))((a, 0.0), (b, 0.0), (t, 1.0))
+    return found
+
+
+def parts(estimate: potto.Estimate) -> list[tuple[Any, Any]]:
+    numbers = (estimate.value, estimate.error), (estimate.tangent, estimate.tangent_error)
+    return [p for n, e in numbers for p in (zip(n, e, strict=True) if isinstance(n, tuple) else [(n, e)])]
+
+
+@pytest.mark.parametrize("t", [0.4375, 0.7])  # on the edges of pixels, and between them
+@pytest.mark.parametrize("name", NAMES)
+def test_a_picture_is_the_same_without_looking_for_whole_pixels(
+    name: str, t: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with_boxes = picture(name, t)
+    monkeypatch.setattr(integrals, "FEW", 10**9)
+    without = picture(name, t)
+    for (v, e), (w, f) in zip(parts(with_boxes), parts(without), strict=True):
+        # Two methods, each within its own bound of the same truth; 1e-18 is the rounding of a pixel's area.
+        assert (np.abs(v - w) <= e + f + 1e-18).all()
+    assert with_boxes.converged == without.converged
+
+
+def antiderivative(f: Callable[[Any, Any], Any], a: Any, b: Any) -> Any:
+    h = 1 / 16
+    return f(a + h, b + h) - f(a, b + h) - f(a + h, b) + f(a, b)
+
+
+def test_whole_pixels_have_the_values_of_a_closed_form() -> None:
+    # int int 1/(x + y + 1)^2 over a pixel, by its antiderivative -log(x + y + 1); derivative by t of the shift y + t
+    m = potto.compile("def f(a, b, t) integral ([a, a + 1/16], [b, b + 1/16]) 1/(x + y + t)^2*[x + y + t > 0] d(x, y)")
+    a, b = np.meshgrid(np.arange(64) / 64, np.arange(64) / 64)
+    got = potto.deriv(m.f)((a, 0.0), (b, 0.0), (1.0, 1.0))
+    value = antiderivative(lambda x, y: -np.log1p(x + y), a, b)
+    rate = antiderivative(lambda x, y: -1 / (1 + x + y), a, b)
+    # The closed forms cancel: four numbers below 1.1 make one of about 4e-3, so they are good to 1e-15.
+    assert np.abs(got.value - value).max() <= 1e-15 and np.abs(got.tangent - rate).max() <= 2e-15
+    assert got.evals == 16 * 64 * 64  # a product of 4 x 4 nodes each, and no cuts
+
+
+def test_only_pixels_that_are_cut_are_cut() -> None:
+    m = potto.compile("def f(a, b, t) integral ([a, a + 1/64], [b, b + 1/64]) [x + y <= t] d(x, y)")
+    a, b = np.meshgrid(np.arange(64) / 64, np.arange(64) / 64)
+    got = potto.deriv(m.f)((a, 0.0), (b, 0.0), (0.51, 1.0))
+    whole = 16 * 64 * 64
+    assert whole * 0.9 < got.evals < whole * 1.5
+    # area of the triangle and the length of its edge along one axis
+    assert abs(got.value.sum() - 0.51**2 / 2) <= 1e-14 and abs(got.tangent.sum() - 0.51) <= 1e-13
