@@ -48,7 +48,11 @@ class Sums:
 
 @dataclass
 class Pieces:
-    """Pieces of segments under refinement, and what is known of each: integrals and errors per channel (C, P)."""
+    """Pieces of segments under refinement, and what is known of each: integrals and errors per channel (C, P).
+
+    excess: (P,) the worst of a piece's errors, of the size of what it is a part of. stuck: how many times in a row
+    that hardly fell when the piece was refined.
+    """
 
     segment: Ints
     u0: Array
@@ -62,7 +66,13 @@ class Pieces:
     ends: Array = field(default_factory=lambda: np.zeros((0, 0)))
     tail: Array = field(default_factory=lambda: np.zeros((0, 0)))
     lean: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    excess: Array = field(default_factory=lambda: np.zeros(0))
+    stuck: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     coefficients: Array | None = None
+
+    def __post_init__(self) -> None:
+        if not self.excess.size:
+            self.excess, self.stuck = np.zeros(self.u0.size), np.zeros(self.u0.size, dtype=np.int64)
 
     def settled(self) -> Pieces:
         """The pieces with what only refinement asks for, which is worked out when it does."""
@@ -77,7 +87,8 @@ class Pieces:
         return Pieces(self.segment[index], self.u0[index], self.u1[index], self.end[index],
                       self.integral[:, index], self.error[:, index], self.floor[:, index],
                       self.size[:, index], self.most[:, index],
-                      self.ends[:, index], self.tail[:, index], self.lean[index])  # fmt: skip
+                      self.ends[:, index], self.tail[:, index], self.lean[index],
+                      self.excess[index], self.stuck[index])  # fmt: skip
 
     def join(self, other: Pieces) -> Pieces:
         return joined([self, other])
@@ -88,8 +99,9 @@ def joined(parts: list[Pieces]) -> Pieces:
     if len(parts) == 1:
         return parts[0]
     parts = [p.settled() for p in parts]
-    names = ("segment", "u0", "u1", "end", "integral", "error", "floor", "size", "most", "ends", "tail", "lean")
-    axes = (0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 0)
+    names = ("segment", "u0", "u1", "end", "integral", "error", "floor", "size", "most", "ends", "tail", "lean",
+             "excess", "stuck")  # fmt: skip
+    axes = (0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0)
     return Pieces(*(np.concatenate([getattr(p, n) for p in parts], axis=a) for n, a in zip(names, axes, strict=True)))
 
 

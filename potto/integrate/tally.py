@@ -45,6 +45,11 @@ class Tally:
                 np.add.at(self.total[i], owner, sign * row)
         self.scale = None
 
+    def whole(self, work: Work) -> Array:
+        """The size of the answer that each of these integrals goes into, values and tangents together: (B,)."""
+        largest = np.abs(self.total).max(axis=0)
+        return work.parent.siblings(largest, work.root) if work.number else largest
+
     def shares(self, work: Work, owner: Ints) -> Array:
         """The error that one piece of each of these integrals may have: (m * (1 + k), P)."""
         if self.scale is None:

@@ -24,7 +24,7 @@ from potto.integrate.pieces import Evaluator, Pieces, Sums, column, gather, join
 from potto.integrate.plan import LevelPlan
 from potto.integrate.rules import EPS, gauss, truncation
 from potto.integrate.tally import Tally
-from potto.kernels.cells import Array, Cell, Ints, Mask, Number, Value, pad
+from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Number, Value, pad
 
 if TYPE_CHECKING:
     from potto.integrate.levels import Iteration
@@ -39,6 +39,10 @@ HALF_ORDER = 14
 # The relative error of a piece up to which more nodes promise more than halves do.
 PROMISING = 1e-2
 DOUBTFUL_ROUNDS = 24
+# An error that is still above this share of itself on a half of its piece is not one of truncation; where it is below
+# so much of the whole answer it is taken for rounding, at once or after three times.
+STUCK = 0.35
+NOISE = (1e-12, 1e-9)
 # How much larger than at the nodes an integrand must be at an end of a segment to be taken for a peak.
 PEAK = 8.0
 # How many times its last terms an interpolant may be off at an end of a segment.
@@ -132,6 +136,7 @@ class Work:
             bad, waiting = found
             accepted.append(fresh.pick(~bad & ~waiting))
             coarse, later = fresh.pick(bad), fresh.pick(waiting)
+            later.excess[:] = 0.0
             nearly = (coarse.error <= PROMISING * coarse.size).all(axis=0) if turn == 0 else np.zeros(0, dtype=bool)
             if nearly.any():
                 near, far = coarse.pick(nearly), coarse.pick(~nearly)
@@ -148,7 +153,9 @@ class Work:
 
     def replaced(self, old: Pieces, new: Pieces, order: int, tally: Tally) -> Pieces:
         """The new pieces that stand for the old ones, measured; the books follow."""
+        copies = new.u0.size // old.u0.size
         new = self.measure(new, order)
+        new.excess, new.stuck = np.tile(old.excess, copies), np.tile(old.stuck, copies)
         tally.replace(self, old, new)
         return new
 
@@ -339,7 +346,8 @@ class Work:
             error = np.concatenate((error[:, :1], better), axis=1)
             floor = floor[:, : 1 + k]
         off, rounding = error.reshape(-1, p.segment.size), floor.reshape(-1, p.segment.size)
-        bad = ((off > tally.shares(self, owner)) & (off > 8 * rounding)).any(axis=0)
+        bad = (off > tally.shares(self, owner)) & (off > 8 * rounding)
+        bad = bad.any(axis=0) & ~self.noisy(p, np.where(bad, off, 0.0), tally.whole(self)[owner])
         wide = (p.u1 - p.u0) >= 1e-14
         waiting = np.zeros(bad.size, dtype=bool)
         if ends is not None:
@@ -351,6 +359,17 @@ class Work:
                 bad = (bad & ~blind[owner]) | peak
         bad &= wide
         return (bad, waiting) if bad.any() else None
+
+    def noisy(self, p: Pieces, off: Array, whole: Array) -> Bools:
+        """Pieces whose errors are small and stay as they are however they are refined: what is left is rounding.
+
+        off: (C, P) the errors that are too large; whole: (P,) the size of the answer, values and tangents together.
+        """
+        with np.errstate(divide="ignore", invalid="ignore"):
+            excess = np.where(whole > 0, off.max(axis=0) / whole, np.inf)
+        p.stuck = np.where((p.excess > 0) & (excess > STUCK * p.excess), p.stuck + 1, 0)
+        p.excess = excess
+        return np.asarray(((excess <= NOISE[0]) & (p.stuck >= 1)) | ((excess <= NOISE[1]) & (p.stuck >= 3)))
 
     def missed_peak(self, p: Pieces, ends: tuple[Array, Array]) -> Any:
         """Pieces at an end of their segment where the integrand is not what its values at the nodes lead to.
@@ -380,6 +399,7 @@ class Work:
         if not doubt.any():
             return None
         doubt &= found.apart > 1e-9 * (np.abs(found.moving[0]) + 1e-3 * found.size[:, 1 : 1 + self.k])
+        doubt &= found.apart > NOISE[0] * found.size[:, :1]
         if not doubt.any():
             return None
         owners = np.asarray(doubt.any(axis=(0, 1)))
