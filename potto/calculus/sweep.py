@@ -12,10 +12,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import lru_cache
 
+from potto.calculus.ranges import positive
 from potto.calculus.solve import Family, Sections, Unsolvable, sections
 from potto.calculus.surfaces import Decide, Finding, Resolve, findings
 from potto.core.simplify import normalized_surface, simplify
-from potto.core.terms import Const, Integral, Term, postorder, substitute
+from potto.core.terms import Const, Integral, Prim, Term, postorder, prim, substitute
 
 MOST_CUTS = 48  # per variable; what is beyond it only costs adaptive refinement
 MOST_CENTERS = 6
@@ -37,6 +38,7 @@ class Cut:
 
     surface: canonical, up to positive scale and sign, so that the same condition met twice is one cut.
     jumps: the branches that it decides; none for a kink, an edge or a place where an inner section changes.
+    steps: a branch that is decided further in jumps here all the same: of (x - t)*(y - s) >= 0 at x = t.
     turning: the integrand behaves like a square root there.
     roots: closed-form sections, or None where they are found by numbers.
     """
@@ -46,6 +48,25 @@ class Cut:
     turning: bool
     roots: tuple[Term, ...] | None
     families: tuple[Family, ...] = ()
+    steps: bool = False
+    product: Product | None = None
+
+    @property
+    def decides(self) -> bool:
+        """Whether it matters on which side of it a stretch lies."""
+        return bool(self.jumps) or self.steps
+
+
+@dataclass(frozen=True, slots=True)
+class Product:
+    """A canonical surface as a product: (sign) * along * outer factors, up to a positive scale.
+
+    along: what varies with the variable that the surface cuts. outer: factors that do not, canonical.
+    """
+
+    along: Term
+    outer: tuple[Term, ...]
+    sign: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,24 +81,46 @@ class Level:
 
 
 @dataclass(slots=True)
+class _Placed:
+    """A surface in its canonical form, what it is a product of (canonical, up to `sign`), and what is known of it."""
+
+    surface: Term
+    factors: tuple[Term, ...]
+    sign: int
+    jumps: list[Jump] = field(default_factory=list)
+    turning: bool = False
+    steps: bool = False
+
+
+@dataclass(slots=True)
 class _Pool:
     """Surfaces still to be placed, the same ones merged."""
 
-    surfaces: dict[Term, tuple[list[Jump], bool]] = field(default_factory=dict)
+    surfaces: dict[Term, _Placed] = field(default_factory=dict)
 
-    def put(self, surface: Term, jump: tuple[tuple[int, ...], bool] | None, turning: bool) -> None:
+    def put(
+        self, surface: Term, jump: tuple[tuple[int, ...], bool] | None, turning: bool, steps: bool = False
+    ) -> None:
         canonical, orientation = _canonical(surface)
         if not canonical.free:
             return
-        jumps, turns = self.surfaces.setdefault(canonical, ([], False))
+        if canonical not in self.surfaces:
+            self.surfaces[canonical] = _Placed(canonical, *_factored(surface, orientation))
+        placed = self.surfaces[canonical]
         if jump is not None:
-            jumps.append(Jump(jump[0], orientation, jump[1]))
-        self.surfaces[canonical] = (jumps, turns or turning)
+            placed.jumps.append(Jump(jump[0], orientation, jump[1]))
+        placed.turning |= turning
+        placed.steps |= steps
 
-    def take(self, variable: str) -> list[tuple[Term, list[Jump], bool]]:
-        taken = [(s, *rest) for s, rest in self.surfaces.items() if variable in s.free]
-        for surface, _, _ in taken:
-            del self.surfaces[surface]
+    def take(self, variable: str) -> list[_Placed]:
+        """The surfaces that vary along a variable. What is a factor of one and does not stays, as a step."""
+        taken = [placed for surface, placed in self.surfaces.items() if variable in surface.free]
+        for placed in taken:
+            del self.surfaces[placed.surface]
+        for placed in taken:
+            for factor in placed.factors:
+                if variable not in factor.free:
+                    self.put(factor, None, placed.turning, bool(placed.jumps) or placed.steps)
         return taken
 
 
@@ -111,8 +154,8 @@ def sweep(term: Integral, found: Iterable[Finding], resolve: Resolve, decide: De
     levels: list[Level] = []
     rows = list(zip(term.variables, term.bounds, term.hints, strict=True))
     for variable, (lo, hi), hints in reversed(rows):
-        cuts = tuple(_cut(s, tuple(jumps), turning, variable) for s, jumps, turning in pool.take(variable))
-        cuts = (*(c for c in cuts if c.jumps), *[c for c in cuts if not c.jumps][:MOST_CUTS])
+        cuts = tuple(_cut(placed, variable) for placed in pool.take(variable))
+        cuts = (*(c for c in cuts if c.decides), *[c for c in cuts if not c.decides][:MOST_CUTS])
         here = [c for c in centers if variable in c.free]
         centers = {c: None for c in centers if variable not in c.free}
         levels.append(Level(variable, lo, hi, (*hints, *_points(here, variable)[:MOST_CENTERS]), cuts))
@@ -123,7 +166,7 @@ def sweep(term: Integral, found: Iterable[Finding], resolve: Resolve, decide: De
                 if f.kind != "center":
                     pool.put(f.surface, None, f.kind == "edge")
     outer = (
-        *(Finding("edge" if turning else "kink", surface) for surface, (_, turning) in pool.surfaces.items()),
+        *(Finding("edge" if placed.turning else "kink", surface) for surface, placed in pool.surfaces.items()),
         *(Finding("center", surface) for surface in centers),
     )
     return Sweep(tuple(reversed(levels)), outer)
@@ -143,12 +186,52 @@ def outer_findings(term: Integral, resolve: Resolve, decide: Decide) -> tuple[Fi
     return (*jumps, *swept.outer)
 
 
-def _cut(surface: Term, jumps: tuple[Jump, ...], turning: bool, variable: str) -> Cut:
-    found = _sections(surface, variable)
-    if isinstance(found, Unsolvable) or not found.complete:
-        return Cut(surface, jumps, turning, None)
-    roots = (*found.roots, *found.poles)
-    return Cut(surface, jumps, turning, roots, (*found.families, *found.pole_families))
+def _cut(placed: _Placed, variable: str) -> Cut:
+    jumps, turning, steps = tuple(placed.jumps), placed.turning, placed.steps
+    here = tuple(f for f in placed.factors if variable in f.free)
+    outer = tuple(f for f in placed.factors if variable not in f.free)
+    product = Product(_product(here), outer, placed.sign) if outer else None
+    roots: dict[Term, None] = {}
+    families: dict[Family, None] = {}
+    for part in here:
+        found = _sections(part, variable)
+        if isinstance(found, Unsolvable) or not found.complete:
+            return Cut(placed.surface, jumps, turning, None, (), steps, product)
+        roots.update(dict.fromkeys((*found.roots, *found.poles)))
+        families.update(dict.fromkeys((*found.families, *found.pole_families)))
+    return Cut(placed.surface, jumps, turning, tuple(roots), tuple(families), steps, product)
+
+
+def _product(terms: tuple[Term, ...]) -> Term:
+    return prim("mul", *terms) if len(terms) > 1 else terms[0]
+
+
+def _factored(surface: Term, orientation: int) -> tuple[tuple[Term, ...], int]:
+    """Canonical factors of a surface written as a product, and the sign of its canonical form against theirs.
+
+    A surface that is none, or in which a factor comes twice, is its own and only factor.
+    """
+    found: dict[Term, None] = {}
+    sign, waiting = orientation, [surface]
+    while waiting:
+        item = waiting.pop()
+        match item:
+            case Prim(op="mul" | "div", args=args):
+                waiting.extend(args)
+            case Prim(op="neg", args=(inner,)):
+                sign = -sign
+                waiting.append(inner)
+            case Const(value=value):
+                sign = -sign if value < 0 else sign
+            case _ if positive(item):
+                pass
+            case _:
+                canonical, turned = _canonical(item)
+                if canonical in found or not canonical.free:
+                    return (_canonical(surface)[0],), 1
+                sign *= turned
+                found[canonical] = None
+    return (tuple(found), sign) if len(found) > 1 else ((_canonical(surface)[0],), 1)
 
 
 def _points(centers: list[Term], variable: str) -> tuple[Term, ...]:
@@ -164,10 +247,11 @@ def _points(centers: list[Term], variable: str) -> tuple[Term, ...]:
 def _shadows(cuts: tuple[Cut, ...], variable: str, lo: Term, hi: Term) -> Iterable[tuple[Term, bool]]:
     """What the cuts of one variable leave in those further out: (surface, whether like a square root)."""
     for cut in cuts:
+        along = cut.surface if cut.product is None else cut.product.along
         for bound in (lo, hi):
             if not (isinstance(bound, Const) and bound.value in (float("inf"), float("-inf"))):
-                yield substitute(cut.surface, {variable: bound}), False
-        found = _sections(cut.surface, variable)
+                yield substitute(along, {variable: bound}), False
+        found = _sections(along, variable)
         if isinstance(found, Sections):
             for turn in found.turning:
                 yield turn, True

@@ -107,7 +107,7 @@ def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, d
             t[d, i] = np.where(inner, speed, th[d])
         if row.turning or (row.cut >= 0 and _any_turning(plan, row)):
             beyond.append((root, True))
-        if directions and row.cut >= 0 and plan.level.cuts[row.cut].jumps:
+        if directions and row.cut >= 0 and plan.level.cuts[row.cut].decides:
             edges.extend(_edges(row, root, low, high, tl, th, directions, batch))
     rank = np.zeros((count + 2, batch), dtype=np.int64)
     conflict = False
@@ -177,7 +177,7 @@ def _sorted(plan: LevelPlan, rows: list[Row], x: Array, t: Array, inside: Bools)
 def _rank(plan: LevelPlan, row: Row) -> int:
     if row.cut < 0:
         return 0
-    return 2 if plan.level.cuts[row.cut].jumps else 1
+    return 2 if plan.level.cuts[row.cut].decides else 1
 
 
 def _agree(t: Array, same: Bools, rank: Ints) -> None:

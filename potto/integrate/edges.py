@@ -49,7 +49,7 @@ def across(
     sides: dict[int, Mask], machine: Evaluator,
 ) -> tuple[Array, Array] | None:  # fmt: skip
     """(F with the edge's surface flipped minus F as it is) at the bound, per component, and its size."""
-    group = level.decided[[i for i, c in enumerate(level.level.cuts) if c.jumps].index(edge.cut)]
+    group = level.decided[[i for i, c in enumerate(level.level.cuts) if c.decides].index(edge.cut)]
     frozen = machine.with_directions(0)
     here = gather({n: still(v) for n, v in env.items()}, edge.owner)
     here[level.variable] = Cell(edge.x)
@@ -60,9 +60,12 @@ def across(
     if level.decided:
         values = frozen.evaluate(level.surfaces, {n: beside[n] for n in level.surfaces.params}, None)
         assert isinstance(values, tuple)
-        for g, value in zip(level.decided, values, strict=True):
+        for g, value, turned in zip(level.decided, values, level.turned, strict=True):
             assert isinstance(value, Cell)
-            inner[g] = as_array(value.v, edge.owner.size) >= 0
+            side = as_array(value.v, edge.owner.size) >= 0
+            for outer in turned:
+                side = side ^ np.logical_not(inner[outer])
+            inner[g] = side
     actual = parent.inside(number, here, edge.owner.size, inner, frozen)
     flipped = parent.inside(number, here, edge.owner.size, {**inner, group: ~np.asarray(inner[group])}, frozen)
     if not (np.isfinite(actual).all() and np.isfinite(flipped).all()):

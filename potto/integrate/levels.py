@@ -86,10 +86,13 @@ class Iteration:
         at[level.variable] = Cell(middle[:, 0])
         values = machine.with_directions(0).evaluate(level.surfaces, at, None)
         assert isinstance(values, tuple)
-        for group, value in zip(level.decided, values, strict=True):
+        for group, value, turned in zip(level.decided, values, level.turned, strict=True):
             assert isinstance(value, Cell)
             at_middle = as_array(value.v, seg.a.size)
-            sides[group] = at_middle >= 0 if self.plan.groups[group].up_at_zero else at_middle > 0
+            side = at_middle >= 0 if self.plan.groups[group].up_at_zero else at_middle > 0
+            for outer in turned:
+                side = side ^ np.logical_not(sides[outer])
+            sides[group] = side
         return sides
 
     def alive(self, sides: dict[int, Mask], seg: Segments) -> Ints | None:

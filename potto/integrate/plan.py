@@ -32,7 +32,9 @@ from potto.core.terms import (
     Term,
     Tuple,
     lam,
+    neg,
     postorder,
+    prim,
     tuple_,
 )  # fmt: skip
 from potto.integrate.boxes import Box, box_of
@@ -50,6 +52,7 @@ class LevelPlan:
     families: tuple[tuple[int, Any], ...]
     decided: tuple[int, ...]
     surfaces: Lam
+    turned: tuple[tuple[int, ...], ...]
 
     @property
     def variable(self) -> str:
@@ -66,6 +69,8 @@ class Group:
     @property
     def up_at_zero(self) -> bool:
         """On which side a stretch lies along which the canonical surface is 0: that of max(x, 0) > 0 where x < 0."""
+        if not self.cut.jumps:
+            return True
         jump = self.cut.jumps[0]
         return jump.strict != (jump.orientation > 0)
 
@@ -155,7 +160,7 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve) -> P
     for level in swept.levels:
         decided = []
         for cut in level.cuts:
-            if cut.jumps:
+            if cut.decides:
                 decided.append(len(groups))
                 groups.append(Group(len(groups), cut))
         levels.append(_level(level, tuple(decided), groups))
@@ -183,10 +188,34 @@ def _level(level: Level, decided: tuple[int, ...], groups: list[Group]) -> Level
     for hint in level.hints:
         terms.append(hint)
         rows.append((-1, False))
-    surfaces = function_of(tuple_(tuple(groups[g].cut.surface for g in decided)))
+    deciding, turned = _deciding(decided, groups)
+    surfaces = function_of(tuple_(deciding))
     return LevelPlan(
-        level, function_of(tuple_(tuple(terms))), tuple(rows), tuple(searched), tuple(families), decided, surfaces
+        level, function_of(tuple_(tuple(terms))), tuple(rows), tuple(searched), tuple(families), decided, surfaces,
+        turned,
     )
+
+
+def _deciding(decided: tuple[int, ...], groups: list[Group]) -> tuple[tuple[Term, ...], tuple[tuple[int, ...], ...]]:
+    """Per group what tells the side, and the groups further out whose lower sides turn it round.
+
+    A factor that does not vary with the variable has its side decided where it does: at a node beside the place where
+    it is 0, its own value may be rounding.
+    """
+    known = {g.cut.surface: g.number for g in groups}
+    terms: list[Term] = []
+    turned: list[tuple[int, ...]] = []
+    for number in decided:
+        cut = groups[number].cut
+        if cut.product is None:
+            terms.append(cut.surface)
+            turned.append(())
+            continue
+        rest = [f for f in cut.product.outer if f not in known]
+        term = prim("mul", cut.product.along, *rest) if rest else cut.product.along
+        terms.append(term if cut.product.sign > 0 else neg(term))
+        turned.append(tuple(known[f] for f in cut.product.outer if f in known))
+    return tuple(terms), tuple(turned)
 
 
 # Where the integrand is exactly zero, told from the sides alone

@@ -38,7 +38,7 @@ HIGH_ORDER = 14
 HALF_ORDER = 14
 # The relative error of a piece up to which more nodes promise more than halves do.
 PROMISING = 1e-2
-DOUBTFUL_ROUNDS = 24
+DOUBTFUL_ROUNDS = 8
 # An error that is still above this share of itself on a half of its piece is not one of truncation; where it is below
 # so much of the whole answer it is taken for rounding, at once or after three times.
 STUCK = 0.35
