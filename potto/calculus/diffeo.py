@@ -61,6 +61,7 @@ from potto.modules import definition
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import nodes
+from potto.types import check_definition, interface
 
 Box = Mapping[str, tuple[float, float]]
 _Bounds = tuple[tuple[str, tuple[float, float]], ...]
@@ -122,12 +123,24 @@ def _exported_in_cycle(db: Database, file: str, name: str) -> Term | None:
 
 @query(cycle=_exported_in_cycle)
 def exported(db: Database, file: str, name: str) -> Term | None:
-    """The conditions and calls of a definition over its parameters: what a caller's check reads."""
+    """The conditions and calls of a definition over its parameters: what a caller's check reads.
+
+    None of one that is wrong itself: what its guessed or ill-typed text would lead to is no fault of its callers.
+    """
+    if not is_sound(db, file, name):
+        return None
     return skeleton(core_term(db, file, name), lambda g: has_conditions(exported(db, g.module, g.name)))
 
 
+@query
+def is_sound(db: Database, file: str, name: str) -> bool:
+    """Whether a definition could be read and has a type."""
+    wrong = any(said.severity == "error" for said in check_definition(db, file, name))
+    return not wrong and not interface(db, file, name).broken
+
+
 def _whole(db: Database, target: Global) -> Term | None:
-    return core_term(db, target.module, target.name)
+    return core_term(db, target.module, target.name) if is_sound(db, target.module, target.name) else None
 
 
 # Conditions under integrals
