@@ -161,11 +161,11 @@ def _sorted(plan: LevelPlan, rows: list[Row], x: Array, t: Array, inside: Bools)
     conflict = False
     order = np.argsort(x, axis=0, kind="stable")
     # the bounds stay first and last even among equals: candidates were clipped to the upper bound
-    x = np.take_along_axis(x, order, axis=0)
-    inside = np.take_along_axis(inside, order, axis=0)
+    member = np.arange(x.shape[1])
+    x, inside = x[order, member], inside[order, member]
     rank: Ints = np.where(inside, np.array([0, *(_rank(plan, r) for r in rows), 0])[order], 0)
     if t.shape[0]:
-        t = np.take_along_axis(t, np.broadcast_to(order, t.shape), axis=1)
+        t = t[:, order, member]
         same = (x[1:] == x[:-1]) & inside[1:] & inside[:-1]
         if same.any():
             apart = np.abs(t[:, 1:] - t[:, :-1]) > 1e-9 * (np.abs(t[:, 1:]) + np.abs(t[:, :-1]))
@@ -208,7 +208,7 @@ def _pieces(
     owner, place = np.nonzero(full.T)
     a, b = a[place, owner], b[place, owner]
     ta, tb = t[:, place, owner], t[:, place + 1, owner]
-    left, right = np.broadcast_to(-np.inf, a.shape), np.broadcast_to(np.inf, a.shape)
+    left, right = np.full(a.shape, -np.inf), np.full(a.shape, np.inf)
     for root, _ in beyond:
         at = root[owner]
         left = np.where((at <= a) & (at > left), at, left)

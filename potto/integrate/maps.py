@@ -63,11 +63,12 @@ def choose(a: Array, b: Array, left: Array, right: Array) -> Ints:
 
 
 def points(seg: Segments, u: Array) -> tuple[Array, Array, Array]:
-    """x, dx/du and the label of each point; `u` is (P, n), row by row in the segments of `seg` (P of them)."""
+    """x, dx/du and the label of each point; `u` is (P, n), row by row in the segments of `seg`, or one row for all."""
     a, b = seg.a[:, None], seg.b[:, None]
     if not seg.kind.any():
         width = b - a
         return a + width * u, width, u
+    u = np.broadcast_to(u, (seg.a.size, u.shape[1]))
     x, slope, label = np.empty_like(u), np.empty_like(u), np.empty_like(u)
     for kind in np.unique(seg.kind):
         rows = np.nonzero(seg.kind == kind)[0]

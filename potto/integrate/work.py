@@ -19,12 +19,13 @@ import numpy as np
 
 from potto.integrate import maps
 from potto.integrate.forms import Ends, Totals, sums, totals
+from potto.integrate.judge import doubtful, missed_peak, too_coarse
 from potto.integrate.maps import Segments
 from potto.integrate.pieces import Evaluator, Pieces, Sums, column, gather, joined, spread, still, take
 from potto.integrate.plan import LevelPlan
 from potto.integrate.rules import EPS, gauss, truncation
 from potto.integrate.tally import Tally
-from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Number, Value, pad
+from potto.kernels.cells import Array, Cell, Ints, Mask, Number, Value, pad
 
 if TYPE_CHECKING:
     from potto.integrate.levels import Iteration
@@ -39,14 +40,6 @@ HALF_ORDER = 14
 # The relative error of a piece up to which more nodes promise more than halves do.
 PROMISING = 1e-2
 DOUBTFUL_ROUNDS = 8
-# An error that is still above this share of itself on a half of its piece is not one of truncation; where it is below
-# so much of the whole answer it is taken for rounding, at once or after three times.
-STUCK = 0.35
-NOISE = (1e-12, 1e-9)
-# How much larger than at the nodes an integrand must be at an end of a segment to be taken for a peak.
-PEAK = 8.0
-# How many times its last terms an interpolant may be off at an end of a segment.
-MISLED = 200.0
 # A relative jump of an inner integral where only kinks are expected: a surface there runs along the inner variable.
 DISCONTINUITY = 1e-6
 BESIDE = 1e-9
@@ -97,7 +90,7 @@ class Work:
         done = self.refine(fresh, ends, tally)
         for _ in range(DOUBTFUL_ROUNDS):
             found = totals(self, done, ends)
-            bad = self.doubtful(done, found)
+            bad = doubtful(self, done, found)
             if bad is None or self.machine.exhausted():
                 break
             halves = self.halve(done.pick(bad))
@@ -119,15 +112,15 @@ class Work:
             error = np.concatenate((error[:, :1], np.minimum(found.moving[1], found.fixed[1])), axis=1)
         if not (error <= 0.5 * np.maximum(self.machine.atol, self.machine.rtol * scale)).all():
             return False
-        if ends is not None and self.missed_peak(p, ends).any():
+        if ends is not None and missed_peak(self, p, ends).any():
             return False
-        return self.doubtful(p, found) is None
+        return doubtful(self, p, found) is None
 
     def refine(self, fresh: Pieces, ends: Any, tally: Tally) -> Pieces:
         """More nodes, then halves, for what is too coarse until nothing is; what is accepted stays accepted."""
         accepted: list[Pieces] = []
         for turn in range(MOST_HALVINGS):
-            found = self.too_coarse(fresh, ends, tally)
+            found = too_coarse(self, fresh, ends, tally)
             if found is None:
                 break
             if self.machine.exhausted():
@@ -187,7 +180,7 @@ class Work:
         rule = gauss(order)
         if whole:
             seg = self.seg
-            x, weight, label = maps.points(seg, np.broadcast_to(rule.nodes, (p.u0.size, order)))
+            x, weight, label = maps.points(seg, rule.nodes[None])
         else:
             seg = self.seg.pick(p.segment)
             u, du = maps.grade(p.u0, p.u1, p.end, rule.nodes)
@@ -330,78 +323,3 @@ class Work:
         apart = np.abs(values[0] - values[1])
         if (apart > DISCONTINUITY * (np.abs(values[0]) + np.abs(values[1]))).any():
             self.machine.note_degenerate(self.level.variable)
-
-    def too_coarse(self, p: Pieces, ends: Any, tally: Tally) -> Any:
-        """Masks of the pieces to halve, and of those to look at again later; None if there are none to halve.
-
-        As long as a peak of an integral is not resolved, its total says nothing, and so what its other pieces may err
-        is not known: they wait.
-        """
-        owner = self.seg.owner[p.segment]
-        rows, m = p.integral.shape[0] // self.width, self.width
-        error, floor = p.error.reshape(m, rows, -1), p.floor.reshape(m, rows, -1)
-        k = self.k
-        if self.moving:  # per direction the better of the two forms
-            better = np.minimum(error[:, 1 : 1 + k], error[:, 1 + k :])
-            error = np.concatenate((error[:, :1], better), axis=1)
-            floor = floor[:, : 1 + k]
-        off, rounding = error.reshape(-1, p.segment.size), floor.reshape(-1, p.segment.size)
-        bad = (off > tally.shares(self, owner)) & (off > 8 * rounding)
-        bad = bad.any(axis=0) & ~self.noisy(p, np.where(bad, off, 0.0), tally.whole(self)[owner])
-        wide = (p.u1 - p.u0) >= 1e-14
-        waiting = np.zeros(bad.size, dtype=bool)
-        if ends is not None:
-            peak = self.missed_peak(p, ends) & wide
-            if peak.any():
-                blind = np.zeros(self.batch, dtype=bool)
-                blind[owner[peak]] = True
-                waiting = bad & blind[owner] & ~peak & wide
-                bad = (bad & ~blind[owner]) | peak
-        bad &= wide
-        return (bad, waiting) if bad.any() else None
-
-    def noisy(self, p: Pieces, off: Array, whole: Array) -> Bools:
-        """Pieces whose errors are small and stay as they are however they are refined: what is left is rounding.
-
-        off: (C, P) the errors that are too large; whole: (P,) the size of the answer, values and tangents together.
-        """
-        with np.errstate(divide="ignore", invalid="ignore"):
-            excess = np.where(whole > 0, off.max(axis=0) / whole, np.inf)
-        p.stuck = np.where((p.excess > 0) & (excess > STUCK * p.excess), p.stuck + 1, 0)
-        p.excess = excess
-        return np.asarray(((excess <= NOISE[0]) & (p.stuck >= 1)) | ((excess <= NOISE[1]) & (p.stuck >= 3)))
-
-    def missed_peak(self, p: Pieces, ends: tuple[Array, Array]) -> Any:
-        """Pieces at an end of their segment where the integrand is not what its values at the nodes lead to.
-
-        Either it is far larger there than at any node, or it is off the interpolant through the nodes by far more
-        than the interpolant's last terms: something narrow sits at the end.
-        """
-        seg = self.seg
-        width = (seg.b - seg.a)[p.segment] * (p.u1 - p.u0)
-        plain = (seg.kind[p.segment] == maps.LINEAR) & (p.end == 0)
-        bad = np.zeros(p.segment.size, dtype=bool)
-        m = self.width
-        for f, touches, led in ((ends[0], p.u0 == 0, p.ends[:m]), (ends[1], p.u1 == 1, p.ends[m:])):
-            for c in range(m):
-                at_end = f[c][p.segment] * width
-                known = touches & np.isfinite(at_end)
-                bad |= known & (np.abs(at_end) > PEAK * p.most[c])
-                off = np.abs(at_end - led[c])
-                bad |= known & plain & (off > MISLED * p.tail[c] + 1e-8 * p.most[c])
-        return bad
-
-    def doubtful(self, p: Pieces, found: Totals) -> Any:
-        """All pieces of the integrals whose two derivatives do not agree: something between the nodes was missed."""
-        if found.fixed is None or found.apart is None:
-            return None
-        doubt = found.apart > 4 * (found.moving[1] + found.fixed[1])
-        if not doubt.any():
-            return None
-        doubt &= found.apart > 1e-9 * (np.abs(found.moving[0]) + 1e-3 * found.size[:, 1 : 1 + self.k])
-        doubt &= found.apart > NOISE[0] * found.size[:, :1]
-        if not doubt.any():
-            return None
-        owners = np.asarray(doubt.any(axis=(0, 1)))
-        bad = owners[self.seg.owner[p.segment]] & (p.u1 - p.u0 > 1e-14)
-        return bad if bad.any() else None
