@@ -76,6 +76,12 @@ class Client:
         return found if isinstance(found, Mapping) else {}
 
     @property
+    def presents(self) -> bool:
+        """Whether the client has commands of its own for Potto: then it shows the answers of ours itself."""
+        found = self.value("experimental.commands.commands")
+        return isinstance(found, list) and any(str(name).startswith("potto.") for name in found)
+
+    @property
     def pulls(self) -> bool:
         """Whether the client asks for diagnostics itself; then none are pushed."""
         return self.can("textDocument.diagnostic")

@@ -146,6 +146,13 @@ def did_change_workspace_folders(server: Server, params: Any) -> None:
     server.edit(change)
 
 
+def cancel_progress(server: Server, params: Any) -> None:
+    """A user does not want to wait any longer."""
+    stop = _session(server).cancels.get(params["token"])
+    if stop is not None:
+        stop()
+
+
 def ignore(server: Server, params: Any) -> None:
     """Nothing to be done."""
 
@@ -162,6 +169,6 @@ NOTIFICATIONS: Mapping[str, Handler] = {
     "workspace/didCreateFiles": files_moved,
     "workspace/didRenameFiles": files_moved,
     "workspace/didDeleteFiles": files_moved,
-    "window/workDoneProgress/cancel": ignore,
+    "window/workDoneProgress/cancel": cancel_progress,
     "$/setTrace": ignore,
 }

@@ -1,12 +1,15 @@
 """Progress that the client shows while something takes long.
 
-Owns `Progress`, which says nothing at all to clients that show none, and nothing while it is over soon.
+Owns `Progress` of what is counted and `Working` of what just takes its time and can be cancelled. Both say nothing at
+all to clients that show none, and nothing while it is over soon.
 """
 
 from __future__ import annotations
 
 import itertools
 import time
+from collections.abc import Callable
+from threading import Lock, Timer
 from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
@@ -51,6 +54,48 @@ class Progress:
     def _allow(self, result: Any, error: Any) -> None:
         if error is None:
             self._state = "allowed"
+
+    def _tell(self, value: dict[str, Any]) -> None:
+        self._session.notify("$/progress", {"token": self._token, "value": value})
+
+
+class Working:
+    """Something that a user waits for. `token` is the client's, if it has given one; `cancel` stops it."""
+
+    def __init__(self, session: Session, title: str, token: int | str | None, cancel: Callable[[], None]) -> None:
+        self._session, self._title = session, title
+        self._own = token is None
+        self._token = f"potto-progress-{next(_tokens)}" if token is None else token
+        self._state: Literal["quiet", "shown", "over"] = "quiet"
+        self._lock = Lock()
+        if not self._own or session.client.can("window.workDoneProgress"):
+            session.cancels[self._token] = cancel
+            timer = Timer(SOON, self._ask)
+            timer.daemon = True
+            timer.start()
+
+    def end(self) -> None:
+        """It is over, well or not."""
+        self._session.cancels.pop(self._token, None)
+        with self._lock:
+            shown, self._state = self._state == "shown", "over"
+        if shown:
+            self._tell({"kind": "end"})
+
+    def _ask(self) -> None:
+        if self._state == "over":
+            return
+        if self._own:
+            self._session.request("window/workDoneProgress/create", {"token": self._token}, self._begin)
+        else:
+            self._begin(None, None)
+
+    def _begin(self, result: Any, error: Any) -> None:
+        with self._lock:
+            if error is not None or self._state == "over":
+                return
+            self._state = "shown"
+        self._tell({"kind": "begin", "title": self._title, "cancellable": True})
 
     def _tell(self, value: dict[str, Any]) -> None:
         self._session.notify("$/progress", {"token": self._token, "value": value})

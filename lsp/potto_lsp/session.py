@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from potto_lsp import memory
 from potto_lsp.client import Client
 from potto_lsp.features import FEATURES
+from potto_lsp.presenting import Presenter
 from potto_lsp.progress import Progress
 
 if TYPE_CHECKING:
@@ -42,6 +43,8 @@ class Session:
     ) -> None:
         self.client, self.notify, self.request = client, notify, request
         self.later = later  # do something on the thread that owns the database
+        self.cancels: dict[int | str, Callable[[], None]] = {}  # what a user can stop, by the token of its progress
+        self.presenter = Presenter(self)
         self.tokens: dict[str, tuple[str, list[int]]] = {}
         self.checked = False
         self._progress = Progress(self, "Potto: checking the workspace")
@@ -115,6 +118,7 @@ class Session:
         evaluator = getattr(self, "evaluator", None)
         if evaluator is not None:
             evaluator.close()
+        self.presenter.close()
 
     def diagnostics_changed(self) -> None:
         """Something else than an edit changed what there is to say."""

@@ -8,7 +8,8 @@ from potto.ide.acting import code_actions, resolve_code_action
 from potto.ide.calling import incoming_calls, outgoing_calls, prepare_call_hierarchy
 from potto.ide.colours import semantic_tokens
 from potto.ide.completing import completions, resolve_completion
-from potto.ide.explaining import derivative_markdown
+from potto.ide.documents import kind_of
+from potto.ide.explaining import derivative_markdown, diffeo_markdown
 from potto.ide.explaining import sound as is_sound
 from potto.ide.finding import highlights, references
 from potto.ide.folds import folding_ranges
@@ -98,6 +99,7 @@ __all__ = [
     "definition",
     "definition_at",
     "derivative_markdown",
+    "diffeo_markdown",
     "document_links",
     "document_symbols",
     "folding_ranges",
@@ -111,6 +113,7 @@ __all__ = [
     "inlay_hints",
     "inline_values",
     "is_sound",
+    "kind_of",
     "linked_editing",
     "live_diagnostics",
     "outgoing_calls",

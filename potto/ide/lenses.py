@@ -9,9 +9,12 @@ from potto.ide.explaining import derivative_text
 from potto.ide.finding import occurrences_of
 from potto.ide.model import CodeLens
 from potto.ide.places import all_chunks
+from potto.ide.points import points
 from potto.ide.symbols import DefinitionSymbol, owner
 from potto.query import Database
 from potto.syntax import live_expressions, nodes
+
+LONG_CALL = 40  # characters of a call beyond which a title does not show it
 
 
 def code_lenses(db: Database, file: str) -> tuple[CodeLens, ...]:
@@ -29,8 +32,8 @@ def code_lenses(db: Database, file: str) -> tuple[CodeLens, ...]:
             if kind == "constant":
                 found.append(CodeLens(span, "evaluate", (file, name), "evaluate"))
             elif kind == "function":
-                found.append(CodeLens(span, "evaluate", (file, name), "evaluate"))
-                found.append(CodeLens(span, "differentiate", (file, name), "differentiate"))
+                found.append(CodeLens(span, "evaluate", (file, name)))
+                found.append(CodeLens(span, "differentiate", (file, name)))
                 found.append(CodeLens(span, "showDerivative", (file, name)))
             else:
                 found.append(CodeLens(span, "showDerivative", (file, name), "show derivative"))
@@ -45,8 +48,14 @@ def code_lenses(db: Database, file: str) -> tuple[CodeLens, ...]:
 
 
 def resolve_code_lens(db: Database, lens: CodeLens) -> CodeLens:
-    """A lens with its title: how many surfaces there are, how often a definition is used."""
+    """A lens with its title: where a function is evaluated, how many surfaces it has, how often it is used."""
     match lens.command, lens.arguments:
+        case "evaluate" | "differentiate", (file, name) if not lens.title:
+            point = next(iter(points(db, file, name)), None)
+            if point is None:
+                return replace(lens, title=lens.command)
+            titled = f"{lens.command} {point.text}" if len(point.text) <= LONG_CALL else lens.command
+            return replace(lens, arguments=(file, point.text), title=titled)
         case "showDerivative", (file, name):
             return replace(lens, title=_derivative_title(db, file, name))
         case "showReferences", (file, name, _):

@@ -92,7 +92,7 @@ def test_lenses():
     f = fixture("def f(t) integral [0, 1] [x < t] d(x)\ny = f(1)\nprint(y)\nprint(y)\n#> f(0.5)\n")
     found = [ide.resolve_code_lens(f.db, lens) for lens in ide.code_lenses(f.db, f.file)]
     assert [(lens.command, lens.title) for lens in found] == [
-        ("evaluate", "evaluate"), ("differentiate", "differentiate"),
+        ("evaluate", "evaluate f(0.5)"), ("differentiate", "differentiate f(0.5)"),
         ("showDerivative", "show derivative (1 surface)"), ("showReferences", "2 references"),
         ("evaluate", "evaluate"), ("showReferences", "2 references"),
         ("run", "run"), ("evaluate", "evaluate"),

@@ -5,11 +5,14 @@ from __future__ import annotations
 import base64
 import re
 import signal
+import stat
 import time
 from collections.abc import Callable
+from pathlib import Path
 from queue import SimpleQueue
 from threading import Event, Timer
 from typing import Any
+from urllib.parse import unquote, urlparse
 
 import pytest
 from lsp_client import Client
@@ -68,6 +71,89 @@ def test_differentiate_needs_no_process(server: Server, uri: Uri) -> None:
     text = run(client, "potto.differentiate", uri("main"), "f")["result"]["text"]
     assert "boundary" in text and "delta" in text
     assert run(client, "potto.differentiate", uri("main"), "nowhere")["error"]["code"] == -32803
+
+
+def test_differentiate_a_diffeomorphism(server: Server, uri: Uri) -> None:
+    client = server()
+    client.open(uri("main"), "diffeo half(x, y; c) = (x + y + c, x - y)\n")
+    text = run(client, "potto.differentiate", uri("main"), "half")["result"]["text"]
+    assert "inverse: (u, v) . " in text and "determinant: -2" in text
+
+
+def test_differentiate_a_call(server: Server, uri: Uri) -> None:
+    """Its value and the slope by each parameter, with what they may be off by."""
+    client = server()
+    client.open(uri("main"), "def f(t, k)\n    k * (integral [0, 1] [x < t] * x d(x))\n")
+    found = run(client, "potto.differentiate", uri("main"), "f(0.5, 2)")["result"]
+    assert found["text"].startswith("f(0.5, 2) = 0.25")
+    slopes = {slope["by"]: float(slope["text"]) for slope in found["slopes"]}
+    assert slopes == pytest.approx({"t": 1.0, "k": 0.125}, abs=1e-12, rel=0)  # k t and t^2/2
+    assert run(client, "potto.differentiate", uri("main"), "sin(1)")["error"]["code"] == -32803
+
+
+def test_a_function_is_evaluated_where_a_live_expression_looks_at_it(server: Server, uri: Uri) -> None:
+    client = server()
+    client.open(uri("main"), "def f(t) t^2\n#> deriv(f)(dt=(3, 1))\ndef g(s) s(1)\n")
+    assert run(client, "potto.evaluate", uri("main"), "f")["result"]["value"] == 9
+    assert "write one as a live expression" in run(client, "potto.evaluate", uri("main"), "g")["error"]["message"]
+
+
+def lenses(client: Client, uri: str) -> list[dict[str, Any]]:
+    found = client.ask("textDocument/codeLens", {"textDocument": {"uri": uri}})
+    return [lens["command"] if "command" in lens else client.ask("codeLens/resolve", lens)["command"] for lens in found]
+
+
+def test_the_lenses_of_a_function_do_what_they_say(server: Server, uri: Uri) -> None:
+    client = server()
+    client.open(uri("main"), TEXT)
+    by_title = {lens["title"]: lens for lens in lenses(client, uri("main"))}
+    shown = "show derivative (1 surface)"
+    for title, expected in (("evaluate f(0.5)", "0.125"), ("differentiate f(0.5)", "by t: 0.5"), (shown, "boundary")):
+        lens = by_title[title]
+        assert expected in run(client, lens["command"], *lens["arguments"])["result"]["text"]
+
+
+SHOWS = {"window": {"showDocument": {"support": True}, "workDoneProgress": True}}
+
+
+def test_a_client_that_drops_answers_is_shown_them(server: Server, uri: Uri) -> None:
+    """A short text as a message, a longer one as a document that cannot be written to, which goes with the server."""
+    client = server(SHOWS)
+    client.open(uri("main"), TEXT)
+    run(client, "potto.differentiate", uri("main"), "f")
+    while (asked := client.asked.get(timeout=10))["method"] != "window/showDocument":
+        pass
+    path = Path(unquote(urlparse(asked["params"]["uri"]).path))
+    assert "boundary" in path.read_text() and not path.stat().st_mode & stat.S_IWUSR
+    run(client, "potto.evaluate", uri("main"), "f(0.5)")
+    assert client.note("window/showMessage")["message"].startswith("0.125")
+    client.stop()
+    assert not path.exists()
+
+
+def test_a_client_with_commands_of_its_own_is_left_alone(server: Server, uri: Uri) -> None:
+    client = server({**SHOWS, "experimental": {"commands": {"commands": ["potto.showReferences"]}}})
+    client.open(uri("main"), TEXT)
+    run(client, "potto.differentiate", uri("main"), "f")
+    run(client, "potto.evaluate", uri("main"), "f(0.5)")
+    client.ask("shutdown", None)
+    assert "window/showMessage" not in [note["method"] for note in client.notes.queue]
+    assert "window/showDocument" not in [asked["method"] for asked in client.asked.queue]
+
+
+@pytest.mark.parametrize("token", [None, "mine"])
+def test_what_takes_long_shows_progress_and_can_be_cancelled_there(server: Server, uri: Uri, token: str | None) -> None:
+    client = server(SHOWS)
+    client.open(uri("main"), SLOW)
+    given = {} if token is None else {"workDoneToken": token}
+    params = {"command": "potto.evaluate", "arguments": [uri("main"), "f(50000)"], **given}
+    id = client.begin("workspace/executeCommand", params)
+    while (begun := client.note("$/progress"))["value"]["kind"] != "begin" or "f(50000)" not in begun["value"]["title"]:
+        pass
+    assert begun["value"]["cancellable"] and (token is None or begun["token"] == token)
+    client.tell("window/workDoneProgress/cancel", {"token": begun["token"]})
+    assert client.answer(id, 10)["error"]["message"] == "cancelled"
+    assert client.note("$/progress", token=begun["token"])["value"]["kind"] == "end"
 
 
 @pytest.mark.parametrize(

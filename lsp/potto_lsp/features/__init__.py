@@ -118,7 +118,11 @@ _ALL = (
     Feature("workspace/diagnostic", "diagnosing.workspace", slow=True),
     Feature("potto/scenes", "previewing.scenes"),
     Feature("potto/sample", "previewing.sample"),
-    Feature("workspace/executeCommand", "commands.execute", {"executeCommandProvider": {"commands": list(COMMANDS)}}),
+    Feature(
+        "workspace/executeCommand",
+        "commands.execute",
+        {"executeCommandProvider": {"commands": list(COMMANDS), "workDoneProgress": True}},
+    ),
 )  # fmt: skip
 FEATURES = {feature.method: feature for feature in _ALL}
 

@@ -6,15 +6,20 @@ answer is an object with a `text` to show; a picture is a data URI in `image`.
 
 from __future__ import annotations
 
+import os.path
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from potto import ide
 from potto.modules import names
 from potto_lsp.asking import Ask
 from potto_lsp.deferred import Deferred
 from potto_lsp.errors import InvalidParams, Refusal, RequestError
 from potto_lsp.evaluation import Task
+from potto_lsp.progress import Working
 from potto_lsp.uris import to_key
+
+Result = Mapping[str, Any]
 
 
 def execute(ask: Ask) -> Any:
@@ -29,28 +34,65 @@ def execute(ask: Ask) -> Any:
 
 
 def _evaluate(ask: Ask, file: str, arguments: list[Any]) -> Deferred:
+    """An expression; a function by its name alone is evaluated at its point."""
     if not arguments:
-        return task(ask, "run", file, "")
-    return task(ask, "evaluate", file, _text(arguments))
+        return _shown(ask, os.path.basename(file), task(ask, "run", file, ""))
+    text = _text(arguments)
+    point = _point_of_name(ask, file, text)
+    return _shown(ask, text, task(ask, "evaluate", file, text if point is None else point.text))
 
 
-def _differentiate(ask: Ask, file: str, arguments: list[Any]) -> dict[str, Any]:
-    """The derivative in symbols: needs no numbers and no other process."""
+def _point_of_name(ask: Ask, file: str, text: str) -> ide.Point | None:
+    """Where a function is looked at, if the text is its name."""
+    if text not in names(ask.db, file) or ide.kind_of(ask.db, file, text) != "function":
+        return None
+    for point in ide.points(ask.db, file, text):
+        return point
+    raise Refusal(f"`{text}` is a function: evaluate a call of it, or write one as a live expression, `#> {text}(…)`")
+
+
+def _differentiate(ask: Ask, file: str, arguments: list[Any]) -> Any:
+    """Of a name the derivative in symbols, which needs no numbers and no other process; of a call the slopes there."""
     from potto.facts import derivative_facts
 
-    name = _text(arguments)
-    if name not in names(ask.db, file):
-        raise Refusal(f"there is no definition of `{name}` in this file")
-    facts = derivative_facts(ask.db, file, name)
+    text = _text(arguments)
+    if text not in names(ask.db, file):
+        point = ide.point_of(ask.db, file, text)
+        if point is None:
+            raise Refusal(f"there is no definition of `{text}` in this file, and it is no call of one")
+        if not point.slopes:
+            raise Refusal(f"`{text}` does not give numbers for numbers, so it has no slopes")
+        deferred = task(ask, "point", file, point.text, {"slopes": point.slopes}, _slopes(point))
+        return _shown(ask, point.text, deferred)
+    facts = derivative_facts(ask.db, file, text)
     if facts is None:
-        raise Refusal(f"`{name}` is no function, so it has no derivative")
-    return {"text": facts.text}
+        raise Refusal(f"`{text}` is no function, so it has no derivative")
+    inverse = ide.diffeo_markdown(ask.db, file, text)
+    lines = [] if inverse is None else ["", *(f"  {line[2:]}" for line in inverse.replace("`", "").splitlines())]
+    result = {"text": "\n".join([facts.text, *lines])}
+    ask.session.presenter.present(f"derivative of {text}", result)
+    return result
+
+
+def _slopes(point: ide.Point) -> Callable[[Result], Result]:
+    """The value at a point and the slopes there as lines to be read."""
+
+    def with_text(found: Result) -> Result:
+        error = f" ± {found['error']}" if "error" in found else ""
+        lines = [f"{point.text} = {found['text']}{error}"]
+        lines += [f"  by {s['by']}: {s['text']} ± {s['error']}" for s in found["slopes"]]
+        missing = [name for name, _ in point.slopes if all(name != s["by"] for s in found["slopes"])]
+        lines += [f"  by {name}: no number, it jumps there" for name in missing]
+        return {**found, "value": found["text"], "text": "\n".join(lines)}
+
+    return with_text
 
 
 def _preview(ask: Ask, file: str, arguments: list[Any]) -> Deferred:
     """A picture over a box: `[[x0, x1], [y0, y1]]`, the unit square if none is given."""
     box = arguments[1] if len(arguments) > 1 else None
-    return task(ask, "preview", file, _text(arguments), {"box": box})
+    text = _text(arguments)
+    return _shown(ask, text, task(ask, "preview", file, text, {"box": box}))
 
 
 def _text(arguments: list[Any]) -> str:
@@ -59,21 +101,47 @@ def _text(arguments: list[Any]) -> str:
     return arguments[0]
 
 
-def task(ask: Ask, do: str, file: str, text: str, more: Mapping[str, Any] | None = None) -> Deferred:
-    """What the evaluation process answers, when it does."""
-    waiting: list[Task] = []
+def task(
+    ask: Ask,
+    do: str,
+    file: str,
+    text: str,
+    more: Mapping[str, Any] | None = None,
+    shape: Callable[[Result], Result] = lambda result: result,
+) -> Deferred:
+    """What the evaluation process answers, when it does; `shape` makes the answer of it."""
+    waiting: list[tuple[Task, Working]] = []
 
     def start(finish: Callable[[Any | RequestError], None]) -> None:
-        def done(answer: Mapping[str, Any]) -> None:
-            finish(answer["result"] if "result" in answer else Refusal(str(answer["error"])))
+        def done(answer: Result) -> None:
+            working.end()
+            finish(shape(answer["result"]) if "result" in answer else Refusal(str(answer["error"])))
 
-        waiting.append(ask.session.evaluator.put(Task(do, file, text, done, more or {})))
+        title = f"Potto: {text or os.path.basename(file)}"
+        token = ask.optional("workDoneToken")
+        working = Working(ask.session, title, token if isinstance(token, int | str) else None, stop)
+        waiting.append((ask.session.evaluator.put(Task(do, file, text, done, more or {})), working))
 
     def stop() -> None:
-        for task in waiting:
-            task.cancelled.set()
+        for each, working in waiting:
+            each.cancelled.set()
+            working.end()
 
     return Deferred(start, stop)
+
+
+def _shown(ask: Ask, title: str, deferred: Deferred) -> Deferred:
+    """The same, shown by us if the client does not."""
+
+    def start(finish: Callable[[Any | RequestError], None]) -> None:
+        def present(result: Any | RequestError) -> None:
+            finish(result)
+            if isinstance(result, Mapping):
+                ask.session.presenter.present(title, result)
+
+        deferred.start(present)
+
+    return Deferred(start, deferred.stop)
 
 
 _COMMANDS: Mapping[str, Callable[[Ask, str, list[Any]], Any]] = {

@@ -21,9 +21,8 @@ REFERENCES = "potto.showReferences"  # of the client; only one that says that it
 def code_lenses(ask: Ask) -> list[protocol.CodeLens]:
     found: list[protocol.CodeLens] = []
     for lens in ide.code_lenses(ask.db, ask.file):
-        if lens.command == "differentiate":  # `showDerivative` says more and does the same
+        if lens.command == "showDerivative":
             found += _previews(ask, lens)
-            continue
         made: protocol.CodeLens = {"range": ask.range(lens.span)}
         if lens.title:
             made["command"] = _command(ask, lens)
