@@ -11,7 +11,7 @@ import os
 from collections.abc import Iterator, Mapping
 from typing import Literal
 
-from potto_repl.pictures import Color, Image, Plot, line, runs
+from potto_repl.pictures import Color, Curve, Image, Plot, line
 
 Protocol = Literal["kitty", "iterm", "sixel", "blocks"]
 _DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
@@ -27,13 +27,12 @@ def braille(plot: Plot, width: int = 60, height: int = 12, *, unicode: bool = Tr
     owners = [[-1] * width for _ in range(height)]
     fine_w, fine_h = (2, 4) if unicode else (1, 1)
     for number, curve in enumerate(plot.curves):
-        for run in runs(plot.places(curve)):
-            dots = [(x * (width * fine_w - 1), (1 - y) * (height * fine_h - 1)) for x, y in run]
-            for x, y in line(dots):
-                row, column = y // fine_h, x // fine_w
-                cells[row][column] |= _DOTS[y % 4][x % 2] if unicode else 1
-                owners[row][column] = number
-    labels = {0: f"{high:.4g}", height // 2: f"{(low + high) / 2:.4g}", height - 1: f"{low:.4g}"}
+        for x, y in _dots(plot, curve, width * fine_w, height * fine_h):
+            row, column = y // fine_h, x // fine_w
+            cells[row][column] |= _DOTS[y % 4][x % 2] if unicode else 1
+            owners[row][column] = number
+    heights = {0: high, height // 2: (low + high) / 2, height - 1: low}
+    labels = {row: plot.label(at) for row, at in heights.items()}
     margin = max(map(len, labels.values()))
     bar = "│" if unicode else "|"
     lines = []
@@ -47,6 +46,21 @@ def braille(plot: Plot, width: int = 60, height: int = 12, *, unicode: bool = Tr
         legends = (_legend(i, name, unicode, color) for i, name in enumerate(plot.labels))
         lines.append(" " * (margin + 2) + "   ".join(legends))
     return "\n".join(lines)
+
+
+def _dots(plot: Plot, curve: Curve, width: int, height: int) -> Iterator[tuple[int, int]]:
+    """The dots of a curve, and every third one of the edges of its error band where that is to be seen."""
+
+    def placed(run: list[tuple[float, float]]) -> set[tuple[int, int]]:
+        return line([(x * (width - 1), (1 - y) * (height - 1)) for x, y in run])
+
+    for run in plot.runs(curve):
+        yield from placed(run)
+    low, high = plot.span
+    if curve.error * height > high - low:
+        for shift in (-1.0, 1.0):
+            for run in plot.runs(curve, shift):
+                yield from (dot for dot in placed(run) if dot[0] % 3 == 0)
 
 
 def _cell(dots: int, owner: int, unicode: bool, color: bool) -> str:

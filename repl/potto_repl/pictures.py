@@ -20,19 +20,66 @@ HOLE: Color = (128, 128, 128)
 
 
 @dataclass(frozen=True, slots=True)
+class Curve:
+    """Values and their errors over places in order, nan where there is none.
+
+    breaks: numbers of the points after which the curve jumps. height: what is to be seen of it; beyond it go poles.
+    """
+
+    xs: tuple[float, ...]
+    ys: tuple[float, ...]
+    errors: tuple[float, ...] = ()
+    breaks: tuple[int, ...] = ()
+    height: tuple[float, float] | None = None
+
+    @classmethod
+    def even(cls, values: Sequence[float], lo: float, hi: float) -> Curve:
+        """Values at equal distances."""
+        last = max(len(values) - 1, 1)
+        return cls(tuple(lo + (hi - lo) * i / last for i in range(len(values))), tuple(values))
+
+    @property
+    def jumps(self) -> list[tuple[float, float, float]]:
+        """Where the curve jumps, and the values before and after."""
+        return [((self.xs[i] + self.xs[i + 1]) / 2, self.ys[i], self.ys[i + 1]) for i in self.breaks]
+
+    @property
+    def error(self) -> float:
+        """The largest error."""
+        return max((e for e in self.errors if math.isfinite(e)), default=0.0)
+
+    def pieces(self) -> list[range]:
+        """The points between holes and jumps."""
+        found: list[range] = []
+        start: int | None = None
+        for i, y in enumerate(self.ys):
+            if not math.isfinite(y):
+                found += [range(start, i)] if start is not None else []
+                start = None
+                continue
+            start = i if start is None else start
+            if i in self.breaks:
+                found.append(range(start, i + 1))
+                start = None
+        return [*found, range(start, len(self.ys))] if start is not None else found
+
+
+@dataclass(frozen=True, slots=True)
 class Plot:
-    """Curves over one stretch: values at equal distances, nan where there is none."""
+    """Curves over one stretch."""
 
     labels: tuple[str, ...]
-    curves: tuple[tuple[float, ...], ...]
+    curves: tuple[Curve, ...]
     lo: float
     hi: float
     axis: str = "x"
 
     @property
     def span(self) -> tuple[float, float]:
-        """The least and the largest value, a little apart."""
-        finite = [y for curve in self.curves for y in curve if math.isfinite(y)]
+        """The least and the largest value that is to be seen, a little apart."""
+        heights = [c.height for c in self.curves if c.height is not None]
+        finite = [y for c in self.curves if c.height is None for y in c.ys if math.isfinite(y)]
+        finite += [y for height in heights for y in height]
         if not finite:
             return 0.0, 1.0
         low, high = min(finite), max(finite)
@@ -41,15 +88,24 @@ class Plot:
             return low - pad, high + pad
         return low, high
 
-    def places(self, curve: Sequence[float]) -> list[tuple[float, float]]:
-        """A curve in the unit square, from below."""
+    def runs(self, curve: Curve, shift: float = 0.0) -> list[list[tuple[float, float]]]:
+        """The pieces of a curve in the unit square, from below; `shift` errors higher."""
         low, high = self.span
-        last = max(len(curve) - 1, 1)
-        return [(i / last, (y - low) / (high - low)) for i, y in enumerate(curve)]
+        found: list[list[tuple[float, float]]] = []
+        for piece in curve.pieces():
+            ys = [curve.ys[i] + (shift * _finite(curve.errors[i]) if shift else 0.0) for i in piece]
+            run = [(self.share(curve.xs[i]), (y - low) / (high - low)) for i, y in zip(piece, ys, strict=True)]
+            found += clipped(run)
+        return found
+
+    def share(self, x: float) -> float:
+        """How far along the axis a place is."""
+        return (x - self.lo) / (self.hi - self.lo)
 
     def svg(self, width: int = 640, height: int = 400) -> str:
         left, top, right, bottom = 70, 20, 20, 40
         inner_w, inner_h = width - left - right, height - top - bottom
+        frame = (left, top, inner_w, inner_h)
         low, high = self.span
         out = [
             f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" font-family="sans-serif" '
@@ -59,18 +115,42 @@ class Plot:
         ]
         for share, label in ((0.0, low), (0.5, (low + high) / 2), (1.0, high)):
             y = top + (1 - share) * inner_h
-            out.append(f'<text x="{left - 6}" y="{y + 4:.1f}" text-anchor="end">{label:.4g}</text>')
+            out.append(f'<text x="{left - 6}" y="{y + 4:.1f}" text-anchor="end">{self.label(label)}</text>')
         for share, label in ((0.0, self.lo), (0.5, (self.lo + self.hi) / 2), (1.0, self.hi)):
             x = left + share * inner_w
             out.append(f'<text x="{x:.1f}" y="{height - 20}" text-anchor="middle">{label:.4g}</text>')
         for number, curve in enumerate(self.curves):
             color = "rgb({},{},{})".format(*COLORS[number % len(COLORS)])
-            for run in runs(self.places(curve)):
-                points = " ".join(f"{left + x * inner_w:.2f},{top + (1 - y) * inner_h:.2f}" for x, y in run)
+            for band in self._bands(curve):
+                out.append(f'<polygon points="{_points(band, frame)}" fill="{color}" fill-opacity="0.2"/>')
+            for x, y0, y1 in self._steps(curve):
+                points = _points([(x, y0), (x, y1)], frame)
+                out.append(f'<polyline points="{points}" fill="none" stroke="{color}" stroke-dasharray="2 3"/>')
+            for run in self.runs(curve):
+                points = _points(run, frame)
                 out.append(f'<polyline points="{points}" fill="none" stroke="{color}" stroke-width="1.5"/>')
             name = html.escape(self.labels[number]) if number < len(self.labels) else ""
             out.append(f'<text x="{left + 8}" y="{top + 16 + 15 * number}" fill="{color}">{name}</text>')
         return "\n".join([*out, "</svg>", ""])
+
+    def label(self, value: float) -> str:
+        """A height in few digits; what is nothing beside the others is 0."""
+        low, high = self.span
+        return f"{0.0 if abs(value) < 1e-4 * (high - low) else value:.4g}"
+
+    def _bands(self, curve: Curve) -> list[list[tuple[float, float]]]:
+        """Between which heights the curve may lie, where that can be seen."""
+        low, high = self.span
+        if not curve.error > (high - low) / 1000:
+            return []
+        above, below = self.runs(curve, 1.0), self.runs(curve, -1.0)
+        return [up + down[::-1] for up, down in zip(above, below, strict=False)] if len(above) == len(below) else []
+
+    def _steps(self, curve: Curve) -> list[tuple[float, float, float]]:
+        """Jumps as places and heights in the unit square; of poles none."""
+        low, high = self.span
+        seen = ((self.share(x), (a - low) / (high - low), (b - low) / (high - low)) for x, a, b in curve.jumps)
+        return [step for step in seen if min(step[1:]) >= 0 and max(step[1:]) <= 1]
 
     def png(self, width: int = 640, height: int = 400) -> bytes:
         pixels = [[WHITE] * width for _ in range(height)]
@@ -79,7 +159,7 @@ class Plot:
         for row in pixels:
             row[0] = row[-1] = (200, 200, 200)
         for number, curve in enumerate(self.curves):
-            for run in runs(self.places(curve)):
+            for run in self.runs(curve):
                 for x, y in line([(x * (width - 1), (1 - y) * (height - 1)) for x, y in run]):
                     for dx, dy in ((0, 0), (1, 0), (0, 1)):
                         if 0 <= x + dx < width and 0 <= y + dy < height:
@@ -137,15 +217,31 @@ def image_of(components: Sequence[Sequence[float]], columns: int) -> Image:
     return Image(tuple(tuple(flat[i : i + columns]) for i in range(0, len(flat), columns)), low, high)
 
 
-def runs(places: Sequence[tuple[float, float]]) -> list[list[tuple[float, float]]]:
-    """The stretches of a curve without holes."""
+def _finite(error: float) -> float:
+    return error if math.isfinite(error) else 0.0
+
+
+def _points(run: Sequence[tuple[float, float]], frame: tuple[float, float, float, float]) -> str:
+    """Points of the unit square as an SVG wants them."""
+    left, top, width, height = frame
+    return " ".join(f"{left + x * width:.2f},{top + (1 - y) * height:.2f}" for x, y in run)
+
+
+def clipped(run: Sequence[tuple[float, float]]) -> list[list[tuple[float, float]]]:
+    """What is to be seen of a curve between the heights 0 and 1."""
     found: list[list[tuple[float, float]]] = [[]]
-    for x, y in places:
-        if math.isfinite(y):
-            found[-1].append((x, y))
-        elif found[-1]:
-            found.append([])
-    return [run for run in found if run]
+    if len(run) == 1 and 0 <= run[0][1] <= 1:
+        return [list(run)]
+    for (x0, y0), (x1, y1) in itertools.pairwise(run):
+        ends = sorted((y - y0) / (y1 - y0) for y in (0.0, 1.0)) if y1 != y0 else [0.0, 1.0]
+        start, stop = max(0.0, ends[0]), min(1.0, ends[1])
+        if start > stop or (y0 == y1 and not 0 <= y0 <= 1):
+            continue
+        first = (x0 + (x1 - x0) * start, y0 + (y1 - y0) * start) if start else (x0, y0)
+        if not found[-1] or found[-1][-1] != first:
+            found.append([first])
+        found[-1].append((x0 + (x1 - x0) * stop, y0 + (y1 - y0) * stop) if stop < 1 else (x1, y1))
+    return [piece for piece in found if piece]
 
 
 def line(points: Sequence[tuple[float, float]]) -> set[tuple[int, int]]:

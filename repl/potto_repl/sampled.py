@@ -1,6 +1,6 @@
 """Values of expressions over grids of numbers: what pictures are made of.
 
-Owns `curve` and `grid`. An expression is a function of one or two numbers, or names that mean nothing: these are the
+Owns `curves` and `grid`. An expression is a function of one or two numbers, or names that mean nothing: these are the
 axes. A derivative counts with its tangent. Where the program has no value, a picture has a hole.
 """
 
@@ -21,21 +21,29 @@ from potto.settings import Settings, settings
 from potto.syntax import nodes, parse_expression
 from potto.types.types import Diffeo, Real, TupleOf, resolve
 from potto.types.types import Function as FunctionType
+from potto_repl.adaptive import Point, followed
 from potto_repl.expressions import Asked, checked, without_parens
+from potto_repl.pictures import Curve
 from potto_repl.reply import Refusal
 from potto_repl.session import Conversation
 
+Pair = tuple[float, float]  # a value and its error
 RTOL = 1e-5  # of a picture: finer than any pixel
 
 
 @dataclass(frozen=True, slots=True)
 class Axes:
-    """A function of the axes. `dual`: its parameters are duals, and what is drawn is the derivative by the first."""
+    """A function of the axes, and of what is fixed after them.
+
+    dual: its parameters are duals, and what is drawn is the derivative by the parameter `by`.
+    """
 
     label: str
     names: tuple[str, ...]
     function: Function
     dual: bool
+    by: int = 0
+    fixed: tuple[float, ...] = ()
 
 
 def axes_of(session: Conversation, text: str, count: int, usage: str) -> Axes:
@@ -44,7 +52,9 @@ def axes_of(session: Conversation, text: str, count: int, usage: str) -> Axes:
     if free:
         if len(free) != count:
             listed = ", ".join(f"`{name}`" for name in free)
-            raise Refusal(f"`{text}` has {len(free)} names that mean nothing: {listed}; {count} can be drawn")
+            other = {1: "`:plot` draws over one name", 2: "`:image` draws over two"}.get(len(free))
+            help = other or "define the others first, such as `c = 0.5`"
+            raise Refusal(f"`{text}` has {len(free)} names that mean nothing: {listed}; {count} can be drawn", help)
         asked = checked(session, f"\\({', '.join(free)}) . ({text})", usage)
     else:
         asked = checked(session, text, usage)
@@ -52,6 +62,25 @@ def axes_of(session: Conversation, text: str, count: int, usage: str) -> Axes:
         what = "one number" if count == 1 else f"{count} numbers"
         raise Refusal(f"`{text}` is no function of {what}", f"write `{usage}`, or leave a name free: `sin(x)`")
     return _axes(session, text, asked)
+
+
+def derivative_of(session: Conversation, text: str, count: int, by: str, usage: str) -> Axes:
+    """The derivative of an expression over axes by one of them, or by a number of the session. Raises Refusal."""
+    plain = axes_of(session, text, count, usage)
+    names = list(plain.names)
+    fixed: tuple[float, ...] = ()
+    inside = f"({text})({', '.join(names)})" if not _free(session, text) else f"({text})"
+    if by not in names:
+        if session.target(by) is None:
+            axes = ", ".join(names)
+            raise Refusal(f"`{by}` is neither an axis ({axes}) nor a number of the session", f"write `{usage}`")
+        value = session.evaluate(by, session.settings).estimate.value
+        if not isinstance(value, float):
+            raise Refusal(f"`{by}` is no number")
+        names, fixed = [*names, by], (value,)
+    asked = checked(session, f"deriv(\\({', '.join(names)}) . {inside})", usage)
+    function = Function(session.world, session.file, asked.expr, asked.type)
+    return Axes(f"d/d{by} {text}", plain.names, function, True, names.index(by), fixed)
 
 
 def _axes(session: Conversation, text: str, asked: Asked) -> Axes:
@@ -74,9 +103,18 @@ def _free(session: Conversation, text: str) -> list[str]:
     return [name for name in found if name not in known and not is_builtin(name) and not name.startswith("_")]
 
 
-def curve(session: Conversation, axes: Axes, lo: float, hi: float, count: int) -> list[list[float]]:
-    """The components of a function of one number at evenly spaced places."""
-    return _sampled(session, axes, [evenly(lo, hi, count)], count)
+def curves(session: Conversation, axes: Axes, lo: float, hi: float) -> list[Curve]:
+    """The components of a function of one number, each as a curve with its errors and jumps."""
+    asked = 0
+
+    def evaluate(places: Sequence[float]) -> list[Point]:
+        nonlocal asked
+        asked += len(places)
+        if session.progress is not None:
+            session.progress(f"{axes.label}: {asked} points")
+        return list(zip(*_sampled(session, axes, [_array(places)], len(places)), strict=True))
+
+    return followed(evaluate, lo, hi)
 
 
 def grid(
@@ -88,7 +126,8 @@ def grid(
     across = evenly(x0 + dx / 2, x1 - dx / 2, columns)
     down = evenly(y1 - dy / 2, y0 + dy / 2, rows)
     points = [[x for _ in range(rows) for x in across.tolist()], [y for y in down.tolist() for _ in range(columns)]]
-    return _sampled(session, axes, [_array(place) for place in points], rows * columns)
+    parts = _sampled(session, axes, [_array(place) for place in points], rows * columns)
+    return [[value for value, _ in part] for part in parts]
 
 
 def _array(numbers: Sequence[float]) -> Any:
@@ -97,7 +136,7 @@ def _array(numbers: Sequence[float]) -> Any:
     return found
 
 
-def _sampled(session: Conversation, axes: Axes, places: list[Any], count: int) -> list[list[float]]:
+def _sampled(session: Conversation, axes: Axes, places: list[Any], count: int) -> list[list[Pair]]:
     with settings(**_coarse(session.settings)):
         try:
             return _components(_call(axes, places), axes, count)
@@ -111,17 +150,20 @@ def _coarse(chosen: Settings) -> dict[str, Any]:
 
 
 def _call(axes: Axes, places: list[Any]) -> Estimate:
-    given = [(place, 1.0 if i == 0 else 0.0) for i, place in enumerate(places)] if axes.dual else places
+    places = [*places, *axes.fixed]
+    given = [(place, 1.0 if i == axes.by else 0.0) for i, place in enumerate(places)] if axes.dual else places
     found: Estimate = axes.function(*given)
     return found
 
 
-def _components(estimate: Estimate, axes: Axes, count: int) -> list[list[float]]:
-    drawn = estimate.tangent if axes.dual else estimate.value
+def _components(estimate: Estimate, axes: Axes, count: int) -> list[list[Pair]]:
+    """Per component the values with their errors."""
+    drawn, doubt = (estimate.tangent, estimate.tangent_error) if axes.dual else (estimate.value, estimate.error)
     if drawn is None:
         raise Refusal(f"`{axes.label}` gives a function, which cannot be drawn")
-    parts = drawn if isinstance(drawn, tuple) else (drawn,)
-    return [_numbers(part, count) for part in parts]
+    parts, doubts = (drawn, doubt) if isinstance(drawn, tuple) else ((drawn,), (doubt,))
+    pairs = zip(parts, doubts, strict=True)
+    return [list(zip(_numbers(v, count), _numbers(e, count), strict=True)) for v, e in pairs]
 
 
 def _numbers(part: Any, count: int) -> list[float]:
@@ -130,9 +172,9 @@ def _numbers(part: Any, count: int) -> list[float]:
     return [float(x) for x in found] if isinstance(found, list) else [found] * count
 
 
-def _one_by_one(session: Conversation, axes: Axes, places: list[Any], count: int) -> list[list[float]]:
+def _one_by_one(session: Conversation, axes: Axes, places: list[Any], count: int) -> list[list[Pair]]:
     """Place by place, with holes where there is no value. Raises what went wrong first if there is none at all."""
-    rows: list[list[float] | None] = []
+    rows: list[list[Pair] | None] = []
     problem: PottoError | None = None
     for i in range(count):
         try:
@@ -144,4 +186,4 @@ def _one_by_one(session: Conversation, axes: Axes, places: list[Any], count: int
     size = max((len(row) for row in rows if row is not None), default=0)
     if not size and problem is not None:
         raise problem
-    return [[math.nan if row is None else row[i] for row in rows] for i in range(size)]
+    return [[(math.nan, 0.0) if row is None else row[i] for row in rows] for i in range(size)]

@@ -306,16 +306,18 @@ def test_plot_draws_the_curve_and_its_derivative(talk):
     reply = talk(":plot g, deriv g 0 0.9")
     plot = reply.parts[0].data["_picture"]
     assert plot.labels == ("g", "deriv g")
-    for i, (value, slope) in enumerate(zip(*plot.curves, strict=True)):
-        t = 0.9 * i / (len(plot.curves[0]) - 1)
-        assert value == pytest.approx(t**3, abs=1e-5) and slope == pytest.approx(3 * t**2, abs=1e-4)
+    value, slope = plot.curves
+    for t, y, error in zip(value.xs, value.ys, value.errors, strict=True):
+        assert abs(y - t**3) <= error + 1e-15 and error < 1e-4
+    assert list(slope.ys) == pytest.approx([3 * t**2 for t in slope.xs], abs=1e-4)
+    assert not value.breaks and "error at most" in reply.text
     assert any("⠀" <= char <= "⣿" for char in reply.text)
     assert max(map(len, reply.text.splitlines())) <= 80
 
 
 def test_plot_of_an_expression_over_its_free_name(talk):
     plot = talk(":plot sin(u)/u 1 6").parts[0].data["_picture"]
-    assert plot.curves[0][-1] == pytest.approx(math.sin(6) / 6, rel=1e-4) and plot.axis == "u"
+    assert plot.curves[0].ys[-1] == pytest.approx(math.sin(6) / 6, rel=1e-4) and plot.axis == "u"
 
 
 def test_plot_is_ascii_where_symbols_are_off(talk):
@@ -325,7 +327,57 @@ def test_plot_is_ascii_where_symbols_are_off(talk):
 
 def test_plot_has_holes_where_there_is_no_value(talk):
     plot = talk(":plot sqrt(x) -1 1").parts[0].data["_picture"]
-    assert math.isnan(plot.curves[0][0]) and plot.curves[0][-1] == pytest.approx(1, rel=1e-4)
+    (curve,) = plot.curves
+    assert math.isnan(curve.ys[0]) and curve.ys[-1] == pytest.approx(1, rel=1e-4)
+    (piece,) = curve.pieces()
+    assert curve.xs[piece[0]] == pytest.approx(0, abs=1e-4)  # it begins where the root has values
+
+
+def test_plot_shows_a_jump_as_a_jump(talk):
+    # t below 0.3, half of it above
+    talk("def h(t) (integral [0, 1] [x < t] d(x)) * (if t < 0.3 then 1 else 0.5)")
+    reply = talk(":plot h")
+    assert not reply.failed, reply.text
+    plot = reply.parts[0].data["_picture"]
+    ((at, before, after),) = plot.curves[0].jumps
+    assert (at, before, after) == pytest.approx((0.3, 0.3, 0.15), abs=1e-3)
+    assert "jumps at t = 0.3 (0.3 to 0.15)" in reply.text
+    assert "stroke-dasharray" in plot.svg() and len(plot.runs(plot.curves[0])) == 2
+
+
+def test_plot_shows_a_pole_without_a_line_through_it(talk):
+    reply = talk(":plot 1/(x - 0.37)")
+    plot = reply.parts[0].data["_picture"]
+    assert len(plot.runs(plot.curves[0])) == 2 and "cut off" in reply.text
+    low, high = plot.span
+    assert -1000 < low < -10 and 10 < high < 1000
+    for run in plot.runs(plot.curves[0]):
+        assert all(0 <= y <= 1 for _, y in run)
+
+
+def test_plot_asks_for_more_points_where_the_curve_bends(talk):
+    (curve,) = talk(":plot tanh(200*(x - 0.6))").parts[0].data["_picture"].curves
+    near = sum(abs(x - 0.6) < 0.02 for x in curve.xs)
+    assert near > len(curve.xs) / 3 and len(curve.xs) < 300 and not curve.breaks
+    (narrow,) = talk(":plot exp(-((x - 0.5)/0.003)^2)").parts[0].data["_picture"].curves
+    assert max(narrow.ys) == 1 and len(narrow.xs) < 400
+
+
+def test_plot_shows_how_far_samples_may_be_off(talk):
+    talk.all(WEIGHTED, ":method mc", ":set samples 400")
+    reply = talk(":plot g")
+    (curve,) = reply.parts[0].data["_picture"].curves
+    assert curve.error > 0.01 and all(abs(y - t**3) <= e for t, y, e in zip(curve.xs, curve.ys, curve.errors))
+    assert "<polygon" in reply.parts[0].data["_picture"].svg()
+
+
+def test_derivative_images(talk):
+    talk.all("def h(x, y, c) integral [0, 1] [u < c*x]*y d(u)", "c = 0.5")  # c*x*y: by c it is x*y, by x it is c*y
+    for by, slope in (("c", lambda x, y: x * y), ("x", lambda x, y: 0.5 * y), ("y", lambda x, y: 0.5 * x)):
+        data = talk(f":image h(x, y, c) by {by} 4").parts[0].data
+        assert data["high"] == pytest.approx(slope(0.875, 0.875), rel=1e-4), by
+        assert data["low"] == pytest.approx(slope(0.125, 0.125), rel=1e-4), by
+    assert "neither an axis" in talk(":image h(x, y, c) by z").text
 
 
 def test_plot_says_what_it_cannot_draw(talk):

@@ -11,7 +11,7 @@ import zlib
 import pytest
 from potto_repl.drawing import braille, half_blocks, inline, protocol, sixel
 from potto_repl.paint import Look, painted
-from potto_repl.pictures import Image, Plot, image_of
+from potto_repl.pictures import Curve, Image, Plot, image_of
 
 CHECKERS = Image((((0, 0, 0), (255, 255, 255)), ((255, 0, 0), (0, 0, 255))), 0.0, 1.0)
 
@@ -73,7 +73,7 @@ def test_half_blocks_hold_two_pixels():
 
 
 def test_braille_dots_stand_where_the_curve_is():
-    line = tuple(i / 100 for i in range(101))
+    line = Curve.even([i / 100 for i in range(101)], 0, 1)
     rows = braille(Plot(("x",), (line,), 0, 1), 20, 5).splitlines()
     places = [(r, row.index("│") + 1 + c) for r, row in enumerate(rows[:5])
               for c, char in enumerate(row.partition("│")[2]) if char > "⠀"]  # fmt: skip
@@ -85,9 +85,10 @@ def test_braille_dots_stand_where_the_curve_is():
 
 
 def test_holes_and_constants_are_drawn():
-    assert braille(Plot(("a", "b"), ((math.nan,) * 9, (2.0,) * 9), 0, 1), 20, 5).count("──") >= 2
+    curves = Curve.even([math.nan] * 9, 0, 1), Curve.even([2.0] * 9, 0, 1)
+    assert braille(Plot(("a", "b"), curves, 0, 1), 20, 5).count("──") >= 2
     assert image_of([[math.nan, 1.0, 1.0, 0.0]], 2).pixels[0][0] == (128, 128, 128)
-    assert Plot(("n",), ((math.nan, math.inf),), 0, 1).span == (0.0, 1.0)
+    assert Plot(("n",), (Curve.even([math.nan, math.inf], 0, 1),), 0, 1).span == (0.0, 1.0)
 
 
 def test_pictures_follow_the_screen(talk):

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import math
 import re
 
+from potto.runtime.printing import format_error
 from potto_repl.drawing import braille, half_blocks
 from potto_repl.expressions import split_items
-from potto_repl.pictures import Plot, image_of
+from potto_repl.pictures import Curve, Plot, image_of
 from potto_repl.registry import command
 from potto_repl.reply import Part, Refusal
-from potto_repl.sampled import axes_of, curve, grid
+from potto_repl.sampled import axes_of, curves, derivative_of, grid
 from potto_repl.session import Conversation, plain_names
 
-POINTS = 401
+MOST_JUMPS = 6  # that a caption names
 MOST_PIXELS = 256
 _NUMBER = r"[-+]?(?:\d+\.?\d*(?:[eE][-+]?\d+)?|pi)"
 _RANGE = re.compile(rf"^(?P<what>.*?[\w)\]])\s+(?P<lo>{_NUMBER})\s+(?P<hi>{_NUMBER})$", re.DOTALL)
@@ -30,21 +32,44 @@ def plot(session: Conversation, text: str) -> Part:
     if not what:
         raise Refusal("there is nothing to draw", "write `:plot f 0 1` or `:plot f, deriv f`")
     labels: list[str] = []
-    curves: list[tuple[float, ...]] = []
+    drawn: list[Curve] = []
     axis = "x"
     for item in split_items(what):
         axes = axes_of(session, item, 1, ":plot f 0 1")
         axis = axes.names[0]
-        parts = curve(session, axes, lo, hi, POINTS)
+        parts = curves(session, axes, lo, hi)
         for number, part in enumerate(parts):
             labels.append(item if len(parts) == 1 else f"{item} [{number + 1}]")
-            curves.append(tuple(part))
-    picture = Plot(tuple(labels), tuple(curves), lo, hi, axis)
+            drawn.append(part)
+    picture = Plot(tuple(labels), tuple(drawn), lo, hi, axis)
     session.last_picture = picture
     width = max(20, min(session.width() - 14, 72))
     low, high = picture.span
-    data = {"plot": labels, "from": lo, "to": hi, "low": low, "high": high, "_picture": picture}
-    return Part("picture", braille(picture, width, unicode=session.options.unicode), data)
+    jumps = [{"of": label, "at": x, "before": a, "after": b}
+             for label, curve in zip(labels, drawn, strict=True) for x, a, b in curve.jumps]  # fmt: skip
+    said = _caption(picture)
+    data = {"plot": labels, "from": lo, "to": hi, "low": low, "high": high, "jumps": jumps,
+            "error": max((curve.error for curve in drawn), default=0.0), "points": sum(len(c.xs) for c in drawn),
+            "_picture": picture, "_scale": said}  # fmt: skip
+    return Part("picture", f"{braille(picture, width, unicode=session.options.unicode)}\n{said}", data)
+
+
+def _caption(plot: Plot) -> str:
+    """Where the curves jump, what is cut off, how far they may be off."""
+    several = len(plot.curves) > 1
+    low, high = plot.span
+    said: list[str] = []
+    for label, curve in zip(plot.labels, plot.curves, strict=True):
+        of = f" of {label}" if several else ""
+        seen = [jump for jump in curve.jumps if low <= min(jump[1:]) and max(jump[1:]) <= high]
+        places = ", ".join(f"{x:.4g} ({a:.4g} to {b:.4g})" for x, a, b in seen[:MOST_JUMPS])
+        if places:
+            said.append(f"jumps{of} at {plot.axis} = {places}{', ...' if len(seen) > MOST_JUMPS else ''}")
+        if any(math.isfinite(y) and not low <= y <= high for y in curve.ys):
+            said.append(f"what lies beyond is cut off{of}")
+    worst = max((curve.error for curve in plot.curves), default=0.0)
+    points = sum(len(curve.xs) for curve in plot.curves)
+    return "; ".join([*said, f"{points} points, {f'error at most {format_error(worst)}' if worst else 'exact'}"])
 
 
 def _range(text: str) -> tuple[str, float, float]:
@@ -70,12 +95,12 @@ def number(text: str) -> float:
     return sign * (pi if bare == "pi" else float(bare))
 
 
-@command("image", "i", argument="EXPR [N] [X0 X1 Y0 Y1]", completes="expression")
+@command("image", "i", argument="EXPR [by NAME] [N] [X0 X1 Y0 Y1]", completes="expression")
 def image(session: Conversation, text: str) -> Part:
     """Draw a function of two numbers as an image over the unit square: `:image f`, `:image f 64 -1 1 -1 1`.
 
-    N is the number of pixels in each direction. A tuple of three is a colour. Free names are the axes, in their
-    order; of a derivative the tangent by the first number is drawn.
+    N is the number of pixels in each direction. A tuple of three is a colour. Free names are the axes, in their order.
+    `by NAME` draws the derivative by an axis or by a number of the session: `c = 0.4`, then `:image g(x, y, c) by c`.
     """
     text = plain_names(text).strip()
     found = _PIXELS.match(text)
@@ -86,11 +111,15 @@ def image(session: Conversation, text: str) -> Part:
     if len(numbers) not in (0, 4):
         raise Refusal("a box is four numbers, X0 X1 Y0 Y1", "write `:image f 64 -1 1 -1 1`")
     x0, x1, y0, y1 = map(number, numbers) if numbers else (0.0, 1.0, 0.0, 1.0)
-    axes = axes_of(session, what.strip(), 2, ":image f")
+    named = re.match(r"(.*?)\s+by\s+([^\W\d]\w*)$", what.strip(), re.DOTALL)
+    if named is None:
+        axes = axes_of(session, what.strip(), 2, ":image f")
+    else:
+        axes = derivative_of(session, named[1], 2, named[2], ":image f by NAME")
     picture = image_of(grid(session, axes, (x0, x1, y0, y1), pixels, pixels), pixels)
     session.last_picture = picture
     shown = half_blocks(picture, unicode=session.options.unicode, color=False)
-    scale = f"{what.strip()}: {picture.low:.4g} (dark) to {picture.high:.4g} (light)"
-    data = {"image": what.strip(), "pixels": pixels, "low": picture.low, "high": picture.high, "_picture": picture,
+    scale = f"{axes.label}: {picture.low:.4g} (dark) to {picture.high:.4g} (light)"
+    data = {"image": axes.label, "pixels": pixels, "low": picture.low, "high": picture.high, "_picture": picture,
             "_scale": scale}  # fmt: skip
     return Part("picture", f"{shown}\n{scale}", data)
