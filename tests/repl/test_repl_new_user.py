@@ -18,6 +18,7 @@ GOLDEN = HERE / "new_user_transcript.txt"
 # What is measured or rounded differently from machine to machine.
 _CHANGING = ((r"[\d,.]+ (?:ms|s)\b", "# ms"), (r"± \d\.\de-\d+", "± #"), (r"[\d,]+ evaluations", "# evaluations"),
              (r"slope \d\.\de-\d+", "slope #"), (r"= \d\.\d+e-\d\d\b", "= #"), (r"\d+ steps", "# steps"),
+             (r"\d+ points, error at most \d\.\de-\d+", "# points, error at most #"),
              (r"\d\.\de-1\d apart|\b0 apart", "# apart"))  # fmt: skip
 
 
