@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from potto.calculus.boundary import NoClosedForm, at_bounds, jumps
+from potto.calculus.branch_cuts import opened
 from potto.calculus.conditions import conditions_of
 from potto.calculus.diffeo import exported
 from potto.calculus.dual import dual
@@ -107,7 +108,7 @@ def _surfaces(db: Database, term: Term) -> dict[str, None]:
         term = term.function if isinstance(term, Deriv) else core(db, term.module, term.name).term
     found = conditions_of(term, lambda g: exported(db, g.module, g.name), lambda g: core(db, g.module, g.name).term)
     own = [node.surface if isinstance(node, Branch) else node.coordinates[0]
-           for node in postorder(term) if isinstance(node, Branch | Delta)]  # fmt: skip
+           for node in postorder(opened(term)) if isinstance(node, Branch | Delta)]  # fmt: skip
     known = [condition.surface for condition in found]
     readable = [surface for surface in own if not any(isinstance(node, App) for node in postorder(surface))]
     texts = (format_term(simplify(surface)) for surface in (*known, *readable))
@@ -171,7 +172,7 @@ def _integral_facts(node: Integral, tangents: Mapping[str, Term]) -> PartFacts:
         interior = "0" if slope is ZERO else over(slope)
         boundary = tuple(
             over(jump.contribution)
-            for jump in jumps(node.body, node.variables, rate)
+            for jump in jumps(opened(node.body), node.variables, rate)
             if jump.rate is not ZERO
         )
         bounds = tuple(format_term(simplify(term)) for term in at_bounds(node, rate))
@@ -188,7 +189,7 @@ def _body_facts(body: Term, tangents: Mapping[str, Term]) -> PartFacts:
         interior = format_term(simplify(dual(body, tangents)[1]))
         boundary = tuple(
             format_term(simplify(jump.contribution))
-            for jump in jumps(body, body.free, lambda term: dual(term, tangents)[1])
+            for jump in jumps(opened(body), body.free, lambda term: dual(term, tangents)[1])
             if jump.rate is not ZERO
         )
     except (PottoError, NoClosedForm) as error:

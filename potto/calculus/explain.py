@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 from potto.calculus.again import moving_deltas
 from potto.calculus.boundary import at_bounds, at_surfaces, jumps
+from potto.calculus.branch_cuts import opened
 from potto.calculus.deltas import without_deltas
 from potto.calculus.derivative import NotSmooth
 from potto.calculus.dual import Differentiator, heads_of
@@ -167,7 +168,7 @@ def describe(term: Term, name: str, type_text: str, resolve: Resolve) -> Derivat
     notes: list[str] = []
     tangent = ""
     try:
-        tangent = _text(work.dual(body, tangents)[1], functions)
+        tangent = _text(work.dual(opened(body), tangents)[1], functions)
     except NoClosedForm as problem:
         notes.append(f"a boundary is found by numbers: {problem}")
     except NotSmooth as problem:
@@ -200,7 +201,7 @@ def _with_deltas(
     plain: Term, work: Differentiator, tangents: Mapping[str, Term], functions: Mapping[str, str], tangent: str
 ) -> str:
     """A function that jumps over its parameters: its derivative is a distribution over what they are filled with."""
-    found = jumps(plain, tangents, lambda t: work.dual(t, tangents)[1])
+    found = jumps(opened(plain), tangents, lambda t: work.dual(t, tangents)[1])
     if not found:
         return tangent
     smooth = _text(work.dual(plain, tangents)[1], functions)  # calls carried out here too: else they count twice
@@ -222,10 +223,12 @@ def _integral(
     interior, reason = "?", ""
     try:
         interior = _text(rate(node.body), functions)
-        for item in jumps(node.body, node.variables, rate):
+        for item in jumps(opened(node.body), node.variables, rate):
             deltas.append(_text(item.contribution, functions))
         deltas += [_text(t, functions) for t in moving_deltas(node, rate)]
-        plain = without_deltas(node)
+        whole = opened(node)
+        assert isinstance(whole, Integral)
+        plain = without_deltas(whole)
         if isinstance(plain, Integral):
             bounds = [_text(t, functions) for t in at_bounds(plain, rate)]
             boundary = [_text(t, functions) for t in at_surfaces(plain, frozenset(inside), rate)]
@@ -249,7 +252,7 @@ def _integral(
 
 def _surfaces(node: Integral, tangents: Mapping[str, Term]) -> tuple[SurfaceText, ...]:
     found: dict[Term, SurfaceText] = {}
-    for item in branches_of(node.body, node.variables):
+    for item in branches_of(opened(node.body), node.variables):
         for factor in factors(item.surface):
             canonical = normalized_surface(factor)[0]
             if canonical in found or not factor.free & frozenset(node.variables):
@@ -268,7 +271,7 @@ def _surfaces(node: Integral, tangents: Mapping[str, Term]) -> tuple[SurfaceText
 def _own_surfaces(body: Term, tangents: Mapping[str, Term]) -> tuple[SurfaceText, ...]:
     """Where a body without an integral jumps."""
     found: dict[Term, SurfaceText] = {}
-    for item in branches_of(body, tangents):
+    for item in branches_of(opened(body), tangents):
         canonical = normalized_surface(item.surface)[0]
         moved = tuple(name for name in tangents if name in item.surface.free)
         found.setdefault(canonical, SurfaceText(equation(item.surface), moved, ()))

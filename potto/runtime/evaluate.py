@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from potto.calculus.branch_cuts import opened
 from potto.calculus.surfaces import TooDeep
 from potto.core.printer import format_term
 from potto.core.terms import Term
@@ -39,7 +40,7 @@ class Program:
 
     def value(self, machine: Machine, term: Term, env: Mapping[str, Value] | None = None) -> Value:
         """The value of a term, with every internal limit turned into a PottoError."""
-        return guarded(lambda: machine.term(term, dict(env or {})))
+        return guarded(lambda: machine.term(opened(term), dict(env or {})))
 
     def evaluate(self, term: Term, settings: Settings = DEFAULTS, env: Mapping[str, Value] | None = None) -> Estimate:
         """The estimate of a term. Raises PottoError where the program has no value."""

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from potto.calculus.branch_cuts import opened
 from potto.calculus.deltas import PRODUCT_OF_DELTAS
 from potto.calculus.surfaces import uncurry
 from potto.core.terms import (
@@ -73,7 +74,7 @@ class Linker:
     def term(self, module: str, name: str) -> Term:
         key = (module, name)
         if key not in self.terms:
-            self.terms[key] = self.lookup(module, name)
+            self.terms[key] = opened(self.lookup(module, name))
         return self.terms[key]
 
     def inexact(self, term: Term) -> bool:

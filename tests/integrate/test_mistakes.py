@@ -190,3 +190,28 @@ def test_the_papers_introduction() -> None:
         assert r.tangent == 0.0
         assert float(note.backward) == pytest.approx(backward, rel=1e-14, abs=0)
         assert float(note.forward) == pytest.approx(forward, rel=1e-14, abs=0)
+
+
+def test_an_angle_jumps_where_it_passes_the_negative_axis() -> None:
+    # With A(u) = atan2(u, -1), f(t) is the integral of A from -1 - t to 1 - t, so that f' = A(-1 - t) - A(1 - t). What
+    # differentiates the integrand alone finds 2 pi more, as A jumps at 0.
+    program = "def f(t) integral [-1, 1] atan2(x - t, -1) d(x)"
+    exact = math.atan2(-1.3, -1) - math.atan2(0.7, -1)
+    assert close(derivative(program, (0.3, 1.0)).tangent, exact)
+    through_a_call = "def angle(p) atan2(p, -1)\ndef f(t) integral [-1, 1] angle(x - t) d(x)"
+    assert close(derivative(through_a_call, (0.3, 1.0)).tangent, exact)
+    with potto.settings(method="mc", samples=100_000, seed=3):
+        r = derivative(program, (0.3, 1.0))
+    assert abs(r.tangent - exact) < 5 * r.tangent_error < 0.1
+    # In a plane f'(0) is -2 times the integral of atan2(1, x) over x in [-2, 0], which is pi - atan(1/s) at x = -s.
+    r = derivative("def f(t) integral ([-2, 0], [-1, 1]) atan2(y - t, x) d(x, y)", (0.0, 1.0))
+    assert close(r.tangent, -2 * (2 * math.pi - 2 * math.atan(0.5) - math.log(5) / 2), 1e-9)
+
+
+def test_a_second_derivative_does_not_meet_the_jump_of_an_angle_again() -> None:
+    # f'' = A'(1 - t) - A'(-1 - t) with A'(u) = -1/(1 + u^2).
+    program = """def g(t) integral [-1, 1] atan2(x - t, -1) d(x)
+dg = deriv(g)
+def f(t) snd(dg((t, 1)))"""
+    r = derivative(program, (0.3, 1.0))
+    assert close(r.tangent, 1 / (1 + 1.3**2) - 1 / (1 + 0.7**2), 1e-10)
