@@ -79,7 +79,7 @@ def leaning(coefficients: Array) -> Ints:
     tail = coefficients[:, n // 2 :]
     total = np.abs(tail).sum(axis=-1)
     signs = (-1.0) ** np.arange(n // 2, n)
-    slow = np.abs(tail[:, -2:]).sum(axis=-1) > 0.03 * np.abs(tail[:, :2]).sum(axis=-1)
+    slow = np.abs(tail[:, -2:]).sum(axis=-1) > 0.01 * np.abs(tail[:, :2]).sum(axis=-1)
     left = np.abs(tail @ signs) > 0.9 * total
     right = np.abs(tail.sum(axis=-1)) > 0.9 * total
     return np.where(slow & left, -1, np.where(slow & right, 1, 0))
