@@ -194,7 +194,10 @@ class Work:
         p.error = truncation(size)
         p.coefficients = coefficients
         # the rounding of a node, as a part of the piece
-        shake = NODE_ROUNDING * EPS * np.abs(x).max(axis=-1) / np.abs(weight).max(axis=-1)
+        if weight.shape[1] == 1:  # the map is linear
+            shake = NODE_ROUNDING * EPS * np.maximum(np.abs(seg.a), np.abs(seg.b)) / weight[:, 0]
+        else:
+            shake = NODE_ROUNDING * EPS * np.abs(x).max(axis=-1) / np.abs(weight).max(axis=-1)
         shake = np.where(shake <= 1.0, shake, np.where(np.isfinite(shake), 1.0, 0.0))
         p.size = height @ rule.weights
         if self.watched:
