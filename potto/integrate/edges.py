@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from potto.core.printer import format_term
 from potto.integrate.cuts import Cuts, Edge, as_array
 from potto.integrate.pieces import Evaluator, Sums, gather, still, take
 from potto.integrate.plan import LevelPlan
@@ -27,27 +28,30 @@ def report_edges(
     for edge in cuts.edges:
         if number and 2 * edge.owner.size < cuts.sign.size:
             continue  # single nodes of the variables further out: of measure zero
-        found = across(parent, number, level, edge, env, sides, machine)
-        if found is None:
-            continue
-        flip, scale = found
+        flip, scale = across(parent, number, level, edge, env, sides, machine)
         speed = edge.bound_t - edge.root_t if edge.upper else edge.root_t - edge.bound_t
+        surface = level.level.cuts[edge.cut].surface
+        singular = ~np.isfinite(flip)[:, None, :] & (speed[None] != 0)
+        if singular.any():  # what comes in as the surface leaves the bound, no value here tells
+            sums.et[:, :, edge.owner] = np.where(singular, np.inf, sums.et[:, :, edge.owner])
+            where = f"{format_term(surface)} = 0 lies on a bound of `{level.variable}`"
+            machine.note_unfinished(f"{where}, and beyond it the integrand is not finite")
         # where the surface comes in as the parameters grow, the growing side has the extra stretch
         change = flip[:, None, :] * speed[None]
         matters = np.abs(change) > 1e-12 * (np.abs(sums.t[:, :, edge.owner]) + scale[:, None, :] + 1e-300)
-        if not matters.any():
+        if not (matters & ~singular).any():
             continue
         inward = speed[None] > 0
         base = sums.t[:, :, edge.owner]
         forward = np.where(inward, base + change, base)
         backward = np.where(inward, base, base + change)
-        machine.note_edge(level.variable, level.level.cuts[edge.cut].surface, backward, forward)
+        machine.note_edge(level.variable, surface, backward, forward)
 
 
 def across(
     parent: Iteration, number: int, level: LevelPlan, edge: Edge, env: dict[str, Value],
     sides: dict[int, Mask], machine: Evaluator,
-) -> tuple[Array, Array] | None:  # fmt: skip
+) -> tuple[Array, Array]:  # fmt: skip
     """(F with the edge's surface flipped minus F as it is) at the bound, per component, and its size."""
     group = level.decided[[i for i, c in enumerate(level.level.cuts) if c.decides].index(edge.cut)]
     frozen = machine.with_directions(0)
@@ -68,6 +72,4 @@ def across(
             inner[g] = side
     actual = parent.inside(number, here, edge.owner.size, inner, frozen)
     flipped = parent.inside(number, here, edge.owner.size, {**inner, group: ~np.asarray(inner[group])}, frozen)
-    if not (np.isfinite(actual).all() and np.isfinite(flipped).all()):
-        return None
     return flipped - actual, np.abs(actual) + np.abs(flipped)

@@ -215,3 +215,14 @@ dg = deriv(g)
 def f(t) snd(dg((t, 1)))"""
     r = derivative(program, (0.3, 1.0))
     assert close(r.tangent, 1 / (1 + 1.3**2) - 1 / (1 + 0.7**2), 1e-10)
+
+
+@pytest.mark.parametrize("mode", [0.0, 1.0])
+def test_a_derivative_is_not_vouched_for_where_a_density_degenerates(mode: float) -> None:
+    # The mean is (0 + m + 1)/3, so that its derivative is 1/3 from inside; but at m = 0 and at m = 1 one slope of the
+    # triangle is 0/0, and the other one alone gives 1/3 by luck or -2/3.
+    r = derivative("def f(m) integral (x ~ triangular(0, m, 1)) x d(x)", (mode, 1.0))
+    assert close(r.value, (1 + mode) / 3)
+    assert not r.converged and r.tangent_error == math.inf and "lies on a bound" in r.reasons[0]
+    still = derivative("def f(t) integral (x ~ triangular(0, 1, 1)) t*x d(x)", (1.0, 1.0))
+    assert still.converged and close(still.tangent, 2 / 3)
