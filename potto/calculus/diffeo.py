@@ -6,6 +6,7 @@ integrated over from `verdict`; here both meet the program: places, the author's
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -258,7 +259,7 @@ def _wrong_shape(components: Sequence[Term], variables: Sequence[str], box: Box)
         return Problem(
             COMPONENTS,
             f"{_many(len(components), 'component')} over {_many(len(variables), 'variable')}",
-            f"{len(components)} here, {len(variables)} variables",
+            f"{len(components)} here, {_many(len(variables), 'variable')}",
             (),
             f"give {_many(len(variables), 'component')}: an invertible map has as many as variables",
         )
@@ -352,9 +353,12 @@ def _wrong(what: _Map, refuted: Refuted) -> Problem:
     at = ", ".join(f"{n} = {v:.6g}" for n, v in refuted.point.items())
     back = ", ".join(f"{n} = {v:.6g}" for n, v in refuted.back.items())
     hint = "" if what.where else "; if it is right on one branch only, select that with `where`"
+    nowhere = not all(math.isfinite(v) for v in refuted.back.values())
     return Problem(
         WRONG_INVERSE,
-        f"this inverse does not lead back: from {at} it gives {back}",
+        f"this inverse does not lead back: it is not defined where the map leads from {at}"
+        if nowhere
+        else f"this inverse does not lead back: from {at} it gives {back}",
         "not the inverse",
         ("checked at sample points",),
         f"correct the inverse{hint}",

@@ -55,7 +55,7 @@ def verify(
     """Whether `inverse`, over `values`, gives back the variables; only where `where` holds."""
     forth = dict(zip(values, coordinates, strict=True))
     round_trip = [substitute(i, forth) for i in inverse]
-    refuted = _sampled(round_trip, variables, where, box or {})
+    refuted = _sampled(coordinates, round_trip, variables, where, box or {})
     if isinstance(refuted, Refuted):
         return refuted
     if all(equal(r, var(v)) for r, v in zip(round_trip, variables, strict=True)):
@@ -64,7 +64,7 @@ def verify(
 
 
 def _sampled(
-    round_trip: Sequence[Term], variables: Sequence[str], where: Sequence[Guard], box: Box
+    coordinates: Sequence[Term], round_trip: Sequence[Term], variables: Sequence[str], where: Sequence[Guard], box: Box
 ) -> Verified | Refuted | Untested:
     names = sorted({n for t in round_trip for n in t.free} | {n for g in where for n in g.surface.free} | {*variables})
     tested = 0
@@ -73,6 +73,8 @@ def _sampled(
             continue
         back = [sample_value(t, point) for t in round_trip]
         if any(not math.isfinite(b) for b in back):
+            if all(math.isfinite(sample_value(c, point)) for c in coordinates):
+                return Refuted(point, dict(zip(variables, back, strict=True)))  # the map reaches what has no inverse
             continue
         tested += 1
         far = [abs(b - point[v]) > _TOLERANCE * (1 + abs(point[v])) for b, v in zip(back, variables, strict=True)]

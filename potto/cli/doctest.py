@@ -39,11 +39,11 @@ def run(options: argparse.Namespace, console: Console) -> int:
         console.answer_json({"tests": [asdict(o) for o in outcomes], **all_to_json(problems, world.source)})
     else:
         console.diagnostics(problems, world.source)
-        _show(outcomes, len(files), options.verbose, console)
+        _show(outcomes, len(files), bool(problems), options.verbose, console)
     return int(bool(problems) or not all(outcome.passed for outcome in outcomes))
 
 
-def _show(outcomes: list[Outcome], files: int, verbose: bool, console: Console) -> None:
+def _show(outcomes: list[Outcome], files: int, broken: bool, verbose: bool, console: Console) -> None:
     from potto.render import display_name
 
     for outcome in outcomes:
@@ -54,7 +54,8 @@ def _show(outcomes: list[Outcome], files: int, verbose: bool, console: Console) 
             console.answer(f"{head}\n    {outcome.value}")
     failed = sum(not outcome.passed for outcome in outcomes)
     count = f"{_count(len(outcomes), 'live expression')} in {_count(files, 'file')}"
-    console.answer(f"{count}: {failed} failed" if failed else f"{count}: all hold")
+    verdict = f"{failed} failed" if failed else "all hold"
+    console.answer(f"{count}: {verdict}{', but not all files could be tested' if broken else ''}")
 
 
 def _count(number: int, what: str) -> str:

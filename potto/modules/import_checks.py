@@ -266,7 +266,8 @@ def unreadable(problem: Unreadable, path: str, span: Span, what: str) -> Diagnos
         case "not text":
             message = f"{what} is not UTF-8 text: {problem.detail} at byte {problem.offset}"
     help = "save it as UTF-8" if kind is NOT_TEXT else ""
-    return kind(span, message, notes=(f"the file is {path}",), help=help)
+    notes = () if path.endswith("<stdin>") else (f"the file is {path}",)
+    return kind(span, message, notes=notes, help=help)
 
 
 def _stem(file: str) -> str:

@@ -128,6 +128,12 @@ def _special(stop: Stop) -> Diagnostic | None:
         return kinds.UNFINISHED(
             at.span, "expected `then` after the condition of `if`", related=_from(opened), help="write `then`, not `:`"
         )
+    if at.kind in ("DOT", "DOTDOT") and before is not None and before.kind in ("FROM", "IMPORT"):
+        return kinds.BAD_IMPORT(
+            at.span,
+            "a module's name does not begin with a dot",
+            help="write `from m import a`: it is looked for beside this file, then from the roots",
+        )
     if at.kind == "STAR" and opened is not None and opened.kind == "IMPORT":
         return kinds.BAD_IMPORT(at.span, "an import says which names it takes", help="list the names instead of `*`")
     if at.kind == "COMMA" and stop.values and isinstance(stop.values[0], Token) and stop.values[0].kind == "IMPORT":

@@ -24,7 +24,7 @@ def lints(inference: Inference, walk: Walk, item: Node) -> Iterator[Diagnostic]:
 
 def _unused(inference: Inference) -> Iterator[Diagnostic]:
     for local in inference.locals:
-        if local.used or local.name.startswith("_"):
+        if local.used or not local.name or local.name.startswith("_"):
             continue
         if local.kind == "local":
             yield kinds.UNUSED_LOCAL(

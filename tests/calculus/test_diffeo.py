@@ -96,6 +96,7 @@ WRONG = [
     ("P0403", "diffeo d(x; t) = (x^3 + t) inverse (u) . (u^(1/3) - t)", "does not lead back"),
     ("P0403", "diffeo d(x, y) = (x + y, x - y) inverse (u, v) . ((u + v)/2, (u + v)/2)", "does not lead back"),
     ("P0403", "diffeo d(x) = (x^2) inverse (u) . (sqrt(u))", "does not lead back"),
+    ("P0403", "diffeo d(x; t) = (x^3 + t) inverse (u) . (u - t)^(1/3)", "not defined where the map leads"),
     ("P0404", "diffeo d(x, y) = (x + y, x - y, x)", "3 components over 2 variables"),
     ("P0404", "diffeo d(x, y) = (x + y)", "1 component over 2 variables"),
     ("P0404", "diffeo d(x, y) = (x + y, x - y) inverse (u, v) . (u + v)", "the inverse takes 2 values to 1 component"),

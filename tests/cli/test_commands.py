@@ -150,12 +150,19 @@ def test_fmt_leaves_alone_what_it_cannot_read(potto: Potto, tmp_path: Path) -> N
     assert ran.status == 1 and "P0102" in ran.err and (tmp_path / "main.po").read_text() == "def f(t) (t\n"
 
 
+def test_a_name_that_is_missing_is_not_called_unused(potto: Potto) -> None:
+    ran = potto("check", "main.po", main="let\n")
+    assert ran.status == 1 and "P0101" in ran.out and "P0610" not in ran.out
+
+
 def test_live_expressions(potto: Potto) -> None:
     good = HALF + "#> f(1/3)\n#= 0.333\n#> deriv(f)((0.3, 1))\n#= (0.3, 1)\n#> f(2)\n"
     ran = potto("test", "main.po", main=good)
     assert ran.status == 0 and "3 live expressions in 1 file: all hold" in ran.out
     ran = potto("test", "main.po", main=HALF + "#> f(1/3)\n#= 0.334\n")
     assert ran.status == 1 and "main.po:3: f(1/3)" in ran.err and "expected 0.334" in ran.err
+    ran = potto("test", "main.po", main="def f(t) (t\n")
+    assert ran.status == 1 and "P0102" in ran.err and "but not all files could be tested" in ran.out
     ran = potto("test", "--json", "main.po", main=HALF + "#> nothing\n#= 1\n")
     assert ran.status == 1 and "not defined" in ran.json["tests"][0]["message"]
 

@@ -102,6 +102,8 @@ def test_unfinished() -> None:
         ("for v in [1, 2] print(v)", "P0104", "for", "this `for` has no statements"),
         ("else", "P0103", "else", "unexpected `else`"),
         ("import", "P0118", "import", "expected a module after `import`"),
+        ("from .m import a", "P0118", ".", "a module's name does not begin with a dot"),
+        ("from ..m import a", "P0118", "..", "a module's name does not begin with a dot"),
         ("import a, b", "P0118", ",", "one `import` takes one module"),
         ("x = sum(y)", "P0103", "sum", "unexpected `sum`"),
         ("x = 1 if p else 2", "P0103", "if", "unexpected `if`"),
