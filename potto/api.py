@@ -222,6 +222,11 @@ class Function:
         return format_type(self._type)
 
     @property
+    def parameters(self) -> tuple[str, ...]:
+        """The names of the parameters of all groups, those that are given already included; nameless ones are empty."""
+        return tuple(parameter.name or "" for group in groups_of(self._whole) for parameter in group)
+
+    @property
     def surfaces(self) -> tuple[str, ...]:
         """The conditions across which the function's value or integrand jumps, as Potto writes them."""
         from potto.facts import surfaces

@@ -271,3 +271,8 @@ def _reason(walk: _Walk, message: str, most: int) -> str:
     if walk.walls:
         return "it ends beside places where the value is no number"
     return "no step along the derivative makes it smaller, though a slope is left: a kink, or the limit of accuracy"
+
+
+def column(numbers: Sequence[float]) -> Array:
+    """Numbers as an array, as `fit` takes those of a table."""
+    return np.array(numbers, dtype=float)

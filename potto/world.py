@@ -29,6 +29,7 @@ from potto.source import SourceText, Span
 from potto.syntax import parse_expression
 from potto.syntax.nodes import Expr
 from potto.types import format_type, infer_expression
+from potto.types.types import Type
 
 EXPRESSION = "<expression>"
 T = TypeVar("T")
@@ -121,6 +122,13 @@ class World(Library):
             raise ProgramError([Located(EXPRESSION, placed(d, whole, 0)) for d in error.diagnostics], sources) from None
         said = tuple(Located(EXPRESSION, d) for d in remarks(estimate, Span(0, len(text)), chosen))
         return Answer(estimate, format_type(inferred.type), said)
+
+    def typed(self, file: str, text: str) -> tuple[Expr, Type]:
+        """The tree of an expression with a file's names in scope, and its type. Raises ProgramError."""
+        tree = self.parse(text)
+        inferred = infer_expression(self.db, file, tree)
+        self._stop(inferred.diagnostics, self.sources(text))
+        return tree, inferred.type
 
     def parse(self, text: str) -> Expr:
         """The tree of an expression. Raises ProgramError."""

@@ -15,7 +15,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     ("potto_lsp", "potto_repl", "potto.__main__", "potto.cli"),
     (
         "potto.ide", "potto.session", "potto.api", "potto.calls", "potto.arguments", "potto.live", "potto.world",
-        "potto.fitting", "potto.bench",
+        "potto.fitting", "potto.images", "potto.bench",
     ),
     ("potto.runtime",),
     ("potto.kernels", "potto.integrate"),
@@ -25,7 +25,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     ("potto.types",),
     ("potto.modules", "potto.primitives", "potto.diffeos", "potto.measures"),
     ("potto.syntax", "potto.core"),
-    ("potto.render", "potto.excerpt", "potto.settings", "potto.project", "potto.pages"),
+    ("potto.png", "potto.render", "potto.excerpt", "potto.settings", "potto.project", "potto.pages"),
     ("potto.source", "potto.diagnostics", "potto.query"),
 )
 # What a package must not import although its floor would let it.
@@ -38,7 +38,7 @@ FORBIDDEN: dict[str, tuple[str, ...]] = {
 OUTSIDERS: dict[str, tuple[str, ...]] = {
     "lark": ("potto.syntax",),
     "numpy": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.arguments", "potto.fitting",
-              "potto.bench", "potto_lsp.preview", "potto_lsp.sampling"),
+              "potto.images", "potto.bench", "potto_lsp.preview", "potto_lsp.sampling"),
     "scipy": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.fitting", "potto.bench"),
     "jax": ("potto.bench.peers",),
     "vegas": ("potto.bench.peers",),

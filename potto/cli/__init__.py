@@ -7,9 +7,9 @@ Owns nothing but the list of commands. Each command is one module with `SUMMARY`
 from __future__ import annotations
 
 COMMANDS = (
-    "run", "eval", "check", "deriv", "fmt", "test", "bench", "explain", "dump", "cache", "repl", "kernel", "lsp",
+    "run", "eval", "check", "deriv", "fmt", "test", "render", "fit", "bench", "explain", "dump", "cache", "repl",
+    "kernel", "lsp",
 )  # fmt: skip
-LATER = ("render", "fit")  # they answer that a later release brings them
 
 
 def module_of(command: str) -> str:

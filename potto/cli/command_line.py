@@ -13,7 +13,7 @@ from collections.abc import Callable
 from typing import Any, NoReturn
 
 from potto import __version__
-from potto.cli import COMMANDS, LATER, module_of
+from potto.cli import COMMANDS, module_of
 from potto.cli.console import Console, standard_console
 
 
@@ -34,9 +34,6 @@ def dispatch(arguments: list[str]) -> int:
         options = parser.parse_intermixed_args(prepare(arguments[1:]))
         run: Callable[[argparse.Namespace, Console], int] = module.run
         return run(options, standard_console(options.color))
-    if arguments and arguments[0] in LATER:
-        sys.stderr.write(f"potto {arguments[0]}: this command comes with a later release; see `potto --help`\n")
-        return 2
     return _without_command(arguments)
 
 

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from potto.cli.console import Console
 from potto.cli.files import STDIN, missing, read_stdin
-from potto.render import ProgramError, all_to_json
+from potto.diagnostics import PottoError
+from potto.render import Located, ProgramError, all_to_json
 from potto.source import SourceText
 
 if TYPE_CHECKING:
@@ -40,8 +41,10 @@ def no_sources(file: str) -> SourceText | None:
     return None
 
 
-def fail(error: ProgramError, options: argparse.Namespace, console: Console) -> int:
-    """Show what is wrong with the program; the exit status."""
+def fail(error: PottoError, options: argparse.Namespace, console: Console) -> int:
+    """Show what is wrong with the program, or with how it is used; the exit status."""
+    if not isinstance(error, ProgramError):
+        error = ProgramError([Located(None, diagnostic) for diagnostic in error.diagnostics], no_sources)
     if options.json:
         console.answer_json(all_to_json(error.located, error.sources))
     else:

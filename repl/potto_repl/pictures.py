@@ -8,10 +8,10 @@ from __future__ import annotations
 import html
 import itertools
 import math
-import struct
-import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
+
+from potto.png import encode
 
 Color = tuple[int, int, int]
 COLORS: tuple[Color, ...] = ((31, 119, 180), (214, 39, 40), (44, 160, 44), (148, 103, 189), (255, 127, 14))
@@ -255,11 +255,4 @@ def line(points: Sequence[tuple[float, float]]) -> set[tuple[int, int]]:
 
 def png(pixels: Sequence[Sequence[Color]]) -> bytes:
     """Pixels as a PNG file."""
-    width, height = len(pixels[0]), len(pixels)
-    raw = b"".join(b"\x00" + bytes(channel for pixel in row for channel in pixel) for row in pixels)
-
-    def chunk(kind: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    head = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(raw, 9)) + chunk(b"IEND", b"")
+    return encode(bytes(channel for row in pixels for pixel in row for channel in pixel), len(pixels[0]), len(pixels))

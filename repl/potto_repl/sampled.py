@@ -6,14 +6,13 @@ axes. A derivative counts with its tangent. Where the program has no value, a pi
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from potto.api import Function
 from potto.arguments import evenly
-from potto.diagnostics import PottoError
+from potto.images import flat, sampled
 from potto.modules.builtins import is_builtin
 from potto.modules.free import free_references
 from potto.runtime.estimate import Estimate
@@ -112,7 +111,7 @@ def curves(session: Conversation, axes: Axes, lo: float, hi: float) -> list[Curv
         asked += len(places)
         if session.progress is not None:
             session.progress(f"{axes.label}: {asked} points")
-        return list(zip(*_sampled(session, axes, [_array(places)], len(places)), strict=True))
+        return list(zip(*_sampled(session, axes, [_array(places)]), strict=True))
 
     return followed(evaluate, lo, hi)
 
@@ -126,7 +125,7 @@ def grid(
     across = evenly(x0 + dx / 2, x1 - dx / 2, columns)
     down = evenly(y1 - dy / 2, y0 + dy / 2, rows)
     points = [[x for _ in range(rows) for x in across.tolist()], [y for y in down.tolist() for _ in range(columns)]]
-    parts = _sampled(session, axes, [_array(place) for place in points], rows * columns)
+    parts = _sampled(session, axes, [_array(place) for place in points])
     return [[value for value, _ in part] for part in parts]
 
 
@@ -136,12 +135,17 @@ def _array(numbers: Sequence[float]) -> Any:
     return found
 
 
-def _sampled(session: Conversation, axes: Axes, places: list[Any], count: int) -> list[list[Pair]]:
+def _sampled(session: Conversation, axes: Axes, places: list[Any]) -> list[list[Pair]]:
+    """Per component the values with their errors; nan where there is none."""
+
+    def parts(*here: Any) -> tuple[list[Any], Estimate]:
+        found = _call(axes, list(here))
+        return _components(found, axes), found
+
     with settings(**_coarse(session.settings)):
-        try:
-            return _components(_call(axes, places), axes, count)
-        except PottoError:
-            return _one_by_one(session, axes, places, count)
+        rows: list[list[float]] = sampled(parts, places).numbers.tolist()
+    count = len(rows) // 2
+    return [list(zip(*pair, strict=True)) for pair in zip(rows[:count], rows[count:], strict=True)]
 
 
 def _coarse(chosen: Settings) -> dict[str, Any]:
@@ -156,34 +160,9 @@ def _call(axes: Axes, places: list[Any]) -> Estimate:
     return found
 
 
-def _components(estimate: Estimate, axes: Axes, count: int) -> list[list[Pair]]:
-    """Per component the values with their errors."""
+def _components(estimate: Estimate, axes: Axes) -> list[Any]:
+    """The values of all components, then their errors."""
     drawn, doubt = (estimate.tangent, estimate.tangent_error) if axes.dual else (estimate.value, estimate.error)
     if drawn is None:
         raise Refusal(f"`{axes.label}` gives a function, which cannot be drawn")
-    parts, doubts = (drawn, doubt) if isinstance(drawn, tuple) else ((drawn,), (doubt,))
-    pairs = zip(parts, doubts, strict=True)
-    return [list(zip(_numbers(v, count), _numbers(e, count), strict=True)) for v, e in pairs]
-
-
-def _numbers(part: Any, count: int) -> list[float]:
-    tolist: Callable[[], Any] | None = getattr(part, "tolist", None)
-    found = tolist() if tolist is not None else float(part)
-    return [float(x) for x in found] if isinstance(found, list) else [found] * count
-
-
-def _one_by_one(session: Conversation, axes: Axes, places: list[Any], count: int) -> list[list[Pair]]:
-    """Place by place, with holes where there is no value. Raises what went wrong first if there is none at all."""
-    rows: list[list[Pair] | None] = []
-    problem: PottoError | None = None
-    for i in range(count):
-        try:
-            found = _components(_call(axes, [float(p[i]) for p in places]), axes, 1)
-            rows.append([part[0] for part in found])
-        except PottoError as error:
-            problem = problem or error
-            rows.append(None)
-    size = max((len(row) for row in rows if row is not None), default=0)
-    if not size and problem is not None:
-        raise problem
-    return [[(math.nan, 0.0) if row is None else row[i] for row in rows] for i in range(size)]
+    return [*flat(drawn), *flat(doubt)]

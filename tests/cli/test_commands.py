@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from command_runs import Potto
 
-from potto.cli import COMMANDS, LATER
+from potto.cli import COMMANDS
 
 HALF = "def f(t)\n    integral [0, 1] [x < t] d(x)\n"
 WRONG = "def f(t)\n    integral [0, 1] (if x < t then 1 else 0) d(x)\n"
@@ -237,13 +237,6 @@ def test_cache(potto: Potto, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
 def test_every_command_helps_with_an_example(potto: Potto, command: str) -> None:
     ran = potto(command, "--help")
     assert ran.status == 0 and "example:" in ran.out and f"potto {command}" in ran.out
-
-
-@pytest.mark.parametrize("command", LATER)
-def test_commands_of_later_releases_say_so(potto: Potto, command: str) -> None:
-    ran = potto(command, "--stdio")
-    assert ran.status == 2 and ran.out == "" and "later release" in ran.err
-    assert f"  {command} " not in potto("--help").out
 
 
 @pytest.mark.parametrize(

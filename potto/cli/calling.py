@@ -1,0 +1,49 @@
+"""Functions and arguments on a command line: `NAME name=EXPR …`, with the file's names in scope."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from potto.api import Function
+    from potto.world import World
+
+
+def assignment(text: str) -> tuple[str, str]:
+    """`name=EXPR` as a pair; for argparse."""
+    name, equals, expression = text.partition("=")
+    if not equals or not name.strip().isidentifier() or not expression.strip() or expression.startswith("="):
+        raise argparse.ArgumentTypeError(f"{text!r} does not say which parameter is what; write `name=value`")
+    return name.strip(), expression.strip()
+
+
+def function_in(world: World, file: str, text: str) -> Function:
+    """The function that an expression stands for. Raises ProgramError, PottoError."""
+    from potto.api import Function
+    from potto.kernels.errors import wrong_call
+    from potto.types.types import Diffeo
+    from potto.types.types import Function as FunctionType
+
+    tree, type = world.typed(file, text)
+    if not isinstance(type, FunctionType | Diffeo):
+        raise wrong_call(f"`{text}` is no function", "name a function of the program, or write one: `\\(x, y) . x*y`")
+    return Function(world, file, tree, type)
+
+
+def argument_in(world: World, file: str, text: str) -> Any:
+    """What a parameter is given: a function, or numbers. Raises ProgramError."""
+    from potto.api import Function
+    from potto.types.types import Diffeo
+    from potto.types.types import Function as FunctionType
+
+    tree, type = world.typed(file, text)
+    if isinstance(type, FunctionType | Diffeo):
+        return Function(world, file, tree, type)
+    return world.evaluate(file, text).estimate.value
+
+
+def arguments_in(world: World, file: str, given: Sequence[tuple[str, str]]) -> dict[str, Any]:
+    """Parameters with what they are given. Raises ProgramError."""
+    return {name: argument_in(world, file, text) for name, text in given}

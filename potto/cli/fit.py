@@ -1,0 +1,194 @@
+"""`potto fit`: the parameters that make a function least, or bring it to a target."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import time
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+from potto.cli.calling import argument_in, arguments_in, assignment, function_in
+from potto.cli.console import Console
+from potto.cli.numbers import add_options, settings_of
+
+if TYPE_CHECKING:
+    from potto.fitting import Fit, Step
+    from potto.world import World
+
+SUMMARY = "find the parameters that make a function least, along its derivatives"
+EXAMPLE = """  potto fit lamp.po loss angle=0.2 height=1 --with shader=lin --bound angle=0:1.5
+  potto fit lamp.po light angle=0.2 --data measured.csv --target brightness --trace steps.csv"""
+EVERY = 1.0  # seconds between lines of progress where no one line can be overwritten
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", metavar="FILE", help="the program; `-` reads it from standard input")
+    parser.add_argument("name", metavar="NAME", help="the function: a name, or an expression that is a function")
+    parser.add_argument("start", metavar="NAME=EXPR", nargs="+", type=assignment, help="what is fitted, and from where")
+    parser.add_argument("--with", dest="given", metavar="NAME=EXPR", action="append", default=[], type=assignment,
+                        help="what another parameter is given")  # fmt: skip
+    parser.add_argument("--bound", metavar="NAME=LO:HI", action="append", default=[], type=_bound,
+                        help="what a parameter may be; one side may be left out")  # fmt: skip
+    parser.add_argument("--target", metavar="EXPR", help="what the function should be (with --data, the name of a "
+                        "column); then the mean squared distance is made least")  # fmt: skip
+    parser.add_argument("--data", metavar="FILE.csv", help="parameters as columns of a table with a line of names")
+    parser.add_argument("--steps", type=int, default=200, help="the most steps (default 200)")
+    parser.add_argument("--trace", metavar="FILE", help="write every step to a .csv or .json file")
+    add_options(parser)
+
+
+def _bound(text: str) -> tuple[str, tuple[float, float]]:
+    name, sides = assignment(text)
+    low, colon, high = sides.partition(":")
+    try:
+        found = float(low or "-inf"), float(high or "inf")
+    except ValueError:
+        found = (1.0, 0.0)
+    if not colon or not found[0] < found[1]:
+        raise argparse.ArgumentTypeError(f"{text!r} is no bound; write `{name}=0:1`, from less to more")
+    return name, found
+
+
+def prepare(arguments: list[str]) -> list[str]:
+    """Let a target begin with a minus: `--target -1` as `--target=-1`."""
+    joined: list[str] = []
+    for word in arguments:
+        if joined and joined[-1] == "--target":
+            joined[-1] += f"={word}"
+        else:
+            joined.append(word)
+    return joined
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    from potto.cli.opening import fail, opened
+
+    chosen = settings_of(options, console)
+    if chosen is None:
+        return 2
+    if options.steps < 1:
+        console.complain("potto fit: --steps must be at least 1")
+        return 2
+    from potto.diagnostics import PottoError
+    from potto.settings import settings
+    from potto.world import World
+
+    world = World(["."])
+    try:
+        file = opened(world, options.file)
+        world.require(file)
+        with settings(**asdict(chosen)):
+            found = _fitted(world, file, options, console)
+    except PottoError as error:
+        console.progress("")
+        return fail(error, options, console)
+    except (OSError, ValueError) as error:  # of the table
+        console.complain(f"potto fit: {error}")
+        return 2
+    try:
+        if options.trace:
+            _write_trace(found, options.trace)
+    except OSError as error:
+        console.complain(f"potto fit: {error}")
+        return 1
+    _tell(found, options, console)
+    return 0 if found.converged else 1
+
+
+def _fitted(world: World, file: str, options: argparse.Namespace, console: Console) -> Fit:
+    """The fit that the command line asks for. Raises PottoError; OSError and ValueError for the table."""
+    from potto.fitting import fit
+    from potto.kernels.errors import wrong_call
+
+    function = function_in(world, file, options.name)
+    start: dict[str, float] = {}
+    for name, text in options.start:
+        value = argument_in(world, file, text)
+        if not isinstance(value, float):
+            raise wrong_call(f"`{name}` starts at something that is no number", "numbers are fitted, one by one")
+        start[name] = value
+    given = arguments_in(world, file, options.given)
+    target: Any = None
+    columns = read_table(options.data) if options.data else {}
+    if options.target is not None:
+        by_column = options.target.strip() in columns
+        target = columns.pop(options.target.strip()) if by_column else argument_in(world, file, options.target)
+    unknown = [name for name in columns if name not in function.parameters]
+    if unknown:
+        raise ValueError(f"{options.data} has a column `{unknown[0]}`, and `{options.name}` has no such parameter; "
+                         "name the column of what is measured with --target")  # fmt: skip
+    bounds = dict(options.bound)
+    return fit(function, start, given={**given, **columns}, bounds=bounds, target=target, steps=options.steps,
+               progress=_Progress(tuple(start), console))  # fmt: skip
+
+
+class _Progress:
+    """A line that is overwritten on a terminal; elsewhere a line now and then."""
+
+    def __init__(self, names: tuple[str, ...], console: Console) -> None:
+        self.names, self.console, self.last = names, console, time.perf_counter()
+
+    def __call__(self, step: Step) -> None:
+        at = ", ".join(f"{n} = {v:.6g}" for n, v in zip(self.names, step.parameters, strict=True))
+        line = f"step {step.number}: {step.value:.6g} at {at}, slope {step.slope:.1e}"
+        self.console.progress(line)
+        if not self.console.err.isatty() and time.perf_counter() - self.last > EVERY:
+            self.console.complain(line)
+            self.last = time.perf_counter()
+
+
+def read_table(path: str) -> dict[str, Any]:
+    """The columns of a CSV file with a line of names, as arrays. Raises OSError, ValueError."""
+    from potto.fitting import column
+
+    with open(path, encoding="utf-8-sig", newline="") as stream:
+        rows = [row for row in csv.reader(stream) if any(cell.strip() for cell in row)]
+    if len(rows) < 2:
+        raise ValueError(f"{path} has no line of names with lines of numbers below it")
+    names = [cell.strip() for cell in rows[0]]
+    for number, row in enumerate(rows[1:], 2):
+        if len(row) != len(names):
+            raise ValueError(f"{path}, line {number}: {len(row)} cells under {len(names)} names")
+    try:
+        return {name: column([float(row[i]) for row in rows[1:]]) for i, name in enumerate(names)}
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def _write_trace(found: Fit, path: str) -> None:
+    """Every step with its parameters by name. Raises OSError."""
+    rows: list[dict[str, Any]] = []
+    for step in found.steps:
+        row = asdict(step)
+        parameters = dict(zip(found.parameters, row.pop("parameters"), strict=True))
+        rows.append({"step": row.pop("number"), **parameters, **row})
+    with open(path, "w", encoding="utf-8", newline="") as stream:
+        if path.endswith(".json"):
+            json.dump(rows, stream, indent=1)
+            return
+        writer = csv.DictWriter(stream, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def _tell(found: Fit, options: argparse.Namespace, console: Console) -> None:
+    from potto.runtime.printing import format_number
+    from potto.runtime.shown import json_number
+
+    console.progress("")
+    count = len(found.steps) - 1
+    if options.json:
+        console.answer_json({
+            "parameters": found.parameters, "value": json_number(found.value), "slope": json_number(found.slope),
+            "converged": found.converged, "reason": found.reason, "steps": count, "evaluations": found.evaluations,
+            "seconds": found.seconds,
+        })  # fmt: skip
+        return
+    for name, value in found.parameters.items():
+        console.answer(f"{name} = {format_number(value, max(1e-9 * abs(value), 1e-12))}")
+    what = options.name if options.target is None else "mean squared distance"
+    console.answer(f"{what} = {found.value:.10g}")
+    console.answer(f"{'converged' if found.converged else 'not converged'}: {found.reason} (slope {found.slope:.1e}, "
+                   f"{count} steps, {found.evaluations} evaluations, {found.seconds:.2f} s)")  # fmt: skip

@@ -1,0 +1,81 @@
+"""`potto fit`: answers on paper, tables, traces, and the exit status of a fit that is none."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import pytest
+from command_runs import Potto
+
+PROGRAM = """
+def area(t) integral [0, 1] x*[x < t] d(x)
+def loss(t) (area(t) - 0.08)^2
+def box(x, a, b) integral [0, 1] a*[u < b*x] d(u)
+def two(a, b) (area(a), integral [0, 1] [x < a*b] d(x))
+def kink(t) abs(t - 0.3)
+def shaded(t, s) (integral [0, 1] s(x)*[x < t] d(x) - 0.08)^2
+def id(x) x
+def root(t) sqrt(t)
+"""
+TABLE = "x,y\n" + "".join(f"{i / 8},{min(1, 1.6 * i / 8)}\n" for i in range(1, 9))
+
+
+def test_a_minimum_through_a_boundary_term(potto: Potto) -> None:
+    ran = potto("fit", "p.po", "loss", "t=0.9", p=PROGRAM)
+    assert ran.status == 0 and ran.out.startswith("t = 0.4\n") and "converged: no slope is left" in ran.out
+
+
+def test_for_machines(potto: Potto) -> None:
+    answer = potto("fit", "p.po", "two", "a=0.5", "b=1/2", "--target", "(0.18, 0.24)", "--json", p=PROGRAM).json
+    assert answer["converged"] and answer["parameters"] == pytest.approx({"a": 0.6, "b": 0.4}, abs=1e-7, rel=0)
+    assert answer["value"] < 1e-15 and answer["evaluations"] >= answer["steps"] > 0
+
+
+def test_a_table_of_measurements(potto: Potto, tmp_path) -> None:
+    (tmp_path / "t.csv").write_text(TABLE)
+    ran = potto("fit", "p.po", "box", "b=0.7", "--with", "a=1", "--data", "t.csv", "--target", "y", p=PROGRAM)
+    assert ran.status == 0 and ran.out.startswith("b = 1.6\nmean squared distance = ")
+
+
+def test_the_trace(potto: Potto, tmp_path) -> None:
+    for name in ("t.csv", "t.json"):
+        potto("fit", "p.po", "loss", "t=0.9", "--trace", name, p=PROGRAM)
+    rows = list(csv.DictReader((tmp_path / "t.csv").open()))
+    assert rows[0]["t"] == "0.9" and [int(r["step"]) for r in rows] == list(range(len(rows)))
+    steps = json.loads((tmp_path / "t.json").read_text())
+    assert [s["value"] for s in steps] == [float(r["value"]) for r in rows] and steps[-1]["value"] < 1e-15
+
+
+def test_bounds_and_functions(potto: Potto) -> None:
+    assert potto("fit", "p.po", "area", "t=0.9", "--bound", "t=0.5:", p=PROGRAM).out.startswith("t = 0.5\n")
+    assert potto("fit", "p.po", "shaded", "t=0.9", "--with", "s=id").out.startswith("t = 0.4\n")
+
+
+def test_what_is_no_minimum_is_said_and_fails(potto: Potto) -> None:
+    ran = potto("fit", "p.po", "kink", "t=2", p=PROGRAM)
+    assert ran.status == 1 and "not converged" in ran.out and "a kink" in ran.out
+    assert not potto("fit", "p.po", "loss", "t=0.9", "--steps", "2", "--json").json["converged"]
+
+
+@pytest.mark.parametrize(("words", "said", "status"), [
+    (["loss"], "NAME=EXPR", 2),
+    (["loss", "s=1"], "no parameter `s`", 1),
+    (["loss", "t=1", "--bound", "t=1:0"], "from less to more", 2),
+    (["loss", "t=1", "--bound", "q=0:1"], "which is not fitted", 1),
+    (["loss", "t=id"], "no number", 1),
+    (["root", "t=-1"], "at the start", 1),
+    (["two", "a=1", "b=1"], "give a target", 1),
+    (["box", "b=1", "--with", "a=1", "--data", "none.csv"], "none.csv", 2),
+    (["box", "b=1", "--with", "a=1", "--data", "p.po"], "cells under", 2),
+    (["loss", "t=1", "--steps", "0"], "at least 1", 2),
+])  # fmt: skip
+def test_mistakes(potto: Potto, words, said, status) -> None:
+    ran = potto("fit", "p.po", *words, p=PROGRAM.strip())
+    assert ran.status == status and said in ran.err and ran.out == ""
+
+
+def test_columns_that_mean_nothing(potto: Potto, tmp_path) -> None:
+    (tmp_path / "t.csv").write_text(TABLE)
+    ran = potto("fit", "p.po", "box", "b=0.7", "--with", "a=1", "--data", "t.csv", p=PROGRAM)
+    assert ran.status == 2 and "--target" in ran.err
