@@ -7,32 +7,16 @@ a shared term once. A term knows its free variables (`.free`) and a digest of it
 
 from __future__ import annotations
 
-import hashlib
 import math
-import threading
-import weakref
 from collections.abc import Iterable
-from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from dataclasses import dataclass
+from typing import Any
 
-
-@dataclass(frozen=True, eq=False, slots=True, weakref_slot=True, repr=False)
-class _Base:
-    free: frozenset[str] = field()
-    digest: bytes = field()
-
-    def __repr__(self) -> str:
-        """The kind and the text, cut short: a shared term may be a small object and an endless text."""
-        from potto.core.printer import format_term
-
-        return f"<{type(self).__name__} {format_term(self, 200)}>"  # type: ignore[arg-type]
-
-    def __reduce__(self) -> Any:
-        return _rebuild, (type(self), tuple(getattr(self, name) for name in _FIELDS[type(self)]))
+from potto.core.consing import Base, made, make
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Const(_Base):
+class Const(Base):
     """A number. `name` is set for named ones (`pi`), which the oracle evaluates to more digits."""
 
     value: float
@@ -40,14 +24,14 @@ class Const(_Base):
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Var(_Base):
+class Var(Base):
     """A parameter, a variable of integration or the index of a sum. Binders in one definition have distinct names."""
 
     name: str
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Prim(_Base):
+class Prim(Base):
     """A builtin applied to terms. `op` names an entry of `potto.primitives`.
 
     add and mul take any number of arguments; neg, div, pow as named. lt le eq ne and or not make truth values, which
@@ -59,7 +43,7 @@ class Prim(_Base):
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
-class If(_Base):
+class If(Base):
     """A plain conditional: the condition varies with no variable of integration."""
 
     condition: Term
@@ -68,7 +52,7 @@ class If(_Base):
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Branch(_Base):
+class Branch(Base):
     """A diffeomorphic conditional: `then` where the first coordinate is >= 0 (> 0 when strict), else `orelse`.
 
     `coordinates` are the components of the diffeomorphism that the author wrote: only the first decides. Over no
@@ -86,12 +70,12 @@ class Branch(_Base):
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Tuple(_Base):
+class Tuple(Base):
     items: tuple[Term, ...]
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Proj(_Base):
+class Proj(Base):
     """Component `index` (from 0) of a tuple of `size` components (0 where the size is not known)."""
 
     term: Term
@@ -99,12 +83,12 @@ class Proj(_Base):
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
-class ListOf(_Base):
+class ListOf(Base):
     items: tuple[Term, ...]
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Lam(_Base):
+class Lam(Base):
     """A function of one group of parameters."""
 
     params: tuple[str, ...]
@@ -112,7 +96,7 @@ class Lam(_Base):
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
-class App(_Base):
+class App(Base):
     """One group of arguments given to a function. A group of n parameters also takes one tuple of n, and back."""
 
     function: Term
@@ -120,7 +104,7 @@ class App(_Base):
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Global(_Base):
+class Global(Base):
     """Another definition, by module (the key of its file) and name."""
 
     module: str
@@ -128,7 +112,7 @@ class Global(_Base):
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Integral(_Base):
+class Integral(Base):
     """The iterated integral of `body`, `variables[0]` outermost; bounds may use variables further out.
 
     `hints` are, per variable, points where a density is concentrated: the integrator cuts there, nothing depends on it.
@@ -141,14 +125,14 @@ class Integral(_Base):
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Delta(_Base):
+class Delta(Base):
     """The Dirac delta of a diffeomorphism's first coordinate."""
 
     coordinates: tuple[Term, ...]
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Sum(_Base):
+class Sum(Base):
     """The sum of `body` for the integers `variable` from `lo` to `hi`, both included; 0 when there are none."""
 
     variable: str
@@ -158,14 +142,14 @@ class Sum(_Base):
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Deriv(_Base):
+class Deriv(Base):
     """The derivative of a function: takes duals `(value, tangent)`, gives a dual."""
 
     function: Term
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Hole(_Base):
+class Hole(Base):
     """Where the program is wrong: evaluating it raises the diagnostic that said so."""
 
     reason: str
@@ -190,55 +174,7 @@ Term = (
     | Hole
 )
 
-_FIELDS: dict[type, tuple[str, ...]] = {
-    Const: ("value", "name"),
-    Var: ("name",),
-    Prim: ("op", "args"),
-    If: ("condition", "then", "orelse"),
-    Branch: ("coordinates", "strict", "then", "orelse"),
-    Tuple: ("items",),
-    Proj: ("term", "index"),
-    ListOf: ("items",),
-    Lam: ("params", "body"),
-    App: ("function", "args"),
-    Global: ("module", "name"),
-    Integral: ("variables", "bounds", "body", "hints"),
-    Delta: ("coordinates",),
-    Sum: ("variable", "lo", "hi", "body"),
-    Deriv: ("function",),
-    Hole: ("reason",),
-}
-
-_table: weakref.WeakValueDictionary[bytes, Any] = weakref.WeakValueDictionary()
-_lock = threading.Lock()
-T = TypeVar("T", bound=_Base)
 _NOTHING: frozenset[str] = frozenset()
-
-
-def _feed(value: object, into: list[bytes]) -> None:
-    if isinstance(value, _Base):
-        into.append(value.digest)
-    elif isinstance(value, tuple):
-        into.append(b"(%d" % len(value))
-        for item in value:
-            _feed(item, into)
-    elif isinstance(value, float):
-        into.append(value.hex().encode())
-    else:
-        into.append(repr(value).encode())
-
-
-def _make(cls: type[T], free: frozenset[str], *fields: object) -> T:
-    parts = [cls.__name__.encode()]
-    for value in fields:
-        _feed(value, parts)
-    digest = hashlib.blake2b(b"\x00".join(parts), digest_size=16).digest()
-    with _lock:
-        found = _table.get(digest)
-        if found is None:
-            found = cls(free, digest, *fields)
-            _table[digest] = found
-    return found
 
 
 def union_of(terms: Iterable[Term]) -> frozenset[str]:
@@ -249,7 +185,7 @@ def union_of(terms: Iterable[Term]) -> frozenset[str]:
     return result
 
 
-def _rebuild(cls: type, fields: tuple[Any, ...]) -> Any:
+def rebuilt(cls: type, fields: tuple[Any, ...]) -> Any:
     return _REBUILD[cls](*fields)
 
 
@@ -258,54 +194,55 @@ def _rebuild(cls: type, fields: tuple[Any, ...]) -> Any:
 
 def const(value: float, name: str | None = None) -> Const:
     value = float(value)
-    return _make(Const, _NOTHING, 0.0 if value == 0 else value, name)
+    value = 0.0 if value == 0 else value
+    return made(Const, (Const, value.hex(), name), _NOTHING, (value, name))
 
 
 def var(name: str) -> Var:
-    return _make(Var, frozenset((name,)), name)
+    return make(Var, frozenset((name,)), name)
 
 
 def prim(op: str, *args: Term) -> Prim:
     """A builtin as it stands, nothing folded. See `add`, `mul`, ... and `apply` for the folding ones."""
-    return _make(Prim, union_of(args), op, args)
+    return make(Prim, union_of(args), op, args)
 
 
 def if_(condition: Term, then: Term, orelse: Term) -> Term:
     if then is orelse:
         return then
-    return _make(If, union_of((condition, then, orelse)), condition, then, orelse)
+    return make(If, union_of((condition, then, orelse)), condition, then, orelse)
 
 
 def branch(coordinates: tuple[Term, ...], strict: bool, then: Term, orelse: Term) -> Term:
-    return _make(Branch, union_of((*coordinates, then, orelse)), coordinates, strict, then, orelse)
+    return make(Branch, union_of((*coordinates, then, orelse)), coordinates, strict, then, orelse)
 
 
 def tuple_(items: Iterable[Term]) -> Tuple:
     items = tuple(items)
-    return _make(Tuple, union_of(items), items)
+    return make(Tuple, union_of(items), items)
 
 
 def proj(term: Term, index: int) -> Term:
     if isinstance(term, Tuple) and index < len(term.items):
         return term.items[index]
-    return _make(Proj, term.free, term, index)
+    return make(Proj, term.free, term, index)
 
 
 def list_of(items: Iterable[Term]) -> ListOf:
     items = tuple(items)
-    return _make(ListOf, union_of(items), items)
+    return make(ListOf, union_of(items), items)
 
 
 def lam(params: tuple[str, ...], body: Term) -> Lam:
-    return _make(Lam, body.free.difference(params), params, body)
+    return make(Lam, body.free.difference(params), params, body)
 
 
 def app(function: Term, args: tuple[Term, ...]) -> App:
-    return _make(App, union_of((function, *args)), function, args)
+    return make(App, union_of((function, *args)), function, args)
 
 
 def global_(module: str, name: str) -> Global:
-    return _make(Global, _NOTHING, module, name)
+    return make(Global, _NOTHING, module, name)
 
 
 def integral(
@@ -319,23 +256,23 @@ def integral(
     free = body.free
     for name, (lo, hi), points in reversed(list(zip(variables, bounds, hints, strict=True))):
         free = free.difference((name,)) | lo.free | hi.free | union_of(points)
-    return _make(Integral, free, variables, bounds, body, hints)
+    return make(Integral, free, variables, bounds, body, hints)
 
 
 def delta(coordinates: tuple[Term, ...]) -> Delta:
-    return _make(Delta, union_of(coordinates), coordinates)
+    return make(Delta, union_of(coordinates), coordinates)
 
 
 def sum_(variable: str, lo: Term, hi: Term, body: Term) -> Sum:
-    return _make(Sum, lo.free | hi.free | body.free.difference((variable,)), variable, lo, hi, body)
+    return make(Sum, lo.free | hi.free | body.free.difference((variable,)), variable, lo, hi, body)
 
 
 def deriv(function: Term) -> Deriv:
-    return _make(Deriv, function.free, function)
+    return make(Deriv, function.free, function)
 
 
 def hole(reason: str) -> Hole:
-    return _make(Hole, _NOTHING, reason)
+    return make(Hole, _NOTHING, reason)
 
 
 def _prim_from(op: str, args: tuple[Term, ...]) -> Prim:

@@ -5,7 +5,9 @@ Owns what every pass is made of. Only binders recurse, and they nest no deeper t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from operator import attrgetter, is_
+from typing import Any
 
 from potto.core.folding import apply
 from potto.core.kinds import (
@@ -44,40 +46,44 @@ from potto.core.kinds import (
 
 def children(term: Term) -> tuple[Term, ...]:
     """The subterms of a term, in the order in which `rebuild` takes them."""
-    match term:
-        case Const() | Var() | Global() | Hole():
-            return ()
-        case Prim(args=args):
-            return args
-        case If():
-            return (term.condition, term.then, term.orelse)
-        case Branch():
-            return (*term.coordinates, term.then, term.orelse)
-        case Tuple(items=items) | ListOf(items=items):
-            return items
-        case Proj():
-            return (term.term,)
-        case Lam():
-            return (term.body,)
-        case App():
-            return (term.function, *term.args)
-        case Integral():
-            return (
-                *(b for pair in term.bounds for b in pair),
-                *(p for points in term.hints for p in points),
-                term.body,
-            )
-        case Delta():
-            return term.coordinates
-        case Sum():
-            return (term.lo, term.hi, term.body)
-        case Deriv():
-            return (term.function,)
+    return _CHILDREN[type(term)](term)
+
+
+def _none(term: Term) -> tuple[Term, ...]:
+    return ()
+
+
+def _of_integral(term: Integral) -> tuple[Term, ...]:
+    return (*(b for pair in term.bounds for b in pair), *(p for points in term.hints for p in points), term.body)
+
+
+# By the type of the term: this is asked more often than anything else.
+_CHILDREN: dict[type, Callable[[Any], tuple[Term, ...]]] = {
+    Const: _none,
+    Var: _none,
+    Global: _none,
+    Hole: _none,
+    Prim: attrgetter("args"),
+    If: attrgetter("condition", "then", "orelse"),
+    Branch: lambda term: (*term.coordinates, term.then, term.orelse),
+    Tuple: attrgetter("items"),
+    ListOf: attrgetter("items"),
+    Proj: lambda term: (term.term,),
+    Lam: lambda term: (term.body,),
+    App: lambda term: (term.function, *term.args),
+    Integral: _of_integral,
+    Delta: attrgetter("coordinates"),
+    Sum: attrgetter("lo", "hi", "body"),
+    Deriv: lambda term: (term.function,),
+}
 
 
 def rebuild(term: Term, parts: tuple[Term, ...]) -> Term:
     """The same term over other children, folded by the smart constructors."""
-    if all(new is old for new, old in zip(parts, children(term), strict=True)):
+    old = children(term)
+    if len(parts) != len(old):
+        raise ValueError(f"{len(parts)} parts for {len(old)} children")
+    if all(map(is_, parts, old)):
         return term
     match term:
         case Const() | Var() | Global() | Hole():
@@ -116,15 +122,23 @@ def postorder(*roots: Term) -> list[Term]:
     """Every distinct subterm once, children before parents. Does not recurse."""
     seen: set[Term] = set()
     order: list[Term] = []
-    stack: list[tuple[Term, bool]] = [(root, False) for root in reversed(roots)]
+    stack: list[Term | None] = list(reversed(roots))  # None: the term below it has all its children in the order
+    pop, push = stack.pop, stack.append
     while stack:
-        term, done = stack.pop()
-        if done:
-            order.append(term)
+        term = pop()
+        if term is None:
+            order.append(pop())  # type: ignore[arg-type]
         elif term not in seen:
             seen.add(term)
-            stack.append((term, True))
-            stack.extend((child, False) for child in reversed(children(term)) if child not in seen)
+            below = _CHILDREN[type(term)](term)
+            if not below:
+                order.append(term)
+                continue
+            push(term)
+            push(None)
+            for child in reversed(below):
+                if child not in seen:
+                    push(child)
     return order
 
 
