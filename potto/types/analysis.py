@@ -8,7 +8,7 @@ walked again until they stand still (they only grow, and there are finitely many
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Set
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from potto.diagnostics import Diagnostic
 from potto.modules.lookup import DefinitionTarget
@@ -50,16 +50,20 @@ class Analysis:
 
     interface: Interface
     diagnostics: tuple[Diagnostic, ...]
-    reasons: Reasons
-    names: tuple[Typed, ...]
+    reasons: Reasons = field(default_factory=Reasons)
+    names: tuple[Typed, ...] = ()
 
 
 def analyse(
     items: Mapping[DefinitionTarget, Written],
     outsides: Mapping[DefinitionTarget, Outside],
     broken: Set[DefinitionTarget] = frozenset(),
+    details: bool = True,
 ) -> dict[DefinitionTarget, Analysis]:
-    """Analyse definitions that need each other (mostly one). Of what is `broken` the parser has spoken already."""
+    """Analyse definitions that need each other (mostly one). Of what is `broken` the parser has spoken already.
+
+    `details`: also what is only asked of definitions that somebody looks at, their reasons and names.
+    """
     ensure_stack()
     skeletons = {target: _skeleton(item) for target, item in items.items()}
     inferences = {}
@@ -70,10 +74,11 @@ def analyse(
         inference.finish()
     recursive = len(items) > 1 or any(inference.recursive() for inference in inferences.values())
     flows: dict[DefinitionTarget, Value] = {target: _nothing(skeletons[target]) for target in items if recursive}
-    for _ in range(MAX_ROUNDS if recursive else 1):
+    for _ in range(MAX_ROUNDS):
         walked = {target: _walk(inferences[target], item, flows) for target, item in items.items()}
-        if recursive:
-            walked = {target: (walk, fitted(value, skeletons[target])) for target, (walk, value) in walked.items()}
+        if not recursive:
+            break
+        walked = {target: (walk, fitted(value, skeletons[target])) for target, (walk, value) in walked.items()}
         closed = {target: Closing(value).value(value) for target, (_, value) in walked.items()}
         if closed == flows:
             break
@@ -82,7 +87,7 @@ def analyse(
     found = {}
     for target, item in items.items():
         walk, value = walked[target]
-        typed = found[target] = _conclude(target, item, inferences[target], walk, value, skeletons[target])
+        typed = found[target] = _conclude(target, item, inferences[target], walk, value, skeletons[target], details)
         if target in broken:
             found[target] = replace(typed, interface=replace(typed.interface, broken=True), diagnostics=())
         elif target in unended:
@@ -191,6 +196,7 @@ def _conclude(
     walk: Walk,
     value: Value,
     skeleton: Type,
+    details: bool,
 ) -> Analysis:
     closing = Closing(value)
     decorating = Decorating(value)
@@ -204,6 +210,8 @@ def _conclude(
         diffeo=isinstance(item, nodes.DiffeoDefinition),
     )
     found = _sorted((*inference.diagnostics, *walk.diagnostics, *lints(inference, walk, item)))
+    if not details:
+        return Analysis(interface, found)
     return Analysis(interface, found, reasons_of(value, closing, decorating), typed(inference, walk))
 
 

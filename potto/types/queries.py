@@ -1,8 +1,9 @@
 """The questions about types, memoized: interfaces, diagnostics, expressions and statements.
 
 What a definition needs is fetched before it is analysed, so that no inference runs inside another one. Its analysis is
-one query; `interface`, `check_definition`, `plain_reasons` and `typed_names` are its parts, each of which stands still
-when an edit does not change it: whoever uses a definition reads its `interface` only.
+one query; `interface` and `check_definition` are its parts, each of which stands still when an edit does not change it:
+whoever uses a definition reads its `interface` only. `plain_reasons` and `typed_names` are asked of few definitions, by
+messages and editors; for those it is analysed once more.
 """
 
 from __future__ import annotations
@@ -57,14 +58,14 @@ def check_definition(db: Database, file: str, name: str) -> tuple[Diagnostic, ..
 @query
 def plain_reasons(db: Database, file: str, name: str) -> Reasons:
     """Why which parameters of a definition must not vary: places in it, for messages about its callers."""
-    found = db.entry(_analyses, (_group(db, file, name),), DefinitionTarget(file, name))
+    found = db.entry(_details, (_group(db, file, name),), DefinitionTarget(file, name))
     return Reasons() if found is None else found.reasons
 
 
 @query
 def typed_names(db: Database, file: str, name: str) -> tuple[Typed, ...]:
     """The names that a definition binds, with their types there: `Real[x]` inside an integral over x."""
-    found = db.entry(_analyses, (_group(db, file, name),), DefinitionTarget(file, name))
+    found = db.entry(_details, (_group(db, file, name),), DefinitionTarget(file, name))
     return () if found is None else found.names
 
 
@@ -80,6 +81,16 @@ def _nothing(db: Database, group: tuple[DefinitionTarget, ...]) -> dict[Definiti
 @query(cycle=_nothing)
 def _analyses(db: Database, group: tuple[DefinitionTarget, ...]) -> dict[DefinitionTarget, Analysis]:
     """The analyses of definitions that need each other."""
+    return _analysed(db, group, details=False)
+
+
+@query(cycle=_nothing, keep=256)
+def _details(db: Database, group: tuple[DefinitionTarget, ...]) -> dict[DefinitionTarget, Analysis]:
+    """The same with all that is asked only where somebody looks: kept for few, and made anew for others."""
+    return _analysed(db, group, details=True)
+
+
+def _analysed(db: Database, group: tuple[DefinitionTarget, ...], details: bool) -> dict[DefinitionTarget, Analysis]:
     items = {}
     for target in group:
         item = definition(db, target.file, target.name)
@@ -87,7 +98,7 @@ def _analyses(db: Database, group: tuple[DefinitionTarget, ...]) -> dict[Definit
             items[target] = item
     outsides = {target: _outside(db, target.file, references(db, target.file, target.name), items) for target in items}
     broken = frozenset(target for target in items if _broken(db, target.file, target.name))
-    return analyse(items, outsides, broken)
+    return analyse(items, outsides, broken, details)
 
 
 def _broken(db: Database, file: str, name: str) -> bool:
@@ -134,9 +145,7 @@ def check_statement(db: Database, file: str, statement: nodes.Statement) -> tupl
 
 
 @query(keep=1024)
-def infer_expression(
-    db: Database, file: str, expr: nodes.Expr, locals: tuple[tuple[str, Type], ...] = ()
-) -> Inferred:
+def infer_expression(db: Database, file: str, expr: nodes.Expr, locals: tuple[tuple[str, Type], ...] = ()) -> Inferred:
     """The type of an expression in a file's scope. `locals`: further names that have a type, innermost last."""
     return _inferred(db, file, expr, locals)[0]
 
