@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from potto.calculus.verdict import Verdict, judge
+from potto.calculus.verdict import Problem, judge
 from potto.core.printer import format_term
 from potto.core.simplify import simplify
-from potto.core.terms import Branch, Hole, postorder
+from potto.core.terms import Branch, Hole, Term, postorder
 from potto.diagnostics import Diagnostic
 from potto.elaborate import elaborate_expression
 from potto.ide.edits import one_file
@@ -19,7 +19,7 @@ from potto.ide.model import Change, Edit
 from potto.ide.offers import At, Offer, reads
 from potto.ide.places import ChunkAt, chunk_at
 from potto.source import Span
-from potto.syntax import extent, node_at, nodes
+from potto.syntax import extent, node_at, nodes, walk
 from potto.syntax.nodes import Expr
 
 
@@ -62,6 +62,10 @@ def _bracket(place: At, chunk: ChunkAt, condition: Expr, said: Diagnostic) -> It
     written = chunk.text[condition.span.start : condition.span.end]
     item = chunk.parsed(place.db).item
     where = "" if place.chunk is not None and chunk.start == place.chunk.start else f" in `{getattr(item, 'name', '')}`"
+    equal = any(isinstance(n, nodes.Compare) and any(o.op in ("==", "!=") for o in n.rest) for n in walk(condition))
+    verdict = None if equal else _judged(place, chunk, condition)
+    if equal or isinstance(verdict, Problem):
+        return  # a bracket would only be the next mistake
     if reads(chunk, [Edit(condition.span, f"[{written}]")]) is not None:
         edit = Edit(chunk.absolute(condition.span), f"[{written}]")
         title = f"Count the jump{where}: `[{written}]`"
@@ -75,6 +79,16 @@ def _bracket(place: At, chunk: ChunkAt, condition: Expr, said: Diagnostic) -> It
 
 def completed_diffeo(place: At, chunk: ChunkAt, condition: Expr) -> str | None:
     """`diffeo(…)` for a comparison over variables of integration, with the coordinates that complete it."""
+    verdict = _judged(place, chunk, condition)
+    if not isinstance(verdict, tuple):
+        return None
+    shown = [format_term(simplify(part)) for part in verdict]
+    return f"diffeo({', '.join(shown)})"
+
+
+def _judged(place: At, chunk: ChunkAt, condition: Expr) -> tuple[Term, ...] | Problem | None:
+    """The coordinates of a comparison over variables of integration, completed, or why there are none; None for what is
+    no comparison over them."""
     if not isinstance(condition, nodes.Compare) or len(condition.rest) != 1:
         return None
     visible = [binder for _, binder in chunk.index(place.db).visible(condition.span.start)]
@@ -88,10 +102,7 @@ def completed_diffeo(place: At, chunk: ChunkAt, condition: Expr) -> str | None:
     if not used:
         return None
     verdict = judge(term.coordinates, variables, {})
-    if not isinstance(verdict, Verdict):
-        return None
-    shown = [format_term(simplify(part)) for part in (*term.coordinates, *verdict.completion)]
-    return f"diffeo({', '.join(shown)})"
+    return verdict if isinstance(verdict, Problem) else (*term.coordinates, *verdict.completion)
 
 
 def inverse_fixes(place: At, said: Diagnostic) -> Iterator[Offer]:

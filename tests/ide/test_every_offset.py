@@ -57,6 +57,15 @@ def ask_everything(library: Library, file: str, text: str, offsets) -> None:
         ide.format_on_type(db, file, offset, "\n")
         ide.format_on_type(db, file, offset, ")")
         ide.code_actions(db, file, Span(offset, offset))
+        ide.definition_at(db, file, offset)
+        to = Span(offset, min(offset + 40, len(text)))
+        for token in ide.semantic_tokens(db, file, to):
+            assert token.span.start < to.end and to.start < token.span.end
+        for hint in ide.inlay_hints(db, file, to):
+            assert to.start <= hint.offset <= to.end
+        for edit in ide.format_range(db, file, to):
+            inside(edit.span)
+        ide.inline_values(db, file, to)
     ask_about_file(library, file, text, whole)
 
 
@@ -78,15 +87,33 @@ def ask_about_file(library: Library, file: str, text: str, whole: Span) -> None:
     ide.document_links(db, file)
     ide.format_document(db, file)
     ide.inline_values(db, file, whole)
+    ide.live_diagnostics(db, file)
     for symbol in ide.document_symbols(db, file):
         ide.incoming_calls(db, file, symbol.name)
         ide.outgoing_calls(db, file, symbol.name)
+        ide.points(db, file, symbol.name)
 
 
 @pytest.mark.parametrize("name", FILES)
 def test_every_feature_at_every_offset(name: str) -> None:
     library, file, text = opened(name)
     ask_everything(library, file, text, range(0, len(text) + 1, 1 if len(text) < 400 else 3))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FILES)
+def test_every_feature_at_really_every_offset(name: str) -> None:
+    """With those that look through the workspace, and every action and proposal resolved."""
+    library, file, text = opened(name)
+    ask_everything(library, file, text, range(len(text) + 1))
+    db = library.db
+    for offset in range(len(text) + 1):
+        ide.references(db, file, offset)
+        ide.rename(db, file, offset, "another_name")
+        for action in ide.code_actions(db, file, Span(offset, offset)):
+            ide.resolve_code_action(db, action)
+        for item in ide.completions(db, file, offset).items:
+            ide.resolve_completion(db, item)
 
 
 @pytest.mark.parametrize("name", FILES)

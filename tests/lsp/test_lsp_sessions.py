@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 from lsp_client import Client
+from lsp_sessions import SESSIONS
 from lsprotocol import converters, types
 
-SESSIONS = sorted((Path(__file__).parent / "sessions").glob("*.jsonl"))
 CONVERTER = converters.get_converter()
 FAIR = (-32800, -32801, -32803)  # cancelled, outdated, refused: what a client must expect at any time
 NEEDS = {  # what the server asks a client, by what the client must have said that it can do

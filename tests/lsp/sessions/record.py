@@ -2,8 +2,8 @@
 
     POTTO_SESSION=vscode.jsonl python record.py lsp --stdio
 
-Writes the client's messages, one a line. The place of the workspace is `${root}` in URIs and `${path}` elsewhere, so that
-`test_lsp_sessions.py` can play them again in another one.
+Writes the client's messages, one a line. The place of the workspace is `${root}` in URIs and `${path}` elsewhere, so
+that `test_lsp_sessions.py` can play them again in another one.
 """
 
 from __future__ import annotations

@@ -1,0 +1,69 @@
+"""Every request about a place, at every offset of every example, through a real server: never an internal error."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from lsp_client import Client
+from lsp_sessions import capabilities_of
+from potto_lsp.features import FEATURES
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+FILES = sorted(path for suffix in ("po", "diffeo") for path in EXAMPLES.rglob(f"*.{suffix}"))
+ABOUT_PLACES = [method for method in FEATURES if method.startswith("textDocument/")]
+RESOLVED = {
+    "textDocument/completion": "completionItem/resolve",
+    "textDocument/codeAction": "codeAction/resolve",
+    "textDocument/codeLens": "codeLens/resolve",
+    "textDocument/inlayHint": "inlayHint/resolve",
+}
+
+
+def ask_at(client: Client, uri: str, line: int, character: int) -> None:
+    """Every question about one place, and one of the things that each brought resolved."""
+    position = {"line": line, "character": character}
+    params = {
+        "textDocument": {"uri": uri}, "position": position, "positions": [position], "newName": "another_name",
+        "range": {"start": position, "end": {"line": line + 2, "character": 0}}, "ch": "\n", "options": {},
+        "context": {"diagnostics": [], "includeDeclaration": True},
+    }  # fmt: skip
+    begun = {method: client.begin(method, params) for method in ABOUT_PLACES}
+    for method, id in begun.items():
+        answer = client.answer(id, 60)
+        assert answer.get("error", {}).get("code") in (None, -32803), (method, position, answer)
+        resolve(client, method, answer.get("result"))
+    prepared: Any = client.answers[begun["textDocument/prepareCallHierarchy"]][0]["result"]
+    for item in prepared or ():
+        client.ask("callHierarchy/incomingCalls", {"item": item})
+        client.ask("callHierarchy/outgoingCalls", {"item": item})
+
+
+def resolve(client: Client, method: str, result: Any) -> None:
+    items = result.get("items", []) if isinstance(result, dict) else result
+    if method in RESOLVED and items:
+        client.ask(RESOLVED[method], items[len(items) // 2])
+
+
+def at_offsets(path: Path, step: int) -> None:
+    client = Client(EXAMPLES, capabilities_of("vscode"))
+    client.start()
+    text = path.read_text(encoding="utf-8")
+    client.open(path.as_uri(), text)
+    for offset in range(0, len(text) + 1, step):
+        before = text[:offset]
+        ask_at(client, path.as_uri(), before.count("\n"), len(before) - before.rfind("\n") - 1)
+    assert client.stop() == 0
+    assert b"Traceback" not in client.stderr
+
+
+@pytest.mark.parametrize("name", ["renderer.po", "half_plane.diffeo", "shortfall.po"])
+def test_at_some_offsets(name: str) -> None:
+    at_offsets(next(path for path in FILES if path.name == name), 29)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
+def test_at_every_offset(path: Path) -> None:
+    at_offsets(path, 1)
