@@ -1,7 +1,9 @@
 """How quick the prompt is: `python benchmarks/repl.py [--json]`.
 
-Start to the first prompt on a real terminal, the first expression after it, the time of a keystroke (highlighting, the
-question whether an entry is over), and of completion. Targets: 250 ms, 300 ms, 10 ms at the 99th percentile.
+On a real terminal: `potto --version`, start to the first prompt, the first expression after it, and from a key to its
+echo with a module of 2,000 lines loaded and what is typed being checked. In the process: what a key waits for
+(highlighting, the question whether an entry is over) and completion. And which libraries are imported when.
+Targets in milliseconds: 60, 250, 300, and 10 at the 99th percentile for all that a key waits for.
 """
 
 from __future__ import annotations
@@ -9,36 +11,72 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import re
 import statistics
+import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 RUNS = 7
+LINES = 2000
+TARGETS = {"version": 60.0, "prompt": 250.0, "first expression": 300.0, "echo p99": 10.0, "highlighting p99": 10.0,
+           "enter p99": 10.0}  # fmt: skip
+HEAVY = ("numpy", "scipy", "mpmath", "lark", "prompt_toolkit", "pygls", "asyncio", "potto.syntax", "potto.check",
+         "potto.kernels", "potto.integrate", "potto.ide", "potto_repl")  # fmt: skip
 TEXT = """def renderer(c, shader)
     area = integral ([0, 1], [0, 1])
         (shader(x, y) * [x + y + c >= 0]) d(x, y)
     edge = sqrt(c^2 + 1) * clamp(c, 0, 1)
     area + edge
 """
+TYPED = "name17(0.3) + integral [0, 1] (if [x < 0.4] then sin(name3(x)) else clamp(x, 0, 1)) d(x)"
+
+
+def module(lines: int) -> str:
+    """A program of so many lines, four a definition."""
+    blocks = [
+        f"# number {n}\ndef name{n}(x)\n    a = sin(x) + {n}\n    a * integral [0, 1] [u < x]*cos(u) d(u)\n"
+        for n in range(lines // 4)
+    ]
+    return "".join(blocks)
 
 
 def quantile(times: list[float], share: float) -> float:
     return sorted(times)[min(int(len(times) * share), len(times) - 1)]
 
 
-def startup() -> dict[str, float]:
-    """Milliseconds to the prompt, and from a typed expression to its answer; the median of some runs."""
+def version() -> float:
+    """Milliseconds that `potto --version` takes."""
+    times = []
+    for _ in range(RUNS):
+        start = time.perf_counter()
+        subprocess.run([sys.executable, "-m", "potto", "--version"], check=True, capture_output=True)
+        times.append(time.perf_counter() - start)
+    return statistics.median(times) * 1e3
+
+
+def opened(folder: str, *arguments: str) -> Any:
+    """A prompt on a terminal of its own."""
     import pexpect
 
+    environment = {**os.environ, "TERM": "xterm", "PROMPT_TOOLKIT_NO_CPR": "1", "POTTO_HISTORY": f"{folder}/h"}
+    process = pexpect.spawn(sys.executable, ["-m", "potto", "repl", *arguments], env=environment, encoding="utf-8",
+                            timeout=60, dimensions=(40, 120))  # fmt: skip
+    process.delaybeforesend = None
+    return process
+
+
+def startup() -> dict[str, float]:
+    """Milliseconds to the prompt, and from a typed expression to its answer; the median of some runs."""
     prompts, first = [], []
     for _ in range(RUNS):
         with tempfile.TemporaryDirectory() as folder:
-            environment = {**os.environ, "TERM": "xterm", "PROMPT_TOOLKIT_NO_CPR": "1", "POTTO_HISTORY": f"{folder}/h"}
             start = time.perf_counter()
-            process = pexpect.spawn(sys.executable, ["-m", "potto", "repl"], env=environment, encoding="utf-8")
-            process.delaybeforesend = None
+            process = opened(folder)
             process.expect("po>")
             prompts.append(time.perf_counter() - start)
             time.sleep(0.5)  # nobody types faster
@@ -48,6 +86,41 @@ def startup() -> dict[str, float]:
             first.append(time.perf_counter() - start)
             process.close(force=True)
     return {"prompt": statistics.median(prompts) * 1e3, "first expression": statistics.median(first) * 1e3}
+
+
+def drain(process: Any) -> None:
+    """Read what the terminal has still to say."""
+    import pexpect
+
+    while True:
+        try:
+            process.read_nonblocking(10_000, 0)
+        except pexpect.TIMEOUT:
+            return
+
+
+def echoes() -> dict[str, float]:
+    """Milliseconds from a key to its echo, with a large module loaded, at the rate of somebody who types fast."""
+    times = []
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "large.po").write_text(module(LINES))
+        process = opened(folder, f"{folder}/large.po")
+        process.expect("names")
+        process.expect("po>")
+        time.sleep(1)
+        process.send("1 + 1\r")
+        process.expect("_1 = 2")
+        process.expect("po>")
+        time.sleep(0.5)
+        for number, char in enumerate(TYPED * 3):
+            drain(process)
+            start = time.perf_counter()
+            process.send(char)
+            process.read_nonblocking(10_000, 5)  # what a key changes on the screen is written at once
+            times.append(time.perf_counter() - start)
+            time.sleep(0.22 if number % 10 == 9 else 0.03)  # now and then long enough for a check to begin
+        process.close(force=True)
+    return {"echo p50": statistics.median(times) * 1e3, "echo p99": quantile(times, 0.99) * 1e3}
 
 
 def each(action: Callable[[str], object]) -> list[float]:
@@ -65,6 +138,7 @@ def keystrokes() -> dict[str, float]:
     from potto_repl.complete import candidates
     from potto_repl.editing import is_over
     from potto_repl.highlight import PottoLexer
+    from potto_repl.respond import respond
     from potto_repl.start import Loader
     from prompt_toolkit.document import Document
 
@@ -72,26 +146,50 @@ def keystrokes() -> dict[str, float]:
 
     loader = Loader(DEFAULTS)
     session = loader.session
-    for number in range(200):
-        list(session.enter(f"def name{number}(x) sin(x) + {number}"))
-    lexer = PottoLexer(loader, lambda text: ())
-    found = {
-        "highlighting": each(lambda text: lexer.lex_document(Document(text))(0)),
-        "enter": each(is_over),
-        "completion": each(lambda text: candidates(session, text)),
-    }
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "large.po"
+        path.write_text(module(LINES))
+        assert not respond(session, f":load {path}").failed
+        lexer = PottoLexer(loader, lambda text: ())
+        found = {
+            "highlighting": each(lambda text: lexer.lex_document(Document(text))(0)),
+            "enter": each(is_over),
+            "completion": each(lambda text: candidates(session, text)),
+        }
     return {f"{name} p99": quantile(times, 0.99) * 1e3 for name, times in found.items()}
+
+
+def imports() -> dict[str, list[str]]:
+    """Which of the libraries that take time are imported by when."""
+    stages = {
+        "potto --version": "from potto.__main__ import main\ntry: main(['--version'])\nexcept SystemExit: pass",
+        "the prompt": "import potto_repl.terminal",
+        "an expression from a pipe": "from potto.__main__ import main\ntry: main(['repl', '-c', 'sin(1)'])\n"
+                                     "except SystemExit: pass",
+    }  # fmt: skip
+    found = {}
+    for name, code in stages.items():
+        check = f"import sys\n{code}\nprint('HEAVY', *[m for m in {HEAVY!r} if m in sys.modules])"
+        done = subprocess.run([sys.executable, "-c", check], capture_output=True, text=True, check=True)
+        line = re.search(r"^HEAVY(.*)$", done.stdout, re.MULTILINE)
+        found[name] = line[1].split() if line is not None else []
+    return found
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--json", action="store_true")
-    figures = {**startup(), **keystrokes()}
-    if parser.parse_args().json:
-        print(json.dumps(figures))
+    options = parser.parse_args()
+    figures = {"version": version(), **startup(), **echoes(), **keystrokes()}
+    loaded = imports()
+    if options.json:
+        print(json.dumps({"milliseconds": figures, "targets": TARGETS, "imports": loaded}))
         return
     for name, milliseconds in figures.items():
-        print(f"{name:<18} {milliseconds:8.2f} ms")
+        target = f"   (target {TARGETS[name]:.0f})" if name in TARGETS else ""
+        print(f"{name:<18} {milliseconds:8.2f} ms{target}")
+    for stage, libraries in loaded.items():
+        print(f"imported by {stage}: {', '.join(libraries) or 'none of these'}")
 
 
 if __name__ == "__main__":

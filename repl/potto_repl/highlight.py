@@ -7,6 +7,7 @@ is underlined where the checker, which runs beside, has found it so for exactly 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import lru_cache
 
 from prompt_toolkit.completion import CompleteEvent, Completer, Completion
 from prompt_toolkit.document import Document
@@ -36,8 +37,9 @@ _KINDS = {"NUMBER": "number", "COMMENT": "comment", "INTEGRAL": "keyword", "SUM"
           "AS": "keyword"}  # fmt: skip
 
 
+@lru_cache(maxsize=8)
 def style(theme: str) -> Style:
-    """The style of a theme."""
+    """The style of a theme, the same object each time: prompt_toolkit keeps what it works out of a style."""
     return Style.from_dict(THEMES.get(theme, THEMES["none"]))
 
 

@@ -9,7 +9,7 @@ from prompt_toolkit.application import get_app
 from prompt_toolkit.application.current import get_app_or_none
 from prompt_toolkit.buffer import Buffer
 from prompt_toolkit.enums import DEFAULT_BUFFER
-from prompt_toolkit.filters import Condition, emacs_mode, has_focus, is_searching, vi_insert_mode
+from prompt_toolkit.filters import Condition, Filter, emacs_mode, has_focus, is_searching, vi_insert_mode
 from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
 from prompt_toolkit.keys import Keys
 
@@ -21,6 +21,14 @@ def bindings() -> KeyBindings:
     """The keys of the prompt, over those of prompt_toolkit."""
     keys = KeyBindings()
     typing = has_focus(DEFAULT_BUFFER) & ~is_searching & (emacs_mode | vi_insert_mode)
+    _lines(keys, typing)
+    _blanks(keys, typing)
+    _suggestions(keys, typing)
+    return keys
+
+
+def _lines(keys: KeyBindings, typing: Filter) -> None:
+    """Enter, pastes and completion."""
     pasted: list[str] = [""]
 
     @keys.add("enter", filter=typing)
@@ -41,6 +49,14 @@ def bindings() -> KeyBindings:
         event.current_buffer.insert_text(text)
         pasted[0] = event.current_buffer.text
 
+    @keys.add("tab", filter=typing)
+    def _tab(event: KeyPressEvent) -> None:
+        complete(event.current_buffer)
+
+
+def _blanks(keys: KeyBindings, typing: Filter) -> None:
+    """Indentation: a step less with Shift-Tab and Backspace."""
+
     @keys.add(" ", filter=typing & blank_line)
     def _blank(event: KeyPressEvent) -> None:
         """Lines that come in a rush, without being marked as a paste, bring their own indentation."""
@@ -52,18 +68,14 @@ def bindings() -> KeyBindings:
                 buffer.insert_text(" ")
         buffer.insert_text(" ")
 
-    @keys.add("tab", filter=typing)
-    def _tab(event: KeyPressEvent) -> None:
-        complete(event.current_buffer)
-
     @keys.add("s-tab", filter=typing & blank_line)
+    @keys.add("backspace", filter=typing & blank_line & Condition(lambda: _indented()))
     def _less(event: KeyPressEvent) -> None:
         event.current_buffer.delete_before_cursor(indent_before(event.current_buffer))
 
-    @keys.add("backspace", filter=typing & blank_line & Condition(lambda: _indented()))
-    def _back(event: KeyPressEvent) -> None:
-        event.current_buffer.delete_before_cursor(indent_before(event.current_buffer))
 
+def _suggestions(keys: KeyBindings, typing: Filter) -> None:
+    """The right arrow alone takes a suggestion: the other keys that would, move as they do without one."""
     suggested = typing & emacs_mode & Condition(lambda: get_app().current_buffer.suggestion is not None)
 
     @keys.add("c-e", filter=suggested)
@@ -79,8 +91,6 @@ def bindings() -> KeyBindings:
     def _word(event: KeyPressEvent) -> None:
         buffer = event.current_buffer
         buffer.cursor_position += buffer.document.find_next_word_ending() or 0
-
-    return keys
 
 
 @Condition
