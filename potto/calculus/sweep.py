@@ -202,6 +202,11 @@ def _cut(placed: _Placed, variable: str) -> Cut:
     return Cut(placed.surface, jumps, turning, tuple(roots), tuple(families), steps, product)
 
 
+def cut_along(surface: Term, variable: str) -> Cut:
+    """A surface as a cut of one variable, whatever it decides."""
+    return _cut(_Placed(surface, *_factored(surface, 1)), variable)
+
+
 def _product(terms: tuple[Term, ...]) -> Term:
     return prim("mul", *terms) if len(terms) > 1 else terms[0]
 

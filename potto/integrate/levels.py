@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from potto.core.terms import Term
 from potto.integrate import maps
 from potto.integrate.cuts import Cuts, as_array, frame_rows, segments, standing
 from potto.integrate.edges import report_edges
@@ -23,11 +24,15 @@ from potto.kernels.cells import Array, Cell, Ints, Mask, Value
 
 @dataclass
 class Iteration:
-    """One plan being evaluated by one machine. `order` is the number of nodes per piece to start with."""
+    """One plan being evaluated by one machine. `order` is the number of nodes per piece to start with.
+
+    still: surfaces that don't move here, since someone else counts what their motion does.
+    """
 
     plan: Plan
     machine: Evaluator
     order: int
+    still: frozenset[Term] = frozenset()
 
     def run(
         self, number: int, env: dict[str, Value], batch: int, sides: dict[int, Mask], machine: Evaluator,
@@ -70,6 +75,9 @@ class Iteration:
         assert isinstance(values, tuple)
         lo, hi, rows = frame_rows(level, values)
         rows += searched_rows(level, env, lo, hi, batch, machine)
+        for row in rows if self.still else ():
+            if row.cut >= 0 and level.level.cuts[row.cut].surface in self.still:
+                row.t = ()
         cuts = segments(level, lo, hi, rows, batch, machine.directions, level is not self.plan.levels[0])
         return standing(cuts) if machine.frozen else cuts
 

@@ -7,7 +7,7 @@ those decisions come out the same.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -57,6 +57,11 @@ class LevelPlan:
     @property
     def variable(self) -> str:
         return self.level.variable
+
+    @cached_property
+    def bounds(self) -> Lam:
+        """The bounds alone, as a pair."""
+        return function_of(tuple_((self.level.lo, self.level.hi)))
 
 
 @dataclass(frozen=True)
@@ -163,7 +168,7 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve) -> P
             if cut.decides:
                 decided.append(len(groups))
                 groups.append(Group(len(groups), cut))
-        levels.append(_level(level, tuple(decided), groups))
+        levels.append(level_plan(level, tuple(decided), groups))
     numbers = {j.path: (g.number, j.orientation) for g in groups for j in g.cut.jumps}
     vanishing = _vanishing(term.body, numbers)
     kept = tuple((t, v) for t, v in decisions.items() if not isinstance(t, Const))
@@ -172,7 +177,8 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve) -> P
     return Plan(term, tuple(levels), tuple(groups), body, vanishing, kept, reaches, box)
 
 
-def _level(level: Level, decided: tuple[int, ...], groups: list[Group]) -> LevelPlan:
+def level_plan(level: Level, decided: tuple[int, ...], groups: Sequence[Group]) -> LevelPlan:
+    """The terms of one variable; `decided` are the numbers of the groups among its cuts."""
     terms: list[Term] = [level.lo, level.hi]
     rows: list[tuple[int, bool]] = []  # (which cut, or -1 for a hint; whether turning)
     families: list[tuple[int, Any]] = []
@@ -196,7 +202,9 @@ def _level(level: Level, decided: tuple[int, ...], groups: list[Group]) -> Level
     )
 
 
-def _deciding(decided: tuple[int, ...], groups: list[Group]) -> tuple[tuple[Term, ...], tuple[tuple[int, ...], ...]]:
+def _deciding(
+    decided: tuple[int, ...], groups: Sequence[Group]
+) -> tuple[tuple[Term, ...], tuple[tuple[int, ...], ...]]:
     """Per group what tells the side, and the groups further out whose lower sides turn it round.
 
     A factor that does not vary with the variable has its side decided where it does: at a node beside the place where

@@ -1,0 +1,363 @@
+"""What crosses a surface as parameters move it, by points on the surface.
+
+Owns `Surface`: the boundary term of one surface as means over unit cubes of one dimension less. In the coordinates u
+of the chart, where the domain stands still, the boundary term of a surface phi(u, theta) = 0 is
+
+    integral over the surface of [F] phi_theta / |grad phi| dS,      [F] the jump of the integrand times dx/du.
+
+Its points are found along lines: for a variable j, the pivot, the other labels are drawn and phi = 0 is solved for u_j,
+which turns dS into |grad phi|/|phi_j| du. Where the surface is parallel to the lines that weight has no variance.
+Therefore, unless one pivot is known to be never nearly parallel, all variables of the surface are pivots, and a point
+found along j counts with the weight phi_j^2/|grad phi|^2: these add up to 1 at each point of the surface, and
+
+    sum over j of the mean over u without u_j of sum over roots of [F] phi_theta |phi_j| / |grad phi|^2
+
+is the boundary term, with bounded weights.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+
+from potto.calculus.derivative import NotSmooth, partial
+from potto.calculus.linear import affine
+from potto.calculus.ranges import range_of
+from potto.calculus.sweep import Level, Product, cut_along
+from potto.core.simplify import simplify
+from potto.core.terms import Integral, Term, add, const, mul, neg, sub, substitute, var
+from potto.integrate.chart import Chart, Point, label_of
+from potto.integrate.cuts import as_array, frame_rows
+from potto.integrate.pieces import Sums, still
+from potto.integrate.plan import LevelPlan, Plan, function_of, level_plan
+from potto.integrate.roots import searched_rows
+from potto.kernels.cells import Array, Bools, Cell, Mask, pad
+
+# How much flatter than the steepest a pivot may be to do alone: its weight then varies by that factor at most.
+STEEP = 4.0
+# A root that phi's own slope puts further away than this (in labels) is not one that phi passes through smoothly.
+OFF = 1e-6
+ASIDE = 1e-7
+LINES = 1 << 11  # lines searched at once
+
+Integrand = Callable[[Point, dict[int, Mask], int], Sums]
+
+
+@dataclass(frozen=True)
+class Line:
+    """A surface along one variable, with the labels of the others given.
+
+    follows: the variables further in whose bounds change along the line; in the surface they are written by their
+    labels. None of `plan` if the surface does not vary along the line.
+    """
+
+    follows: frozenset[int]
+    plan: LevelPlan | None
+
+
+# Of a pair of bounds the one that is infinite: (which of the two, its sign); None if both are finite or both infinite.
+End = tuple[int, float] | None
+
+
+@lru_cache(maxsize=4096)
+def line(term: Integral, surface: Term, pivot: int, last: int, ends: tuple[End, ...]) -> Line:
+    """The line along variable number `pivot`, for a surface whose innermost variable is number `last`."""
+    follows: list[int] = []
+    moving = {term.variables[pivot]}
+    for number in range(pivot + 1, last + 1):
+        if any(b.free & moving for b in term.bounds[number]):
+            moving.add(term.variables[number])
+            follows.append(number)
+    for number in reversed(follows):
+        name = term.variables[number]
+        surface = substitute(surface, {name: _by_label(*term.bounds[number], ends[number], var(label_name(name)))})
+    if follows:
+        surface = simplify(surface)
+    name = term.variables[pivot]
+    if name not in surface.free:
+        return Line(frozenset(follows), None)
+    level = Level(name, *term.bounds[pivot], (), (cut_along(surface, name),))
+    return Line(frozenset(follows), level_plan(level, (), ()))
+
+
+def _by_label(lo: Term, hi: Term, end: End, label: Term) -> Term:
+    """The variable by its label; where a bound is infinite, by how far it is from the other (`offset`)."""
+    if end is None:
+        return add(lo, mul(sub(hi, lo), label))
+    which, sign = end
+    return add((hi, lo)[which], label if sign > 0 else neg(label))
+
+
+def label_name(variable: str) -> str:
+    return f"{variable}@label"
+
+
+def factors(plan: Plan, drawn: int) -> list[tuple[Term, int, tuple[tuple[int, Term | None], ...]]]:
+    """The surfaces of a plan as (term, level, what it decides), products taken apart.
+
+    Where a factor of a product is 0 that decides nothing for itself, the product changes its side all the same. The
+    sides of products that `drawn` variables don't reach are settled by whoever integrates those further in.
+    """
+    numbers = {group.cut.surface: group.number for group in plan.groups}
+    levels = {group: number for number, level in enumerate(plan.levels) for group in level.decided}
+    found: dict[int, tuple[Term, int, list[tuple[int, Term | None]]]] = {}
+    for group in plan.groups:
+        product = group.cut.product
+        term, way = (group.cut.surface, None) if product is None else (product.along, _rest(product, None))
+        found[group.number] = (term, levels[group.number], [(group.number, way)])
+    for group in plan.groups:
+        product = group.cut.product
+        for factor in () if product is None else product.outer:
+            if product is None or factor not in numbers:
+                continue
+            _, level, forces = found[numbers[factor]]
+            if level >= drawn or levels[group.number] < drawn:
+                forces.append((group.number, _rest(product, factor)))
+    return [(term, level, tuple(forces)) for term, level, forces in found.values()]
+
+
+def _rest(product: Product, factor: Term | None) -> Term:
+    """A product without one of its outer factors, or without what varies along its variable."""
+    rest = [f for f in product.outer if f != factor]
+    return mul(const(product.sign), *rest, *(() if factor is None else (product.along,)))
+
+
+@dataclass
+class Surface:
+    """The boundary term of one surface.
+
+    number: the level of its innermost variable. forces: the groups that it decides, and what tells which way round
+    (None for the right way). stop: how many variables are drawn or solved for; those further in are left to the
+    integrand. held: the first of the variables that parameters don't move.
+    """
+
+    chart: Chart
+    term: Term
+    number: int
+    forces: tuple[tuple[int, Term | None], ...]
+    stop: int
+    held: int | None
+    integrand: Integrand
+
+    @property
+    def machine(self) -> Any:
+        return self.chart.machine
+
+    @cached_property
+    def axes(self) -> tuple[int, ...]:
+        """The numbers of the variables that the surface varies with."""
+        levels = self.chart.plan.levels[: self.number + 1]
+        return tuple(i for i, level in enumerate(levels) if level.variable in self.term.free)
+
+    @cached_property
+    def ends(self) -> tuple[End, ...]:
+        """Which bound of each variable is infinite; one that depends on other variables is taken to be finite."""
+        env = {name: still(value) for name, value in self.chart.env.items()}
+        machine = self.machine.with_directions(0)
+        names = {level.variable for level in self.chart.plan.levels}
+        found: list[End] = []
+        for level in self.chart.plan.levels[: self.number + 1]:
+            values = [0.0, 0.0]
+            for i, bound in enumerate((level.level.lo, level.level.hi)):
+                if not bound.free & names:
+                    function = function_of(bound)
+                    value = machine.evaluate(function, {p: env[p] for p in function.params}, None)
+                    values[i] = float(np.ravel(value.v)[0])
+            infinite = [i for i in (0, 1) if np.isinf(values[i])]
+            found.append((infinite[0], values[infinite[0]]) if len(infinite) == 1 else None)
+        return tuple(found)
+
+    @cached_property
+    def pivots(self) -> tuple[int, ...]:
+        """The variables that it is solved for: one if that is known to do, otherwise all of them."""
+        if len(self.axes) == 1:
+            return self.axes
+        lengths = self._box()
+        slopes = None if lengths is None else self._slopes(lengths)
+        if slopes is None or lengths is None:
+            return self.axes
+        most = {i: hi * _length(lengths[i]) for i, (_, hi) in slopes.items()}
+        least = {i: lo * _length(lengths[i]) for i, (lo, _) in slopes.items()}
+        order = sorted(self.axes, key=lambda i: (i != self.number, -least[i]))
+        for i in order:
+            if least[i] > 0 and STEEP * least[i] >= max(most.values()):
+                return (i,)
+        return self.axes
+
+    def _box(self) -> dict[int, tuple[float, float]] | None:
+        """The bounds of the variables if they are the same everywhere."""
+        box: dict[int, tuple[float, float]] = {}
+        names = {level.variable for level in self.chart.plan.levels}
+        for i in self.axes:
+            level = self.chart.plan.levels[i]
+            if (level.level.lo.free | level.level.hi.free) & names:
+                return None
+            lo, hi = self.chart.bounds(level, self.chart.start(1, self.machine.directions).env, self.machine)
+            a, b = float(np.ravel(lo.v)[0]), float(np.ravel(hi.v)[0])
+            box[i] = (min(a, b), max(a, b))
+        return box
+
+    def _slopes(self, box: dict[int, tuple[float, float]]) -> dict[int, tuple[float, float]] | None:
+        """The least and the greatest |d psi/dx_i|; None if that is not known."""
+        names = {i: self.chart.plan.levels[i].variable for i in self.axes}
+        found = affine(self.term, tuple(names.values()))
+        if found is None and any(np.isinf(end) for ends in box.values() for end in ends):
+            return None
+        terms = _partials(self.term, tuple(names.values())) if found is None else found.coefficients
+        if terms is None:
+            return None
+        known: dict[str, tuple[float, float]] = {names[i]: ends for i, ends in box.items()}
+        for name, value in self.chart.env.items():
+            if isinstance(value, Cell):
+                at = float(np.ravel(value.v)[0])
+                known[name] = (at, at)
+        out: dict[int, tuple[float, float]] = {}
+        for i, term in zip(names, terms, strict=True):
+            r = range_of(term, known)
+            out[i] = (max(r.lo, -r.hi, 0.0), max(abs(r.lo), abs(r.hi)))
+        return out if all(np.isfinite(hi) for _, hi in out.values()) else None
+
+    # Points on the surface
+
+    def crossing(self, u: Array, pivot: int) -> Sums:
+        """For n points of the other labels (n, stop - 1), the sum over the roots along the pivot."""
+        n, k = u.shape[0], self.machine.directions
+        nothing = Sums(np.zeros((1, n)), np.zeros((1, n)), np.zeros((1, k, n)), np.zeros((1, k, n)))
+        along = line(self.chart.plan.term, self.term, pivot, self.number, self.ends)
+        if along.plan is None:
+            return nothing
+        if n > LINES and along.plan.searched:
+            return joined([self.crossing(u[i : i + LINES], pivot) for i in range(0, n, LINES)])
+        labels: list[Array | None] = list(u.T)
+        labels.insert(pivot, None)
+        before = self.chart.place(self.chart.start(n, k), labels, 0, pivot)
+        lo, hi, roots = self.roots(before, labels, pivot, along, n)
+        t, et = nothing.t, nothing.et
+        seen: list[Array] = []
+        for root in roots:
+            inside = (root > np.minimum(lo.v, hi.v)) & (root < np.maximum(lo.v, hi.v))
+            for other in seen:
+                inside &= root != other
+            seen.append(root)
+            if inside.any():
+                labels[pivot] = np.where(inside, label_of(lo, hi, root), 0.5)
+                more, error = self.at(labels, pivot, inside, n)
+                t, et = t + more, et + error
+        return Sums(nothing.v, nothing.e, t, et)
+
+    def roots(
+        self, before: Point, labels: list[Array | None], pivot: int, along: Line, n: int
+    ) -> tuple[Cell, Cell, list[Array]]:
+        """The bounds of the pivot and where the surface is crossed along it, nan for those that are not there."""
+        machine = self.machine.with_directions(0)
+        point = Point({name: still(v) for name, v in before.env.items()}, Cell(1.0))
+        for number in range(pivot + 1, self.number + 1):
+            u = labels[number]
+            if u is None:
+                continue
+            level = self.chart.plan.levels[number]
+            if number not in along.follows:
+                point = self.chart.place(point, labels, number, number + 1, directions=0)
+            else:
+                point.env[label_name(level.variable)] = Cell(_offset(self.ends[number], u))
+        assert along.plan is not None
+        values = machine.evaluate(along.plan.frame, {p: point.env[p] for p in along.plan.frame.params}, None)
+        assert isinstance(values, tuple)
+        lo, hi, rows = frame_rows(along.plan, values)
+        rows += searched_rows(along.plan, point.env, lo, hi, n, machine)
+        return lo, hi, [as_array(r.x, n) for r in rows]
+
+    def at(self, labels: list[Array | None], pivot: int, inside: Bools, n: int) -> tuple[Array, Array]:
+        """[F] phi_theta |phi_j|/|grad phi|^2 at points of the surface, and its error: (m, k, n) each."""
+        k = self.machine.directions
+        axes = self.axes if len(self.pivots) > 1 else (pivot,)
+        marked = {axis: k + i for i, axis in enumerate(axes)}
+        wide = k + len(axes)
+        point = self.chart.place(self.chart.start(n, wide), labels, 0, self.stop, marked, self.held, wide)
+        phi, slopes = self.slopes(point, wide, n)
+        j = marked[pivot]
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            steep = np.abs(slopes[j])
+            smooth = np.isfinite(slopes).all(axis=0) & (steep > 0) & (np.abs(phi) <= OFF * steep)
+            rates = slopes[:k] / (steep * ((slopes[k:] / steep) ** 2).sum(axis=0))
+        odd = inside & ~smooth
+        if odd.any():
+            rates[:, odd] = self.beside(labels, pivot, marked, n)[:, odd]
+        frozen = Point({name: still(v) for name, v in point.env.items()}, Cell(point.volume.v))
+        sides = self.sides(frozen, n)
+        above = self.integrand(frozen, sides, n)
+        below = self.integrand(frozen, {g: np.logical_not(mask) for g, mask in sides.items()}, n)
+        counts = inside & (rates != 0).any(axis=0)
+        rates = np.where(counts, rates, 0.0)
+        jump, error = np.where(counts, above.v - below.v, 0.0), np.where(counts, above.e + below.e, 0.0)
+        return jump[:, None, :] * rates, error[:, None, :] * np.abs(rates)
+
+    def sides(self, point: Point, n: int) -> dict[int, Mask]:
+        """The sides of what the surface decides, just above it."""
+        sides: dict[int, Mask] = {}
+        for group, way in self.forces:
+            side = np.ones(n, dtype=bool)
+            if way is not None:
+                function = function_of(way)
+                env = {p: point.env[p] for p in function.params}
+                side = as_array(self.machine.with_directions(0).evaluate(function, env, None).v, n) >= 0
+            sides[group] = side
+        return sides
+
+    def beside(self, labels: list[Array | None], pivot: int, marked: dict[int, int], n: int) -> Array:
+        """The same where phi has a pole, a kink or no slope, from just beside: nothing if its sign does not change."""
+        k = self.machine.directions
+        wide = k + len(marked)
+        found = []
+        for side in (-ASIDE, ASIDE):
+            u = labels[pivot]
+            assert u is not None
+            moved = [*labels[:pivot], u + side, *labels[pivot + 1 :]]
+            point = self.chart.place(self.chart.start(n, wide), moved, 0, self.stop, marked, self.held, wide)
+            found.append(self.slopes(point, wide, n))
+        (below, _), (above, slopes) = found
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            steep = slopes[marked[pivot]]
+            rates = slopes[:k] / (steep * ((slopes[k:] / steep) ** 2).sum(axis=0))
+            change = (np.sign(above) - np.sign(below)) / 2
+        return np.where(np.isfinite(rates), rates * change, 0.0)
+
+    def slopes(self, point: Point, wide: int, n: int) -> tuple[Array, Array]:
+        """phi and its tangents: those of the parameters, then those of the labels."""
+        function = function_of(self.term)
+        env = {name: pad(point.env[name], wide) for name in function.params}
+        value = self.machine.with_directions(wide).evaluate(function, env, None)
+        assert isinstance(value, Cell)
+        t = value.t or (None,) * wide
+        return as_array(value.v, n), np.stack([as_array(0.0 if x is None else x, n) + np.zeros(n) for x in t])
+
+
+def _offset(end: End, u: Array) -> Array:
+    """What a label says of a variable whose bounds are not known yet: the label, or how far from the finite bound."""
+    if end is None:
+        return u
+    with np.errstate(divide="ignore"):
+        return u / (1 - u) if end[1] > 0 else (1 - u) / u
+
+
+def joined(parts: list[Sums]) -> Sums:
+    """Sums of several batches put together."""
+    names = ("v", "e", "t", "et")
+    return Sums(*(np.concatenate([getattr(p, name) for p in parts], axis=-1) for name in names))
+
+
+def _length(ends: tuple[float, float]) -> float:
+    length = ends[1] - ends[0]
+    return length if np.isfinite(length) else 1.0
+
+
+@lru_cache(maxsize=1024)
+def _partials(surface: Term, names: tuple[str, ...]) -> tuple[Term, ...] | None:
+    try:
+        return tuple(simplify(partial(surface, name)) for name in names)
+    except NotSmooth:
+        return None
