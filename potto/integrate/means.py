@@ -95,7 +95,7 @@ class Replicates:
             self.steps[name] = self.steps[name] + np.abs(np.diff(ordered)).max(axis=(-1, -2), initial=0.0)
 
     def _apart(self, x: Array) -> Array:
-        return x.reshape(*x.shape[:-1], self.count, -1)
+        return x.reshape(*x.shape[:-1], self.count, x.shape[-1] // self.count)
 
     def fix(self, sample: Sums) -> None:
         """A term that nothing is drawn for."""
