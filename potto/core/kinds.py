@@ -150,9 +150,13 @@ class Deriv(Base):
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Hole(Base):
-    """Where the program is wrong: evaluating it raises the diagnostic that said so."""
+    """Where the program is wrong: evaluating it raises the diagnostic that said so.
+
+    measure: the program is fine, but these parameters give a measure no density.
+    """
 
     reason: str
+    measure: bool = False
 
 
 Term = (
@@ -271,8 +275,8 @@ def deriv(function: Term) -> Deriv:
     return make(Deriv, function.free, function)
 
 
-def hole(reason: str) -> Hole:
-    return make(Hole, _NOTHING, reason)
+def hole(reason: str, measure: bool = False) -> Hole:
+    return make(Hole, _NOTHING, reason, measure)
 
 
 def _prim_from(op: str, args: tuple[Term, ...]) -> Prim:

@@ -63,7 +63,7 @@ def _integral(elaboration: Elaboration, node: nodes.Integral, scope: Scope) -> V
     made = elaboration.note(integral_term(tuple(names), tuple(bounds), body, tuple(hints)), node.span)
     for valid, why in reversed(guards):
         if not valid.free & set(names) and not _holds(valid):  # a plain condition cannot vary inside the integral
-            made = if_(valid, made, hole(why))
+            made = if_(valid, made, hole(why, measure=True))
     return made
 
 

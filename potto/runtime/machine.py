@@ -226,7 +226,8 @@ class Machine:
 
     def fail(self, term: Hole | DeltaTerm) -> Value:
         if isinstance(term, Hole):
-            raise PottoError([errors.BROKEN(errors.NOWHERE, term.reason)])
+            kind = errors.NO_MEASURE if term.measure else errors.BROKEN
+            raise PottoError([kind(errors.NOWHERE, term.reason)])
         message = "a delta has a meaning only under an integral over its variables"
         raise PottoError([errors.NO_MEANING(errors.NOWHERE, message)])
 
