@@ -13,9 +13,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from potto.calculus.derivative import zero_like
-from potto.calculus.isolate import NAN
 from potto.calculus.pivots import NoClosedForm as NoClosedForm
 from potto.calculus.pivots import Root, chosen, conjunction, pivots
+from potto.calculus.radicals import NAN
 from potto.calculus.ranges import range_of
 from potto.calculus.sides import (
     NOWHERE,

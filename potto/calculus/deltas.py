@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from potto.calculus.boundary import between, remaining, scaled, total, vanishes
 from potto.calculus.derivative import NotSmooth, partial, zero_like
-from potto.calculus.isolate import quotient
 from potto.calculus.pivots import NoClosedForm, Root, chosen, pivots
+from potto.calculus.radicals import quotient
 from potto.calculus.ranges import range_of
 from potto.calculus.sides import branches_of, flipping, forced, unguarded
 from potto.core.printer import format_term

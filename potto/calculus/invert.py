@@ -12,9 +12,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from potto.calculus.derivative import partial
-from potto.calculus.isolate import NAN, guarded
 from potto.calculus.linear import affine, determinant, solve_affine
 from potto.calculus.normal import is_zero, shorter, tidy
+from potto.calculus.radicals import NAN, guarded
 from potto.calculus.solve import Sections, Unsolvable, sections
 from potto.core.terms import (
     ZERO,

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from potto.calculus.collect import collect
-from potto.calculus.isolate import quotient
 from potto.calculus.normal import is_zero, shorter
+from potto.calculus.radicals import quotient
 from potto.core.terms import ONE, ZERO, Term, add, mul, neg, sub, var
 
 Matrix = tuple[tuple[Term, ...], ...]

@@ -10,8 +10,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from potto.calculus.derivative import partial
-from potto.calculus.isolate import NAN
 from potto.calculus.normal import as_term, normal
+from potto.calculus.radicals import NAN
 from potto.calculus.ranges import range_of
 from potto.core.simplify import is_zero
 from potto.core.terms import (

@@ -14,8 +14,9 @@ from fractions import Fraction
 
 from potto.calculus.collect import collect
 from potto.calculus.gather import split
-from potto.calculus.isolate import NAN, Guard, Step, Stuck, guarded, step
+from potto.calculus.isolate import Guard, Step, Stuck, step
 from potto.calculus.normal import shorter
+from potto.calculus.radicals import NAN, guarded
 from potto.calculus.ranges import positive
 from potto.core.terms import (
     ZERO,

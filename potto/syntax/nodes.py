@@ -10,6 +10,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 from potto.source import Span
+from potto.syntax.type_nodes import DiffeoType as DiffeoType
+from potto.syntax.type_nodes import FunctionType as FunctionType
+from potto.syntax.type_nodes import ListType as ListType
+from potto.syntax.type_nodes import Parameter as Parameter
+from potto.syntax.type_nodes import RealType as RealType
+from potto.syntax.type_nodes import TupleType as TupleType
+from potto.syntax.type_nodes import TypeExpr as TypeExpr
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,13 +132,6 @@ class If:
     then: Expr
     orelse: Expr
     style: Literal["if", "?:"]
-
-
-@dataclass(frozen=True, slots=True)
-class Parameter:
-    span: Span
-    name: str
-    annotation: TypeExpr | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -267,51 +267,6 @@ Expr = (
     | InlineDiffeo
     | ErrorExpr
 )
-
-
-# Written types
-
-
-@dataclass(frozen=True, slots=True)
-class RealType:
-    """`Real`, `Real*` (accepts what varies) or `Real[x, y]`, `Dist[x]`."""
-
-    span: Span
-    head: Literal["Real", "Dist"]
-    star: bool
-    variables: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class TupleType:
-    span: Span
-    items: tuple[TypeExpr, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class ListType:
-    span: Span
-    item: TypeExpr
-
-
-@dataclass(frozen=True, slots=True)
-class FunctionType:
-    """`(A, name: B) -> C`; parameters in one group."""
-
-    span: Span
-    parameters: tuple[Parameter, ...]
-    result: TypeExpr
-
-
-@dataclass(frozen=True, slots=True)
-class DiffeoType:
-    """`Diffeo[2]`."""
-
-    span: Span
-    dims: int
-
-
-TypeExpr = RealType | TupleType | ListType | FunctionType | DiffeoType
 
 
 # Top-level items: one per chunk
