@@ -21,6 +21,7 @@ from potto.types import check_statement
 from potto_lsp.documents import Document
 from potto_lsp.text import Encoding, Text
 from potto_lsp.uris import to_key, to_uri
+from potto_lsp.verdicts import Verdicts
 
 logger = logging.getLogger(__name__)
 
@@ -44,6 +45,9 @@ class Analysis:
         self._documents: dict[str, Document] = {}
         self._texts: dict[str, Text] = {}
         self._failing: dict[tuple[str, str], str] = {}
+        self._verdicts = Verdicts(self.db)
+        self._checked: set[str] = set()  # files asked for: only the first answer may be from an earlier session
+        self.settled = False  # whether all files have been checked
 
     # What the client has
 
@@ -133,10 +137,22 @@ class Analysis:
 
     def diagnostics(self, key: str) -> tuple[Located, ...]:
         """What is wrong with a file. A bug of ours in one definition costs what is said of that one alone."""
+        if not self.settled and key in self._documents and key not in self._checked:
+            self._checked.add(key)
+            known = self._verdicts.of(key)
+            if known is not None:
+                return known
         try:
             return file_diagnostics(self.db, key)
         except Exception:
             return tuple(Located(key, said) for said in arranged(self._guarded(key)))
+
+    def keep(self, key: str) -> None:
+        """Keep for later sessions what was found out about a file."""
+        try:
+            self._verdicts.keep(key, file_diagnostics(self.db, key), file_diagnostics.__name__)
+        except Exception as error:
+            self._failed(key, "verdict", error)
 
     def _guarded(self, key: str) -> list[Diagnostic]:
         """The diagnostics of a file part by part; a part that fails is logged once for each of its texts."""

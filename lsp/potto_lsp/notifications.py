@@ -103,9 +103,16 @@ def did_close(server: Server, params: Any) -> None:
 
 def did_save(server: Server, params: Any) -> None:
     """What is on disk is looked at again, for clients that watch no files."""
-    if not _session(server).client.can("workspace.didChangeWatchedFiles.dynamicRegistration"):
-        key = to_key(params["textDocument"]["uri"])
-        server.edit(lambda: _session(server).analysis.files.refresh((key,)))
+    key = to_key(params["textDocument"]["uri"])
+    watched = _session(server).client.can("workspace.didChangeWatchedFiles.dynamicRegistration")
+
+    def saved() -> None:
+        session = _session(server)
+        session.to_keep.add(key)
+        if not watched:
+            session.analysis.files.refresh((key,))
+
+    server.edit(saved)
 
 
 def did_change_watched_files(server: Server, params: Any) -> None:

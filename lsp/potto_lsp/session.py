@@ -47,6 +47,7 @@ class Session:
         self.presenter = Presenter(self)
         self.tokens: dict[str, tuple[str, list[int]]] = {}
         self.checked = False
+        self.to_keep: set[str] = set()  # saved files, of which it is to be kept what was found out about them
         self._progress = Progress(self, "Potto: checking the workspace")
 
     def load(self) -> Database:
@@ -84,6 +85,8 @@ class Session:
         """The steps of what is done when there is nothing else to do."""
         if self.checked:
             yield from self.publisher.steps()
+            for key in [key for key in self.to_keep if key in self.analysis.documents]:
+                yield lambda key=key: self._keep(key)  # type: ignore[misc]
         else:
             yield from self._first_check()
         yield self.live.refresh
@@ -94,6 +97,7 @@ class Session:
         for number, step in enumerate(steps):
             if number == len(self.analysis.documents):  # what is open is told; the next thing is to be asked about it
                 yield self._load_features
+                yield from steps[:number]  # what was known from an earlier session is found anew, for the edits to come
             yield step
             self._progress.report(number + 1, len(steps))
             if number % TREES == TREES - 1:
@@ -101,6 +105,12 @@ class Session:
         yield self._load_features
         yield self.analysis.forget_trees
         yield self._all_checked
+        for key in self.analysis.documents:
+            yield lambda key=key: self._keep(key)  # type: ignore[misc]
+
+    def _keep(self, key: str) -> None:
+        self.to_keep.discard(key)
+        self.analysis.keep(key)
 
     def _load_features(self) -> None:
         """Load all adapters, so that the first question waits for none."""
@@ -109,7 +119,7 @@ class Session:
                 feature.load()
 
     def _all_checked(self) -> None:
-        self.checked = True
+        self.checked = self.analysis.settled = True
         self._progress.end()
         memory.settle()
 

@@ -18,7 +18,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
     from potto.syntax.tables import cache_folder
 
     folder = cache_folder()
-    files = sorted(path for path in folder.glob("grammar-*.json") if path.is_file()) if folder.is_dir() else []
+    tables = sorted(path for path in folder.glob("grammar-*.json") if path.is_file()) if folder.is_dir() else []
+    verdicts = sorted(path for path in folder.glob("checked-*/*.json") if path.is_file()) if folder.is_dir() else []
+    files = tables + verdicts
     size = sum(path.stat().st_size for path in files)
     if options.clear:
         for path in files:
@@ -28,7 +30,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
         console.answer_json({**report, "kernels": "in memory only"})
         return 0
     console.answer(f"folder:   {folder}")
-    console.answer(f"contents: parse tables, {len(files)} file{'' if len(files) == 1 else 's'}, {size / 1024:.1f} KiB")
+    count = f"{len(files)} file{'' if len(files) == 1 else 's'}, {size / 1024:.1f} KiB"
+    console.answer(f"contents: parse tables, and what was said about files that an editor had open; {count}")
     console.answer("kernels:  kept in memory only, while a process runs")
     if options.clear:
         console.answer("cleared")

@@ -109,6 +109,26 @@ class Database(Engine):
         finally:
             self._frame = frame
 
+    def inputs_below(self, name: str, args: tuple[Hashable, ...]) -> tuple[Hashable, ...] | None:
+        """The keys of all inputs that the answer of the query `name` was found from; None if there is no answer now."""
+        with self.evaluating():
+            query = next((query for query in self._memos if query.name == name), None)
+            memo = None if query is None else self._memos[query].get(args)
+            if memo is None or memo.verified_at < self.revision:
+                return None
+            keys = {id(node): key for key, node in self._inputs.items()}
+            found: dict[Hashable, None] = {}
+            seen, stack = {memo}, [memo]
+            while stack:
+                for dep in stack.pop().deps:
+                    source = dep.source
+                    if source is None:
+                        found[keys[id(dep)]] = None
+                    elif source not in seen:
+                        seen.add(source)
+                        stack.append(source)
+            return tuple(found)
+
     @contextmanager
     def evaluating(self) -> Iterator[None]:
         """Hold the database: no other thread writes or evaluates. `cancel` holds for all of the block."""
