@@ -14,6 +14,7 @@ from potto.settings import settings
 if TYPE_CHECKING:
     from potto.api import Function, Module, Workspace, compile, deriv, grad, load
     from potto.fitting import fit
+    from potto.integrate.costs import counting
     from potto.runtime.estimate import Estimate
 
 __version__ = "0.1.0"
@@ -25,6 +26,7 @@ __all__ = [
     "Workspace",
     "__version__",
     "compile",
+    "counting",
     "deriv",
     "fit",
     "grad",
@@ -32,7 +34,7 @@ __all__ = [
     "settings",
 ]
 
-_HOMES = {"Estimate": "potto.runtime.estimate", "fit": "potto.fitting"}
+_HOMES = {"Estimate": "potto.runtime.estimate", "counting": "potto.integrate.costs", "fit": "potto.fitting"}
 
 
 def __getattr__(name: str) -> Any:

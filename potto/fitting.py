@@ -20,6 +20,7 @@ from potto.api import Function, grad
 from potto.diagnostics import PottoError
 from potto.kernels.cells import Array
 from potto.kernels.errors import wrong_call
+from potto.runtime.estimate import Estimate
 
 MOST_STEPS = 200
 # The slope of a minimum, measured in the size of the values met and of the parameters.
@@ -83,12 +84,14 @@ def fit(
     target: Any = None,
     steps: int = MOST_STEPS,
     progress: Callable[[Step], None] | None = None,
+    watch: Callable[[Estimate], object] | None = None,
 ) -> Fit:
     """Make a function least over the parameters named in `start`, from there on.
 
     given: the other parameters; arrays among them make the function an array. bounds: what a parameter may be.
     target: where the function should come to instead of being least: then what is made least is the mean of the squared
-    distances; numbers, tuples and arrays as the function's answer has them. progress: is told every step.
+    distances; numbers, tuples and arrays as the function's answer has them. progress: is told every step;
+    watch: is given every answer of the function.
 
     Raises PottoError if the arguments do not fit the function or it has no value at the start.
     """
@@ -105,7 +108,10 @@ def fit(
 
     def objective(x: Array) -> Seen:
         here = {name: float(v) for name, v in zip(names, x, strict=True)}
-        return _seen(gradient(**here, **given), len(names), target)
+        answer = gradient(**here, **given)
+        if watch is not None:
+            watch(answer)
+        return _seen(answer, len(names), target)
 
     limits = [(bounds or {}).get(name, (-math.inf, math.inf)) for name in names]
     return minimized(objective, dict(start), limits, steps, progress)

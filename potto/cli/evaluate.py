@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from potto.cli.console import Console
-from potto.cli.numbers import add_options, settings_of, show_stats
+from potto.cli.numbers import accounts, add_options, settings_of, show_stats, totals
 
 SUMMARY = "evaluate an expression with a file's names in scope"
 EXAMPLE = "  potto eval examples/paper/renderer.po 'deriv(renderer)((-0.7, 1), \\(x, y) . c . 1)'"
@@ -36,12 +36,14 @@ def run(options: argparse.Namespace, console: Console) -> int:
     try:
         file = opened(world, options.file)
         world.require(file)
-        answer = world.evaluate(file, options.expression.strip(), settings)
+        with accounts(options):
+            answer = world.evaluate(file, options.expression.strip(), settings)
     except ProgramError as error:
         return fail(error, options, console)
     estimate = answer.estimate
     if options.json:
-        console.answer_json(estimate_json(estimate, answer.type))
+        more = {"stats": totals([estimate])} if options.stats else {}
+        console.answer_json({**estimate_json(estimate, answer.type), **more})
     else:
         console.answer(format_estimate(estimate))
         if estimate.text is None and options.stats:

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 from potto.cli.calling import argument_in, arguments_in, assignment, function_in
 from potto.cli.console import Console
-from potto.cli.numbers import add_options, settings_of
+from potto.cli.numbers import accounts, add_options, settings_of, show_stats
 
 if TYPE_CHECKING:
     from potto.fitting import Fit, Step
+    from potto.runtime.estimate import Estimate
     from potto.world import World
 
 SUMMARY = "find the parameters that make a function least, along its derivatives"
@@ -76,11 +77,12 @@ def run(options: argparse.Namespace, console: Console) -> int:
     from potto.world import World
 
     world = World(["."])
+    answers: list[Estimate] = []
     try:
         file = opened(world, options.file)
         world.require(file)
-        with settings(**asdict(chosen)):
-            found = _fitted(world, file, options, console)
+        with settings(**asdict(chosen)), accounts(options):
+            found = _fitted(world, file, options, console, answers)
     except PottoError as error:
         console.progress("")
         return fail(error, options, console)
@@ -94,11 +96,18 @@ def run(options: argparse.Namespace, console: Console) -> int:
         console.complain(f"potto fit: {error}")
         return 1
     _tell(found, options, console)
+    if options.stats:
+        show_stats(answers, console)
     return 0 if found.converged else 1
 
 
-def _fitted(world: World, file: str, options: argparse.Namespace, console: Console) -> Fit:
-    """The fit that the command line asks for. Raises PottoError; OSError and ValueError for the table."""
+def _fitted(
+    world: World, file: str, options: argparse.Namespace, console: Console, answers: list[Estimate]
+) -> Fit:  # fmt: skip
+    """The fit that the command line asks for; its evaluations join the answers.
+
+    Raises PottoError; OSError and ValueError for the table.
+    """
     from potto.fitting import fit
     from potto.kernels.errors import wrong_call
 
@@ -121,7 +130,7 @@ def _fitted(world: World, file: str, options: argparse.Namespace, console: Conso
                          "name the column of what is measured with --target")  # fmt: skip
     bounds = dict(options.bound)
     return fit(function, start, given={**given, **columns}, bounds=bounds, target=target, steps=options.steps,
-               progress=_Progress(tuple(start), console))  # fmt: skip
+               progress=_Progress(tuple(start), console), watch=answers.append)  # fmt: skip
 
 
 class _Progress:

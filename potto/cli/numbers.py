@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 import os
+from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import fields, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from potto.cli.console import Console
 from potto.project import Projects
@@ -61,15 +63,40 @@ def settings_of(options: argparse.Namespace, console: Console) -> Settings | Non
     return replace(DEFAULTS if project is None else project.settings, **chosen)
 
 
-def show_stats(estimates: list[Estimate], console: Console) -> None:
+def accounts(options: argparse.Namespace) -> AbstractContextManager[None]:
+    """Where evaluations keep books of what they cost, if `--stats` asks for them."""
+    if not options.stats:
+        return nullcontext()
+    from potto.integrate.costs import counting
+
+    return counting()
+
+
+def totals(estimates: Sequence[Estimate]) -> dict[str, Any]:
+    """What evaluations cost, all together: the numbers added up, each surface once."""
+    found: dict[str, Any] = {}
+    surfaces: dict[str, dict[str, Any]] = {}
+    for estimate in estimates:
+        for name, value in estimate.stats.items():
+            if name == "surfaces":
+                for entry in value:
+                    if not surfaces.get(entry["surface"], entry)["kept"] or entry["surface"] not in surfaces:
+                        surfaces[entry["surface"]] = entry
+            else:
+                found[name] = found.get(name, 0) + value
+    return {**found, "surfaces": list(surfaces.values())}
+
+
+def show_stats(estimates: Sequence[Estimate], console: Console) -> None:
     """What evaluations cost, all together, for the person."""
     seconds = sum(estimate.seconds for estimate in estimates)
     compiling = sum(estimate.compile_seconds for estimate in estimates)
-    totals: dict[str, float] = {}
-    for estimate in estimates:
-        for name, value in estimate.stats.items():
-            if isinstance(value, int | float):
-                totals[name] = totals.get(name, 0) + value
     console.complain(f"time: {seconds * 1e3:.2f} ms, {compiling * 1e3:.2f} ms of it making kernels")
-    for name, total in totals.items():
+    found = totals(estimates)
+    surfaces = found.pop("surfaces")
+    for name, total in found.items():
         console.complain(f"{name}: {total:,}")
+    kept = sum(entry["kept"] for entry in surfaces)
+    console.complain(f"surfaces kept: {kept}, dropped: {len(surfaces) - kept}")
+    for entry in surfaces:
+        console.complain(f"  {entry['surface']}   {'kept' if entry['kept'] else 'dropped'}: {entry['why']}")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from potto.cli.calling import arguments_in, assignment, function_in
 from potto.cli.console import Console
-from potto.cli.numbers import add_options, settings_of, show_stats
+from potto.cli.numbers import accounts, add_options, settings_of, show_stats
 
 if TYPE_CHECKING:
     from potto.api import Function
@@ -120,7 +120,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
         file = opened(world, options.file)
         world.require(file)
         picture = _picture(world, file, options)
-        found = _sampled(picture, grid, settings, console)
+        with accounts(options):
+            found = _sampled(picture, grid, settings, console)
     except PottoError as error:
         console.progress("")
         return fail(error, options, console)

@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from potto.cli.console import Console
-from potto.cli.numbers import add_options, settings_of, show_stats
+from potto.cli.numbers import accounts, add_options, settings_of, show_stats
 
 SUMMARY = "run a script"
 EXAMPLE = "  potto run examples/paper/main.po"
@@ -35,18 +35,19 @@ def run(options: argparse.Namespace, console: Console) -> int:
     estimates: list[Estimate] = []
     try:
         file = opened(world, options.file)
-        for event in world.run(file, settings):
-            if isinstance(event, Located):
-                said.append(event)
-                status = max(status, int(event.diagnostic.severity == "error"))
+        with accounts(options):
+            for event in world.run(file, settings):
+                if isinstance(event, Located):
+                    said.append(event)
+                    status = max(status, int(event.diagnostic.severity == "error"))
+                    if not options.json:
+                        console.diagnostics([event], world.source)
+                    continue
+                estimates += event.estimates
+                outputs.append({"text": event.text, "values": [estimate_json(e) for e in event.estimates]})
                 if not options.json:
-                    console.diagnostics([event], world.source)
-                continue
-            estimates += event.estimates
-            outputs.append({"text": event.text, "values": [estimate_json(e) for e in event.estimates]})
-            if not options.json:
-                console.answer(event.text)
-                console.out.flush()
+                    console.answer(event.text)
+                    console.out.flush()
     except ProgramError as error:
         return fail(error, options, console)
     if options.json:

@@ -6,6 +6,7 @@ the derivative is on either side of the present parameters follows from the inte
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -70,6 +71,7 @@ def across(
             for outer in turned:
                 side = side ^ np.logical_not(inner[outer])
             inner[g] = side
-    actual = parent.inside(number, here, edge.owner.size, inner, frozen)
-    flipped = parent.inside(number, here, edge.owner.size, {**inner, group: ~np.asarray(inner[group])}, frozen)
+    with nullcontext() if machine.costs is None else machine.costs.apart():
+        actual = parent.inside(number, here, edge.owner.size, inner, frozen)
+        flipped = parent.inside(number, here, edge.owner.size, {**inner, group: ~np.asarray(inner[group])}, frozen)
     return flipped - actual, np.abs(actual) + np.abs(flipped)

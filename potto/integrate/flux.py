@@ -18,6 +18,7 @@ is the boundary term, with bounded weights.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
@@ -287,11 +288,17 @@ class Surface:
         odd = inside & ~smooth
         if odd.any():
             rates[:, odd] = self.beside(labels, pivot, marked, n)[:, odd]
+        counts = inside & (rates != 0).any(axis=0)
+        costs = self.machine.costs
+        if costs is not None:
+            costs.sampled(self.term, inside, rates)
+        if not counts.any():  # nothing that is differentiated moves it here
+            return np.zeros((1, k, n)), np.zeros((1, k, n))
         frozen = Point({name: still(v) for name, v in point.env.items()}, Cell(point.volume.v))
         sides = self.sides(frozen, n)
-        above = self.integrand(frozen, sides, n)
-        below = self.integrand(frozen, {g: np.logical_not(mask) for g, mask in sides.items()}, n)
-        counts = inside & (rates != 0).any(axis=0)
+        with nullcontext() if costs is None else costs.apart(1.0):
+            above = self.integrand(frozen, sides, n)
+            below = self.integrand(frozen, {g: np.logical_not(mask) for g, mask in sides.items()}, n)
         rates = np.where(counts, rates, 0.0)
         jump, error = np.where(counts, above.v - below.v, 0.0), np.where(counts, above.e + below.e, 0.0)
         return jump[:, None, :] * rates, error[:, None, :] * np.abs(rates)

@@ -48,6 +48,8 @@ class Iteration:
         seg = cuts.segments
         outer, sides = sides, self.sides_of(level, env, seg, sides, machine)
         keep = self.alive(sides, seg)
+        if machine.costs is not None and number + 1 == len(self.plan.levels):
+            machine.costs.stretches(seg.a.size, seg.a.size if keep is None else keep.size)
         if keep is not None:
             seg, sides = seg.pick(keep), {g: take(m, keep) for g, m in sides.items()}
         work = Work(self, number, level, env, seg, sides, machine, cuts.moving and k > 0, batch, root, cuts.conflict)
@@ -75,6 +77,12 @@ class Iteration:
         assert isinstance(values, tuple)
         lo, hi, rows = frame_rows(level, values)
         rows += searched_rows(level, env, lo, hi, batch, machine)
+        if machine.costs is not None:
+            asked = self.machine.directions > 0 and not machine.frozen  # others are by variables further out
+            for number, cut in enumerate(level.level.cuts):
+                if cut.jumps:
+                    roots = [(row.x, row.t[: self.machine.directions]) for row in rows if row.cut == number]
+                    machine.costs.saw(cut.surface, roots, lo.v, hi.v, asked)
         for row in rows if self.still else ():
             if row.cut >= 0 and level.level.cuts[row.cut].surface in self.still:
                 row.t = ()

@@ -12,6 +12,7 @@ in one go. For a derivative two forms are computed from the same values:
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -296,7 +297,9 @@ class Work:
         here = gather({n: still(v) for n, v in self.env.items() if n in names}, both)
         here[self.level.variable] = Cell(np.concatenate((seg.a, seg.b)))
         sides = {g: np.concatenate((m, m)) if isinstance(m, np.ndarray) else m for g, m in self.sides.items()}
-        f = self.parent.inside(self.number, here, both.size, sides, frozen)
+        costs = self.machine.costs
+        with nullcontext() if costs is None else costs.ends(seg.ta, seg.tb, self.parent.machine.directions):
+            f = self.parent.inside(self.number, here, both.size, sides, frozen)
         return f[:, : seg.a.size], f[:, seg.a.size :]
 
     def sweeps(self) -> bool:
@@ -322,7 +325,8 @@ class Work:
             here = gather({n: still(v) for n, v in self.env.items()}, seg.owner[index])
             here[self.level.variable] = Cell(seg.a[follows] + side * BESIDE * np.minimum(width, 1e300))
             sides = {g: take(m, index) for g, m in self.sides.items()}
-            values.append(self.parent.inside(self.number, here, index.size, sides, frozen))
+            with nullcontext() if self.machine.costs is None else self.machine.costs.apart():
+                values.append(self.parent.inside(self.number, here, index.size, sides, frozen))
         apart = np.abs(values[0] - values[1])
         if (apart > DISCONTINUITY * (np.abs(values[0]) + np.abs(values[1]))).any():
             self.machine.note_degenerate(self.level.variable)

@@ -95,12 +95,14 @@ class Clock:
 def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
     books, settings = machine.books, machine.settings
     method = "exact" if not books.methods else "+".join(sorted(books.methods))
-    stats = {
+    stats: dict[str, Any] = {
         "kernels compiled": clock.compiled,
         "kernels reused": clock.reused,
         "integrals": books.integrals,
         "evaluations": books.evaluations,
     }
+    if books.costs is not None:
+        stats |= books.costs.told()
     notes = tuple(_notes(books))
     common = {
         "evals": books.evaluations,

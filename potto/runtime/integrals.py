@@ -167,6 +167,8 @@ def in_parts(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) ->
         return iterated(plan, machine, env, batch)
     done, sums = found
     rest = np.nonzero(~done)[0]
+    if machine.costs is not None:
+        machine.costs.whole += batch - rest.size
     if rest.size:
         here = {n: map_arrays(v, operator.itemgetter(rest)) for n, v in env.items()}
         part = iterated(plan, machine, here, rest.size)

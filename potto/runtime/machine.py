@@ -31,6 +31,8 @@ from potto.core.terms import (
 )  # fmt: skip
 from potto.core.terms import Delta as DeltaTerm
 from potto.diagnostics import PottoError
+from potto.integrate import costs
+from potto.integrate.costs import Costs
 from potto.integrate.pieces import still
 from potto.kernels import errors
 from potto.kernels.cells import Array, Cell, Number, Pattern, Trace, Value, pad, pattern
@@ -56,7 +58,7 @@ class Books:
     second: bool = False
     members: int = 1
     integrals: int = 0
-    pieces: int = 0
+    costs: Costs | None = field(default_factory=costs.books)
 
 
 class Linker:
@@ -156,8 +158,14 @@ class Machine:
 
     # Books
 
+    @property
+    def costs(self) -> Costs | None:
+        return self.books.costs
+
     def count(self, evaluations: int) -> None:
         self.books.evaluations += evaluations
+        if self.books.costs is not None:
+            self.books.costs.add(evaluations)
 
     def exhausted(self) -> bool:
         return self.books.evaluations > self.settings.max_evals * self.books.members

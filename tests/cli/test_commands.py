@@ -93,6 +93,16 @@ def test_impossible_options_are_wrong_use(potto: Potto, option: tuple[str, str])
 def test_stats_go_to_the_person(potto: Potto) -> None:
     ran = potto("eval", "main.po", "f(0.25)", "--stats", main=HALF)
     assert ran.out == "0.25\n" and "evaluations" in ran.err and "kernels" in ran.err
+    assert "surfaces kept: 1, dropped: 0" in ran.err and "cut along; no derivative is asked for" in ran.err
+
+
+def test_stats_say_why_surfaces_are_dropped(potto: Potto) -> None:
+    program = "def f(t, a) integral [0, 1] a*[x < t]*[x < 2 + a] d(x)"
+    ran = potto("eval", "main.po", "deriv(f)((0.25, 0), (1, 1))", "--stats", "--json", main=program)
+    stats = ran.json["stats"]
+    assert stats["boundary evaluations"] == 0 and stats["interior evaluations"] == 11
+    why = sorted(entry["why"] for entry in stats["surfaces"] if not entry["kept"])
+    assert why == ["it does not meet the domain", "nothing that is differentiated moves it"]
 
 
 def test_standard_input_is_a_file_of_the_folder(potto: Potto) -> None:

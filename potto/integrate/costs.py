@@ -1,0 +1,141 @@
+"""What an evaluation is spent on: evaluations of interior and boundary, cells, surfaces kept and dropped, and why.
+
+Owns `Costs` and `counting`, which asks for them: keeping these books takes time, so that nobody pays who does not read
+them. The integrator and the sampler write; the runtime makes them a part of an estimate's `stats`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from potto.core.terms import Term
+from potto.kernels.cells import Array
+
+_wanted: ContextVar[bool] = ContextVar("potto_counting", default=False)
+
+
+@contextmanager
+def counting() -> Iterator[None]:
+    """In this block the `stats` of estimates say what the evaluation was spent on."""
+    token = _wanted.set(True)
+    try:
+        yield
+    finally:
+        _wanted.reset(token)
+
+
+def books() -> Costs | None:
+    """Books to write in, if anyone asked for them."""
+    return Costs() if _wanted.get() else None
+
+
+@dataclass(slots=True)
+class Surface:
+    """What became of a surface: whether it met the domain, whether it moved there, whether anyone asked if it does."""
+
+    met: bool = False
+    moves: bool = False
+    asked: bool = False
+
+    @property
+    def kept(self) -> bool:
+        return self.met and (self.moves or not self.asked)
+
+    @property
+    def why(self) -> str:
+        if not self.met:
+            return "it does not meet the domain"
+        if not self.asked:
+            return "cut along; no derivative is asked for"
+        return "it moves: it has a boundary term" if self.moves else "nothing that is differentiated moves it"
+
+
+@dataclass(slots=True)
+class Costs:
+    """The books of one evaluation.
+
+    interior: evaluations of integrands at nodes. boundary: at places that move, where boundary terms are read off.
+    checks: at ends that stand still, for peaks and jumps that lie there. cells: stretches of the innermost variable
+    that were integrated; empty: those left out, since the integrand vanishes there. whole: members of a batch that no
+    surface crosses.
+    """
+
+    interior: int = 0
+    boundary: int = 0
+    checks: int = 0
+    cells: int = 0
+    empty: int = 0
+    whole: int = 0
+    surfaces: dict[Term, Surface] = field(default_factory=dict)
+    _apart: int | None = None
+
+    def add(self, evaluations: int) -> None:
+        if self._apart is None:
+            self.interior += evaluations
+        else:
+            self._apart += evaluations
+
+    @contextmanager
+    def apart(self, share: float = 0.0) -> Iterator[None]:
+        """What is evaluated here is no interior: `share` of it is boundary, the rest checks."""
+        if self._apart is not None:  # within another one: that decides
+            yield
+            return
+        self._apart = 0
+        try:
+            yield
+        finally:
+            boundary = round(share * self._apart)
+            self.boundary, self.checks = self.boundary + boundary, self.checks + self._apart - boundary
+            self._apart = None
+
+    def ends(self, ta: Array, tb: Array, k: int) -> Any:
+        """The same for ends of stretches, which move at these speeds, of which the first k count: (k or more, S)."""
+        ta, tb = ta[:k], tb[:k]
+        count = ta.shape[1] + tb.shape[1]
+        moving = np.count_nonzero(ta.any(axis=0)) + np.count_nonzero(tb.any(axis=0))
+        return self.apart(moving / count if count else 0.0)
+
+    def stretches(self, there: int, kept: int) -> None:
+        """How many stretches of the innermost variable there were, and on how many the integrand is not zero."""
+        if self._apart is None:
+            self.cells, self.empty = self.cells + kept, self.empty + there - kept
+
+    def saw(self, surface: Term, roots: Sequence[tuple[Any, Sequence[Any]]], lo: Any, hi: Any, asked: bool) -> None:
+        """The roots of a surface over one variable with their speeds, and the bounds that they may lie between."""
+        seen = self.surfaces.setdefault(surface, Surface())
+        seen.asked = seen.asked or asked
+        low, high = np.minimum(lo, hi), np.maximum(lo, hi)
+        for root, speeds in roots:
+            inside = (root > low) & (root < high)
+            seen.met = seen.met or bool(np.any(inside))
+            seen.moves = seen.moves or any(s is not None and bool(np.any(inside & (s != 0))) for s in speeds)
+
+    def sampled(self, surface: Term, inside: Any, speeds: Sequence[Any]) -> None:
+        """The same of a surface that was sampled."""
+        seen = self.surfaces.setdefault(surface, Surface())
+        seen.asked = True
+        seen.met = seen.met or bool(np.any(inside))
+        seen.moves = seen.moves or any(bool(np.any(inside & (s != 0))) for s in speeds)
+
+    def told(self) -> dict[str, Any]:
+        """As a part of an estimate's `stats`."""
+        from potto.core.printer import format_term
+
+        surfaces = [{"surface": f"{format_term(s)} = 0", "kept": seen.kept, "why": seen.why}
+                    for s, seen in self.surfaces.items()]  # fmt: skip
+        return {
+            "interior evaluations": self.interior,
+            "boundary evaluations": self.boundary,
+            "checks at still ends": self.checks,
+            "cells": self.cells,
+            "empty cells left out": self.empty,
+            "members that no surface crosses": self.whole,
+            "surfaces": surfaces,
+        }

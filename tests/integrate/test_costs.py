@@ -1,0 +1,100 @@
+"""Only what a scene needs: evaluations of interior and boundary, cells, surfaces kept and dropped, counted."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import potto
+
+M = potto.compile("""
+def step(t, a) integral [0, 1] a*[x < t] d(x)
+def scene(c, s, a) integral ([0, 1], [0, 1]) a*x*[x + y + c >= 0]*[x < s]*[y < 5*a] d(x, y)
+def still(a) integral ([0, 1], [0, 1]) a*x*[x + y >= 1] d(x, y)
+def four(t, a) integral ([0, 1], [0, 1], [0, 1], [0, 1]) a*[x + y + z + w < t]*[x < 1/2] d(x, y, z, w)
+def walled(c, a) integral ([0, 1], [0, 1]) a*[x < 1/2]*[x + y + c >= 0] d(x, y)
+""")
+INTERIOR, BOUNDARY, CHECKS = "interior evaluations", "boundary evaluations", "checks at still ends"
+
+
+def costs(call, **chosen):
+    with potto.counting(), potto.settings(**chosen):
+        return call().stats
+
+
+def fates(stats):
+    return {entry["surface"]: (entry["kept"], entry["why"]) for entry in stats["surfaces"]}
+
+
+def test_nobody_pays_who_does_not_ask():
+    assert INTERIOR not in M.step(0.3, 2.0).stats
+
+
+def test_the_parts_are_the_whole():
+    for call in (lambda: M.scene(-0.7, 0.5, 1.0), lambda: potto.grad(M.scene, ["c", "s", "a"])(-0.7, 0.5, 1.0),
+                 lambda: potto.grad(M.scene, ["c"])(0.0, 1.0, 1.0)):  # fmt: skip
+        found = costs(call)
+        assert found[INTERIOR] + found[BOUNDARY] + found[CHECKS] == found["evaluations"] > 0
+
+
+def test_a_line_costs_eleven_nodes_and_its_two_ends():
+    """One stretch with the first rule; its end at t is the boundary, its end at 0 a check; [t, 1] is left out."""
+    found = costs(lambda: potto.grad(M.step, "t")(0.3, 2.0))
+    assert (found[INTERIOR], found[BOUNDARY], found[CHECKS]) == (11, 1, 1)
+    assert (found["cells"], found["empty cells left out"]) == (1, 1)
+
+
+def test_a_surface_that_nothing_moves_costs_no_boundary_work():
+    found = costs(lambda: potto.grad(M.still, "a")(1.0))
+    assert found[BOUNDARY] == 0
+    assert fates(found) == {"x + y - 1 = 0": (False, "nothing that is differentiated moves it")}
+
+
+@pytest.mark.parametrize("method", ["mc", "qmc"])
+def test_nor_when_it_is_sampled(method):
+    still = costs(lambda: potto.grad(M.four, "a")(1.5, 2.0), method=method, samples=512)
+    moves = costs(lambda: potto.grad(M.four, "t")(1.5, 2.0), method=method, samples=512)
+    assert still[BOUNDARY] == 0 < moves[BOUNDARY] and still[INTERIOR] == moves[INTERIOR]
+    assert [kept for kept, _ in fates(still).values()] == [False, False]
+    assert sorted(kept for kept, _ in fates(moves).values()) == [False, True]
+    alone = costs(lambda: M.four(1.5, 2.0), method=method, samples=512)
+    assert alone[INTERIOR] == still[INTERIOR]
+
+
+def test_parameters_that_are_not_perturbed_cost_nothing():
+    """Differentiating by `c` alone, by a dual with tangent 0 for the rest, or by all: the same cells and nodes."""
+    one = costs(lambda: potto.grad(M.scene, "c")(-0.7, 0.5, 1.0))
+    zero = costs(lambda: potto.deriv(M.scene)((-0.7, 1.0), (0.5, 0.0), (1.0, 0.0)))
+    every = costs(lambda: potto.grad(M.scene, ["c", "s", "a"])(-0.7, 0.5, 1.0))
+    value = costs(lambda: M.scene(-0.7, 0.5, 1.0))
+    assert one[INTERIOR] == zero[INTERIOR] == value[INTERIOR]
+    assert one[BOUNDARY] == zero[BOUNDARY] < every[BOUNDARY] and value[BOUNDARY] == 0
+
+
+def test_every_surface_says_what_became_of_it():
+    moved = (True, "it moves: it has a boundary term")
+    still = (False, "nothing that is differentiated moves it")
+    outside = (False, "it does not meet the domain")
+    whole = ("s - x = 0", "c + x + y = 0", "a - y/5 = 0")
+    by_c = fates(costs(lambda: potto.grad(M.scene, "c")(-0.7, 0.5, 1.0)))
+    assert by_c == dict(zip(whole, (still, moved, outside)))
+    by_s = fates(costs(lambda: potto.grad(M.scene, "s")(-0.7, 0.5, 1.0)))
+    assert by_s == dict(zip(whole, (moved, still, outside)))
+    value = fates(costs(lambda: M.scene(-0.7, 0.5, 1.0)))
+    assert value["s - x = 0"] == (True, "cut along; no derivative is asked for") and value["a - y/5 = 0"] == outside
+
+
+def test_a_cell_without_light_is_left_out():
+    """Right of x = 1/2 the integrand is 0: those cells are counted, and nothing is evaluated there."""
+    found = costs(lambda: M.walled(-0.7, 1.0))
+    assert found["empty cells left out"] > 0
+    everywhere = costs(lambda: potto.compile("def f(a) integral ([0, 1], [0, 1]) a*x d(x, y)").f(1.0))
+    assert everywhere["empty cells left out"] == 0 and everywhere["cells"] > 0
+
+
+def test_pixels_that_no_surface_crosses_are_told_apart():
+    """Of 128 x 128 pixels the line x + y = 1 crosses the 127 on the diagonal below it and touches corners of others."""
+    m = potto.compile("def p(x, y) integral ([x, x + 1/128], [y, y + 1/128]) [u + v >= 1] d(u, v)")
+    x, y = np.meshgrid(np.arange(128) / 128, np.arange(128) / 128)
+    whole = costs(lambda: m.p(x, y))["members that no surface crosses"]
+    assert 128 * 128 - 3 * 128 <= whole <= 128 * 128 - 127
