@@ -8,7 +8,7 @@ from __future__ import annotations
 
 COMMANDS = (
     "run", "eval", "check", "deriv", "fmt", "test", "render", "fit", "bench", "explain", "dump", "cache", "repl",
-    "kernel", "lsp",
+    "replay", "kernel", "lsp",
 )  # fmt: skip
 
 

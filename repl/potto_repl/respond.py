@@ -39,15 +39,18 @@ def stream(session: Conversation, text: str) -> Iterator[Part]:
 
 def _write_down(path: str, text: str, said: list[Part]) -> None:
     """An entry and its answer at the end of a transcript."""
-    prompted = text.rstrip().replace("\n", "\n... ")
+    from potto_repl.replay import prompted
+
     with open(path, "a", encoding="utf-8") as file:
-        file.write("\n".join([f"po> {prompted}", *(part.plain() for part in said)]) + "\n\n")
+        file.write("\n".join([prompted(text), *(part.plain() for part in said)]) + "\n\n")
 
 
 def _guarded(session: Conversation, text: str) -> Iterator[Part]:
     try:
         if session.watching:
-            yield from session.refreshed(quiet=True)
+            from potto_repl.following import refreshed
+
+            yield from refreshed(session, quiet=True)
         yield from _answered(session, text)
     except Refusal as refusal:
         yield from refusal.parts

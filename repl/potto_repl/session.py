@@ -1,26 +1,22 @@
 """What a prompt remembers: the session's definitions, settings, entries to undo and to save, files that it watches.
 
-Owns `Conversation`. A file that was loaded and is broken on disk goes on meaning what it meant before, and the reload
-says so. No terminal: what only a terminal can do (an editor, progress) comes in as functions that may be missing.
+Owns `Conversation`. What becomes of files that change is for `following`. No terminal: what only a terminal can do (an
+editor, progress) comes in as functions that may be missing.
 """
 
 from __future__ import annotations
 
 import os
 import re
-import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from potto.diagnostics import Diagnostic
-from potto.modules import imported_files, names
-from potto.render import Located, display_name
-from potto.session import Defined, Imported, Outcome, Said, Session
+from potto.session import Defined, Imported, Outcome, Session
 from potto.settings import DEFAULTS, Settings
 from potto.source import SourceText
 from potto_repl.options import Options
-from potto_repl.reply import Part, diagnostic, note
 
 TYPING = "<typing>"
 _OUT = re.compile(r"\bOut\[(\d+)\]")
@@ -112,76 +108,6 @@ class Conversation(Session):
         self.entries.clear()
         self.undoing.clear()
         self.broken.clear()
-
-    # Files
-
-    def bring(self, path: str) -> list[Part]:
-        """Load a file and say what it brought."""
-        self.remember(f"`:load {path}`")
-        outcomes = self.load(os.path.expanduser(path))
-        parts = [diagnostic(o.located, self.source) for o in outcomes if isinstance(o, Said)]
-        brought = [o for o in outcomes if isinstance(o, Imported)]
-        if not brought:
-            self.undoing.pop()
-        self._elaborated()
-        for item in brought:
-            count = f"{len(item.names)} name{'' if len(item.names) == 1 else 's'}"
-            listed = f": {', '.join(item.names[:8])}{', ...' if len(item.names) > 8 else ''}" if item.names else ""
-            data = {"loaded": item.module, "names": list(item.names)}
-            parts.append(Part("answer", f"{display_name(item.module)}: {count}{listed}", data))
-        return parts
-
-    def refreshed(self, quiet: bool = False) -> list[Part]:
-        """Read again what changed on disk, keep old definitions where the new text is wrong, and say what was done."""
-        start = time.perf_counter()
-        files = self._files()
-        before = {file: text.text for file in files if (text := self.world.source(file)) is not None}
-        for file in self.broken:
-            self.world.files.close(file)
-        waiting, self.broken = self.broken, set()
-        if not self.world.refresh() and not waiting:
-            return [] if quiet else [Part("answer", "nothing has changed", {"reloaded": []})]
-        parts: list[Part] = []
-        with self.db.recording() as events:
-            total = self._check_all(before, parts)
-        again = {e.args for e in events if e.kind == "executed" and e.query == "core"}
-        milliseconds = (time.perf_counter() - start) * 1e3
-        said = f"{len(again)} of {total} recompiled, {milliseconds:.0f} ms"
-        return [*parts, Part("answer", said, {"recompiled": len(again), "definitions": total})]
-
-    def _files(self) -> list[str]:
-        """The loaded files and all that they import."""
-        found: dict[str, None] = {}
-        todo = list(self.loaded)
-        while todo:
-            file = todo.pop(0)
-            if file not in found:
-                found[file] = None
-                todo += imported_files(self.db, file)
-        return list(found)
-
-    def _check_all(self, before: dict[str, str], parts: list[Part]) -> int:
-        """Check the files, set aside those that are broken now, elaborate the rest; how many definitions there are."""
-        found: dict[str, list[Located]] = {}
-        for file in self._files():
-            found[file] = list(self.world.diagnostics(file))
-        for file, said in found.items():
-            parts += [diagnostic(located, self.source) for located in said]
-            if any(located.diagnostic.severity == "error" for located in said) and file in before:
-                parts.append(note(f"{display_name(file)}: the definitions of before are kept"))
-                self.broken.add(file)
-        for file in self.broken:
-            self.world.files.set_text(file, before[file])
-        return self._elaborated()
-
-    def _elaborated(self) -> int:
-        """Elaborate every definition of the loaded files and of those that they import; how many there are."""
-        from potto.elaborate import core
-
-        found = [(file, name) for file in self._files() for name in names(self.db, file)]
-        for file, name in found:
-            core(self.db, file, name)
-        return len(found)
 
 
 def plain_names(text: str) -> str:

@@ -230,7 +230,9 @@ class Terminal:
             await asyncio.sleep(WATCH)
             if not self.loader.ready or not self.loader.session.watching:
                 continue
-            parts = await asyncio.get_running_loop().run_in_executor(None, self.loader.session.refreshed, True)
+            from potto_repl.following import refreshed
+
+            parts = await asyncio.get_running_loop().run_in_executor(None, refreshed, self.loader.session, True)
             if parts:
                 await run_in_terminal(partial(self._show_all, parts))
 

@@ -9,6 +9,7 @@ import sys
 
 import pytest
 from potto_repl.registry import COMMANDS
+from potto_repl.replay import replayed, same
 
 JUMP = "def f(t) integral [0, 1] [x < t] d(x)"
 WEIGHTED = "def g(t) integral [0, 1] [x < t]*t^2 d(x)"
@@ -206,8 +207,28 @@ def test_load_and_reload_recompile_what_changed(talk):
     assert talk(":reload").text == "nothing has changed"
     talk.write("b.po", "def h(t) 3*t\ndef k(t) 7*t")
     reply = talk(":reload")
-    assert re.fullmatch(r"1 of 4 recompiled, \d+ ms", reply.text)
+    assert re.fullmatch(r"1 of 4 recompiled, \d+ ms\n  h: its text changed", reply.text)
     assert talk.data("f(3)")["value"] == 10
+
+
+def test_reload_says_why_something_is_recompiled(talk):
+    talk.write("a.po", "from b import h\ndef f(t) h(t) + 1\ndef old(t) t")
+    talk.write("b.po", "def h(t) 2*t")
+    talk(":load a.po")
+    talk.write("a.po", "from b import h\ndef f(t) h(t) + 1\ndef fresh(t) t")
+    talk.write("b.po", "def h(t) [t > 1]*2*t")  # its users must know of the jump
+    data = talk.data(":reload")
+    assert data["why"]["h"] == "its text changed" and data["why"]["fresh"] == "it is new"
+    assert data["why"]["old"] == "it is gone" and "uses `h`" in data["why"].get("f", "it uses `h`")
+
+
+def test_loading_again_keeps_the_old_on_an_error(talk):
+    talk.write("a.po", "def f(t) 2*t")
+    assert "1 of 1 compiled" in talk(":load a.po").text
+    talk.write("a.po", "def f(t) 2*")
+    reply = talk(":load a.po")
+    assert reply.failed and "the definitions of before are kept" in reply.text
+    assert talk.data("f(3)")["value"] == 6
 
 
 def test_a_broken_file_keeps_its_old_definitions_and_says_so(talk):
@@ -260,6 +281,33 @@ def test_record(talk):
     talk("2 + 2")
     text = (talk.folder / "log.txt").read_text()
     assert "po> 1 + 1\n_1 = 2 : Real\n" in text and "P0201" in text and "2 + 2" not in text
+
+
+def test_a_record_is_replayed(talk):
+    talk.all(JUMP, ":record log.txt", "f(0.3)", "def g(t)\n    2*f(t)", "g(0.25)", ":grad g(0.25)", ":time g(0.1)")
+    talk.all(":plot g")
+    talk("nothing")
+    talk(":record off")
+    path = talk.folder / "log.txt"
+    text = path.read_text()
+    assert text.startswith(f"po> {JUMP}\n")  # what was entered before comes first
+    found = list(replayed(text))
+    assert len(found) == 8 and [difference for _, difference in found if difference is not None] == []
+    changed = text.replace("po> def g(t)\n...     2*f(t)", "po> def g(t)\n...     3*f(t)")
+    different = [entry.text for entry, difference in replayed(changed) if difference is not None]
+    assert different == ["g(0.25)", ":grad g(0.25)", ":plot g"]
+
+
+@pytest.mark.parametrize(("before", "now", "alike"), [
+    ("_1 = 0.3 ± 4e-16 : Real", "_1 = 0.30000000000000004 ± 4e-16 : Real", True),
+    ("_1 = 0.31 ± 1.0e-3 : Real", "_1 = 0.3 ± 4e-16 : Real", False),
+    ("_1 = 0.30 ± 5.0e-3 : Real", "_1 = 0.304 ± 1.0e-4 : Real", True),
+    ("_1 = 3 : Real", "_1 = 4 : Real", False),
+    ("quadrature, 12 evaluations, 3 ms", "quadrature, 14 evaluations, 9 ms", True),
+    ("f : (t: Real) -> Real", "f : (t: a) -> a", False),
+])  # fmt: skip
+def test_what_counts_as_the_same_answer(before, now, alike):
+    assert same(before, now) is alike
 
 
 SESSION = [

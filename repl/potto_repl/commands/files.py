@@ -6,7 +6,9 @@ import os
 
 from potto.modules.texts import chunk_text
 from potto.render import display_name
+from potto_repl.following import bring, refreshed
 from potto_repl.registry import command
+from potto_repl.replay import prompted
 from potto_repl.reply import Part, Refusal, answer, note
 from potto_repl.session import Conversation
 
@@ -21,20 +23,20 @@ def load(session: Conversation, text: str) -> list[Part]:
     if not os.path.exists(expanded):
         for suffix in (".po", ".diffeo"):
             if os.path.exists(expanded + suffix):
-                return session.bring(path + suffix)
+                return bring(session, path + suffix)
         from potto.cli.files import missing
 
         found = missing(path).diagnostic
         raise Refusal(found.message, found.help)
-    return session.bring(path)
+    return bring(session, path)
 
 
 @command("reload", "r")
 def reload(session: Conversation, text: str) -> list[Part]:
     """Read again what changed on disk, recompiling only that. A file that is broken now keeps its old definitions."""
     if not session.loaded:
-        return [note("no file is loaded; imported modules are looked at all the same"), *session.refreshed()]
-    return session.refreshed()
+        return [note("no file is loaded; imported modules are looked at all the same"), *refreshed(session)]
+    return refreshed(session)
 
 
 @command("watch", "w", argument="[on | off]")
@@ -88,7 +90,7 @@ def _edited_file(session: Conversation, path: str) -> list[Part]:
     with loud_keys():
         subprocess.run([*editor(), path], check=False)
     key = session.world.key(path)
-    return session.refreshed() if key in session.loaded else session.bring(path)
+    return refreshed(session) if key in session.loaded else bring(session, path)
 
 
 def editor() -> list[str]:
@@ -140,7 +142,10 @@ def _write(path: str, data: bytes) -> None:
 
 @command("record", argument="[FILE | off]", completes="file")
 def record(session: Conversation, text: str) -> list[Part]:
-    """Write entries and answers to a file as they come, until `:record off`."""
+    """Write entries and answers to a file as they come, until `:record off`; `potto replay FILE` says what changed.
+
+    What was entered before is written first, so that the file can be replayed from its beginning.
+    """
     path = os.path.expanduser(text.strip())
     if not path:
         return [answer(f"recording to {session.record}" if session.record else "not recording", record=session.record)]
@@ -148,9 +153,16 @@ def record(session: Conversation, text: str) -> list[Part]:
         was, session.record = session.record, None
         return [answer(f"{was} is complete" if was else "nothing was being recorded", record=None)]
     try:
-        with open(path, "a", encoding="utf-8"):
-            pass
+        with open(path, "a", encoding="utf-8") as file:
+            if not file.tell():
+                file.writelines(f"{prompted(text)}\n\n" for text in _so_far(session))
     except OSError as error:
         raise Refusal(f"`{path}` cannot be written: {(error.strerror or str(error)).lower()}") from None
     session.record = path
     return [answer(f"recording to {path}", record=path)]
+
+
+def _so_far(session: Conversation) -> list[str]:
+    """What brings the session to where it is: files that were loaded, and entries."""
+    loaded = [f":load {display_name(file)}" for file in reversed(session.loaded)]
+    return loaded + [entry.text for entry in session.entries]

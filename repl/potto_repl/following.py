@@ -1,0 +1,140 @@
+"""Files that a session follows: what they bring, what is recompiled when they change, and why.
+
+Owns `bring` and `refreshed`. A file that is broken on disk goes on meaning what it meant before, and the reload
+says so.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import dataclass
+
+from potto.core.terms import Global, postorder
+from potto.elaborate import core, core_term
+from potto.modules import imported_files, names
+from potto.modules.texts import chunk_text
+from potto.render import Located, display_name
+from potto.session import Imported, Said
+from potto_repl.reply import Part, diagnostic, note
+from potto_repl.session import Conversation
+
+MOST_REASONS = 12  # that are listed
+
+Definition = tuple[str, str]  # its file and its name
+
+
+def bring(session: Conversation, path: str) -> list[Part]:
+    """Load a file and say what it brought; one that was loaded before is read again."""
+    if session.world.key(os.path.expanduser(path)) in session.loaded:
+        return refreshed(session)
+    start = time.perf_counter()
+    session.remember(f"`:load {path}`")
+    with session.db.recording() as events:
+        outcomes = session.load(os.path.expanduser(path))
+        total = _elaborated(session)
+    parts = [diagnostic(o.located, session.source) for o in outcomes if isinstance(o, Said)]
+    brought = [o for o in outcomes if isinstance(o, Imported)]
+    if not brought:
+        session.undoing.pop()
+    made = len({e.args for e in events if e.kind == "executed" and e.query == "core"})
+    for item in brought:
+        count = f"{len(item.names)} name{'' if len(item.names) == 1 else 's'}"
+        listed = f": {', '.join(item.names[:8])}{', ...' if len(item.names) > 8 else ''}" if item.names else ""
+        data = {"loaded": item.module, "names": list(item.names), "compiled": made, "definitions": total}
+        parts.append(Part("answer", f"{display_name(item.module)}: {count}{listed}", data))
+        parts.append(Part("tail", f"{made} of {total} compiled, {(time.perf_counter() - start) * 1e3:.0f} ms"))
+    return parts
+
+
+def refreshed(session: Conversation, quiet: bool = False) -> list[Part]:
+    """Read again what changed on disk, keep old definitions where the new text is wrong, and say what was done."""
+    start = time.perf_counter()
+    before = _State.of(session)
+    for file in session.broken:
+        session.world.files.close(file)
+    waiting, session.broken = session.broken, set()
+    if not session.world.refresh() and not waiting:
+        return [] if quiet else [Part("answer", "nothing has changed", {"reloaded": []})]
+    parts: list[Part] = []
+    with session.db.recording() as events:
+        total = _check_all(session, before.files, parts)
+    again = {(str(e.args[0]), str(e.args[1])) for e in events if e.kind == "executed" and e.query == "core"}
+    why = _reasons(session, again, before.texts)
+    milliseconds = (time.perf_counter() - start) * 1e3
+    lines = [f"{len(again)} of {total} recompiled, {milliseconds:.0f} ms"]
+    lines += [f"  {name}: {reason}" for name, reason in list(why.items())[:MOST_REASONS]]
+    if len(why) > MOST_REASONS:
+        lines.append(f"  and {len(why) - MOST_REASONS} more")
+    return [*parts, Part("answer", "\n".join(lines), {"recompiled": len(again), "definitions": total, "why": why})]
+
+
+@dataclass(frozen=True, slots=True)
+class _State:
+    """The texts of the files and of their definitions."""
+
+    files: dict[str, str]
+    texts: dict[Definition, str | None]
+
+    @classmethod
+    def of(cls, session: Conversation) -> _State:
+        files = {file: text.text for file in _files(session) if (text := session.world.source(file)) is not None}
+        return cls(files, {(f, n): chunk_text(session.db, f, n) for f in files for n in names(session.db, f)})
+
+
+def _reasons(
+    session: Conversation, again: set[Definition], before: dict[Definition, str | None]
+) -> dict[str, str]:
+    """Why each definition was compiled again, and which are gone."""
+    why: dict[str, str] = {}
+    now = [(file, name) for file in _files(session) for name in names(session.db, file)]
+    edited = {item for item in now if chunk_text(session.db, *item) != before.get(item)}
+    for item in now:
+        if item not in again:
+            continue
+        used = {(g.module, g.name) for g in postorder(core_term(session.db, *item)) if isinstance(g, Global)}
+        changed = sorted(name for file, name in used & (edited | again) if (file, name) != item)
+        if item not in before:
+            why[item[1]] = "it is new"
+        elif item in edited:
+            why[item[1]] = "its text changed"
+        elif changed:
+            why[item[1]] = f"it uses {', '.join(f'`{name}`' for name in changed)}, which changed for its users"
+        else:
+            why[item[1]] = "a name in it means something else now"
+    return {**why, **{name: "it is gone" for file, name in before.keys() - set(now)}}
+
+
+def _files(session: Conversation) -> list[str]:
+    """The loaded files and all that they import."""
+    found: dict[str, None] = {}
+    todo = list(session.loaded)
+    while todo:
+        file = todo.pop(0)
+        if file not in found:
+            found[file] = None
+            todo += imported_files(session.db, file)
+    return list(found)
+
+
+def _check_all(session: Conversation, before: dict[str, str], parts: list[Part]) -> int:
+    """Check the files, set aside those that are broken now, elaborate the rest; how many definitions there are."""
+    found: dict[str, list[Located]] = {}
+    for file in _files(session):
+        found[file] = list(session.world.diagnostics(file))
+    for file, said in found.items():
+        parts += [diagnostic(located, session.source) for located in said]
+        if any(located.diagnostic.severity == "error" for located in said) and file in before:
+            parts.append(note(f"{display_name(file)}: the definitions of before are kept"))
+            session.broken.add(file)
+    for file in session.broken:
+        session.world.files.set_text(file, before[file])
+    return _elaborated(session)
+
+
+def _elaborated(session: Conversation) -> int:
+    """Elaborate every definition of the loaded files and of those that they import; how many there are."""
+    found = [(file, name) for file in _files(session) for name in names(session.db, file)]
+    for file, name in found:
+        core(session.db, file, name)
+    return len(found)
