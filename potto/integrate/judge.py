@@ -24,8 +24,9 @@ if TYPE_CHECKING:
 PEAK = 8.0
 # How many times its last terms an interpolant may be off at an end of a segment.
 MISLED = 200.0
-# An error that is still above this share of itself on a half of its piece is not one of truncation; where it is below
-# so much of the whole answer it is taken for rounding, at once or after three times.
+# An error that is still above this share of itself on a half of its piece is not one of truncation. It is taken for
+# rounding at once where it is below so much of what is added up, after three times where it is below so much of the
+# answer, which may be far smaller.
 STUCK = 0.35
 NOISE = (1e-12, 1e-9)
 
@@ -46,7 +47,7 @@ def too_coarse(work: Work, p: Pieces, ends: Any, tally: Tally) -> Any:
         floor = floor[:, : 1 + k]
     off, rounding = error.reshape(-1, p.segment.size), floor.reshape(-1, p.segment.size)
     bad = (off > tally.shares(work, owner)) & (off > 8 * rounding)
-    bad = bad.any(axis=0) & ~noisy(p, np.where(bad, off, 0.0), tally.whole(work)[owner])
+    bad = bad.any(axis=0) & ~noisy(p, np.where(bad, off, 0.0), tally.gross[owner], tally.whole(work)[owner])
     wide = (p.u1 - p.u0) >= 1e-14
     waiting = np.zeros(bad.size, dtype=bool)
     if ends is not None:
@@ -60,16 +61,18 @@ def too_coarse(work: Work, p: Pieces, ends: Any, tally: Tally) -> Any:
     return (bad, waiting) if bad.any() else None
 
 
-def noisy(p: Pieces, off: Array, whole: Array) -> Bools:
+def noisy(p: Pieces, off: Array, gross: Array, whole: Array) -> Bools:
     """Pieces whose errors are small and stay as they are however they are refined: what is left is rounding.
 
-    off: (C, P) the errors that are too large; whole: (P,) the size of the answer, values and tangents together.
+    off: (C, P) the errors that are too large; gross: (P,) what is added up, without regard to sign; whole: (P,) the
+    size of the answer, values and tangents together.
     """
+    worst = off.max(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        excess = np.where(whole > 0, off.max(axis=0) / whole, np.inf)
+        excess = np.where(gross > 0, worst / gross, np.inf)
     p.stuck = np.where((p.excess > 0) & (excess > STUCK * p.excess), p.stuck + 1, 0)
     p.excess = excess
-    return np.asarray(((excess <= NOISE[0]) & (p.stuck >= 1)) | ((excess <= NOISE[1]) & (p.stuck >= 3)))
+    return np.asarray(((excess <= NOISE[0]) & (p.stuck >= 1)) | ((worst <= NOISE[1] * whole) & (p.stuck >= 3)))
 
 
 def missed_peak(work: Work, p: Pieces, ends: tuple[Array, Array]) -> Any:

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 class Tally:
     """Running totals per integral, by which tolerances are measured: (m * (1 + k), B), and how many pieces there are.
 
+    gross: what the pieces amount to without regard to sign, which is what rounding is measured by: (B,).
+
     For the outermost variable the magnitude of the result counts; further in, where results are added up once more,
     the largest magnitude of what is added up, among all that go into the same answer.
     """
@@ -30,6 +32,8 @@ class Tally:
         self.total = np.empty((x.shape[0], work.batch))
         for i, row in enumerate(x):
             self.total[i] = np.bincount(owner, row, minlength=work.batch)
+        self.gross: Array = np.zeros(work.batch)
+        self.gross += np.bincount(owner, p.size.max(axis=0), minlength=work.batch)
         self.scale: Array | None = None
 
     def channels(self, work: Work, p: Pieces) -> Array:
@@ -41,6 +45,7 @@ class Tally:
         for p, sign in ((old, -1), (new, 1)):
             owner = work.seg.owner[p.segment]
             np.add.at(self.count, owner, sign)
+            np.add.at(self.gross, owner, sign * p.size.max(axis=0))
             for i, row in enumerate(self.channels(work, p)):
                 np.add.at(self.total[i], owner, sign * row)
         self.scale = None
