@@ -18,6 +18,7 @@ from potto.calculus.isolate import Guard, Step, Stuck, step
 from potto.calculus.normal import shorter
 from potto.calculus.radicals import NAN, guarded
 from potto.calculus.ranges import positive
+from potto.core.printer import format_term
 from potto.core.terms import (
     ZERO,
     Branch,
@@ -41,6 +42,7 @@ from potto.core.terms import (
 )
 from potto.primitives import PRIMITIVES
 
+_LONGEST = 4096  # equations on the way from one surface to its roots
 _MOST = 256  # equations that lead to several others, for one surface
 
 
@@ -160,9 +162,10 @@ class _Search:
         self.reasons: list[str] = []
 
     def run(self, first: Goal) -> None:
-        goals, cases = [first], 0
+        goals, cases, length = [first], 0, 0
         while goals:
             goal = goals.pop()
+            length += 1
             if self.name not in goal.inner.free or _absent(goal.value):
                 continue  # constant along the variable (no root is isolated), or no root
             if isinstance(goal.inner, Var):
@@ -174,7 +177,7 @@ class _Search:
                 else:
                     goals.extend(reversed(found))
                     cases += len(found) > 1
-                if cases > _MOST:
+                if cases > _MOST or length > _LONGEST:
                     self.reasons.append("there are too many cases")
                     return
 
@@ -214,6 +217,8 @@ class _Search:
             return steps
         goals: list[Goal] = []
         for item in steps:
+            if item.inner is term and item.value is goal.value:  # a step that leads to itself would go on for ever
+                return Stuck(f"`{self.name}` cannot be isolated in {format_term(term)}")
             following = self.follow(goal, item)
             if isinstance(following, Stuck):
                 return following

@@ -91,6 +91,7 @@ WRONG = [
     ("P0401", "diffeo d(x, y, z) = (x - y, y - z, z - x)", "determinant is 0"),
     ("P0402", "def f(t)\n    integral [0, 9] [x + 2*sin(x) < t] d(x)", "`x`"),
     ("P0402", "def f(t)\n    integral [-9, 9] [x*exp(x) < t] d(x)", "`x`"),
+    ("P0402", "def f(t)\n    integral [0, 1] [x^x < t] d(x)", "`x`"),
     ("P0402", "diffeo d(x; t) = (x + sin(x) + t)", "no inverse was found"),
     ("P0402", "diffeo d(x) = (sin(x))", "no inverse was found"),
     ("P0403", "diffeo d(x; t) = (x^3 + t) inverse (u) . (u^(1/3) - t)", "does not lead back"),
