@@ -13,7 +13,7 @@ from potto.check import absolute, arranged, definition_diagnostics
 from potto.check import diagnostics as check_file
 from potto.diagnostics import Diagnostic
 from potto.modules import chunk_start, module_diagnostics, names, open_files, source, statements
-from potto.modules.texts import syntax_diagnostics
+from potto.modules.texts import chunks, syntax_diagnostics
 from potto.project import Project, Projects, read_project
 from potto.query import Database, query
 from potto.render import Located
@@ -123,11 +123,12 @@ class Analysis:
         """Forget the trees of closed files, which are most of the memory: what was found in them stays, and parsing
         again takes less than half a millisecond a definition."""
         opened = self._documents
+        shown = {chunk.text for key in opened for chunk in chunks(self.db, key)}
 
         def is_tree(query: str, args: tuple[Hashable, ...]) -> bool:
-            return query == "parsed" or (query == "definition" and args[0] not in opened)
+            return args[0] not in (shown if query == "parsed" else opened)
 
-        self.db.forget(is_tree)
+        self.db.forget(is_tree, ("parsed", "definition"))
 
     # What there is to say
 

@@ -17,7 +17,7 @@ from potto.diagnostics import Diagnostic
 from potto.modules.free import Reference, references_in
 from potto.query import Database, query
 from potto.source import SourceText, Span
-from potto.syntax import ParsedChunk, nodes, parse_chunk, split
+from potto.syntax import Chunk, ParsedChunk, nodes, parse_chunk, split
 
 Importing = nodes.FromImport | nodes.Import
 
@@ -31,14 +31,7 @@ class Unreadable:
     offset: int = 0
 
 
-@dataclass(frozen=True, slots=True)
-class ChunkRef:
-    """One chunk of a file: where it starts and its text."""
-
-    start: int
-    text: str
-
-
+ChunkRef = Chunk
 @dataclass(frozen=True, slots=True)
 class StatementRef:
     """A top-level statement of a script; its spans are relative to `start`."""
@@ -105,7 +98,7 @@ def exists(db: Database, file: str) -> bool:
 def chunks(db: Database, file: str) -> tuple[ChunkRef, ...]:
     """The chunks of a file, in order, with their absolute starts."""
     text = content(db, file)
-    return tuple(ChunkRef(c.start, c.text) for c in split(text)) if isinstance(text, str) else ()
+    return split(text) if isinstance(text, str) else ()
 
 
 @query(keep=4096)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator, Mapping
+from collections.abc import Callable, Container, Hashable, Iterator, Mapping
 from contextlib import contextmanager
 from threading import get_ident
 from typing import Any, TypeVar, cast
@@ -159,19 +159,25 @@ class Database(Engine):
 
     # Forgetting
 
-    def forget(self, predicate: Callable[[str, tuple[Hashable, ...]], bool]) -> int:
-        """Drop the memos whose query's name and arguments fulfil `predicate`; how many. Asked again, they run again."""
-        return self._forget(lambda memo: predicate(memo.query.name, memo.args))
+    def forget(
+        self, predicate: Callable[[str, tuple[Hashable, ...]], bool], names: Container[str] | None = None
+    ) -> int:
+        """Drop the memos whose query's name and arguments fulfil `predicate`; how many. Asked again, they run again.
+
+        `names`: the queries that are looked at at all.
+        """
+        return self._forget(lambda memo: predicate(memo.query.name, memo.args), names)
 
     def forget_unused(self, revisions: int, durability: int = 0) -> int:
         """Drop the memos of at most this durability that nobody asked for in the last `revisions` revisions."""
         before = self.revision - revisions
         return self._forget(lambda memo: memo.verified_at < before and memo.durability <= durability)
 
-    def _forget(self, predicate: Callable[[Memo], bool]) -> int:
+    def _forget(self, predicate: Callable[[Memo], bool], names: Container[str] | None = None) -> int:
         with self.evaluating():
             self._forbid_in_queries("forget")
-            return sum(drop(table, [m for m in table.values() if predicate(m)]) for table in self._memos.values())
+            tables = [table for query, table in self._memos.items() if names is None or query.name in names]
+            return sum(drop(table, [memo for memo in table.values() if predicate(memo)]) for table in tables)
 
     def _evict(self) -> None:
         """Bring the tables of queries that `keep` back to size. Only between evaluations: nothing is in use then.

@@ -140,6 +140,10 @@ class Engine:
                         source.verified_at = revision
                     elif source.index >= 0 or source.provisional:
                         return True
+                    elif self._stands(source, STEPS):  # as most do: no need to go there and come back
+                        source.verified_at = revision
+                        if self._logs:
+                            self._log("reused", source.query.name, source.args)
                     else:
                         places[-1] = place
                         return source

@@ -44,14 +44,14 @@ class Inferred:
 @query
 def interface(db: Database, file: str, name: str) -> Interface:
     """What others may know of a definition: its type, and what flows where. Broken ones have one too."""
-    found = db.entry(_analyses, (_group(db, file, name),), DefinitionTarget(file, name))
+    found = _analysis(db, file, name)
     return unknown_interface(name) if found is None else found.interface
 
 
 @query
 def check_definition(db: Database, file: str, name: str) -> tuple[Diagnostic, ...]:
     """What is wrong with a definition. Spans are relative to its chunk."""
-    found = db.entry(_analyses, (_group(db, file, name),), DefinitionTarget(file, name))
+    found = _analysis(db, file, name)
     return () if found is None else found.diagnostics
 
 
@@ -67,6 +67,12 @@ def typed_names(db: Database, file: str, name: str) -> tuple[Typed, ...]:
     """The names that a definition binds, with their types there: `Real[x]` inside an integral over x."""
     found = db.entry(_details, (_group(db, file, name),), DefinitionTarget(file, name))
     return () if found is None else found.names
+
+
+def _analysis(db: Database, file: str, name: str) -> Analysis | None:
+    """The analysis of a definition. One that stands alone is read whole: that is verified in one step less."""
+    group, target = _group(db, file, name), DefinitionTarget(file, name)
+    return _analyses(db, group).get(target) if len(group) == 1 else db.entry(_analyses, (group,), target)
 
 
 def _group(db: Database, file: str, name: str) -> tuple[DefinitionTarget, ...]:
