@@ -22,19 +22,24 @@ class Client:
     """One server process and what it has said. `capabilities` are the client's."""
 
     def __init__(self, folder: Path | None = None, capabilities: dict[str, Any] | None = None, **params: Any) -> None:
-        command = [sys.executable, "-m", "potto", "lsp", "--stdio"]
         pipe = subprocess.PIPE
-        self.process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe)
+        self.process = subprocess.Popen(self.command, stdin=pipe, stdout=pipe, stderr=pipe)
         self.notes: Queue[dict[str, Any]] = Queue()
         self.asked: Queue[dict[str, Any]] = Queue()
         self.answers: dict[Any, list[dict[str, Any]]] = {}
         self.arrived = threading.Condition()
         self.stderr = b""
         self._last = 0
+        self.replies: dict[str, Any] = {"workspace/configuration": [{}]}  # what the server is answered; else null
         threading.Thread(target=self._read, daemon=True).start()
         threading.Thread(target=self._complaints, daemon=True).start()
         self.capabilities = EVERYTHING if capabilities is None else capabilities
         self.folder, self.params = folder, params
+
+    @property
+    def command(self) -> list[str]:
+        """How the server is started."""
+        return [sys.executable, "-m", "potto", "lsp", "--stdio"]
 
     def start(self) -> dict[str, Any]:
         """`initialize` and `initialized`; the result of the first."""
@@ -126,7 +131,7 @@ class Client:
                 self.arrived.notify_all()
         elif "id" in message:
             self.asked.put(message)
-            empty = [{}] if message["method"] == "workspace/configuration" else None
+            empty = self.replies.get(message["method"])
             with contextlib.suppress(BrokenPipeError):  # it may have gone since
                 self.send({"jsonrpc": "2.0", "id": message["id"], "result": empty})
         else:

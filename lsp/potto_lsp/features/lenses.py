@@ -47,6 +47,8 @@ def _previews(ask: Ask, lens: ide.CodeLens) -> list[protocol.CodeLens]:
 
 def resolve(ask: Ask) -> Any:
     data = ask.optional("data")
+    if ask.optional("command") is not None:  # nothing is missing
+        return ask.params
     if not isinstance(ask.params, Mapping) or not isinstance(data, list) or len(data) < 2:
         raise InvalidParams("`data` is not as it was given")
     command, *arguments = map(str, data)
