@@ -152,15 +152,26 @@ def _variable(db: Database, chunk: ChunkAt, span: Span, variable: str, name: str
         return parts
     typed = typed_names(db, chunk.file, name)
     varying = dict.fromkeys(
-        t.name for t in typed if isinstance(t.type, Real) and variable in t.type.variables and t.name != variable
+        code(t.name) for t in typed if isinstance(t.type, Real) and variable in t.type.variables and t.name != variable
     )
+    inner = [code(name) for name in _bounded(node, variable)]
+    if inner:
+        varying[f"the bounds of {', '.join(inner)}"] = None
     if varying:
-        parts.append("varies with it: " + ", ".join(code(v) for v in varying))
+        parts.append("varies with it: " + ", ".join(varying))
     surfaces = {i.equation: i.moved_by for i in condition_infos(db, chunk.file, name) if variable in i.variables}
     for where, by in surfaces.items():
         moved = f", moved by {', '.join(code(m) for m in by)}" if by else ""
         parts.append(f"- surface {code(where)}{moved}")
     return parts
+
+
+def _bounded(node: nodes.Node | None, variable: str) -> Iterator[str]:
+    """The variables further in whose bounds mention a variable of integration."""
+    if isinstance(node, nodes.Integral):
+        for inner, bounds in zip(node.variables, node.bounds):
+            if any(isinstance(part, nodes.Name) and part.id == variable for part in walk(bounds)):
+                yield inner.name
 
 
 def written(text: str, expr: nodes.Expr) -> str:

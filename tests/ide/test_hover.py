@@ -222,3 +222,9 @@ def test_names_in_live_expressions_and_statements_have_types():
     assert "x : Real[x]" in f.hover("x^2") and "distributed as `x ~ uniform(1, 4)`" in f.hover("x^2")
     assert "y : Real" in f.hover("y . exp")
     assert "z : Real" in f.hover("z*v") and "v : Real" in f.hover("v)")
+
+
+def test_a_variable_of_integration_says_whose_bounds_vary_with_it():
+    f = fixture("def area(t)\n    integral ([0, t], [0, x]) x + y d(x, y)\n")
+    assert "from `0` to `t`" in f.hover("x + y") and "varies with it: the bounds of `y`" in f.hover("x + y")
+    assert "varies with it" not in f.hover("y d(x")
