@@ -72,6 +72,6 @@ def across(
                 side = side ^ np.logical_not(inner[outer])
             inner[g] = side
     with nullcontext() if machine.costs is None else machine.costs.apart():
-        actual = parent.inside(number, here, edge.owner.size, inner, frozen)
-        flipped = parent.inside(number, here, edge.owner.size, {**inner, group: ~np.asarray(inner[group])}, frozen)
+        actual, _ = parent.inside(number, here, edge.owner.size, inner, frozen)
+        flipped, _ = parent.inside(number, here, edge.owner.size, {**inner, group: ~np.asarray(inner[group])}, frozen)
     return flipped - actual, np.abs(actual) + np.abs(flipped)

@@ -18,7 +18,15 @@ from potto.kernels.cells import Array
 if TYPE_CHECKING:
     from potto.integrate.work import Work
 
-Ends = tuple[Array, Array]
+
+@dataclass(frozen=True)
+class Ends:
+    """The integrand at both ends of every segment, sides as on the segment, and its rounding there: (m, S) each."""
+
+    low: Array
+    high: Array
+    low_error: Array
+    high_error: Array
 
 
 @dataclass
@@ -40,6 +48,7 @@ class Totals:
 def totals(work: Work, p: Pieces, ends: Ends | None) -> Totals:
     k = work.k
     integral, error, size = added(work, np.concatenate((p.integral, p.error + p.floor, p.size)), p, 3)
+    error = np.where(np.isnan(integral) | np.isnan(error), np.inf, error)
     moving = integral[:, 1 : 1 + k], error[:, 1 : 1 + k]
     if not work.moving:
         return Totals(integral, error, size, moving, None, None)
@@ -74,16 +83,17 @@ def boundary(work: Work, ends: Ends) -> tuple[Array, Array]:
     seg = work.seg
     sizes = work.width, work.k, work.batch
     speeds = np.concatenate((seg.tb, -seg.ta), axis=1)
-    terms = np.concatenate((ends[1], ends[0]), axis=1)[:, None, :] * speeds
+    terms = np.concatenate((ends.high, ends.low), axis=1)[:, None, :] * speeds
+    rounded = np.concatenate((ends.high_error, ends.low_error), axis=1)[:, None, :] * np.abs(speeds)
     nothing = (speeds == 0) | np.isinf(np.concatenate((seg.b, seg.a)))
     if nothing.any():
-        terms = np.where(nothing, 0.0, terms)
-    rows = np.concatenate((terms, np.abs(terms))).reshape(2 * work.width * work.k, -1)
+        terms, rounded = np.where(nothing, 0.0, terms), np.where(nothing, 0.0, rounded)
+    rows = np.concatenate((terms, 32 * EPS * np.abs(terms) + rounded)).reshape(2 * work.width * work.k, -1)
     place = np.concatenate((seg.owner, seg.owner)) + work.batch * np.arange(rows.shape[0])[:, None]
     sums = np.bincount(place.reshape(-1), rows.reshape(-1), minlength=work.batch * rows.shape[0])
-    out, size = sums.reshape(2, *sizes)
+    out, rounding = sums.reshape(2, *sizes)
     finite = np.isfinite(out)
-    return np.where(finite, out, 0.0), np.where(finite, 32 * EPS * size, np.inf)
+    return np.where(finite, out, 0.0), np.where(finite, rounding, np.inf)
 
 
 def cut_rounding(work: Work, ends: Ends) -> Array:
@@ -91,7 +101,7 @@ def cut_rounding(work: Work, ends: Ends) -> Array:
     seg, batch = work.seg, work.batch
     if not seg.a.size:
         return np.zeros((work.width, batch))
-    low, high = ends
+    low, high = ends.low, ends.high
     follows = np.zeros(seg.a.size, dtype=bool)
     follows[1:] = (seg.owner[1:] == seg.owner[:-1]) & (seg.a[1:] == seg.b[:-1])
     last = ~np.append(follows[1:], False)
@@ -111,7 +121,7 @@ def sums(work: Work, found: Totals, ends: Ends | None) -> Sums:
     if found.fixed is None or found.apart is None:
         return Sums(v, e, *found.moving)
     moving, fixed = found.moving, found.fixed
-    better = fixed[1] < moving[1]
+    better = fixed[1] < 0.5 * moving[1]  # the moving form does not cancel: where they are alike it is the better one
     # two independent values that differ by more than they admit: neither estimate is believed
     doubt = np.where(found.apart > 4 * (moving[1] + fixed[1]), found.apart, 0.0)
     return Sums(v, e, np.where(better, fixed[0], moving[0]), np.where(better, fixed[1], moving[1]) + doubt)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from potto.integrate import maps
-from potto.integrate.forms import Totals
+from potto.integrate.forms import Ends, Totals
 from potto.integrate.pieces import Pieces
 from potto.integrate.tally import Tally
 from potto.kernels.cells import Array, Bools
@@ -75,7 +75,7 @@ def noisy(p: Pieces, off: Array, gross: Array, whole: Array) -> Bools:
     return np.asarray(((excess <= NOISE[0]) & (p.stuck >= 1)) | ((worst <= NOISE[1] * whole) & (p.stuck >= 3)))
 
 
-def missed_peak(work: Work, p: Pieces, ends: tuple[Array, Array]) -> Any:
+def missed_peak(work: Work, p: Pieces, ends: Ends) -> Any:
     """Pieces at an end of their segment where the integrand is not what its values at the nodes lead to.
 
     Either it is far larger there than at any node, or it is off the interpolant through the nodes by far more
@@ -86,7 +86,7 @@ def missed_peak(work: Work, p: Pieces, ends: tuple[Array, Array]) -> Any:
     plain = (seg.kind[p.segment] == maps.LINEAR) & (p.end == 0)
     bad = np.zeros(p.segment.size, dtype=bool)
     m = work.width
-    for f, touches, led in ((ends[0], p.u0 == 0, p.ends[:m]), (ends[1], p.u1 == 1, p.ends[m:])):
+    for f, touches, led in ((ends.low, p.u0 == 0, p.ends[:m]), (ends.high, p.u1 == 1, p.ends[m:])):
         for c in range(m):
             at_end = f[c][p.segment] * width
             known = touches & np.isfinite(at_end)

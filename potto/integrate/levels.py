@@ -121,11 +121,17 @@ class Iteration:
 
     def inside(
         self, number: int, env: dict[str, Value], batch: int, sides: dict[int, Mask], machine: Evaluator
-    ) -> Array:
-        """The integrand of variable `number` (with the variables further in integrated out), values only: (m, B)."""
+    ) -> tuple[Array, Array]:
+        """The integrand of variable `number` (with the variables further in integrated out) and its errors: (m, B)."""
         if number + 1 < len(self.plan.levels):
-            return self.run(number + 1, env, batch, sides, machine).v
+            sums = self.run(number + 1, env, batch, sides, machine)
+            return sums.v, sums.e
         body = self.plan.body
         machine.count(batch)
-        value = machine.evaluate(body, {n: env[n] for n in body.params}, self.plan.trace(sides))
-        return np.stack([np.broadcast_to(c.v, (batch,)) for c in components(value)]).astype(float)
+        value = machine.tracking().evaluate(body, {n: env[n] for n in body.params}, self.plan.trace(sides))
+        cells = components(value)
+        values, errors = np.empty((len(cells), batch)), np.zeros((len(cells), batch))
+        for i, cell in enumerate(cells):
+            values[i] = cell.v
+            errors[i] = 0.0 if cell.e is None else cell.e
+        return values, errors

@@ -15,8 +15,9 @@ import numpy as np
 from potto.kernels.cells import Array, Ints
 
 LINEAR, LEFT, RIGHT, BOTH, UP, DOWN, WHOLE = range(7)
-# Powers by which a piece at the end of its segment is graded once it has shown itself not to be smooth there.
-GRADE = 6
+# Powers by which a piece at the end of its segment is graded once it has shown itself not to be smooth there: so that
+# what is like x^a becomes like t^(GRADE - 1).
+GRADE, STEEPEST = 6, 120
 # How near to an infinite end points come: the square of its inverse is still a number.
 FARTHEST = 1e-150
 
@@ -75,6 +76,20 @@ def points(seg: Segments, u: Array) -> tuple[Array, Array, Array]:
         part = seg.pick(rows)
         x[rows], slope[rows], label[rows] = _MAPS[int(kind)](part, u[rows])
     return x, slope, label
+
+
+def off_the_ends(seg: Segments, x: Array) -> Array:
+    """Points that crowd at an end, none of them rounded onto it: there an integrand may be infinite."""
+    low, high = np.nextafter(seg.a, seg.b)[:, None], np.nextafter(seg.b, seg.a)[:, None]
+    return np.where(x <= seg.a[:, None], low, np.where(x >= seg.b[:, None], high, x))
+
+
+def displaced(seg: Segments, x: Array, label: Array) -> tuple[Array, Array]:
+    """How far rounded points of linear segments are from where they should be, in lengths of the segment, and their
+    labels as they are. Exact as long as the segment is far from 0 for its length."""
+    actual = (x - seg.a[:, None]) / (seg.b - seg.a)[:, None]
+    off = ((x - seg.a[:, None]) - (seg.b - seg.a)[:, None] * label) / (seg.b - seg.a)[:, None]
+    return off, actual
 
 
 def _label(seg: Segments, x: Array) -> Array:
@@ -139,19 +154,23 @@ _MAPS = {LINEAR: _linear, LEFT: _left, RIGHT: _right, BOTH: _both, UP: _up, DOWN
 
 
 def grade(u0: Array, u1: Array, end: Ints, t: Array) -> tuple[Array, Array]:
-    """u and du/dt for t (n,) in [0, 1] over pieces [u0, u1]; `end` -1 or 1 crowds points at the left or right end."""
+    """u and du/dt for t (n,) in [0, 1] over pieces [u0, u1]; `end` < 0 or > 0 crowds points at the left or right end.
+
+    Its magnitude is the power of t by which it does.
+    """
     width = (u1 - u0)[:, None]
     u = u0[:, None] + width * t
     slope = width
     if end.any():
         slope = np.repeat(width, t.size, axis=1)
+        power = np.abs(end).astype(float)[:, None]
         rows = np.nonzero(end < 0)[0]
-        u[rows] = u0[rows, None] + width[rows] * t**GRADE
-        slope[rows] = width[rows] * GRADE * t ** (GRADE - 1)
+        u[rows] = u0[rows, None] + width[rows] * t ** power[rows]
+        slope[rows] = width[rows] * power[rows] * t ** (power[rows] - 1)
         rows = np.nonzero(end > 0)[0]
         s = 1.0 - t
-        u[rows] = u1[rows, None] - width[rows] * s**GRADE
-        slope[rows] = width[rows] * GRADE * s ** (GRADE - 1)
+        u[rows] = u1[rows, None] - width[rows] * s ** power[rows]
+        slope[rows] = width[rows] * power[rows] * s ** (power[rows] - 1)
     return u, slope
 
 

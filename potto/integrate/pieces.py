@@ -11,8 +11,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from potto.core.terms import Lam
+from potto.integrate import maps
 from potto.integrate.costs import Costs
-from potto.integrate.rules import leaning
+from potto.integrate.rules import gauss, leaning
 from potto.kernels.cells import Array, Cell, Ints, Mask, Trace, Value, map_arrays
 from potto.kernels.errors import not_a_number
 
@@ -31,6 +32,7 @@ class Evaluator(Protocol):
     @property
     def costs(self) -> Costs | None: ...
     def with_directions(self, directions: int) -> Evaluator: ...
+    def tracking(self) -> Evaluator: ...
     def evaluate(self, lam: Lam, env: dict[str, Value], trace: Trace | None) -> Value: ...
     def count(self, evaluations: int) -> None: ...
     def exhausted(self) -> bool: ...
@@ -53,6 +55,7 @@ class Sums:
 class Pieces:
     """Pieces of segments under refinement, and what is known of each: integrals and errors per channel (C, P).
 
+    lean: -p or p where a singularity sits at the left or right end, and powers of p would grade it.
     excess: (P,) the worst of a piece's errors, of the size of what it is a part of. stuck: how many times in a row
     that hardly fell when the piece was refined.
     """
@@ -72,6 +75,7 @@ class Pieces:
     excess: Array = field(default_factory=lambda: np.zeros(0))
     stuck: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     coefficients: Array | None = None
+    heights: Array | None = None
 
     def __post_init__(self) -> None:
         if not self.excess.size:
@@ -80,9 +84,11 @@ class Pieces:
     def settled(self) -> Pieces:
         """The pieces with what only refinement asks for, which is worked out when it does."""
         if self.coefficients is not None:
-            worst = self.error.argmax(axis=0)
-            self.lean = leaning(self.coefficients[worst, np.arange(self.u0.size)])
-            self.coefficients = None
+            worst, all_of_them = self.error.argmax(axis=0), np.arange(self.u0.size)
+            lean = leaning(self.coefficients[worst, all_of_them])
+            assert self.heights is not None
+            self.lean = lean * _power(self.heights[worst, all_of_them], lean, self.end)
+            self.coefficients = self.heights = None
         return self
 
     def pick(self, index: Any) -> Pieces:
@@ -95,6 +101,19 @@ class Pieces:
 
     def join(self, other: Pieces) -> Pieces:
         return joined([self, other])
+
+
+def _power(heights: Array, lean: Ints, end: Ints) -> Ints:
+    """The power that would grade pieces which lean to an end so that they become smooth there: (P,).
+
+    Near the end values (P, n) go like a power of the distance; it is read off the two nodes next to it.
+    """
+    t = gauss(heights.shape[1]).nodes[:2]
+    near = np.where(lean[:, None] > 0, heights[:, :-3:-1], heights[:, :2])
+    with np.errstate(all="ignore"):
+        exponent = np.log(near[:, 0] / near[:, 1]) / np.log(t[0] / t[1])
+        wanted = maps.GRADE * np.maximum(np.abs(end), 1) / (exponent + 1)
+    return np.where((wanted > maps.GRADE) & (wanted <= maps.STEEPEST), np.rint(wanted), maps.GRADE).astype(np.int64)
 
 
 def joined(parts: list[Pieces]) -> Pieces:

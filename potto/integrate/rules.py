@@ -24,6 +24,7 @@ class Rule:
     nodes: (n,), weights: (n,). transform: (n, n), values at the nodes times it are the coefficients of the shifted
     Legendre polynomials, scaled so that the k-th counts by its size on [0, 1]. ends: (n, 2), coefficients times it
     are the interpolant's values at 0 and 1. slopes: (n,), bounds of the derivatives of the polynomials in the mean.
+    derivative: (n, n), values times it are the interpolant's derivatives at the nodes.
     """
 
     nodes: Array
@@ -31,6 +32,7 @@ class Rule:
     transform: Array
     ends: Array
     slopes: Array
+    derivative: Array
 
 
 @lru_cache(maxsize=64)
@@ -40,7 +42,8 @@ def gauss(n: int) -> Rule:
     vander = np.polynomial.legendre.legvander(x, n - 1)
     transform = (w / 2)[:, None] * vander * (2 * k + 1)
     ends = np.stack([(-1.0) ** k, np.ones(n)], axis=1)
-    return Rule((x + 1) / 2, w / 2, transform, ends, k * (k + 1.0))
+    derivative = transform @ (2 * np.polynomial.legendre.legval(x, np.polynomial.legendre.legder(np.eye(n))))
+    return Rule((x + 1) / 2, w / 2, transform, ends, k * (k + 1.0), derivative)
 
 
 def truncation(size: Array) -> Array:

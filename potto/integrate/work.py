@@ -24,7 +24,7 @@ from potto.integrate.judge import doubtful, missed_peak, too_coarse
 from potto.integrate.maps import Segments
 from potto.integrate.pieces import Evaluator, Pieces, Sums, column, gather, joined, spread, still, take
 from potto.integrate.plan import LevelPlan
-from potto.integrate.rules import EPS, gauss, truncation
+from potto.integrate.rules import EPS, Rule, gauss, truncation
 from potto.integrate.tally import Tally
 from potto.kernels.cells import Array, Cell, Ints, Mask, Number, Value, pad
 
@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 CHUNK = 1 << 15  # points per kernel call: a few buffers of this length fit the second-level cache
 # The rounding of a node, in units of the last place, that noise in a steep integrand is blamed on.
 NODE_ROUNDING = 0.5
+# From how many lengths of a piece away from 0 on the rounding of its nodes is put right.
+FAR = 8
 MOST_HALVINGS = 64
 # Nodes for pieces that were too coarse: first more of them on the same piece, then on halves.
 HIGH_ORDER = 14
@@ -62,7 +64,7 @@ class Work:
     root: Ints | None = None
     conflict: bool = False
     width: int = 1
-    watched: bool = True
+    ends: Ends | None = None
 
     def __post_init__(self) -> None:
         self.k = self.machine.directions
@@ -78,8 +80,7 @@ class Work:
             return Sums(np.zeros(shape), np.zeros(shape), np.zeros((1, self.k, self.batch)),
                         np.zeros((1, self.k, self.batch)))  # fmt: skip
         zero, one = np.zeros(count), np.ones(count)
-        ends = self.end_values()
-        self.watched = ends is not None
+        ends = self.ends = self.end_values()
         whole = Pieces(np.arange(count), zero, one, np.zeros(count, dtype=np.int64))
         fresh = self.measure(whole, self.parent.order, True)
         if self.conflict and not self.last:
@@ -156,8 +157,8 @@ class Work:
     def halve(self, p: Pieces) -> Pieces:
         """Two pieces for each; the one at the end of its segment is graded towards that end."""
         middle = 0.5 * (p.u0 + p.u1)
-        left = np.where((p.u0 == 0) & (p.end <= 0) & (p.lean < 0), -1, np.minimum(p.end, 0))
-        right = np.where((p.u1 == 1) & (p.end >= 0) & (p.lean > 0), 1, np.maximum(p.end, 0))
+        left = np.where((p.u0 == 0) & (p.end <= 0) & (p.lean < 0), p.lean, np.minimum(p.end, 0))
+        right = np.where((p.u1 == 1) & (p.end >= 0) & (p.lean > 0), p.lean, np.maximum(p.end, 0))
         return Pieces(
             np.concatenate((p.segment, p.segment)),
             np.concatenate((p.u0, middle)),
@@ -187,21 +188,51 @@ class Work:
             u, du = maps.grade(p.u0, p.u1, p.end, rule.nodes)
             x, dx, label = maps.points(seg, u)
             weight = dx * du
+        if seg.kind.any() or p.end.any():
+            x = maps.off_the_ends(seg, x)
+        off = None
+        if weight.shape[1] == 1 and self.few_doubles(seg, weight):
+            off, label = maps.displaced(seg, x, label)
         h, inner = self.values(seg, p.segment, x, label, weight)
+        if off is not None:
+            part = off * (seg.b - seg.a)[:, None] / weight
+            slope = h @ rule.derivative
+            h = np.where(np.isfinite(slope) & (np.abs(part) < 0.1), h - part * slope, h)
+        self.estimate(p, seg, h, rule, self.shake(p, seg, x, weight, off is not None))
+        if inner is not None:
+            p.floor = p.floor + np.abs(inner) @ rule.weights
+        return p
+
+    @staticmethod
+    def few_doubles(seg: Segments, weight: Array) -> bool:
+        """Whether pieces are so far from 0 for their length that the rounding of nodes is worth putting right."""
+        far = np.maximum(np.abs(seg.a), np.abs(seg.b))
+        return bool((NODE_ROUNDING * far > FAR * weight[:, 0]).any())
+
+    @staticmethod
+    def shake(p: Pieces, seg: Segments, x: Array, weight: Array, put_right: bool) -> Array:
+        """The rounding of nodes, as a part of the piece: (P,).
+
+        Far from 0, where few doubles lie in a piece, a node is not where the rule wants it; but how far off it is is
+        known exactly, and the interpolant's slope puts that right but for its square.
+        """
+        if weight.shape[1] > 1:
+            shake = NODE_ROUNDING * EPS * np.abs(x).max(axis=-1) / np.abs(weight).max(axis=-1)
+        else:
+            shake = NODE_ROUNDING * EPS * np.maximum(np.abs(seg.a), np.abs(seg.b)) / weight[:, 0]
+            if put_right:
+                shake = np.minimum(shake, shake * shake + 2 * EPS * p.u1 / (p.u1 - p.u0))
+        return np.where(shake <= 1.0, shake, np.where(np.isfinite(shake), 1.0, 0.0))
+
+    def estimate(self, p: Pieces, seg: Segments, h: Array, rule: Rule, shake: Array) -> None:
+        """Integrals of pieces from the values of their channels (C, P, n), their errors and rounding floors."""
         coefficients = h @ rule.transform
-        size = np.abs(coefficients)
-        height = np.abs(h)
+        size, height = np.abs(coefficients), np.abs(h)
         p.integral = coefficients[..., 0]
         p.error = truncation(size)
-        p.coefficients = coefficients
-        # the rounding of a node, as a part of the piece
-        if weight.shape[1] == 1:  # the map is linear
-            shake = NODE_ROUNDING * EPS * np.maximum(np.abs(seg.a), np.abs(seg.b)) / weight[:, 0]
-        else:
-            shake = NODE_ROUNDING * EPS * np.abs(x).max(axis=-1) / np.abs(weight).max(axis=-1)
-        shake = np.where(shake <= 1.0, shake, np.where(np.isfinite(shake), 1.0, 0.0))
+        p.coefficients, p.heights = coefficients, height
         p.size = height @ rule.weights
-        if self.watched:
+        if self.ends is not None:
             stride = height.shape[0] // self.width
             p.most = height[::stride].max(axis=-1)
             p.ends = np.concatenate(np.moveaxis(coefficients[::stride] @ rule.ends, -1, 0))
@@ -209,6 +240,8 @@ class Work:
         else:
             p.most = p.ends = p.tail = np.empty((0, p.u0.size))
         p.floor = 4 * EPS * p.size + (size @ rule.slopes) * shake
+        if self.ends is not None and self.last:
+            p.floor += self.noise(p)
         if self.k:
             # speeds are rounded too, and so are the places of the cuts, which matters where they are close together
             place = 2 * EPS * np.maximum(np.abs(seg.a), np.abs(seg.b)) / (seg.b - seg.a)
@@ -216,12 +249,26 @@ class Work:
             tangents = p.floor.reshape(self.width, -1, p.u0.size)[:, 1:]
             tangents *= 3
             tangents += place * p.size.reshape(self.width, -1, p.u0.size)[:, 1:]
-        if inner is not None:
-            p.floor = p.floor + np.abs(inner) @ rule.weights
         broken = ~np.isfinite(p.integral)
         if broken.any():
             p.error = np.where(broken, np.inf, p.error)
-        return p
+
+    def noise(self, p: Pieces) -> Array:
+        """What the integrand's own rounding, kept track of at the ends of segments, comes to in each channel: (C, P).
+
+        More than a few units in the last place where terms of parameters cancel, or where sines of them have large
+        arguments. What only grows towards one end is rounding of the variable, which is counted elsewhere.
+        """
+        ends = self.ends
+        assert ends is not None
+        shares = [
+            np.divide(e, np.abs(f), out=np.full(f.shape, np.inf), where=(f != 0) & np.isfinite(f))
+            for f, e in ((ends.low, ends.low_error), (ends.high, ends.high_error))
+        ]
+        share = np.minimum(*shares)
+        share = np.where((share > 4 * EPS) & (share < 1), share, 0.0)[:, p.segment]
+        sizes = p.size.reshape(self.width, -1, p.u0.size)
+        return np.asarray((share[:, None] * sizes).reshape(p.size.shape))
 
     def values(self, seg: Segments, index: Ints, x: Array, label: Array, weight: Array) -> tuple[Array, Array | None]:
         """The channels at the nodes, times the weight: (C, P, n), and the errors that came with them."""
@@ -286,8 +333,8 @@ class Work:
             return owner if self.batch > 1 else None
         return None if self.root is None else self.root[owner]
 
-    def end_values(self) -> tuple[Array, Array] | None:
-        """F at both ends of every segment, sides as on the segment: (m, S) each; None where they are not needed."""
+    def end_values(self) -> Ends | None:
+        """F at both ends of every segment, sides as on the segment; None where it is not needed."""
         hinted = any(level.level.hints for level in self.parent.plan.levels[self.number :])
         if not self.last and not hinted and not (self.moving and self.sweeps()):
             return None
@@ -299,8 +346,10 @@ class Work:
         sides = {g: np.concatenate((m, m)) if isinstance(m, np.ndarray) else m for g, m in self.sides.items()}
         costs = self.machine.costs
         with nullcontext() if costs is None else costs.ends(seg.ta, seg.tb, self.parent.machine.directions):
-            f = self.parent.inside(self.number, here, both.size, sides, frozen)
-        return f[:, : seg.a.size], f[:, seg.a.size :]
+            f, e = self.parent.inside(self.number, here, both.size, sides, frozen)
+        count = seg.a.size
+        e = np.where(np.isfinite(e), e, 0.0)  # where F is infinite
+        return Ends(f[:, :count], f[:, count:], e[:, :count], e[:, count:])
 
     def sweeps(self) -> bool:
         """Whether an end moves at which the integrand may jump: not where only something further in changes."""
@@ -326,7 +375,7 @@ class Work:
             here[self.level.variable] = Cell(seg.a[follows] + side * BESIDE * np.minimum(width, 1e300))
             sides = {g: take(m, index) for g, m in self.sides.items()}
             with nullcontext() if self.machine.costs is None else self.machine.costs.apart():
-                values.append(self.parent.inside(self.number, here, index.size, sides, frozen))
+                values.append(self.parent.inside(self.number, here, index.size, sides, frozen)[0])
         apart = np.abs(values[0] - values[1])
         if (apart > DISCONTINUITY * (np.abs(values[0]) + np.abs(values[1]))).any():
             self.machine.note_degenerate(self.level.variable)

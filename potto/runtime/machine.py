@@ -156,6 +156,12 @@ class Machine:
             return self
         return Machine(self.linker, self.settings, self.books, self.directions, False, False, self.frozen)
 
+    def tracking(self) -> Machine:
+        """The machine with rounding errors kept track of."""
+        if self.rounding:
+            return self
+        return Machine(self.linker, self.settings, self.books, self.directions, True, self.root, self.frozen)
+
     # Books
 
     @property
