@@ -1,7 +1,7 @@
 """Completion: what can stand at the cursor, with its type and what it is for.
 
-Owns `candidates`. Knows no terminal. Reads the same queries as hover and the language server, so it may be called from
-another thread than the one that evaluates.
+Owns `candidates`: what a command takes is known here, names and words are those that `potto.ide` proposes to editors.
+Knows no terminal, and may be called from another thread than the one that evaluates.
 """
 
 from __future__ import annotations
@@ -12,23 +12,19 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from potto import pages
-from potto.measures import MEASURES
-from potto.modules import DefinitionTarget, names
-from potto.modules.lookup import find_module, resolve_module
-from potto.primitives import PRIMITIVES
+from potto.ide import completions, resolve_completion
 from potto.settings import METHODS
-from potto.syntax import RESERVED
-from potto.types import format_type, interface
 from potto_repl import options
 from potto_repl.commands.settings import NUMBERS
-from potto_repl.documentation import WORDS, described, leading_comment
+from potto_repl.documentation import plain
 from potto_repl.registry import COMMANDS, Completes, find
 from potto_repl.reply import Refusal
 from potto_repl.respond import command_words
 from potto_repl.session import Conversation
 
-_WORD = re.compile(r"[^\W\d][\w']*(?:\.[^\W\d][\w']*)*\.?$|_[0-9]*$")
-_IMPORT = re.compile(r"^\s*(?:from\s+(?P<module>[\w.]+)\s+import\s+(?:[\w\s,]*,)?\s*\w*|(?:from|import)\s+[\w.]*)$")
+_ASKED = re.compile(r"(?:^(?:from|import)\s+|\bimport\s+|[\w)]\.|~\s*)$")  # behind these there is something to list
+MOST_RESOLVED = 200  # proposals whose types are looked up
+COMPLETING = "<completing>"  # the pseudo file that what is typed stands in
 PROGRAMS = (".po", ".diffeo")
 
 
@@ -44,13 +40,9 @@ class Candidate:
 
 def candidates(session: Conversation, before: str) -> list[Candidate]:
     """What can stand where the text ends."""
-    line = before.rpartition("\n")[2]
     if before.lstrip().startswith(":"):
         return list(_command(session, before.lstrip()))
-    imported = _IMPORT.match(line)
-    if imported is not None:
-        return list(_import(session, line, imported["module"]))
-    return list(_names(session, line))
+    return list(_code(session, before))
 
 
 def _command(session: Conversation, text: str) -> Iterator[Candidate]:
@@ -75,7 +67,7 @@ def _argument(session: Conversation, command: str, kind: Completes, text: str) -
         case "file":
             yield from _files(text, everything=command in ("save", "record"))
         case "expression" | "name":
-            yield from _names(session, text)
+            yield from _code(session, text)
         case "code":
             yield from (Candidate(code, len(last), "", _title(code)) for code in pages.codes()
                         if code.startswith(last.upper()))  # fmt: skip
@@ -121,64 +113,22 @@ def _files(text: str, everything: bool) -> Iterator[Candidate]:
             yield Candidate(entry.name, len(start))
 
 
-def _import(session: Conversation, line: str, module: str | None) -> Iterator[Candidate]:
-    last = re.split(r"[\s,]+", line)[-1]
-    if module is not None:
-        file = find_module(session.db, session.file, module)
-        for name in names(session.db, file) if file is not None else ():
-            if name.startswith(last):
-                yield _definition(session, name, DefinitionTarget(file or "", name), len(last))
-        return
-    seen = set()
-    for folder in session.world.files.roots:
-        base = os.path.join(folder, *last.split(".")[:-1])
-        for name in sorted(os.listdir(base)) if os.path.isdir(base) else ():
-            stem, suffix = os.path.splitext(name)
-            dotted = ".".join([*last.split(".")[:-1], stem])
-            if suffix in PROGRAMS and dotted.startswith(last) and dotted not in seen:
-                seen.add(dotted)
-                yield Candidate(dotted, len(last), "module")
+def _code(session: Conversation, text: str) -> Iterator[Candidate]:
+    """What can stand where a piece of Potto ends: what the editor would propose, as far as it begins like the word."""
+    session.put_aside(COMPLETING, text)
+    found = completions(session.db, COMPLETING, len(text))
+    word = text[found.span.start :]
+    everything = word or _ASKED.search(text)
+    shown = [item for item in found.items if everything or item.kind == "argument"]
+    for number, item in enumerate(shown):
+        name = item.insert if item.kind == "symbol" else item.label
+        if not (item.filter or item.label).startswith(word.removeprefix("\\")) or item.data[:1] == ("import",):
+            continue
+        resolved = resolve_completion(session.db, item) if number < MOST_RESOLVED else item
+        doc = next((line for line in plain(_prose(resolved.documentation)).splitlines() if line.strip()), "")
+        yield Candidate(name, len(word), resolved.detail or resolved.description, doc)
 
 
-def _names(session: Conversation, line: str) -> Iterator[Candidate]:
-    found = _WORD.search(line)
-    word = found[0] if found is not None else ""
-    path, dot, last = word.rpartition(".")
-    if dot:
-        yield from _members(session, path, last)
-        return
-    if not word:
-        return
-    seen = set()
-    for name, target in session.names().items():
-        if name.startswith(word):
-            seen.add(name)
-            yield _definition(session, name, target, len(word))
-    yield from (c for c in _builtins(word) if c.text not in seen)
-
-
-def _members(session: Conversation, path: str, last: str) -> Iterator[Candidate]:
-    file = resolve_module(session.db, session.file, path)
-    for name in names(session.db, file) if file is not None else ():
-        if name.startswith(last):
-            yield _definition(session, name, DefinitionTarget(file or "", name), len(last))
-
-
-def _definition(session: Conversation, name: str, target: DefinitionTarget | None, length: int) -> Candidate:
-    from potto.modules.texts import chunk_text
-
-    if target is None:
-        return Candidate(name, length, "module")
-    type = format_type(interface(session.db, target.file, target.name).type)
-    comment = leading_comment(chunk_text(session.db, target.file, target.name) or "")
-    return Candidate(name, length, type, comment.partition("\n")[0])
-
-
-def _builtins(word: str) -> Iterator[Candidate]:
-    for name, entry in sorted(PRIMITIVES.items()):
-        if entry.surface and not entry.truth and name.isidentifier() and name.startswith(word):
-            yield Candidate(name, len(word), "builtin", entry.doc)
-    for name in sorted({*MEASURES, *WORDS, *RESERVED}):
-        if name.startswith(word):
-            kind = "measure" if name in MEASURES else "word" if name in RESERVED else "builtin"
-            yield Candidate(name, len(word), kind, described(name))
+def _prose(markdown: str) -> str:
+    """Markdown without its blocks of code: they say the type once more."""
+    return re.sub(r"```.*?```", "", markdown, flags=re.DOTALL)

@@ -82,9 +82,13 @@ class Conversation(Session):
 
     def wrong(self, text: str) -> list[Diagnostic]:
         """The errors that an entry would have, without making it one."""
-        self._put(TYPING, plain_names(text), self.prelude)
+        self.put_aside(TYPING, text)
         return [located.diagnostic for located in self.world.diagnostics(TYPING)
                 if located.diagnostic.severity == "error" and located.file == TYPING]  # fmt: skip
+
+    def put_aside(self, file: str, text: str) -> None:
+        """Let a pseudo file hold what is being typed, in the scope of the session, without making it an entry."""
+        self._put(file, plain_names(text), self.prelude)
 
     def source(self, file: str) -> SourceText | None:
         return self.written.get(file) or super().source(file)

@@ -69,6 +69,7 @@ class Loader:
             self._ready.set()
         if self._session is not None:
             self._session.evaluate(WARM)  # the first kernel, plan and rule cost more than all later ones
+            from potto_repl import complete  # noqa: F401  (for the first Tab)
 
 
 def talk(options: argparse.Namespace, settings: Settings, *, color: bool, unicode: bool) -> int:

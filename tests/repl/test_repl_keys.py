@@ -6,6 +6,7 @@ import threading
 import time
 
 import pytest
+from potto_repl.complete import candidates
 from potto_repl.start import Loader
 from potto_repl.terminal import Terminal
 from prompt_toolkit.application import create_app_session
@@ -25,7 +26,7 @@ def paste(text):
 @pytest.fixture(scope="module")
 def loader():
     loader = Loader(DEFAULTS)
-    assert loader.session is not None
+    assert candidates(loader.session, "expm")  # what the first Tab would wait for
     return loader
 
 

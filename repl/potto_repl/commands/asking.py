@@ -18,7 +18,7 @@ from potto.render import display_name
 from potto.syntax import nodes
 from potto.types import derivative_type, format_type, interface
 from potto.types.types import Diffeo, Function
-from potto_repl.documentation import WORDS, documentation
+from potto_repl.documentation import documentation, documented
 from potto_repl.expressions import Asked, checked, without_parens
 from potto_repl.registry import COMMANDS, command
 from potto_repl.reply import Part, Refusal, answer
@@ -120,10 +120,7 @@ def _target(session: Conversation, name: str) -> DefinitionTarget | ModuleTarget
 
 
 def _unknown(session: Conversation, name: str) -> Refusal:
-    from potto.measures import MEASURES
-    from potto.primitives import PRIMITIVES
-
-    known = [*session.names(), *PRIMITIVES, *MEASURES, *WORDS]
+    known = [*session.names(), *documented()]
     near = difflib.get_close_matches(name, known, 1)
     if name in COMMANDS:
         return Refusal(f"`{name}` is a command of the prompt", f"`:help {name}` says what it does")
