@@ -18,15 +18,22 @@ from potto.integrate.plan import LevelPlan
 from potto.integrate.rules import EPS
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 
+# How far off, in units of the last place, a root may be that was found by numbers.
+SEARCHED = 4
+
 
 @dataclass
 class Row:
-    """One candidate cut for the whole batch: where it is, how it moves, which cut of the level it belongs to."""
+    """One candidate cut for the whole batch: where it is, how it moves, which cut of the level it belongs to.
+
+    e: how far off the place may be by rounding; None where that is not known.
+    """
 
     x: Array
     t: tuple[Any, ...]
     cut: int
     turning: bool
+    e: Any = None
 
 
 @dataclass
@@ -43,7 +50,7 @@ class Edge:
 
 @dataclass
 class Cuts:
-    """The outcome for one variable: orientation (B,), segments, whether anything moves, edges, bounds' errors.
+    """The outcome for one variable: orientation (B,), segments, whether anything moves, edges.
 
     conflict: cuts that coincide move differently, which is harmless only where the integrand does not jump there.
     """
@@ -52,7 +59,6 @@ class Cuts:
     segments: Segments
     moving: bool
     edges: list[Edge]
-    bound_error: Array | None
     bound_nan: Bools | None
     conflict: bool = False
 
@@ -69,7 +75,7 @@ def frame_rows(plan: LevelPlan, values: tuple[Value, ...]) -> tuple[Cell, Cell, 
         assert isinstance(value, Cell)
         cells.append(value)
     rows = [
-        Row(cell.v, cell.t, cut, turning)  # type: ignore[arg-type]
+        Row(cell.v, cell.t, cut, turning, 0.0 if cell.e is None else cell.e)  # type: ignore[arg-type]
         for cell, (cut, turning) in zip(cells[2:], plan.rows, strict=True)
     ]
     return cells[0], cells[1], rows
@@ -79,16 +85,20 @@ def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, d
     """Cut [lo, hi] at the rows; reversed bounds are turned round and counted negative."""
     low, high = as_array(lo.v, batch), as_array(hi.v, batch)
     tl, th = _tangents(lo.t, batch, directions), _tangents(hi.t, batch, directions)
+    el, eh = (0.0 if bound.e is None else bound.e for bound in (lo, hi))
     sign = np.ones(batch)
     turn = high < low
     if turn.any():
         sign[turn] = -1.0
         low, high = np.where(turn, high, low), np.where(turn, low, high)
         tl, th = np.where(turn, th, tl), np.where(turn, tl, th)
+        el, eh = np.where(turn, eh, el), np.where(turn, el, eh)
     count = len(rows)
     x = np.empty((count + 2, batch))
     t = np.zeros((directions, count + 2, batch))
+    e = np.empty((count + 2, batch))
     x[0], x[-1] = low, high
+    e[0], e[-1] = el, eh
     t[:, 0], t[:, -1] = tl, th
     inside = np.zeros((count + 2, batch), dtype=bool)
     edges: list[Edge] = []
@@ -102,6 +112,7 @@ def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, d
                     inner &= np.isfinite(speed)
         inside[i] = inner
         x[i] = np.where(inner, root, high)
+        e[i] = np.where(inner, SEARCHED * EPS * np.abs(root) if row.e is None else row.e, eh)
         for d in range(directions):
             speed = row.t[d] if d < len(row.t) and row.t[d] is not None else 0.0
             t[d, i] = np.where(inner, speed, th[d])
@@ -114,8 +125,8 @@ def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, d
     if count == 1:  # in order already
         rank[1] = _rank(plan, rows[0]) * inside[1]
     elif count:
-        x, t, rank, conflict = _sorted(plan, rows, x, t, inside)
-    cuts = _pieces(x, t, rank, sign, beyond, edges, lo, hi, batch)
+        x, e, t, rank, conflict = _sorted(plan, rows, x, e, t, inside)
+    cuts = _pieces(x, e, t, rank, sign, beyond, edges)
     cuts.conflict = conflict
     return cuts
 
@@ -157,12 +168,14 @@ def _edges(
     return out
 
 
-def _sorted(plan: LevelPlan, rows: list[Row], x: Array, t: Array, inside: Bools) -> tuple[Array, Array, Ints, bool]:
+def _sorted(
+    plan: LevelPlan, rows: list[Row], x: Array, e: Array, t: Array, inside: Bools
+) -> tuple[Array, Array, Array, Ints, bool]:
     conflict = False
     order = np.argsort(x, axis=0, kind="stable")
     # the bounds stay first and last even among equals: candidates were clipped to the upper bound
     member = np.arange(x.shape[1])
-    x, inside = x[order, member], inside[order, member]
+    x, e, inside = x[order, member], e[order, member], inside[order, member]
     rank: Ints = np.where(inside, np.array([0, *(_rank(plan, r) for r in rows), 0])[order], 0)
     if t.shape[0]:
         t = t[:, order, member]
@@ -171,7 +184,7 @@ def _sorted(plan: LevelPlan, rows: list[Row], x: Array, t: Array, inside: Bools)
             apart = np.abs(t[:, 1:] - t[:, :-1]) > 1e-9 * (np.abs(t[:, 1:]) + np.abs(t[:, :-1]))
             conflict = bool((same & apart.any(axis=0)).any())
             _agree(t, same, rank)
-    return x, t, rank, conflict
+    return x, e, t, rank, conflict
 
 
 def _rank(plan: LevelPlan, row: Row) -> int:
@@ -193,15 +206,7 @@ def _agree(t: Array, same: Bools, rank: Ints) -> None:
 
 
 def _pieces(
-    x: Array,
-    t: Array,
-    rank: Ints,
-    sign: Array,
-    beyond: list[tuple[Array, bool]],
-    edges: list[Edge],
-    lo: Cell,
-    hi: Cell,
-    batch: int,
+    x: Array, e: Array, t: Array, rank: Ints, sign: Array, beyond: list[tuple[Array, bool]], edges: list[Edge]
 ) -> Cuts:
     a, b = x[:-1], x[1:]
     full = b > a
@@ -214,11 +219,7 @@ def _pieces(
         left = np.where((at <= a) & (at > left), at, left)
         right = np.where((at >= b) & (at < right), at, right)
     moving = bool(ta.any() or tb.any())
-    error = None
-    for bound in (lo, hi):
-        if bound.e is not None:
-            error = np.zeros(batch) if error is None else error
-            error = error + bound.e
     bad = np.isnan(x[0]) | np.isnan(x[-1])
-    made = Segments(owner, a, b, ta, tb, choose(a, b, left, right), left, right, rank[place, owner])
-    return Cuts(sign, made, moving, edges, error, bad if bad.any() else None)
+    ea, eb = e[place, owner], e[place + 1, owner]
+    made = Segments(owner, a, b, ta, tb, choose(a, b, left, right), left, right, rank[place, owner], ea, eb)
+    return Cuts(sign, made, moving, edges, bad if bad.any() else None)

@@ -108,7 +108,7 @@ def cut_rounding(work: Work, ends: Ends) -> Array:
     before = np.zeros_like(high)
     before[:, 1:] = high[:, :-1]
     jump = np.abs(low - np.where(follows, before, 0.0))
-    cost = 2 * EPS * (jump * np.abs(seg.a) + np.where(last, np.abs(high * seg.b), 0.0))
+    cost = jump * seg.ea + np.where(last, np.abs(high) * seg.eb, 0.0)
     cost = np.where(np.isfinite(cost), cost, 0.0)
     return np.stack([np.bincount(seg.owner, row, minlength=batch) for row in cost])
 

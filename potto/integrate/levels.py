@@ -73,7 +73,7 @@ class Iteration:
         return most[root]
 
     def cut(self, level: LevelPlan, env: dict[str, Value], batch: int, machine: Evaluator) -> Cuts:
-        values = machine.evaluate(level.frame, env, None)
+        values = machine.tracking().evaluate(level.frame, env, None)
         assert isinstance(values, tuple)
         lo, hi, rows = frame_rows(level, values)
         rows += searched_rows(level, env, lo, hi, batch, machine)

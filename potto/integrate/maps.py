@@ -28,6 +28,7 @@ class Segments:
 
     owner: (S,) index of the integral. a, b: (S,) ends, a < b. ta, tb: (k, S) how they move. kind: (S,) the map.
     left, right: (S,) turning points that the map resolves (where `kind` says so).
+    ea, eb: (S,) how far off the ends may be by rounding.
     rank: (S,) what lies at the left end: 2 a jump, 1 a place where something further in changes, 0 neither.
     """
 
@@ -40,10 +41,13 @@ class Segments:
     left: Array
     right: Array
     rank: Ints
+    ea: Array
+    eb: Array
 
     def pick(self, index: Any) -> Segments:
         return Segments(self.owner[index], self.a[index], self.b[index], self.ta[:, index], self.tb[:, index],
-                        self.kind[index], self.left[index], self.right[index], self.rank[index])  # fmt: skip
+                        self.kind[index], self.left[index], self.right[index], self.rank[index],
+                        self.ea[index], self.eb[index])  # fmt: skip
 
 
 def choose(a: Array, b: Array, left: Array, right: Array) -> Ints:

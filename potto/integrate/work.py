@@ -244,7 +244,7 @@ class Work:
             p.floor += self.noise(p)
         if self.k:
             # speeds are rounded too, and so are the places of the cuts, which matters where they are close together
-            place = 2 * EPS * np.maximum(np.abs(seg.a), np.abs(seg.b)) / (seg.b - seg.a)
+            place = np.maximum(seg.ea, seg.eb) / (seg.b - seg.a)
             place = np.where(np.isfinite(place), place, 0.0)
             tangents = p.floor.reshape(self.width, -1, p.u0.size)[:, 1:]
             tangents *= 3
