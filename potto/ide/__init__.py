@@ -7,7 +7,7 @@ question takes the database first and answers also on broken text.
 from potto.ide.acting import code_actions, resolve_code_action
 from potto.ide.calling import incoming_calls, outgoing_calls, prepare_call_hierarchy
 from potto.ide.colours import semantic_tokens
-from potto.ide.completing import completions, resolve_completion
+from potto.ide.completing import completions, completions_after, resolve_completion
 from potto.ide.documents import kind_of
 from potto.ide.explaining import derivative_markdown, diffeo_markdown
 from potto.ide.explaining import sound as is_sound
@@ -95,6 +95,7 @@ __all__ = [
     "code_actions",
     "code_lenses",
     "completions",
+    "completions_after",
     "declaration",
     "definition",
     "definition_at",

@@ -1,7 +1,7 @@
 """Completion: what can stand where the cursor is.
 
-Owns `completions` and `resolve_completion`. What stands in front of the cursor decides (`completion_place`); types and
-documentation are looked up when an item is resolved, so that a list costs no inference.
+Owns `completions`, `completions_after` and `resolve_completion`. What stands in front of the cursor decides
+(`completion_place`); types and documentation are looked up when an item is resolved, so that a list costs no inference.
 """
 
 from __future__ import annotations
@@ -11,16 +11,16 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from potto.ide.completion_modules import member_items, module_items, name_items
-from potto.ide.completion_place import Place, place_at
+from potto.ide.completion_place import Place, place_in
 from potto.ide.documents import definition_head, documentation, type_text, written_kind, written_kinds
 from potto.ide.explaining import fence
 from potto.ide.hover_locals import TITLES, local_type
 from potto.ide.hovers import builtin_markdown, measure_markdown, measure_signature, module_markdown
 from potto.ide.importing import import_edit, importable
 from potto.ide.model import Completion, CompletionKind, Completions
-from potto.ide.pending import call_at
-from potto.ide.places import chunk_at, text_of, writing_at
-from potto.ide.signatures import called_at
+from potto.ide.pending import call_in
+from potto.ide.places import Site, chunk_at, site_after, site_at
+from potto.ide.signatures import called_in
 from potto.ide.symbols import LocalSymbol, owner
 from potto.ide.words import KEYWORDS, LETTERS, SPECIALS, TYPES, Keyword
 from potto.measures import MEASURES
@@ -46,16 +46,26 @@ _OPENERS = {
 
 def completions(db: Database, file: str, offset: int, trigger: str = "") -> Completions:
     """What can stand at an offset. `trigger`: the character that was just typed, if that is why it is asked."""
-    place = place_at(db, file, offset)
+    return _at(db, site_at(db, file, offset), trigger)
+
+
+def completions_after(db: Database, file: str, before: str) -> Completions:
+    """What can stand behind a text that belongs to no file, as at a prompt: the names are those of `file` and of the
+    entries in front of it. Spans are relative to the text."""
+    return _at(db, site_after(file, before), "")
+
+
+def _at(db: Database, site: Site, trigger: str) -> Completions:
+    file, place = site.file, place_in(site.text, site.offset)
     match place.kind:
         case "letter":
             return Completions(place.span, tuple(_letters(place)))
         case "module":
             return Completions(place.span, tuple(module_items(db, file, place)))
         case "imported":
-            return Completions(place.span, tuple(name_items(db, file, place)))
+            return Completions(place.span, tuple(name_items(db, site, place)))
         case "member":
-            return Completions(place.span, tuple(member_items(db, file, place)))
+            return Completions(place.span, tuple(member_items(db, site, place)))
         case "measure":
             return Completions(place.span, tuple(_measures(place)))
         case "type":
@@ -67,16 +77,16 @@ def completions(db: Database, file: str, offset: int, trigger: str = "") -> Comp
     if trigger == " ":
         return Completions(place.span, ())
     with db.evaluating():
-        return _everything(db, file, offset, place)
+        return _everything(db, site, place)
 
 
-def _everything(db: Database, file: str, offset: int, place: Place) -> Completions:
+def _everything(db: Database, site: Site, place: Place) -> Completions:
     items: dict[str, Completion] = {}
-    for item in (*_arguments(db, file, offset, place), *_locals(db, file, offset, place)):
+    for item in (*_arguments(db, site, place), *_locals(db, site, place)):
         items.setdefault(item.label, item)
-    for item in (*_file_names(db, file, place), *builtin_items(place), *_keywords(db, file, offset, place)):
+    for item in (*_file_names(db, site, place), *builtin_items(place), *_keywords(site, place)):
         items.setdefault(item.label, item)
-    others = _others(db, file, place, items) if place.word else []
+    others = _others(db, site.file, place, items) if place.word else []
     return Completions(place.span, (*items.values(), *others), not place.word or len(others) >= MOST_IMPORTS)
 
 
@@ -102,12 +112,12 @@ def _types(place: Place) -> Iterator[Completion]:
         yield Completion(name, "type", place.span, name, name, documentation=doc)
 
 
-def _arguments(db: Database, file: str, offset: int, place: Place) -> Iterator[Completion]:
+def _arguments(db: Database, site: Site, place: Place) -> Iterator[Completion]:
     """The parameters that the call at hand can be given by name."""
-    call = call_at(db, file, offset)
+    call = None if site.chunk is None else call_in(db, site.chunk, site.offset - site.chunk.start)
     if call is None or not call.fresh or call.measure:
         return
-    called = called_at(db, file, call)
+    called = called_in(db, site.file, call, site.chunk)
     if called is None:
         return
     for group in groups_of(called.type)[called.given :]:
@@ -122,11 +132,10 @@ def _arguments(db: Database, file: str, offset: int, place: Place) -> Iterator[C
                 )
 
 
-def _locals(db: Database, file: str, offset: int, place: Place) -> Iterator[Completion]:
-    writing = writing_at(db, file, offset)
-    if writing is None or place.kind == "top":
+def _locals(db: Database, site: Site, place: Place) -> Iterator[Completion]:
+    if site.writing is None or place.kind == "top":
         return
-    chunk, relative = writing
+    file, (chunk, relative) = site.file, site.writing
     for number, binder in chunk.index(db).visible(relative):
         if binder.span.start <= relative <= binder.span.end:
             continue
@@ -136,10 +145,10 @@ def _locals(db: Database, file: str, offset: int, place: Place) -> Iterator[Comp
         yield Completion(binder.name, kind, place.span, binder.name, sort, description=TITLES[binder.kind], data=data)
 
 
-def _file_names(db: Database, file: str, place: Place) -> Iterator[Completion]:
+def _file_names(db: Database, site: Site, place: Place) -> Iterator[Completion]:
     """The names at the top of the file, and behind an entry of a prompt those of the entries before."""
-    here = writing_at(db, file, place.span.start)
-    own = None if here is None else owner(db, here[0])  # a constant cannot be made of itself
+    file = site.file
+    own = None if site.writing is None else owner(db, site.writing[0])  # a constant cannot be made of itself
     for each in (file, *preludes(db, file)):
         for name, kind in written_kinds(db, each):
             if fits(place.word, name) and not (each == file and name == own and kind == "constant"):
@@ -180,9 +189,9 @@ def builtin_items(place: Place) -> Iterator[Completion]:
             yield Completion(name, "builtin", place.span, name, _BUILTIN + name, data=("builtin", name))
 
 
-def _keywords(db: Database, file: str, offset: int, place: Place) -> Iterator[Completion]:
-    chunk = chunk_at(db, file, offset)
-    before = "" if chunk is None else text_of(db, file)[chunk.start : offset - len(place.word)]
+def _keywords(site: Site, place: Place) -> Iterator[Completion]:
+    chunk = site.chunk
+    before = "" if chunk is None else site.text[chunk.start : site.offset - len(place.word)]
     goes_on = bool(_OPERAND.search(before)) and place.kind != "top"
     for keyword in KEYWORDS.values():
         group = _WORD

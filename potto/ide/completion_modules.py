@@ -9,7 +9,7 @@ from dataclasses import replace
 from potto.ide.completion_place import Place
 from potto.ide.documents import written_kind
 from potto.ide.model import Completion
-from potto.ide.places import chunk_at
+from potto.ide.places import Site
 from potto.modules import DefinitionTarget, ModuleTarget, find_module, names, resolve, resolve_module
 from potto.modules.lookup import bindings, folders
 from potto.modules.texts import imports
@@ -42,10 +42,11 @@ def module_items(db: Database, file: str, place: Place) -> Iterator[Completion]:
         yield Completion(dotted, "module", place.span, dotted, dotted, data=("module", target, dotted))
 
 
-def name_items(db: Database, file: str, place: Place) -> Iterator[Completion]:
+def name_items(db: Database, site: Site, place: Place) -> Iterator[Completion]:
     """The names of a module, after `from m import`; those that are imported already are left out."""
+    file = site.file
     module = find_module(db, file, place.path)
-    taken = _taken(db, file, place)
+    taken = _taken(db, site, place)
     if module is not None:
         for item in _names_of(db, module, place):
             if item.label not in taken:
@@ -57,9 +58,9 @@ def name_items(db: Database, file: str, place: Place) -> Iterator[Completion]:
             yield Completion(name, "module", place.span, name, name, data=("module", target, dotted))
 
 
-def member_items(db: Database, file: str, place: Place) -> Iterator[Completion]:
+def member_items(db: Database, site: Site, place: Place) -> Iterator[Completion]:
     """What follows `m.`: the names of the module, and the modules of a package that is imported."""
-    chunk = chunk_at(db, file, place.span.start)
+    file, chunk = site.file, site.chunk
     head = place.path.partition(".")[0]
     if chunk is not None and any(b.name == head for _, b in chunk.index(db).visible(place.span.start - chunk.start)):
         return  # a parameter, and the dot of a lambda
@@ -88,8 +89,8 @@ def _names_of(db: Database, module: str, place: Place) -> Iterator[Completion]:
                 yield Completion(bound, "module", place.span, bound, "1" + bound)
 
 
-def _taken(db: Database, file: str, place: Place) -> set[str]:
-    chunk = chunk_at(db, file, place.span.start)
+def _taken(db: Database, site: Site, place: Place) -> set[str]:
+    chunk = site.chunk
     item = None if chunk is None else chunk.parsed(db).item
     if chunk is None or not isinstance(item, nodes.FromImport):
         return set()

@@ -1,4 +1,4 @@
-"""What kind of word the cursor is in, from the text in front of it. Owns `place_at`."""
+"""What kind of word the cursor is in, from the text in front of it. Owns `place_in`."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
-from potto.ide.places import line_start, text_of
-from potto.query import Database
+from potto.ide.places import line_start
 from potto.source import Span
 
 Kind = Literal[
@@ -40,10 +39,8 @@ class Place:
     path: str = ""
 
 
-def place_at(db: Database, file: str, offset: int) -> Place:
-    """The kind of word at an offset."""
-    text = text_of(db, file)
-    offset = min(max(offset, 0), len(text))
+def place_in(text: str, offset: int) -> Place:
+    """The kind of word at an offset of a text."""
     start = line_start(text, offset)
     line = text[start:offset]
     found = _WORD.search(line)

@@ -230,6 +230,8 @@ def condition_markdown(info: ConditionInfo) -> str:
         facts.append(f"- surface: {code(f'{info.pivot} = {root}')}")
     for branch in info.inverse:
         facts.append(f"- inverse: {code(inverse_text(info.values, branch))}")
+    if not info.inverse:
+        facts.append("- inverse: none in closed form" + ("" if info.roots else "; the surface is found by numbers"))
     if info.determinant:
         facts.append(f"- determinant: {code(info.determinant)}")
     if info.calls:

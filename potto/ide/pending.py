@@ -1,6 +1,6 @@
 """The call that the cursor is in, found in the text alone: while it is typed, there is no tree of it yet.
 
-Owns `call_at` and `juxtaposed_at`.
+Owns `call_at` (`call_in` in a chunk) and `juxtaposed_at`.
 """
 
 from __future__ import annotations
@@ -42,10 +42,13 @@ class PendingCall:
 def call_at(db: Database, file: str, offset: int) -> PendingCall | None:
     """The innermost call whose parentheses hold an offset."""
     chunk = chunk_at(db, file, offset)
-    if chunk is None:
-        return None
+    return None if chunk is None else call_in(db, chunk, offset - chunk.start)
+
+
+def call_in(db: Database, chunk: ChunkAt, at: int) -> PendingCall | None:
+    """The innermost call of a chunk whose parentheses hold a place in it."""
     text = _blank_comments(db, chunk)
-    at = min(offset - chunk.start, len(text))
+    at = min(at, len(text))
     position = _open_before(text, at)
     while position is not None:
         if text[position] == "(":

@@ -76,6 +76,33 @@ def writing_at(db: Database, file: str, offset: int) -> tuple[ChunkAt, int] | No
     return chunk, len(chunk.text)
 
 
+@dataclass(frozen=True, slots=True)
+class Site:
+    """Where something is being typed: `offset` in `text`, seen from the names of `file`.
+
+    `chunk` is what the offset is in or follows; `writing` what goes on if something is typed here, and the place in it.
+    """
+
+    file: str
+    text: str
+    offset: int
+    chunk: ChunkAt | None
+    writing: tuple[ChunkAt, int] | None
+
+
+def site_at(db: Database, file: str, offset: int) -> Site:
+    """A place in a file."""
+    text = text_of(db, file)
+    offset = min(max(offset, 0), len(text))
+    return Site(file, text, offset, chunk_at(db, file, offset), writing_at(db, file, offset))
+
+
+def site_after(file: str, before: str) -> Site:
+    """The end of a text that belongs to no file, as at a prompt."""
+    chunk = ChunkAt(file, 0, before, False)
+    return Site(file, before, len(before), chunk, (chunk, len(before)))
+
+
 def chunk_of(file: str, chunk: ChunkRef) -> ChunkAt:
     """A chunk with its file."""
     return ChunkAt(file, chunk.start, chunk.text, is_diffeo(file))

@@ -14,7 +14,7 @@ from potto.ide.hovers import builtin_parameters, builtin_signature
 from potto.ide.index import call_head
 from potto.ide.model import ParameterText, Signature, SignatureHelp
 from potto.ide.pending import PendingCall, call_at, juxtaposed_at
-from potto.ide.places import chunk_at
+from potto.ide.places import ChunkAt, chunk_at
 from potto.ide.symbols import LocalSymbol, callee
 from potto.ide.words import SPECIALS
 from potto.measures import MEASURES
@@ -59,9 +59,14 @@ def signature_help(db: Database, file: str, offset: int) -> SignatureHelp | None
 
 def called_at(db: Database, file: str, call: PendingCall) -> Called | None:
     """What a call is of, if that has a type: a definition, or a local name that is a function."""
+    return called_in(db, file, call, chunk_at(db, file, call.function_span.start))
+
+
+def called_in(db: Database, file: str, call: PendingCall, chunk: ChunkAt | None) -> Called | None:
+    """The same for a call in a chunk."""
     head, given, derived = call_head(call.function)
     if isinstance(head, nodes.Name):
-        local = _local(db, file, call.function_span.start, head.id)
+        local = None if chunk is None else _local(db, chunk, call.function_span.start - chunk.start, head.id)
         if local is not None:
             return _derived(head.id, local_type(db, local), given, derived, "", ())
     target = callee(db, file, call.function)
@@ -79,11 +84,8 @@ def _derived(name: str, type: Type, given: int, derived: int, said: str, plain: 
     return Called(prefix + name, type, given, said, tuple(prefix + p for p in plain))
 
 
-def _local(db: Database, file: str, offset: int, name: str) -> LocalSymbol | None:
-    chunk = chunk_at(db, file, offset)
-    if chunk is None:
-        return None
-    for number, binder in chunk.index(db).visible(offset - chunk.start):
+def _local(db: Database, chunk: ChunkAt, place: int, name: str) -> LocalSymbol | None:
+    for number, binder in chunk.index(db).visible(place):
         if binder.name == name:
             return LocalSymbol(chunk, number, binder)
     return None

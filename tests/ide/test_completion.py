@@ -207,3 +207,21 @@ def test_the_name_of_a_dual_brings_its_two_parts():
     f = fixture("def f(a, n) a^n\ny = deriv(f)($0)\n")
     item, after = f.complete("da=")
     assert item.snippet and after.endswith("y = deriv(f)(da=(${1:0}, ${2:1}))\n")
+
+
+def test_behind_a_text_that_is_in_no_file():
+    """What a prompt asks: the names of its file, and what the text itself binds."""
+    f = fixture("half = 0.5\ndef disc(x, y) x*y\n")
+
+    def labels(before: str) -> list[str]:
+        return [item.label for item in ide.completions_after(f.db, f.file, before).items]
+
+    assert {"half", "disc", "sin", "def"} <= set(labels(""))
+    assert {"t", "half", "disc"} <= set(labels("def f(t)\n    "))
+    assert labels("disc(")[:2] == ["x=", "y="]
+    assert labels("let u = 1 in u + ").count("u") == 1
+    assert labels("\\thet") == ["θ", "Θ"] and "normal" in labels("integral (x ~ no")
+    found = ide.completions_after(f.db, f.file, "1 + ha")
+    assert (found.span.start, found.span.end) == (4, 6)
+    item = next(item for item in found.items if item.label == "half")
+    assert "half : Real" in ide.resolve_completion(f.db, item).documentation

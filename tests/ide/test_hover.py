@@ -228,3 +228,11 @@ def test_a_variable_of_integration_says_whose_bounds_vary_with_it():
     f = fixture("def area(t)\n    integral ([0, t], [0, x]) x + y d(x, y)\n")
     assert "from `0` to `t`" in f.hover("x + y") and "varies with it: the bounds of `y`" in f.hover("x + y")
     assert "varies with it" not in f.hover("y d(x")
+
+
+def test_a_condition_without_an_inverse_in_closed_form_says_so():
+    shown = fixture("def f(t)\n    integral ([0, 1], [0, 1]) $0[sin(x*y) > t] d(x, y)\n").hover()
+    assert "inverse: none in closed form; the surface is found by numbers" in shown
+    singular = "(if $0diffeo(x + y + t, 2*x + 2*y) then 1 else 0)"
+    shown = fixture(f"def f(t)\n    integral ([0, 1], [0, 1]) {singular} d(x, y)\n").hover()
+    assert "no diffeomorphism" in shown and "determinant is 0" in shown
