@@ -6,14 +6,14 @@ Owns `Analysis`. Everything here is for the one thread that works with the datab
 from __future__ import annotations
 
 import logging
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from potto.check import absolute, arranged, definition_diagnostics
 from potto.check import diagnostics as check_file
 from potto.diagnostics import Diagnostic
 from potto.modules import chunk_start, module_diagnostics, names, open_files, source, statements
-from potto.modules.texts import chunks, syntax_diagnostics
+from potto.modules.texts import chunks, is_diffeo, parsed, syntax_diagnostics
 from potto.project import Project, Projects, read_project
 from potto.query import Database, query
 from potto.render import Located
@@ -30,6 +30,12 @@ logger = logging.getLogger(__name__)
 def file_diagnostics(db: Database, file: str) -> tuple[Located, ...]:
     """All that there is to say about a file. As one memo, so that a file that an edit does not reach costs nothing."""
     return check_file(db, file)
+
+
+# What is forgotten of closed files, by what the queries are asked about: a chunk's text, a file, some definitions.
+OF_TEXTS = frozenset({"parsed", "head", "chunk_references", "occurring_names"})
+OF_FILES = frozenset({"definition", "core", "core_term"})
+OF_GROUPS = frozenset({"_analyses"})
 
 
 class Analysis:
@@ -120,15 +126,22 @@ class Analysis:
         return known
 
     def forget_trees(self) -> None:
-        """Forget the trees of closed files, which are most of the memory: what was found in them stays, and parsing
-        again takes less than half a millisecond a definition."""
+        """Forget the trees, terms and analyses of closed files, which are most of the memory: what was found in them
+        stays, and making them again takes less than a millisecond a definition."""
         opened = self._documents
         shown = {chunk.text for key in opened for chunk in chunks(self.db, key)}
 
-        def is_tree(query: str, args: tuple[Hashable, ...]) -> bool:
-            return args[0] not in (shown if query == "parsed" else opened)
+        def is_closed(query: str, args: tuple[Any, ...]) -> bool:
+            if query in OF_GROUPS:
+                return all(target.file not in opened for target in args[0])
+            return args[0] not in (shown if query in OF_TEXTS else opened)
 
-        self.db.forget(is_tree, ("parsed", "definition"))
+        self.db.forget(is_closed, OF_TEXTS | OF_FILES | OF_GROUPS)
+
+    def parse(self, key: str) -> None:
+        """Make the trees of a file that was opened, before the first keystroke asks for them."""
+        for chunk in chunks(self.db, key):
+            parsed(self.db, chunk.text, is_diffeo(key))
 
     # What there is to say
 

@@ -77,7 +77,9 @@ def did_open(server: Server, params: Any) -> None:
 
     def opened() -> None:
         session = _session(server)
-        if session.analysis.finds_project(session.analysis.put(document)):
+        key = session.analysis.put(document)
+        session.to_parse.add(key)
+        if session.analysis.finds_project(key):
             session.projects_changed()
 
     server.edit(opened)

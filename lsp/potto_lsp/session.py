@@ -47,6 +47,7 @@ class Session:
         self.presenter = Presenter(self)
         self.tokens: dict[str, tuple[str, list[int]]] = {}
         self.checked = False
+        self.to_parse: set[str] = set()  # files that were opened
         self.to_keep: set[str] = set()  # saved files, of which it is to be kept what was found out about them
         self._progress = Progress(self, "Potto: checking the workspace")
 
@@ -85,6 +86,9 @@ class Session:
         """The steps of what is done when there is nothing else to do."""
         if self.checked:
             yield from self.publisher.steps()
+            while self.to_parse:
+                key = self.to_parse.pop()
+                yield lambda key=key: self.analysis.parse(key)  # type: ignore[misc]
             for key in [key for key in self.to_keep if key in self.analysis.documents]:
                 yield lambda key=key: self._keep(key)  # type: ignore[misc]
         else:

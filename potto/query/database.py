@@ -12,6 +12,7 @@ from potto.query.nodes import FOREVER, MISSING, Entry, Event, Input, Memo, Query
 
 K = TypeVar("K")
 V = TypeVar("V")
+MOST_ARGUMENTS = 200_000
 
 
 class Database(Engine):
@@ -185,6 +186,8 @@ class Database(Engine):
         The longest unused go first. A memo that reads no input is verified for ever, so whether it is used shows only
         after it was set back to the present revision: it goes at the sweep after, if it is still there.
         """
+        if len(self._arguments) > MOST_ARGUMENTS:
+            self._arguments.clear()  # they are only shared, and nobody looks there for anything
         for query, table in self._memos.items():
             if not query.keep or len(table) <= self._limits.get(query, query.keep):
                 continue

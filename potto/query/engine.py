@@ -41,6 +41,7 @@ class Engine:
     def __init__(self) -> None:
         self.revision = 1
         self._memos: defaultdict[Query, dict[tuple[Hashable, ...], Memo]] = defaultdict(dict)
+        self._arguments: dict[tuple[Hashable, ...], tuple[Hashable, ...]] = {}  # most stand in a dozen memos
         self._last_changed = [1] * (DURABILITIES + 1)  # by durability; of what reads no input: never
         self._lock = threading.Lock()
         self._owner = 0  # the thread that evaluates or writes
@@ -87,7 +88,8 @@ class Engine:
         table = self._memos[query]
         memo = table.get(args)
         if memo is None:
-            memo = table[args] = Memo(query, args)
+            shared = args if query.keep else self._arguments.setdefault(args, args)
+            memo = table[shared] = Memo(query, shared)
         if self._frame is not None:
             self._frame[memo] = None
         if memo.index >= 0 or memo.provisional:

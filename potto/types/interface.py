@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, lru_cache
 
 from potto.modules.lookup import DefinitionTarget
 from potto.types.algebra import flat, inputs_of, inputs_of_ports, join, ports_in
@@ -99,6 +99,17 @@ def _sink(kind: SinkKind, number: int) -> Sink:
     return Sink(kind, number=number)
 
 
+@lru_cache(maxsize=16384)
+def _closed(
+    sources: tuple[Source, ...],
+    jumps: frozenset[Surface] = frozenset(),
+    spikes: frozenset[Spike] = frozenset(),
+    carriers: frozenset[Source] = frozenset(),
+) -> Scalar:
+    """A number in an interface. Most interfaces have the same few, so that each is there once."""
+    return Scalar(dict.fromkeys(sources) or NONE, jumps, spikes, carriers)
+
+
 VARYING = Source("variable", "", number=-2)
 
 
@@ -141,14 +152,13 @@ class Closing:
                 return Choice(tuple(map(self.value, options)))
 
     def _scalar(self, value: Scalar, variables: bool = False) -> Scalar:
-        numbered = sorted((self.sources[s] for s in value.sources if s in self.sources), key=lambda s: s.number)
-        sources = dict.fromkeys(numbered)
+        sources = sorted({self.sources[s] for s in value.sources if s in self.sources}, key=lambda s: s.number)
         if variables and any(source.kind == "variable" for source in value.sources):
-            sources[VARYING] = None
+            sources.append(VARYING)
         jumps = frozenset(filter(None, map(self._surface, value.jumps)))
         spikes = frozenset(Spike(self._surface(spike.over), "") for spike in value.spikes)
         carriers = frozenset(self.sources[s] for s in value.carriers if s in self.sources)
-        return Scalar(sources or NONE, jumps, spikes, carriers)
+        return _closed(tuple(sources), jumps, spikes, carriers)
 
     def _surface(self, surface: Surface) -> Surface:
         return frozenset(self.sources[source] for source in surface if source in self.sources)
@@ -163,7 +173,7 @@ class Closing:
                     if source in self.sources:
                         own = self.sources[source]
                         key = (effect.to.kind, own.number)
-                        sinks[key] = Effect(_sink(*key), Scalar({own: None}))
+                        sinks[key] = Effect(_sink(*key), _closed((own,)))
             else:
                 port = self.ports.get(effect.to)
                 if port is not None:
