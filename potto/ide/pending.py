@@ -101,7 +101,7 @@ def _open_before(text: str, at: int) -> int | None:
 
 def _function_start(text: str, open: int) -> int | None:
     """Where the function in front of a parenthesis begins; None if there is none, as in `(a + b)`."""
-    at, start = open, None
+    at, start, starts = open, None, list[int]()
     while True:
         end = len(text[:at].rstrip(" \t"))
         if end == 0:
@@ -112,6 +112,7 @@ def _function_start(text: str, open: int) -> int | None:
             if char == "]" or before is None:
                 return start
             start = at = before
+            starts.append(before)
             continue
         begin = end
         while begin and (text[begin - 1].isalnum() or text[begin - 1] in "_."):
@@ -120,8 +121,25 @@ def _function_start(text: str, open: int) -> int | None:
         if not word or not (word[0].isalpha() or word[0] == "_") or word in RESERVED or word in ("def", "d"):
             return start
         if re.search(r"(?:\bdef|\bdiffeo|\\)\s*$", text[:begin]):
-            return None  # parameters, not arguments
+            body = _after_parameters(text, end)
+            return min((place for place in starts if place >= body), default=None)
         start = at = begin
+        starts.append(begin)
+
+
+def _after_parameters(text: str, name_end: int) -> int:
+    """Where the groups of parameters end that stand directly behind a name; the end of the text if one is open."""
+    at = name_end
+    while text[at : at + 1] == "(":
+        depth = 0
+        for position in range(at, len(text)):
+            depth += (text[position] == "(") - (text[position] == ")")
+            if depth == 0:
+                break
+        else:
+            return len(text)
+        at = position + 1
+    return at
 
 
 def _call(chunk: ChunkAt, text: str, start: int, open: int, at: int) -> PendingCall:

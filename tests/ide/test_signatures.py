@@ -34,6 +34,9 @@ def help_at(text: str) -> tuple[str, str | None, ide.SignatureHelp] | None:
     ("text", "active"),
     [
         ("print(render($0", "c: Real"),
+        ("def half(angle) render(1, $0)", "shader: Real -> Real"),
+        ("def half(angle) curried(1)(2, $0", "k: Real*"),
+        ("def half(angle)(b) 2*render($0", "c: Real"),
         ("print(render(1, $0", "shader: Real -> Real"),
         ("print(render(shader=f, $0", "c: Real"),
         ("print(render(shader=$0", "shader: Real -> Real"),

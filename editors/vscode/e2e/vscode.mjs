@@ -1,0 +1,130 @@
+// A real Visual Studio Code without a screen: its server with the packaged extension, and pages of it in Chromium.
+import { spawn, spawnSync } from "node:child_process";
+import { cpSync, existsSync, mkdirSync, mkdtempSync, rmSync, symlinkSync, writeFileSync } from "node:fs";
+import { createServer } from "node:net";
+import { tmpdir } from "node:os";
+import { dirname, join } from "node:path";
+import { fileURLToPath } from "node:url";
+import { chromium } from "playwright-core";
+
+export const here = dirname(fileURLToPath(import.meta.url));
+const root = join(here, "..", "..", "..");
+const inner = join(here, "node_modules", "code-server", "lib", "vscode");
+const LOADING = 60_000;
+
+const SETTINGS = {
+  "chat.disableAIFeatures": true,
+  "chat.commandCenter.enabled": false,
+  "extensions.autoCheckUpdates": false,
+  "extensions.ignoreRecommendations": true,
+  "files.exclude": { "**/.venv": true },
+  "git.enabled": false,
+  "security.workspace.trust.enabled": false,
+  "telemetry.telemetryLevel": "off",
+  "update.mode": "none",
+  "workbench.colorTheme": "Default Dark Modern",
+  "workbench.enableExperiments": false,
+  "workbench.startupEditor": "none",
+  "workbench.tips.enabled": false,
+  "editor.fontSize": 13,
+  "editor.minimap.enabled": false,
+  "editor.accessibilitySupport": "off",
+  "files.simpleDialog.enable": true,
+  "task.problemMatchers.neverPrompt": true,
+};
+
+function freePort() {
+  return new Promise((resolve, reject) => {
+    const probe = createServer();
+    probe.on("error", reject);
+    probe.listen(0, "127.0.0.1", () => {
+      const { port } = probe.address();
+      probe.close(() => resolve(port));
+    });
+  });
+}
+
+/** The server with the extension installed from its package, and a browser. Close it in the end, whatever happens. */
+export async function start(vsix, chromiumPath) {
+  const folder = mkdtempSync(join(tmpdir(), "potto-e2e-"));
+  const workspace = join(folder, "workspace");
+  cpSync(join(here, "workspace"), workspace, { recursive: true });
+  const lost = join(folder, "lost"); // a workspace whose setting names no server
+  mkdirSync(join(lost, ".vscode"), { recursive: true });
+  cpSync(join(here, "workspace", "shapes.po"), join(lost, "shapes.po"));
+  writeFileSync(join(lost, ".vscode", "settings.json"), JSON.stringify({ "potto.server.path": "/nowhere/potto" }));
+  const data = join(folder, "data");
+  mkdirSync(join(data, "data", "Machine"), { recursive: true });
+  writeFileSync(join(data, "data", "Machine", "settings.json"), JSON.stringify(SETTINGS));
+  const common = ["--accept-server-license-terms", "--server-data-dir", data, "--extensions-dir", join(data, "ext")];
+  const main = join(inner, "out", "server-main.js");
+  symlinkSync(join(root, ".venv"), join(workspace, ".venv")); // where the extension is to find the language server
+  // Terminals need a native module, which is built where there is a compiler.
+  const terminal = existsSync(join(inner, "node_modules", "node-pty", "build", "Release", "pty.node"));
+  const env = { ...process.env, POTTO_E2E_TERMINAL: terminal ? "1" : "" };
+  const installed = spawnSync(process.execPath, [main, ...common, "--install-extension", vsix], { env, encoding: "utf8" });
+  if (installed.status !== 0) throw new Error(`the extension was not installed:\n${installed.stdout}${installed.stderr}`);
+  const port = await freePort();
+  const server = spawn(
+    process.execPath,
+    [main, ...common, "--host", "127.0.0.1", "--port", String(port), "--without-connection-token", "--disable-telemetry",
+      "--disable-workspace-trust", "--enable-smoke-test-driver"],
+    { env, stdio: ["ignore", "pipe", "pipe"] },
+  );
+  let said = "";
+  for (const stream of [server.stdout, server.stderr]) stream.on("data", (text) => (said += text));
+  let browser;
+  const close = async () => {
+    await browser?.close();
+    const ended = new Promise((resolve) => server.on("exit", resolve));
+    server.kill();
+    await Promise.race([ended, new Promise((resolve) => setTimeout(resolve, 3000))]);
+    if (server.exitCode === null) server.kill("SIGKILL");
+    if (process.env.POTTO_E2E_KEEP) console.log(`kept: ${folder}`);
+    else rmSync(folder, { recursive: true, force: true, maxRetries: 5 });
+  };
+  try {
+    await answering(`http://127.0.0.1:${port}/`, server, () => said);
+    browser = await chromium.launch({
+      executablePath: chromiumPath,
+      args: ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
+        "--disable-component-update", "--disable-sync"],
+    });
+  } catch (error) {
+    await close();
+    throw error;
+  }
+  return { port, workspace, lost, browser, terminal, close, said: () => said };
+}
+
+async function answering(url, server, said) {
+  const until = Date.now() + LOADING;
+  while (Date.now() < until) {
+    if (server.exitCode !== null) throw new Error(`the server ended:\n${said()}`);
+    try {
+      if ((await fetch(url)).ok) return;
+    } catch {
+      // not yet
+    }
+    await new Promise((resolve) => setTimeout(resolve, 100));
+  }
+  throw new Error(`the server does not answer:\n${said()}`);
+}
+
+/** A window on a folder. `payload` are pairs that Visual Studio Code's web page understands. */
+export async function open(code, folder, payload, prepare = async () => undefined) {
+  const context = await code.browser.newContext({ viewport: { width: 1280, height: 800 } });
+  const page = await context.newPage();
+  const local = new URL(`http://127.0.0.1:${code.port}/`);
+  await page.route("**/*", (route) => {
+    const { hostname, protocol } = new URL(route.request().url());
+    const inside = hostname === local.hostname || hostname.endsWith(".vscode-resource.vscode-cdn.net") || !/^(https?|wss?):/.test(protocol);
+    return inside ? route.continue() : route.abort();
+  });
+  await prepare(page);
+  const query = new URLSearchParams({ folder, payload: JSON.stringify([["skipWelcome", "true"], ...payload]) });
+  await page.goto(`${local}?${query}`);
+  return page;
+}
+
+export const remote = (code, path) => `vscode-remote://127.0.0.1:${code.port}${path}`;
