@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.stamp
 VSCODE := editors/vscode
 
-.PHONY: demo test quick check format clean vsix
+.PHONY: demo test quick check format clean vsix e2e
 
 demo: $(STAMP)  ## the paper's programs, evaluated and differentiated
 	@PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python examples/demo.py
@@ -23,6 +23,9 @@ check: $(STAMP)  ## lints, types, floors
 
 vsix: $(VSCODE)/node_modules/.stamp  ## the extension for Visual Studio Code, checked, tested and packaged
 	cd $(VSCODE) && npm run --silent check && npm run --silent test && npm run --silent package
+
+e2e: $(STAMP)  ## the editors: the packaged extension in a real Visual Studio Code, and Neovim, Emacs, Vim (INSTALL=1 gets what is missing)
+	INSTALL=$(INSTALL) sh editors/e2e.sh
 
 format: $(STAMP)  ## what ruff can put right by itself
 	$(BIN)/ruff check --fix .

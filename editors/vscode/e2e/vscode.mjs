@@ -17,6 +17,7 @@ const SETTINGS = {
   "chat.commandCenter.enabled": false,
   "extensions.autoCheckUpdates": false,
   "extensions.ignoreRecommendations": true,
+  "files.autoSave": "off",
   "files.exclude": { "**/.venv": true },
   "git.enabled": false,
   "security.workspace.trust.enabled": false,

@@ -57,7 +57,7 @@ export function span(arrays: Iterable<ArrayLike<number>>): [number, number] {
 export function short(number: number, digits = 6): string {
   if (!Number.isFinite(number)) return Number.isNaN(number) ? "no value" : number > 0 ? "∞" : "−∞";
   const text = Number(number.toPrecision(digits)).toString();
-  return text.replace("-", "−").replace(/e\+?(.*)$/, " · 10^$1");
+  return text.replaceAll("-", "−").replace("e+", "e");
 }
 
 /** A value to the digits that its error bears out, and the error. */

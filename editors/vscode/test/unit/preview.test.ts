@@ -85,7 +85,7 @@ test("numbers are written to the digits that their errors bear out", () => {
   assert.equal(estimated(0.123456789, 1e-4), "0.1235 ± 0.0001");
   assert.equal(estimated(-2, 0), "−2 ± 0");
   assert.equal(estimated(NaN, NaN), "no value");
-  assert.equal(short(1.5e-9), "1.5 · 10^-9".replace("-", "−"));
+  assert.equal(short(1.5e-9), "1.5e−9");
   assert.equal(label(0.30000000000000004, 0, 1), "0.3");
   assert.deepEqual(ticks(0, 1, 5).map((tick) => label(tick, 0, 1)), ["0", "0.2", "0.4", "0.6", "0.8", "1"]);
 });

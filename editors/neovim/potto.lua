@@ -1,0 +1,89 @@
+-- Potto in Neovim 0.7 or newer: put this file into `lua/` of your configuration and call `require("potto").setup()`.
+local M = {}
+
+local defaults = {
+  cmd = { "potto", "lsp" },
+  settings = { potto = {} },
+  on_attach = nil,
+}
+
+--- The nearest folder above a file that looks like the root of a project.
+local function root_of(path)
+  local start = vim.fn.fnamemodify(path, ":p:h")
+  for _, mark in ipairs({ "potto.toml", ".git" }) do
+    for _, found in ipairs({ vim.fn.findfile(mark, start .. ";"), vim.fn.finddir(mark, start .. ";") }) do
+      if found ~= "" then
+        return (vim.fn.fnamemodify(found, ":p"):gsub("/$", ""):gsub("/[^/]*$", ""))
+      end
+    end
+  end
+  return start
+end
+
+local clients = {} -- by root
+
+local function attach(buffer, options)
+  local name = vim.api.nvim_buf_get_name(buffer)
+  if name == "" then
+    return
+  end
+  local root = root_of(name)
+  local id = clients[root]
+  if not id or not vim.lsp.get_client_by_id(id) then
+    local capabilities = vim.lsp.protocol.make_client_capabilities()
+    id = vim.lsp.start_client({
+      name = "potto",
+      cmd = options.cmd,
+      root_dir = root,
+      workspace_folders = { { uri = vim.uri_from_fname(root), name = root } },
+      settings = options.settings,
+      init_options = options.settings,
+      capabilities = capabilities,
+      on_attach = options.on_attach,
+    })
+    clients[root] = id
+  end
+  if id then
+    vim.lsp.buf_attach_client(buffer, id)
+  end
+end
+
+--- Ask the server of a buffer to run one of its commands, and show the text that it answers.
+local function command(name, ...)
+  local arguments = { vim.uri_from_bufnr(0), ... }
+  vim.lsp.buf_request(0, "workspace/executeCommand", { command = name, arguments = arguments }, function(failure, result)
+    if failure then
+      vim.notify(failure.message, vim.log.levels.ERROR)
+    elseif result and result.text then
+      vim.lsp.util.open_floating_preview(vim.split(result.text, "\n"), "potto", { border = "single" })
+    end
+  end)
+end
+
+--- Start the server for Potto files. `options`: `cmd`, `settings`, `on_attach`.
+function M.setup(options)
+  options = vim.tbl_deep_extend("force", defaults, options or {})
+  local group = vim.api.nvim_create_augroup("potto", { clear = true })
+  vim.api.nvim_create_autocmd("FileType", {
+    group = group,
+    pattern = "potto",
+    callback = function(event)
+      attach(event.buf, options)
+    end,
+  })
+  vim.api.nvim_create_user_command("PottoEvaluate", function(given)
+    command("potto.evaluate", given.args)
+  end, { nargs = 1, desc = "The value of an expression in the names of this file" })
+  vim.api.nvim_create_user_command("PottoDerivative", function(given)
+    command("potto.differentiate", given.args ~= "" and given.args or vim.fn.expand("<cword>"))
+  end, { nargs = "?", desc = "The derivative of a definition, in symbols" })
+  vim.api.nvim_create_user_command("PottoRun", "!potto run %", { desc = "Run this file" })
+  vim.api.nvim_create_user_command("PottoRepl", "botright split | terminal potto repl %", { desc = "A prompt with the names of this file" })
+  for _, buffer in ipairs(vim.api.nvim_list_bufs()) do
+    if vim.api.nvim_buf_is_loaded(buffer) and vim.bo[buffer].filetype == "potto" then
+      attach(buffer, options)
+    end
+  end
+end
+
+return M
