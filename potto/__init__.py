@@ -14,6 +14,7 @@ from potto.settings import settings
 if TYPE_CHECKING:
     from potto.api import Function, Module, Workspace, compile, deriv, grad, load
     from potto.fitting import fit
+    from potto.hessian import hvp
     from potto.integrate.costs import counting
     from potto.runtime.estimate import Estimate
 
@@ -30,11 +31,17 @@ __all__ = [
     "deriv",
     "fit",
     "grad",
+    "hvp",
     "load",
     "settings",
 ]
 
-_HOMES = {"Estimate": "potto.runtime.estimate", "counting": "potto.integrate.costs", "fit": "potto.fitting"}
+_HOMES = {
+    "Estimate": "potto.runtime.estimate",
+    "counting": "potto.integrate.costs",
+    "fit": "potto.fitting",
+    "hvp": "potto.hessian",
+}
 
 
 def __getattr__(name: str) -> Any:

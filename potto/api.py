@@ -283,6 +283,12 @@ def _labelled(
     return found
 
 
+def bound(function: Function, args: tuple[Any, ...], kwargs: dict[str, Any]) -> builtins.list[tuple[str, Any]]:
+    """The arguments of a call under the names of their parameters. Raises PottoError if some are missing."""
+    labelled = _labelled((*function._given, (args, kwargs)), groups_of(function._whole))
+    return [(label, argument) for label, argument, _ in labelled]
+
+
 class GradientFunction:
     """A function that also answers with its derivatives by some of its parameters."""
 

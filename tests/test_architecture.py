@@ -15,7 +15,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     ("potto_lsp", "potto_repl", "potto.__main__", "potto.cli"),
     (
         "potto.ide", "potto.session", "potto.api", "potto.calls", "potto.arguments", "potto.live", "potto.world",
-        "potto.fitting", "potto.images", "potto.bench",
+        "potto.fitting", "potto.hessian", "potto.images", "potto.bench",
     ),
     ("potto.runtime",),
     ("potto.kernels", "potto.integrate"),

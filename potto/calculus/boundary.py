@@ -169,20 +169,20 @@ def at_bounds(node: Integral, rate: Rate) -> list[Term]:
 
 
 def between(at: Term, lo: Term, hi: Term, value: Term) -> Term:
-    """`value` where lo < at < hi, minus it where hi < at < lo, 0 elsewhere and where `at` is nan."""
-    upward = above(sub(at, lo), above(sub(hi, at), value)) if _finite(lo) or _finite(hi) else value
-    if not _finite(lo):
-        upward = above(sub(hi, at), value) if _finite(hi) else exists(at, value)
-    elif not _finite(hi):
-        upward = above(sub(at, lo), value)
+    """`value` where lo < at < hi, minus it where hi < at < lo, 0 elsewhere and where `at` is not a number."""
+    upward = value
+    if _finite(hi):
+        upward = above(sub(hi, at), upward)
+    if _finite(lo):
+        upward = above(sub(at, lo), upward)
     if not (_finite(lo) and _finite(hi)) or range_of(sub(hi, lo)).lo >= 0:
-        return upward
+        return exists(at, upward)
     downward = above(sub(lo, at), above(sub(at, hi), scaled(value, neg(ONE))))
-    return branch((sub(hi, lo),), False, upward, downward)
+    return exists(at, branch((sub(hi, lo),), False, upward, downward))
 
 
 def exists(at: Term, value: Term) -> Term:
-    """`value` where `at` is a number: over the whole line that is the only condition."""
+    """`value` where `at` is a number, else 0: these conditions come first, since a comparison with nan is nan."""
     guards = [n.surface for n in postorder(at) if isinstance(n, Branch) and n.orelse is NAN]
     for surface in guards:
         value = branch((surface,), False, value, zero_like(value))

@@ -1,23 +1,41 @@
-"""`potto deriv`: a derivative in symbols."""
+"""`potto deriv`: a derivative in symbols; with arguments, in numbers, by all parameters at once."""
 
 from __future__ import annotations
 
 import argparse
 import difflib
 from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
 
+from potto.cli.calling import argument_in, arguments_in, assignment, function_in
 from potto.cli.console import Console
+from potto.cli.numbers import accounts, add_options, settings_of, show_stats
 
-SUMMARY = "show the derivative of a definition: type, interior, boundary, surfaces"
-EXAMPLE = "  potto deriv examples/paper/renderer.po renderer"
+if TYPE_CHECKING:
+    from potto.calls import Gradient
+    from potto.world import World
+
+SUMMARY = "show the derivative of a definition in symbols, or its gradient in numbers"
+EXAMPLE = """  potto deriv examples/paper/renderer.po renderer
+  potto deriv examples/worked/picture.po pixel x=0.7 y=0 r=0.7 --wrt r,x --along r=1"""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", help="the program; `-` reads it from standard input")
     parser.add_argument("name", metavar="NAME", help="the definition")
+    parser.add_argument("given", metavar="NAME=EXPR", nargs="*", type=assignment,
+                        help="what its parameters are given: then the derivatives are numbers")  # fmt: skip
+    parser.add_argument("--wrt", metavar="A,B", help="the parameters to differentiate by (default: all numbers)")
+    parser.add_argument("--along", metavar="NAME=EXPR", action="append", default=[], type=assignment,
+                        help="also the Hessian times the vector that has these components")  # fmt: skip
+    add_options(parser)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
+    return _numbers(options, console) if options.given or options.along or options.wrt else _symbols(options, console)
+
+
+def _symbols(options: argparse.Namespace, console: Console) -> int:
     from potto.cli.opening import fail, opened
     from potto.facts import derivative_facts
     from potto.library import NO_SUCH_DEFINITION, NOWHERE, Library
@@ -45,3 +63,73 @@ def run(options: argparse.Namespace, console: Console) -> int:
     else:
         console.answer(facts.text)
     return 0
+
+
+# In numbers
+
+
+def _numbers(options: argparse.Namespace, console: Console) -> int:
+    from potto.cli.opening import fail, opened
+
+    chosen = settings_of(options, console)
+    if chosen is None:
+        return 2
+    from potto.diagnostics import PottoError
+    from potto.settings import settings
+    from potto.world import World
+
+    world = World(["."])
+    try:
+        file = opened(world, options.file)
+        world.require(file)
+        with settings(**asdict(chosen)), accounts(options):
+            once, twice = _taken(world, file, options)
+    except PottoError as error:
+        return fail(error, options, console)
+    _tell(once, twice, options, console)
+    if options.stats:
+        show_stats([once] if twice is None else [once, twice], console)
+    return 0
+
+
+def _taken(world: World, file: str, options: argparse.Namespace) -> tuple[Gradient, Gradient | None]:
+    """The gradient, and the Hessian's product with the vector if one is given. Raises PottoError."""
+    from potto.api import Function, grad
+    from potto.hessian import hvp
+
+    function = function_in(world, file, options.name)
+    given = arguments_in(world, file, options.given)
+    numbers = [name for name in function.parameters if not isinstance(given.get(name), Function)]
+    wrt = numbers if options.wrt is None else [name.strip() for name in options.wrt.split(",")]
+    once = grad(function, wrt)(**given)
+    if not options.along:
+        return once, None
+    return once, hvp(function, {name: argument_in(world, file, text) for name, text in options.along})(**given)
+
+
+def _tell(once: Gradient, twice: Gradient | None, options: argparse.Namespace, console: Console) -> None:
+    from potto.runtime.shown import format_numbers, json_number
+
+    def sides(found: Gradient) -> list[tuple[str, Any, Any]]:
+        errors = found.tangent_error if len(found.wrt) > 1 else (found.tangent_error,)
+        return [(name, found[name], error) for name, error in zip(found.wrt, errors, strict=True)]
+
+    if options.json:
+        answer: dict[str, Any] = {"value": json_number(once.value), "error": json_number(once.error)}
+        for key, found in (("gradient", once), ("hessian_product", twice)):
+            if found is not None:
+                answer[key] = {name: json_number(value) for name, value, _ in sides(found)}
+                answer[f"{key}_error"] = {name: json_number(error) for name, _, error in sides(found)}
+        both = [found for found in (once, twice) if found is not None]
+        answer |= {"converged": all(f.converged for f in both), "evals": sum(f.evals for f in both)}
+        console.answer_json(answer)
+        return
+    console.answer(f"{options.name} = {format_numbers(once.value, once.error)}")
+    for name, value, error in sides(once):
+        console.answer(f"  by {name}: {format_numbers(value, error)}")
+    if twice is not None:
+        console.answer(f"Hessian times ({', '.join(f'{name}={text}' for name, text in options.along)})")
+        for name, value, error in sides(twice):
+            console.answer(f"  by {name}: {format_numbers(value, error)}")
+    for reason in dict.fromkeys((*once.reasons, *(twice.reasons if twice is not None else ()))):
+        console.complain(f"warning: not as accurate as was asked: {reason}")

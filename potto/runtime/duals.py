@@ -29,6 +29,7 @@ def call_derivative(
         primal = dual_function(machine, primal.primal)
         machine.books.second = True
     if machine.directions or isinstance(primal, Paired):
+        machine.books.second = machine.books.second or machine.directions > 0
         return machine.call(dual_function(machine, primal), groups, None)
     _, arities = machine.linker_shape(primal.lam, len(groups))
     carrying = machine.with_directions(1)
