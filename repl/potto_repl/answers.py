@@ -121,6 +121,9 @@ def _advice(session: Conversation, missing: list[str]) -> str:
     if not any(isinstance(reference.statement, nodes.ExpressionStatement) for reference in written):
         return ""
     named = " and ".join(f"`{name}`" for name in missing)
+    called = [name for name in missing if re.search(rf"\b{re.escape(name)}\s*\(", expression)]
+    if called:
+        return f"define {named} first, such as `def {called[0]}(x) x^2`; `:load FILE` brings what a file defines"
     function = f"\\({', '.join(missing)}) . {expression}"
     return f"define {named} first, such as `{missing[0]} = 0.5`; or make a function: `{function}`"
 

@@ -47,7 +47,7 @@ def _picture(part: Part, look: Look) -> str:
     picture = data.get("_picture")
     if isinstance(picture, Plot):
         width = max(20, min(look.width - 14, 72))
-        shown = braille(picture, width, unicode=look.unicode, color=look.color)
+        shown = braille(picture, width, data.get("_height", 12), unicode=look.unicode, color=look.color)
         return f"{shown}\n{data['_scale']}" if data.get("_scale") else shown
     if isinstance(picture, Image):
         if not look.color:

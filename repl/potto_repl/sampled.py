@@ -27,6 +27,7 @@ from potto_repl.reply import Refusal
 from potto_repl.session import Conversation
 
 Pair = tuple[float, float]  # a value and its error
+BANDS = 16  # of an image, one after the other, where somebody watches
 RTOL = 1e-5  # of a picture: finer than any pixel
 
 
@@ -47,7 +48,7 @@ class Axes:
 
 def axes_of(session: Conversation, text: str, count: int, usage: str) -> Axes:
     """An expression as a function of its axes. Raises Refusal, ProgramError."""
-    free = _free(session, text)
+    free = free_names(session, text)
     if free:
         if len(free) != count:
             listed = ", ".join(f"`{name}`" for name in free)
@@ -68,7 +69,7 @@ def derivative_of(session: Conversation, text: str, count: int, by: str, usage: 
     plain = axes_of(session, text, count, usage)
     names = list(plain.names)
     fixed: tuple[float, ...] = ()
-    inside = f"({text})({', '.join(names)})" if not _free(session, text) else f"({text})"
+    inside = f"({text})({', '.join(names)})" if not free_names(session, text) else f"({text})"
     if by not in names:
         if session.target(by) is None:
             axes = ", ".join(names)
@@ -92,7 +93,7 @@ def _axes(session: Conversation, text: str, asked: Asked) -> Axes:
     return Axes(text, names, Function(session.world, session.file, asked.expr, asked.type), dual)
 
 
-def _free(session: Conversation, text: str) -> list[str]:
+def free_names(session: Conversation, text: str) -> list[str]:
     """The names of an expression that mean nothing, in order."""
     parsed = parse_expression(text)
     if any(d.severity == "error" for d in parsed.diagnostics) or isinstance(without_parens(parsed.expr), nodes.Name):
@@ -125,8 +126,17 @@ def grid(
     across = evenly(x0 + dx / 2, x1 - dx / 2, columns)
     down = evenly(y1 - dy / 2, y0 + dy / 2, rows)
     points = [[x for _ in range(rows) for x in across.tolist()], [y for y in down.tolist() for _ in range(columns)]]
-    parts = _sampled(session, axes, [_array(place) for place in points])
-    return [[value for value, _ in part] for part in parts]
+    size = max(1, rows // BANDS) * columns if session.progress is not None else rows * columns
+    found: list[list[float]] = []
+    for start in range(0, rows * columns, size):
+        stop = min(start + size, rows * columns)
+        parts = _sampled(session, axes, [_array(place[start:stop]) for place in points])
+        found = found or [[] for _ in parts]
+        for pixels, part in zip(found, parts, strict=True):
+            pixels += [value for value, _ in part]
+        if session.progress is not None:
+            session.progress(f"{axes.label}: {stop} of {rows * columns} pixels", stop / (rows * columns))
+    return found
 
 
 def _array(numbers: Sequence[float]) -> Any:

@@ -37,7 +37,9 @@ def slopes(session: Conversation, called: Called) -> Iterator[Slope]:
     if not numbers:
         why = f"`{called.head.text}` has no number among its parameters"
         raise Refusal(f"{why}, so there is nothing to differentiate by")
-    for name in numbers:
+    for place, name in enumerate(numbers):
+        if session.progress is not None:
+            session.progress(f"by {name}", place / len(numbers))
         text = dual_text(called, name)
         expr = checked(session, text, ":grad f(0.3)").expr
         dual = as_dual(session.evaluate(text, session.settings).estimate)

@@ -149,6 +149,10 @@ def test_free_names_are_to_be_defined(talk):
     assert "define `x` and `t` first" in reply.text and r"`\(x, t) . x + t`" in reply.text
 
 
+def test_a_function_that_is_missing_is_to_be_defined_as_one(talk):
+    assert "such as `def area(x) x^2`" in talk("1 + area(3)").text
+
+
 def test_the_rule_is_said_with_the_place_in_the_entry(talk):
     reply = talk("def f(t)\n    integral [0, 1] (if x < t then 1 else 0) d(x)")
     assert "error[P0301]" in reply.text and "<In 1>:2:25" in reply.text

@@ -459,12 +459,19 @@ def test_image(talk):
 
 def test_fit_finds_the_minimum_through_a_boundary_term(talk):
     talk.all(JUMP, "def loss(t) (f(t) - 0.25)^2")
-    data = talk.data(":fit loss t=0.9")
+    data = talk(":fit loss t=0.9").parts[0].data
     assert data["parameters"]["t"] == pytest.approx(0.25, abs=1e-6) and data["converged"]
+
+
+def test_fit_of_an_expression_over_its_free_names(talk):
+    data = talk(":fit (x - 2)^2 + exp(y) + y^2 x=1, y=3").parts[0].data
+    assert data["parameters"] == pytest.approx({"x": 2, "y": -0.35173371124919584}, abs=1e-6)  # exp(y) = -2y
 
 
 def test_fit_of_two_numbers_with_one_fixed(talk):
     talk("def rosenbrock(a, b, k) (1 - a)^2 + k*(b - a^2)^2")
-    data = talk.data(":fit rosenbrock a=-1.2, b=1 with k=100")
+    reply = talk(":fit rosenbrock a=-1.2, b=1 with k=100")
+    data = reply.parts[0].data
+    assert "log10 rosenbrock from step to step" in reply.text and talk(":save loss.svg").text.startswith("loss.svg")
     assert data["parameters"] == pytest.approx({"a": 1, "b": 1}, abs=1e-5)
     assert talk(":fit rosenbrock").failed and talk(":fit rosenbrock z=1").failed

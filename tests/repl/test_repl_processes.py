@@ -141,11 +141,17 @@ def test_a_talk_on_a_screen(tmp_path):
 def test_an_interrupt_ends_the_evaluation_and_nothing_else(tmp_path):
     screen = Screen(tmp_path)
     screen.say("def f(t) 2*t", "f : ")
+    screen.say(":set samples 1000000000", "samples")
+    screen.say(":set max_evals 1000000000", "max_evals")
+    rough = "integral ([0,1],[0,1]) sin(300*u*v*x)*[sin(20*u)*y+v*v>0.3] d(u,v)"
     slow = [
         "integral ([0,1],[0,1],[0,1]) sin(1000*x*y*z)*[sin(20*x)+y*y>z] d(x,y,z)",
         "sum i in 1..9000000 (sum j in 1..50 (sin(i*j)))",
+        f":image {rough} 128",
+        "integral ([0,1],[0,1],[0,1]) sin(x*y*z) d(x,y,z)",  # by samples
     ]
     for line in slow:
+        screen.say(f":method {'mc' if line is slow[-1] else 'auto'}", "method")
         screen.process.sendline(line)
         screen.process.expect(r"Ctrl-C stops")
         start = time.perf_counter()

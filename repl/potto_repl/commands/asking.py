@@ -15,7 +15,7 @@ from potto.modules import DefinitionTarget, ModuleTarget, chunk_start, names, re
 from potto.modules.lookup import find_module, resolve_module, scope
 from potto.modules.texts import chunk_text
 from potto.render import display_name
-from potto.syntax import nodes
+from potto.syntax import nodes, print_expression
 from potto.types import derivative_type, format_type, interface
 from potto.types.types import Diffeo, Function
 from potto_repl.documentation import documentation, documented
@@ -79,6 +79,10 @@ def derivative_text(session: Conversation, asked: Asked) -> DerivativeText:
 def show_surfaces(session: Conversation, text: str) -> Part:
     """Show where the value or the integrand of an expression jumps, and which parameters move that place."""
     asked = checked(session, text, ":surfaces f")
+    expr = without_parens(asked.expr)
+    while isinstance(expr, nodes.Apply):  # a call jumps where the function does
+        expr = without_parens(expr.function)
+        asked = checked(session, print_expression(expr), ":surfaces f")
     found = surfaces(session.db, session.file, asked.expr)
     moved: dict[str, str] = {}
     if isinstance(asked.type, Function):

@@ -5,21 +5,28 @@ Owns how a fit is asked for and told at the prompt; the fitting itself is `potto
 
 from __future__ import annotations
 
+import math
 import re
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from potto.api import Function
 from potto.fitting import Step
 from potto.fitting import fit as fitted
 from potto.runtime.printing import format_number
 from potto.settings import settings
+from potto_repl.drawing import braille
 from potto_repl.expressions import checked, split_items
+from potto_repl.pictures import Curve, Plot
 from potto_repl.registry import command
 from potto_repl.reply import Part, Refusal
+from potto_repl.sampled import free_names
 from potto_repl.session import Conversation, plain_names
 from potto_repl.values import seconds
 
+ROUNDING = 1e-16  # of the largest value: what lies below says nothing
+FEWEST = 3  # steps that are worth a picture
+HEIGHT = 6  # of that picture in lines
 PATIENCE = 0.5  # seconds before progress is shown
 
 
@@ -30,7 +37,8 @@ def fit(session: Conversation, text: str) -> Iterator[Part]:
     Parameters after `with` keep what they are given: `:fit loss c=-0.5 with shader=lin_shader`.
     """
     name, start, fixed = _read(plain_names(text))
-    asked = checked(session, name, ":fit loss t=0.5")
+    free = [n for n in free_names(session, name) if n in start or n in fixed]
+    asked = checked(session, f"\\({', '.join(free)}) . ({name})" if free else name, ":fit loss t=0.5")
     function = Function(session.world, session.file, asked.expr, asked.type)
     given = {n: _fixed(session, value) for n, value in fixed.items()}
     begun = time.perf_counter()
@@ -50,7 +58,24 @@ def fit(session: Conversation, text: str) -> Iterator[Part]:
             "steps": len(found.steps) - 1, "converged": found.converged}  # fmt: skip
     yield Part("answer", "\n".join(said), data)
     count = len(found.steps) - 1
+    if count >= FEWEST:
+        yield _course(session, name, [step.value for step in found.steps])
     yield Part("tail", f"{count} steps, {found.evaluations} evaluations, {seconds(time.perf_counter() - begun)}")
+
+
+def _course(session: Conversation, name: str, values: Sequence[float]) -> Part:
+    """The value from step to step as a picture; its logarithm where it falls far."""
+    least, most = min(values), max(values)
+    logarithm = least > 0 and most > 100 * least
+    heights = [math.log10(max(value, ROUNDING * most)) for value in values] if logarithm else list(values)
+    label = f"log10 {name}" if logarithm else name
+    picture = Plot((label,), (Curve.even(heights, 0, len(values) - 1),), 0, len(values) - 1, "step")
+    session.last_picture = picture
+    said = f"{label} from step to step"
+    width = max(20, min(session.width() - 14, 72))
+    shown = braille(picture, width, HEIGHT, unicode=session.options.unicode)
+    data = {"course": list(values), "_picture": picture, "_scale": said, "_height": HEIGHT}
+    return Part("picture", f"{shown}\n{said}", data)
 
 
 def _read(text: str) -> tuple[str, dict[str, str], dict[str, str]]:
