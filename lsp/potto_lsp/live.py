@@ -21,7 +21,7 @@ from potto.modules import names
 from potto.query import Database, query
 from potto.render import Located
 from potto.source import Span
-from potto.syntax import live_expressions, parse_expression
+from potto.syntax import parse_expression
 from potto_lsp.evaluation import LIVE, POINTS, Task
 
 if TYPE_CHECKING:
@@ -110,6 +110,7 @@ class LiveValues:
         self._waiting: dict[Key, Task] = {}
         self._shown: set[str] = set()
         self._asked: dict[tuple[str, str], None] = {}
+        self._wrong: set[str] = set()  # files in which something was to be said about a value
         self._told = 0.0
 
     # What is known
@@ -144,8 +145,9 @@ class LiveValues:
         if document is None or "#>" not in document.text.text:
             return ()
         found = list(ide.live_diagnostics(analysis.db, file))
-        for live, value in ((live, self._values.get(key)) for live, key in self._live(file)):
-            found += () if value is None else _said(live, value)
+        if file in self._wrong:
+            for live, value in ((live, self._values.get(key)) for live, key in self._live(file)):
+                found += () if value is None else _said(live, value)
         return tuple(Located(file, said) for said in found)
 
     # What is to be known
@@ -157,7 +159,7 @@ class LiveValues:
         db = self._session.analysis.db
         return [
             (live, Key("live", file, live.text, (("expected", live.expected),), fingerprint(db, file, live.text)))
-            for live in live_expressions(text)[:MOST]
+            for live in ide.live_in(db, file)[:MOST]
         ]
 
     def _points(self, file: str, name: str) -> Iterator[tuple[ide.Point, Key]]:
@@ -201,9 +203,11 @@ class LiveValues:
     def _arrived(self, key: Key, answer: Mapping[str, Any]) -> None:
         if self._waiting.pop(key, None) is None:
             return
-        self._values[key] = Value(answer)
+        self._values[key] = value = Value(answer)
         if key.do != "live":
             return
+        if value.result.get("said"):
+            self._wrong.add(key.file)
         before = self._session.publisher.known(key.file)
         self._session.publisher.push(key.file)
         if self._session.publisher.known(key.file) != before:

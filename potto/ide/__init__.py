@@ -18,7 +18,7 @@ from potto.ide.hints import inlay_hints, resolve_inlay_hint
 from potto.ide.hovers import hover
 from potto.ide.lenses import code_lenses, resolve_code_lens
 from potto.ide.linking import document_links, linked_editing
-from potto.ide.living import live_diagnostics
+from potto.ide.living import live_diagnostics, live_in
 from potto.ide.model import (
     TOKEN_MODIFIERS,
     TOKEN_TYPES,
@@ -117,6 +117,7 @@ __all__ = [
     "kind_of",
     "linked_editing",
     "live_diagnostics",
+    "live_in",
     "outgoing_calls",
     "point_of",
     "points",

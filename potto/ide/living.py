@@ -1,6 +1,6 @@
 """Live expressions as the checker sees them: what is wrong with them, though they stand in comments.
 
-Owns `live_diagnostics`. What they give is for who evaluates.
+Owns `live_in` and `live_diagnostics`. What they give is for who evaluates.
 """
 
 from __future__ import annotations
@@ -13,7 +13,19 @@ from potto.ide.places import ChunkAt, all_chunks
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import live_expressions, parse_expression
+from potto.syntax.live import Live
 from potto.types import infer_expression
+
+
+def live_in(db: Database, file: str) -> tuple[Live, ...]:
+    """The live expressions of a file, in order."""
+    found: list[Live] = []
+    for chunk in all_chunks(db, file):
+        for live in lives(db, chunk.text) if "#>" in chunk.text else ():
+            span, text_span = live.span.shift(chunk.start), live.text_span.shift(chunk.start)
+            expected = None if live.expected_span is None else live.expected_span.shift(chunk.start)
+            found.append(replace(live, span=span, text_span=text_span, expected_span=expected))
+    return tuple(found)
 
 
 def live_diagnostics(db: Database, file: str) -> tuple[Diagnostic, ...]:
@@ -22,11 +34,17 @@ def live_diagnostics(db: Database, file: str) -> tuple[Diagnostic, ...]:
 
 
 def _of_chunk(db: Database, chunk: ChunkAt) -> Iterator[Diagnostic]:
-    for live in live_expressions(chunk.text):
+    for live in lives(db, chunk.text):
         yield from (_placed(said, chunk.start, live.text_span) for said in wrong_with(db, chunk.file, live.text))
         if live.expected is not None and live.expected_span is not None:
             found = wrong_with(db, chunk.file, live.expected)
             yield from (_placed(said, chunk.start, live.expected_span) for said in found)
+
+
+@query(keep=8192)
+def lives(db: Database, text: str) -> tuple[Live, ...]:
+    """The live expressions of a chunk."""
+    return live_expressions(text)
 
 
 @query(keep=4096)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from potto.ide.documents import kind_of
 from potto.ide.places import all_chunks
 from potto.ide.symbols import callee
-from potto.modules import names
+from potto.modules import names, parsed
 from potto.query import Database, query
 from potto.syntax import children, live_expressions, nodes, parse_expression
 from potto.types import Function, Parameter, Real, TupleOf, Type, Var, groups_of, interface, result_of
@@ -38,30 +38,40 @@ def points(db: Database, file: str, name: str) -> tuple[Point, ...]:
     if kind != "function":
         return (Point(name),) if kind == "constant" else ()
     found: dict[str, Point] = {}
-    for text, call in calls(db, file):
-        made = _point(db, file, text, call)
-        if made is not None and made[0] == (file, name):
-            found.setdefault(made[1].text, made[1])
-            if len(found) == MOST:
-                break
+    for text in looking(db, file):
+        for target, point in points_in(db, file, text) if name in text else ():
+            if target == (file, name) and len(found) < MOST:
+                found.setdefault(point.text, point)
     return tuple(found.values()) or _chosen(db, file, name)
 
 
 @query
-def calls(db: Database, file: str) -> tuple[tuple[str, nodes.Apply], ...]:
-    """The calls outside of definitions that name nothing of their own, each with the text that its places are of."""
-    found: list[tuple[str, nodes.Apply]] = []
-    for chunk in all_chunks(db, file):
-        for live in live_expressions(chunk.text) if "#>" in chunk.text else ():
-            found += ((live.text, call) for call in _calls(parse_expression(live.text).expr))
-        match chunk.parsed(db).item:
+def looking(db: Database, file: str) -> tuple[str, ...]:
+    """The expressions of a file that look at its definitions: those of live expressions and of statements."""
+    return tuple(text for chunk in all_chunks(db, file) for text in _looking(db, chunk.text, chunk.diffeo))
+
+
+@query(keep=8192)
+def _looking(db: Database, text: str, diffeo: bool) -> tuple[str, ...]:
+    """Those of a chunk."""
+    found = [live.text for live in live_expressions(text)] if "#>" in text else []
+    shown: tuple[nodes.Expr, ...] = ()
+    if not text.startswith("def "):
+        match parsed(db, text, diffeo).item:
             case nodes.Print(arguments=arguments):
-                found += ((chunk.text, call) for argument in arguments for call in _calls(argument))
+                shown = arguments
             case nodes.ExpressionStatement(value=value):
-                found += ((chunk.text, call) for call in _calls(value))
+                shown = (value,)
             case _:
                 pass
-    return tuple(found)
+    return (*found, *(text[expr.span.start : expr.span.end] for expr in shown))
+
+
+@query(keep=8192)
+def points_in(db: Database, file: str, text: str) -> tuple[tuple[tuple[str, str], Point], ...]:
+    """The points in an expression in a file's scope, each with the definition that it is one of."""
+    made = (_point(db, file, text, call) for call in _calls(parse_expression(text).expr))
+    return tuple(found for found in made if found is not None)
 
 
 def _calls(node: nodes.Node) -> Iterator[nodes.Apply]:

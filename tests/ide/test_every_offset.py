@@ -12,6 +12,7 @@ import pytest
 import potto.ide as ide
 from potto.library import Library
 from potto.source import Span
+from potto.syntax import live_expressions
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 FILES = sorted(str(path.relative_to(EXAMPLES)) for suffix in ("po", "diffeo") for path in EXAMPLES.rglob(f"*.{suffix}"))
@@ -88,6 +89,7 @@ def ask_about_file(library: Library, file: str, text: str, whole: Span) -> None:
     ide.format_document(db, file)
     ide.inline_values(db, file, whole)
     ide.live_diagnostics(db, file)
+    assert ide.live_in(db, file) == live_expressions(text)
     for symbol in ide.document_symbols(db, file):
         ide.incoming_calls(db, file, symbol.name)
         ide.outgoing_calls(db, file, symbol.name)

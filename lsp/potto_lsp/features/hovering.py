@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from potto import ide
-from potto.syntax import live_expressions
 from potto_lsp import convert, protocol
 from potto_lsp.asking import Ask
 from potto_lsp.live import shown
@@ -22,7 +21,7 @@ def hover(ask: Ask) -> protocol.Hover | None:
 def _values(ask: Ask, offset: int) -> str:
     """The values of the definition that is named at an offset."""
     named = ide.definition_at(ask.db, ask.file, offset) if ask.session.live.enabled else None
-    if named is None:
+    if named is None or "#>" not in ask.analysis.text(named[0]).text:
         return ""
     return "\n".join(filter(None, (shown(*each) for each in ask.session.live.at_points(*named))))
 
@@ -31,7 +30,7 @@ def _live(ask: Ask, offset: int) -> protocol.Hover | None:
     """A live expression: its value, with what it is off by."""
     if "#>" not in ask.text.text:
         return None
-    if all(not live.span.start <= offset <= live.span.end for live in live_expressions(ask.text.text)):
+    if all(not live.span.start <= offset <= live.span.end for live in ide.live_in(ask.db, ask.file)):
         return None
     for live, value in ask.session.live.values(ask.file):
         if value is not None and live.span.start <= offset <= live.span.end:
