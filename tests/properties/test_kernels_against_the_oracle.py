@@ -1,11 +1,13 @@
 """The numpy kernels equal the oracle point by point: values, tangents, and branches forced to a side.
 
 The oracle works with 40 digits and more. Doubles are allowed 8 roundings, each as large as the term's condition makes
-it: what the value changes by when every leaf and every builtin's result is off by a relative 2^-53.
+it: what the value changes by when every builtin's result, and pi, which no double is, is off by a relative 2^-53. Where
+such a change decides which side a condition falls on (`sin(pi) > 0`), nothing is compared.
 """
 
 from __future__ import annotations
 
+import math
 import random
 from typing import Any
 
@@ -24,12 +26,14 @@ from potto.settings import DEFAULTS
 NAMES = ("x", "y", "t")
 POINTS = 7
 EPS = 2.0**-53
+# What a relative change of 2^-40 does at most to a number that is not on the edge of a condition.
+ON_AN_EDGE = 2.0**-20
 UNARY = ("sin", "cos", "exp", "tanh", "atan", "sinh", "cosh", "erf", "expm1", "abs", "neg", "asinh")
 POSITIVE = ("sqrt", "log", "log1p")
 
 
 def leaf(pick: random.Random) -> Term:
-    return pick.choice([*map(core.var, NAMES), core.const(0.5), core.const(-2.0), core.const(0.3), core.const(3.25)])
+    return pick.choice([*map(core.var, NAMES), core.const(0.5), core.const(-2.0), core.const(0.3), core.PI])
 
 
 def term(pick: random.Random, depth: int) -> Term:
@@ -65,12 +69,12 @@ def kernel(whole: Term, env: dict[str, Any], tangents: dict[str, Any] | None, tr
 
 
 def shaken(node: Term, pick: random.Random) -> Term:
-    """The term with every builtin's result off by about a rounding; so are its leaves, as those of sums."""
+    """The term with every builtin's result off by about a rounding, and so pi."""
     memo: dict[Term, Term] = {}
     for part in core.postorder(node):
         new = core.rebuild(part, tuple(memo[c] for c in core.children(part)))
         decides = isinstance(part, Prim) and part.op in ("lt", "le", "eq")
-        if isinstance(part, Prim) and not decides:
+        if (isinstance(part, Prim) and not decides) or part is core.PI:
             new = core.prim("mul", new, core.const(1.0 + pick.choice((-1, 1)) * 2.0**-40))
         memo[part] = new
     return memo[node]
@@ -81,9 +85,14 @@ def exact(whole: Term, env: dict[str, float]) -> Any:
 
 
 def allowed(whole: Term, env: dict[str, float], value: Any) -> float:
-    """8 times what roundings of 2^-53 may come to; measured with 2^-40, so that no difference is lost."""
+    """8 times what roundings of 2^-53 may come to; measured with 2^-40, so that no difference is lost.
+
+    Infinite where such a rounding decides what there is.
+    """
     pick = random.Random(0)
     moved = max(abs(float(exact(shaken(whole, pick), env) - value)) for _ in range(6))
+    if moved > ON_AN_EDGE * (1 + abs(float(value))):
+        return math.inf
     return 8 * (moved * 2.0**40 * EPS + EPS * abs(float(value)))
 
 
@@ -96,14 +105,18 @@ def at(env: dict[str, Any], i: int) -> dict[str, float]:
     return {n: float(v[i]) for n, v in env.items()}
 
 
-def check_values(seed: int) -> None:
-    whole, env = term(random.Random(seed), 4), points(seed)
+def check_values(seed: int) -> int:
+    """Compare one term at every point; at how many of them nothing could be said."""
+    whole, env, edges = term(random.Random(seed), 4), points(seed), 0
     got = np.broadcast_to(kernel(whole, env, None, None).v, (POINTS,))
     for i in range(POINTS):
         here = at(env, i)
         value = exact(whole, here)
         if mp.isfinite(value) and abs(value) < 1e150:
-            assert abs(got[i] - float(value)) <= allowed(whole, here, value), (seed, i, got[i], value)
+            bound = allowed(whole, here, value)
+            edges += bound == math.inf
+            assert abs(got[i] - float(value)) <= bound, (seed, i, got[i], value)
+    return edges
 
 
 def check_tangents(seed: int) -> None:
@@ -119,7 +132,7 @@ def check_tangents(seed: int) -> None:
             ahead, behind = ({n: mp.mpf(v) + k * h * speed[n] for n, v in here.items()} for k in (1, -1))
             slope = (evaluate(whole, ahead, digits=60) - evaluate(whole, behind, digits=60)) / (2 * h)
         # Derivatives are sums of many products: 1e-12 of the largest partial tells a wrong rule from a rounding.
-        if mp.isfinite(slope) and abs(slope) < 1e6:
+        if mp.isfinite(slope) and abs(slope) < 1e6 and allowed(whole, here, exact(whole, here)) < math.inf:
             assert abs(tangent[i] - float(slope)) <= 1e-11 * (1 + abs(float(slope))), (seed, i, tangent[i], slope)
 
 
@@ -165,6 +178,8 @@ def test_forced_sides(start: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("start", range(1000, 3000, 200))
 def test_many_terms(start: int) -> None:
+    edges = 0
     for seed in range(start, start + 200):
-        check_values(seed)
+        edges += check_values(seed)
         check_tangents(seed)
+    assert edges <= 0.02 * 200 * POINTS
