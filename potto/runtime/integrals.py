@@ -18,8 +18,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from potto.calculus.deciding import deciding
 from potto.calculus.surfaces import TooDeep
-from potto.core.terms import Deriv, Global, Integral, Lam, Sum, Term, Var, deriv, integral, postorder, substitute, var
+from potto.core.terms import Deriv, Integral, Lam, Term, Var, deriv, integral, substitute, var
 from potto.diagnostics import PottoError
 from potto.integrate.boxes import uncut
 from potto.integrate.levels import Iteration
@@ -373,22 +374,18 @@ def split_by_decisions(machine: Machine, term: Integral, linked: Linked, batch: 
 
 def deciding_names(machine: Machine, term: Integral, linked: Linked) -> frozenset[str]:
     """Parameters that reach the condition of a recursion or the bounds of a sum under the integral."""
-    names: set[str] = set()
-    recursive = False
-    seen: set[Term] = set()
-    todo: list[Term] = [term.body, *linked.functions.values()]
-    while todo:
-        for node in postorder(todo.pop()):
-            if isinstance(node, Global) and node not in seen:
-                seen.add(node)
-                found = machine.linker.function(node)
-                if found is not None:
-                    inside = postorder(found)
-                    recursive = recursive or any(n in seen for n in inside if isinstance(n, Global))
-                    recursive = recursive or any(isinstance(n, Sum) for n in inside)
-                    todo.append(found)
-            elif isinstance(node, Sum):
-                names |= node.lo.free | node.hi.free
-    if recursive:
-        names |= {n for n in term.free if isinstance(linked.env.get(n), Cell)}
-    return frozenset(names)
+    functions = tuple(f.digest for _, f in sorted(linked.functions.items()))
+    key = (term.digest, functions, machine.linker.reached(term, *linked.functions.values()))
+    found = _deciding.get(key)
+    if found is None:
+        found = deciding(
+            (term.body, *(bound for pair in term.bounds for bound in pair), *linked.functions.values()),
+            lambda head: linked.functions.get(head.name) if isinstance(head, Var) else machine.linker.function(head),
+        )
+        if len(_deciding) > MOST_PLANS:
+            _deciding.clear()
+        _deciding[key] = found
+    return found
+
+
+_deciding: dict[Any, frozenset[str]] = {}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 import potto
@@ -79,3 +80,30 @@ def test_a_condition_on_an_integral_whose_surface_moves_is_refused() -> None:
     with pytest.raises(PottoError) as caught:
         potto.compile("def f(t) integral [-1, 1] [(integral [0, 1] [y < 2*x + t] d(y)) < t] d(x)")
     assert caught.value.diagnostics[0].code == "P0402"
+
+
+def test_a_recursion_over_an_inner_variable_is_integrated_at_once() -> None:
+    """What ends the recursion is the same at all nodes, so they are one batch, whatever else the recursion is given."""
+    f = potto.compile("""
+def g(n, x, t) if n <= 0 then 1 else n*[x < n/3]*g(n - 1, x, t) + t
+def f(n, t) integral [0, 1] (integral [0, 1] g(n, x, t)*[y < t*x] d(y))^2 d(x)
+""").f
+    low, middle, high = 1.0, 0.0, 0.0  # g(4, x, t) for x below 1/3, below 2/3 and above
+    for n in range(1, 5):
+        low = n * low + T
+        middle = n * middle + T if n > 1 else T
+        high = n * high + T if n > 2 else T
+    expected = T**2 / 3 * (low**2 / 27 + middle**2 * 7 / 27 + high**2 * 19 / 27)
+    answer = f(4, T)
+    assert answer.value == pytest.approx(expected, rel=1e-13)
+    assert answer.error >= abs(answer.value - expected)
+    assert answer.stats["integrals"] < 20
+
+
+def test_recursions_of_different_depth_in_one_batch() -> None:
+    f = potto.compile("""
+def power(n, x) if n <= 0 then 1 else x*power(n - 1, x)
+def f(n, t) integral [0, t] power(n, x)*[x < t/2] d(x)
+""").f
+    n, t = np.array([0.0, 1, 2, 3, 2]), np.array([0.5, 1, 1.5, 2, 0.25])
+    assert f(n, t).value == pytest.approx((t / 2) ** (n + 1) / (n + 1), rel=1e-13)
