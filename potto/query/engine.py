@@ -30,7 +30,6 @@ from potto.query.nodes import (
 )
 
 STEPS: Final = 10
-NOTHING: Final[frozenset[Leaf]] = frozenset()
 LEAVES: Final = 64  # of a memo that are kept: to look at more takes as long as to walk
 SEGMENT: Final = 40  # levels of running queries on one thread: at 20 frames a level still below the limit
 
@@ -322,9 +321,10 @@ class Engine:
             self._depend(member, outside)
 
 
-def leaves_of(deps: tuple[Node, ...]) -> frozenset[Leaf] | None:
+def leaves_of(deps: tuple[Node, ...]) -> tuple[Leaf, ...] | None:
     """The undurable leaves below some nodes; None if there are more than `LEAVES`, or not all are known."""
-    sets: list[frozenset[Leaf]] = []
+    widest: tuple[Leaf, ...] = ()
+    others: list[tuple[Leaf, ...]] = []
     own: list[Leaf] = []
     for dep in deps:
         if dep.durability:
@@ -333,12 +333,16 @@ def leaves_of(deps: tuple[Node, ...]) -> frozenset[Leaf] | None:
             own.append(dep)
         elif dep.leaves is None:
             return None
-        elif dep.leaves:
-            sets.append(dep.leaves)
-    if not own and len(sets) <= 1:
-        return sets[0] if sets else NOTHING  # most chains are straight: they share one set
-    found = NOTHING.union(own, *sets)
-    return found if len(found) <= LEAVES else None
+        elif dep.leaves is not widest:
+            others.append(dep.leaves)
+            if len(dep.leaves) > len(widest):
+                widest = dep.leaves
+    if not own and len(others) <= 1:
+        return widest
+    found = set(own).union(*others)
+    if len(found) > LEAVES:
+        return None
+    return widest if len(found) == len(widest) else tuple(found)  # most chains are straight: they share one
 
 
 def drop(table: dict[tuple[Hashable, ...], Memo], memos: list[Memo]) -> int:

@@ -80,7 +80,7 @@ class Memo:
     def __init__(self, query: Query, args: tuple[Hashable, ...]) -> None:
         self.query, self.args, self.value = query, args, GONE
         self.deps: tuple[Node, ...] = ()
-        self.leaves: frozenset[Leaf] | None = None
+        self.leaves: tuple[Leaf, ...] | None = None
         self.cuts = False
         self.verified_at, self.changed_at, self.durability = -1, -1, 0
         self.entries: dict[Any, Entry] | None = None
