@@ -53,6 +53,7 @@ class Analysis:
         self._failing: dict[tuple[str, str], str] = {}
         self._verdicts = Verdicts(self.db)
         self._checked: set[str] = set()  # files asked for: only the first answer may be from an earlier session
+        self._ripe: set[str] = set()  # files that were checked since trees were forgotten
         self.settled = False  # whether all files have been checked
 
     # What the client has
@@ -126,15 +127,18 @@ class Analysis:
         return known
 
     def forget_trees(self) -> None:
-        """Forget the trees, terms and analyses of closed files, which are most of the memory: what was found in them
-        stays, and making them again takes less than a millisecond a definition."""
-        opened = self._documents
-        shown = {chunk.text for key in opened for chunk in chunks(self.db, key)}
+        """Forget the trees, terms and analyses of the closed files that were checked since the last time, which are
+        most of the memory: what was found in them stays, and making them again takes less than a millisecond a
+        definition."""
+        closed = self._ripe - self._documents.keys()
+        texts = {chunk.text for key in closed for chunk in chunks(self.db, key)}
+        texts.difference_update(chunk.text for key in self._documents for chunk in chunks(self.db, key))
+        self._ripe.clear()
 
         def is_closed(query: str, args: tuple[Any, ...]) -> bool:
             if query in OF_GROUPS:
-                return all(target.file not in opened for target in args[0])
-            return args[0] not in (shown if query in OF_TEXTS else opened)
+                return all(target.file in closed for target in args[0])
+            return args[0] in (texts if query in OF_TEXTS else closed)
 
         self.db.forget(is_closed, OF_TEXTS | OF_FILES | OF_GROUPS)
 
@@ -156,6 +160,7 @@ class Analysis:
             known = self._verdicts.of(key)
             if known is not None:
                 return known
+        self._ripe.add(key)
         try:
             return file_diagnostics(self.db, key)
         except Exception:
