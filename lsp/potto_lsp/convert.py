@@ -5,6 +5,7 @@ Owns every conversion that more than one feature needs. UTF-16 ends here.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -48,6 +49,21 @@ def place(analysis: Analysis, found: Place) -> protocol.Location:
 def markdown(text: str) -> protocol.MarkupContent:
     """A text in markdown."""
     return {"kind": "markdown", "value": text}
+
+
+def markup(client: Client, capability: str, text: str) -> protocol.MarkupContent:
+    """A text in markdown, or without its signs for a client that says in a capability that it shows no markdown."""
+    formats = client.value(capability)
+    if not isinstance(formats, list) or "markdown" in formats or not formats:
+        return markdown(text)
+    return {"kind": "plaintext", "value": plain(text)}
+
+
+def plain(text: str) -> str:
+    """Markdown of ours without its signs."""
+    lines = [line for line in text.splitlines() if not line.startswith("```")]
+    unmarked = (re.sub(r"^\*([^*].*)\*$", r"\1", line.replace("**", "").replace("`", "")) for line in lines)
+    return "\n".join("" if line == "---" else line for line in unmarked)
 
 
 def text_edits(text: Text, edits: Iterable[Edit]) -> list[protocol.TextEdit]:

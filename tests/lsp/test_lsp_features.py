@@ -109,9 +109,10 @@ def test_rename_reaches_other_files(client: Client, uri: Uri) -> None:
 def test_a_module_is_renamed_with_its_file(client: Client, uri: Uri, server: Server) -> None:
     change = client.ask("textDocument/rename", {**at(uri("main"), 1, 9), "newName": "forms"})
     assert change["documentChanges"][-1] == {"kind": "rename", "oldUri": uri("shapes"), "newUri": uri("forms")}
-    poor = server({})
-    poor.open(uri("main"), TEXT)
-    assert poor.error("textDocument/rename", {**at(uri("main"), 1, 9), "newName": "forms"}) == -32803
+    for capabilities in ({}, {"workspace": {"workspaceEdit": {"resourceOperations": ["rename"]}}}):  # as Neovim 0.7
+        poor = server(capabilities)
+        poor.open(uri("main"), TEXT)
+        assert poor.error("textDocument/rename", {**at(uri("main"), 1, 9), "newName": "forms"}) == -32803
 
 
 def test_files_that_are_renamed(client: Client, uri: Uri) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from lsp_client import Client
-from lsp_sessions import SESSIONS
+from lsp_sessions import SESSIONS, capabilities_of
 from lsprotocol import converters, types
 
 CONVERTER = converters.get_converter()
@@ -104,3 +104,63 @@ def _diagnostics_come_one_way(session: Session, client: Client) -> None:
     """Pushed to clients that cannot pull, and only to them."""
     pushed = [note for note in client.notes.queue if note["method"] == "textDocument/publishDiagnostics"]
     assert bool(pushed) != can(session.capabilities, "textDocument.diagnostic")
+
+
+# What the greetings of real editors ask for
+
+
+def started(editor: str, folder: Path, **files: str) -> Client:
+    """A server that was greeted as by an editor."""
+    for name, text in files.items():
+        (folder / f"{name}.po").write_text(text)
+    client = Client(folder, capabilities_of(editor))
+    client.start()
+    return client
+
+
+EDITORS = ["vscode", "neovim", "emacs", "helix"]
+PLAIN = "def f(t)\n    integral [0, 1] (if x < t then 1 else 0) d(x)\ny = ha\n"
+
+
+@pytest.mark.parametrize("editor", EDITORS)
+def test_an_action_has_its_edit_at_once_or_when_it_is_asked_for(editor: str, tmp_path: Path) -> None:
+    """Eglot 1.9 resolves none: an action that waits for that would do nothing."""
+    client = started(editor, tmp_path, main=PLAIN)
+    uri = (tmp_path / "main.po").as_uri()
+    client.open(uri, PLAIN)
+    place = {"start": {"line": 1, "character": 24}, "end": {"line": 1, "character": 24}}
+    params = {"textDocument": {"uri": uri}, "range": place, "context": {"diagnostics": []}}
+    actions = client.ask("textDocument/codeAction", params)
+    assert any(action["title"] == "Count the jump: `[x < t]`" for action in actions)
+    support = client.capabilities["textDocument"]["codeAction"].get("resolveSupport") or {}
+    later = "edit" in support.get("properties", ())
+    for action in actions:
+        assert ("edit" in action) != later
+        assert "edit" in (client.ask("codeAction/resolve", action) if later else action)
+
+
+@pytest.mark.parametrize("editor", EDITORS)
+def test_a_name_of_another_module_comes_with_its_import(editor: str, tmp_path: Path) -> None:
+    client = started(editor, tmp_path, main=PLAIN, shapes="def half(t) t/2\n")
+    uri = (tmp_path / "main.po").as_uri()
+    client.open(uri, PLAIN)
+    params = {"textDocument": {"uri": uri}, "position": {"line": 2, "character": 6}}
+    item = next(i for i in client.ask("textDocument/completion", params)["items"] if i["label"] == "half")
+    support = client.capabilities["textDocument"]["completion"]["completionItem"].get("resolveSupport") or {}
+    later = "additionalTextEdits" in support.get("properties", ())
+    assert ("additionalTextEdits" in item) != later
+    whole = client.ask("completionItem/resolve", item)
+    assert whole["additionalTextEdits"][0]["newText"].startswith("from shapes import half")
+
+
+@pytest.mark.parametrize("editor", EDITORS)
+def test_texts_are_of_a_kind_that_is_shown(editor: str, tmp_path: Path) -> None:
+    """Emacs without a mode for markdown asks for plain text."""
+    client = started(editor, tmp_path, main=PLAIN)
+    uri = (tmp_path / "main.po").as_uri()
+    client.open(uri, PLAIN)
+    params = {"textDocument": {"uri": uri}, "position": {"line": 0, "character": 4}}
+    contents = client.ask("textDocument/hover", params)["contents"]
+    assert contents["kind"] in client.capabilities["textDocument"]["hover"]["contentFormat"]
+    assert "f : (t: Real) -> Real" in contents["value"]
+    assert ("```" in contents["value"]) == (contents["kind"] == "markdown")

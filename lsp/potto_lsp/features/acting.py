@@ -18,7 +18,11 @@ def code_actions(ask: Ask) -> list[protocol.CodeAction]:
     wanted = [str(kind) for kind in kinds] if isinstance(kinds, list) else []
     diagnostics = ask.optional("context", "diagnostics")
     given = diagnostics if isinstance(diagnostics, list) else []
-    found = [_action(ask, action, given) for action in ide.code_actions(ask.db, ask.file, ask.span, wanted)]
+    actions = ide.code_actions(ask.db, ask.file, ask.span, wanted)
+    if not ask.client.lists("textDocument.codeAction.resolveSupport.properties", "edit"):
+        whole = (ide.resolve_code_action(ask.db, action) for action in actions)  # it takes no edits later
+        actions = tuple(action for action in whole if not action.disabled)
+    found = [_action(ask, action, given) for action in actions]
     return [*found, *(_action(ask, action, given) for action in _expecting(ask, wanted))]
 
 

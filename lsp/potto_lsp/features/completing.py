@@ -16,14 +16,22 @@ KINDS = {
     "snippet": 15, "builtin": 3, "measure": 7, "symbol": 1, "argument": 10, "type": 25, "command": 1,
 }  # fmt: skip
 PLAIN, SNIPPET = 1, 2
+ITEM = "textDocument.completion.completionItem."
 
 
 def complete(ask: Ask) -> protocol.CompletionList:
     typed = ask.optional("context", "triggerCharacter")
     found = ide.completions(ask.db, ask.file, ask.offset, typed if isinstance(typed, str) else "")
-    can_snippet = ask.client.can("textDocument.completion.completionItem.snippetSupport")
-    items = [_item(ask, item if can_snippet else _plain(item)) for item in found.items]
+    can_snippet = ask.client.can(ITEM + "snippetSupport")
+    waits = ask.client.lists(ITEM + "resolveSupport.properties", "additionalTextEdits")
+    whole = found.items if waits else [_with_import(ask, item) for item in found.items]
+    items = [_item(ask, item if can_snippet else _plain(item)) for item in whole]
     return {"isIncomplete": found.incomplete, "items": items}
+
+
+def _with_import(ask: Ask, item: ide.Completion) -> ide.Completion:
+    """For a client that takes no edits later: the import that goes with a name."""
+    return replace(item, edits=ide.resolve_completion(ask.db, item).edits) if item.data[:1] == ("import",) else item
 
 
 def _plain(item: ide.Completion) -> ide.Completion:
@@ -55,7 +63,7 @@ def _add_details(ask: Ask, found: protocol.CompletionItem, item: ide.Completion,
     if item.detail:
         found["detail"] = item.detail
     if item.documentation:
-        found["documentation"] = convert.markdown(item.documentation)
+        found["documentation"] = convert.markup(ask.client, ITEM + "documentationFormat", item.documentation)
     if item.edits:
         found["additionalTextEdits"] = convert.text_edits(ask.analysis.text(file), item.edits)
 

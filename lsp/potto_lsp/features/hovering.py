@@ -7,6 +7,8 @@ from potto_lsp import convert, protocol
 from potto_lsp.asking import Ask
 from potto_lsp.live import shown
 
+FORMATS = "textDocument.hover.contentFormat"
+
 
 def hover(ask: Ask) -> protocol.Hover | None:
     offset = ask.offset
@@ -15,7 +17,7 @@ def hover(ask: Ask) -> protocol.Hover | None:
         return _live(ask, offset)
     values = _values(ask, offset)
     markdown = f"{found.markdown}\n\n**values**\n\n{values}" if values else found.markdown
-    return {"contents": convert.markdown(markdown), "range": ask.range(found.span)}
+    return {"contents": convert.markup(ask.client, FORMATS, markdown), "range": ask.range(found.span)}
 
 
 def _values(ask: Ask, offset: int) -> str:
@@ -34,6 +36,6 @@ def _live(ask: Ask, offset: int) -> protocol.Hover | None:
         return None
     for live, value in ask.session.live.values(ask.file):
         if value is not None and live.span.start <= offset <= live.span.end:
-            told = convert.markdown(f"`{live.text}` {value.label}\n\n{value.tooltip}")
+            told = convert.markup(ask.client, FORMATS, f"`{live.text}` {value.label}\n\n{value.tooltip}")
             return {"contents": told, "range": ask.range(live.span)}
     return None

@@ -23,7 +23,9 @@ def rename(ask: Ask) -> protocol.WorkspaceEdit:
     found = ide.rename(ask.db, ask.file, ask.offset, ask.string("newName"))
     if isinstance(found, ide.Refused):
         raise Refusal(found.message)
-    if found.renames and not ask.client.lists("workspace.workspaceEdit.resourceOperations", "rename"):
+    edits = "workspace.workspaceEdit."
+    moves = ask.client.can(edits + "documentChanges") and ask.client.lists(edits + "resourceOperations", "rename")
+    if found.renames and not moves:
         raise Refusal("this editor cannot be asked to rename a file, and a module is named by its file")
     return convert.workspace_edit(ask.analysis, ask.client, found)
 
