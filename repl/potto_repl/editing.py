@@ -26,6 +26,8 @@ def is_over(text: str) -> bool:
     from potto_repl.symbols import readable
 
     lines = text.split("\n")
+    if lines[-1].startswith("#") and all(line.startswith("#") for line in lines):
+        return False  # a comment goes with the definition below it; an empty line ends it
     if len(lines) > 2 and not lines[-1].strip() and not lines[-2].strip():
         return True  # two empty lines end anything
     verdict = completeness(readable(text))

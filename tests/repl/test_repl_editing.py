@@ -107,5 +107,10 @@ def test_modules_and_members_complete(talk):
     assert set(words(talk, "scene.a")) == {"area"} and words(talk, "scene.a")["area"].type == "(t: a) -> a"
 
 
+def test_a_comment_waits_for_its_definition():
+    assert not is_over("# how long") and is_over("# how long\n")
+    assert not is_over("# how long\ndef f(t)") and is_over("# how long\ndef f(t) t")
+
+
 def test_nothing_completes_nothing(talk):
     assert words(talk, "") == {} and words(talk, "1 + ") == {}

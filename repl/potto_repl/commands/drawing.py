@@ -69,7 +69,7 @@ def _caption(plot: Plot) -> str:
             said.append(f"what lies beyond is cut off{of}")
     worst = max((curve.error for curve in plot.curves), default=0.0)
     points = sum(len(curve.xs) for curve in plot.curves)
-    return "; ".join([*said, f"{points} points, {f'error at most {format_error(worst)}' if worst else 'exact'}"])
+    return "\n".join([*said, f"{points} points, {f'error at most {format_error(worst)}' if worst else 'exact'}"])
 
 
 def _range(text: str) -> tuple[str, float, float]:
