@@ -12,7 +12,7 @@ from potto.diagnostics import PottoError
 from potto.settings import settings
 
 if TYPE_CHECKING:
-    from potto.api import Function, Module, Workspace, compile, deriv, grad, load
+    from potto.api import Function, Module, ProgramWarning, Workspace, compile, deriv, grad, load
     from potto.fitting import fit
     from potto.hessian import hvp
     from potto.integrate.costs import counting
@@ -24,6 +24,7 @@ __all__ = [
     "Function",
     "Module",
     "PottoError",
+    "ProgramWarning",
     "Workspace",
     "__version__",
     "compile",

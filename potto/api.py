@@ -11,17 +11,18 @@ import builtins
 import difflib
 import itertools
 import os
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
 from potto.arguments import Batch, batch_of, misfit, value_of
 from potto.calls import Call, Form, Gradient, gradient
-from potto.diagnostics import PottoError
+from potto.diagnostics import Diagnostic, PottoError
 from potto.kernels.cells import Value
 from potto.kernels.errors import wrong_call
 from potto.modules import DefinitionTarget, ModuleTarget, find_module, names, resolve
 from potto.modules.kinds import NO_MODULE
-from potto.render import display_name
+from potto.render import ProgramError, display_name
 from potto.runtime.estimate import Estimate
 from potto.source import Span
 from potto.syntax import nodes, print_expression
@@ -43,7 +44,7 @@ class Workspace:
         self._world = World([self.root, *roots])
 
     def module(self, name: str) -> Module:
-        """The module of a dotted name. Raises PottoError if there is none, or if it has errors."""
+        """The module of a dotted name. Raises PottoError if there is none, or as `load` does."""
         file = find_module(self._world.db, os.path.join(self.root, "<workspace>"), name)
         if file is None:
             problem = NO_MODULE(NOWHERE, f"there is no module `{name}` in {display_name(self.root)}")
@@ -67,12 +68,16 @@ class Workspace:
 
 
 def load(path: str | os.PathLike[str]) -> Module:
-    """The module in a file: `potto.load("renderer.po")`. Raises PottoError if it has errors."""
+    """The module in a file: `potto.load("renderer.po")`.
+
+    Raises PottoError if nothing in it is without errors. If some of it is, `ProgramWarning` says what is not; using
+    that raises PottoError.
+    """
     return _load(World(["."]), os.fspath(path))
 
 
 def compile(text: str, name: str | None = None) -> Module:
-    """A module from text: `potto.compile("def f(t) integral [0, 1] [x < t] d(x)")`. Raises PottoError."""
+    """A module from text: `potto.compile("def f(t) integral [0, 1] [x < t] d(x)")`. Raises as `load` does."""
     return _compile(World(["."]), os.path.join(os.getcwd(), f"<{name or f'text {next(_texts)}'}>"), text)
 
 
@@ -110,8 +115,17 @@ def _compile(world: World, key: str, text: str) -> Module:
 
 
 def _module(world: World, file: str) -> Module:
-    world.require(file)
+    wrong = world.errors(file)
+    if wrong:
+        error = ProgramError(wrong, world.source)
+        if not world.has_sound(file):
+            raise error
+        warnings.warn(ProgramWarning(f"a definition has an error, the others can be used{error}"), stacklevel=3)
     return Module(world, file)
+
+
+class ProgramWarning(UserWarning):
+    """A module is broken in part. What does not need the broken part can be used."""
 
 
 class Module:
@@ -136,6 +150,11 @@ class Module:
     def __dir__(self) -> list[str]:
         return sorted(names(self._world.db, self._file))
 
+    @property
+    def diagnostics(self) -> tuple[Diagnostic, ...]:
+        """Everything that `potto check` says about the file."""
+        return tuple(located.diagnostic for located in self._world.diagnostics(self._file))
+
     def eval(self, expression: str) -> Estimate:
         """The value of an expression with the module's names in scope."""
         return self._world.evaluate(self._file, expression).estimate
@@ -146,6 +165,7 @@ class Module:
 
 def _member(world: World, file: str, expr: nodes.Expr) -> Any:
     """What a name stands for: a function, a list of what its items stand for, or an estimate."""
+    world.need(file, expr)
     type = infer_expression(world.db, file, expr).type
     if isinstance(type, FunctionType | Diffeo):
         return Function(world, file, expr, type)

@@ -75,6 +75,7 @@ class Call:
 
     def _elaborate(self) -> Term:
         whole = applied(self.expr, self.form)
+        self.world.need(self.file, whole)
         inferred = infer_expression(self.world.db, self.file, whole)
         wrong = [d for d in inferred.diagnostics if d.severity == "error"]
         elaborated = elaborate_expression(self.world.db, self.file, whole)

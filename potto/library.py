@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from potto.check import diagnostics, errors_of
 from potto.diagnostics import declare
-from potto.modules import Unreadable, module_diagnostics, open_files, source
+from potto.modules import Unreadable, module_diagnostics, names, open_files, source
 from potto.modules.files import MAX_BYTES, decode
 from potto.modules.import_checks import unreadable
 from potto.modules.texts import content
@@ -19,6 +19,8 @@ from potto.query import Database
 from potto.render import Located, ProgramError
 from potto.settings import DEFAULTS, Settings
 from potto.source import SourceText, Span
+from potto.spoiled import standing_in_the_way
+from potto.syntax import nodes
 
 NOWHERE = Span(0, 0)
 NO_PROGRAMS = declare("P0230", "a folder without programs")
@@ -103,8 +105,20 @@ class Library:
         found, project = diagnostics(self.db, file), self.project(file)
         return found if project is None or not project.lints else tuple(levelled(found, project.lints))
 
-    def require(self, file: str) -> None:
-        """Raise ProgramError if there is an error in a file."""
-        wrong = errors_of(diagnostics(self.db, file))
+    def errors(self, file: str) -> tuple[Located, ...]:
+        """The errors in a file."""
+        return errors_of(diagnostics(self.db, file))
+
+    def has_sound(self, file: str) -> bool:
+        """Whether there is a definition in a file that no error spoils."""
+        return any(self.is_sound(file, name) for name in names(self.db, file))
+
+    def is_sound(self, file: str, name: str) -> bool:
+        """Whether no error spoils what a name means in a file."""
+        return not standing_in_the_way(self.db, file, nodes.Name(NOWHERE, name))
+
+    def need(self, file: str, expr: nodes.Expr) -> None:
+        """Raise ProgramError if an expression with a file's names in scope leads to a definition with an error."""
+        wrong = standing_in_the_way(self.db, file, expr)
         if wrong:
             raise ProgramError(wrong, self.source)

@@ -10,7 +10,7 @@ import os
 import threading
 import weakref
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from potto.check import absolute, definition_diagnostics, has_errors
@@ -97,15 +97,22 @@ class World(Library):
             return core(self.db, file, name).term
 
     def run(self, file: str, settings: Settings | None = None) -> Iterator[Shown | Located]:
-        """Run a script's statements. Raises ProgramError if the file has errors."""
-        self.require(file)
-        return Script(self.db, file, self.program, settings or current(self.settings(file))).run()
+        """Run those statements of a script that no error spoils. The errors come out in their places, those that no
+        statement met in the end; one of evaluation ends the run."""
+        said: set[tuple[str | None, Diagnostic]] = set()
+        for event in Script(self.db, file, self.program, settings or current(self.settings(file))).run():
+            if isinstance(event, Located):
+                said.add(_identity(event))
+            yield event
+        yield from (located for located in self.errors(file) if _identity(located) not in said)
 
     def evaluate(self, file: str, text: str, settings: Settings | None = None) -> Answer:
-        """The value of an expression with a file's names in scope. Raises ProgramError."""
+        """The value of an expression with a file's names in scope. Raises ProgramError, also for an error in a
+        definition that the expression leads to; others of the file are nothing to it."""
         sources = self.sources(text)
         parsed = parse_expression(text)
         self._stop(parsed.diagnostics, sources)
+        self.need(file, parsed.expr)
         inferred = infer_expression(self.db, file, parsed.expr)
         self._stop(inferred.diagnostics, sources)
         elaborated = elaborate_expression(self.db, file, parsed.expr)
@@ -126,6 +133,7 @@ class World(Library):
     def typed(self, file: str, text: str) -> tuple[Expr, Type]:
         """The tree of an expression with a file's names in scope, and its type. Raises ProgramError."""
         tree = self.parse(text)
+        self.need(file, tree)
         inferred = infer_expression(self.db, file, tree)
         self._stop(inferred.diagnostics, self.sources(text))
         return tree, inferred.type
@@ -144,6 +152,11 @@ class World(Library):
         wrong = [Located(EXPRESSION, absolute(self.db, EXPRESSION, d, 0)) for d in found if d.severity == "error"]
         if wrong:
             raise ProgramError(wrong, sources)
+
+
+def _identity(located: Located) -> tuple[str | None, Diagnostic]:
+    """An error without the note on how one came to it."""
+    return located.file, replace(located.diagnostic, notes=())
 
 
 @dataclass(frozen=True)

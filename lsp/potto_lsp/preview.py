@@ -28,7 +28,6 @@ class NoPicture(Exception):
 
 def preview(world: World, file: str, name: str, box: Any = None) -> dict[str, Any]:
     """The picture of a function as a data URI, and a text that says what is shown. Raises NoPicture."""
-    world.require(file)
     function = getattr(Module(world, file), name, None)
     (x0, x1), (y0, y1) = _box(box)
     if not isinstance(function, Function):

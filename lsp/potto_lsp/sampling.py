@@ -36,7 +36,6 @@ def sample(
 
     Two axes span rows and columns; one goes from end to end. Raises NoSamples, ProgramError.
     """
-    world.require(file)
     module = Module(world, file)
     function = getattr(module, name, None)
     if not isinstance(function, Function):

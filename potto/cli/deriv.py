@@ -36,16 +36,17 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 
 def _symbols(options: argparse.Namespace, console: Console) -> int:
-    from potto.cli.opening import fail, opened
+    from potto.cli.opening import fail, opened, others_json, report_others
     from potto.facts import derivative_facts
     from potto.library import NO_SUCH_DEFINITION, NOWHERE, Library
     from potto.modules import DefinitionTarget, names, resolve
     from potto.render import Located, ProgramError
+    from potto.syntax import nodes
 
     world = Library(["."])
     try:
         file = opened(world, options.file)
-        world.require(file)
+        world.need(file, nodes.Name(NOWHERE, options.name))
         target = resolve(world.db, file, options.name)
         facts = None
         if isinstance(target, DefinitionTarget):
@@ -59,17 +60,17 @@ def _symbols(options: argparse.Namespace, console: Console) -> int:
     except ProgramError as error:
         return fail(error, options, console)
     if options.json:
-        console.answer_json(asdict(facts))
+        console.answer_json({**asdict(facts), **others_json(world, file)})
     else:
         console.answer(facts.text)
-    return 0
+    return report_others(world, file, options, console)
 
 
 # In numbers
 
 
 def _numbers(options: argparse.Namespace, console: Console) -> int:
-    from potto.cli.opening import fail, opened
+    from potto.cli.opening import fail, opened, others_json, report_others
 
     chosen = settings_of(options, console)
     if chosen is None:
@@ -81,15 +82,14 @@ def _numbers(options: argparse.Namespace, console: Console) -> int:
     world = World(["."])
     try:
         file = opened(world, options.file)
-        world.require(file)
         with settings(**asdict(chosen)), accounts(options):
             once, twice = _taken(world, file, options)
     except PottoError as error:
         return fail(error, options, console)
-    _tell(once, twice, options, console)
+    _tell(once, twice, options, console, others_json(world, file))
     if options.stats:
         show_stats([once] if twice is None else [once, twice], console)
-    return 0
+    return report_others(world, file, options, console)
 
 
 def _taken(world: World, file: str, options: argparse.Namespace) -> tuple[Gradient, Gradient | None]:
@@ -107,7 +107,10 @@ def _taken(world: World, file: str, options: argparse.Namespace) -> tuple[Gradie
     return once, hvp(function, {name: argument_in(world, file, text) for name, text in options.along})(**given)
 
 
-def _tell(once: Gradient, twice: Gradient | None, options: argparse.Namespace, console: Console) -> None:
+def _tell(
+    once: Gradient, twice: Gradient | None, options: argparse.Namespace, console: Console,
+    others: dict[str, Any],
+) -> None:  # fmt: skip
     from potto.runtime.shown import format_numbers, json_number
 
     def sides(found: Gradient) -> list[tuple[str, Any, Any]]:
@@ -122,7 +125,7 @@ def _tell(once: Gradient, twice: Gradient | None, options: argparse.Namespace, c
                 answer[f"{key}_error"] = {name: json_number(error) for name, _, error in sides(found)}
         both = [found for found in (once, twice) if found is not None]
         answer |= {"converged": all(f.converged for f in both), "evals": sum(f.evals for f in both)}
-        console.answer_json(answer)
+        console.answer_json({**answer, **others})
         return
     console.answer(f"{options.name} = {format_numbers(once.value, once.error)}")
     for name, value, error in sides(once):

@@ -32,7 +32,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
     outcomes: list[Outcome] = []
     for path in files:
         try:
-            outcomes += outcomes_of(world, opened(world, path))
+            file = opened(world, path)
+            problems += world.errors(file)
+            outcomes += outcomes_of(world, file)
         except ProgramError as error:
             problems += error.located
     if options.json:
@@ -55,7 +57,7 @@ def _show(outcomes: list[Outcome], files: int, broken: bool, verbose: bool, cons
     failed = sum(not outcome.passed for outcome in outcomes)
     count = f"{_count(len(outcomes), 'live expression')} in {_count(files, 'file')}"
     verdict = f"{failed} failed" if failed else "all hold"
-    console.answer(f"{count}: {verdict}{', but not all files could be tested' if broken else ''}")
+    console.answer(f"{count}: {verdict}{', and there are errors' if broken else ''}")
 
 
 def _count(number: int, what: str) -> str:

@@ -24,7 +24,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    from potto.cli.opening import fail, opened
+    from potto.cli.opening import fail, opened, others_json, report_others
     from potto.render import ProgramError
     from potto.world import World
 
@@ -39,17 +39,16 @@ def run(options: argparse.Namespace, console: Console) -> int:
     }
     try:
         file = opened(world, options.file)
-        if options.kind in ("deriv", "kernel"):
-            world.require(file)
         sections = list(makers[options.kind](world, file))
     except ProgramError as error:
         return fail(error, options, console)
     if options.json:
-        console.answer_json({"kind": options.kind, "sections": [{"name": n, "text": t} for n, t in sections]})
+        shown = [{"name": n, "text": t} for n, t in sections]
+        console.answer_json({"kind": options.kind, "sections": shown, **others_json(world, file)})
     else:
         for name, text in sections:
             console.answer(f"# {name}\n{text}\n" if name else text)
-    return 0
+    return report_others(world, file, options, console)
 
 
 def _tokens(world: World, file: str) -> Iterator[Section]:
@@ -96,7 +95,7 @@ def _deriv(world: World, file: str) -> Iterator[Section]:
     from potto.facts import derivative_facts
     from potto.modules import names
 
-    for name in names(world.db, file):
+    for name in filter(lambda name: world.is_sound(file, name), names(world.db, file)):
         facts = derivative_facts(world.db, file, name)
         if facts is not None:
             yield name, facts.text
@@ -106,7 +105,7 @@ def _kernel(world: World, file: str) -> Iterator[Section]:
     from potto.modules import names
     from potto.runtime.dumping import kernel_text
 
-    for name in names(world.db, file):
+    for name in filter(lambda name: world.is_sound(file, name), names(world.db, file)):
         text = kernel_text(world.program, file, name)
         if text is not None:
             yield name, text

@@ -23,7 +23,7 @@ def prepare(arguments: list[str]) -> list[str]:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    from potto.cli.opening import fail, opened
+    from potto.cli.opening import fail, opened, others_json, report_others
 
     settings = settings_of(options, console)
     if settings is None:
@@ -35,7 +35,6 @@ def run(options: argparse.Namespace, console: Console) -> int:
     world = World(["."])
     try:
         file = opened(world, options.file)
-        world.require(file)
         with accounts(options):
             answer = world.evaluate(file, options.expression.strip(), settings)
     except ProgramError as error:
@@ -43,7 +42,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     estimate = answer.estimate
     if options.json:
         more = {"stats": totals([estimate])} if options.stats else {}
-        console.answer_json({**estimate_json(estimate, answer.type), **more})
+        console.answer_json({**estimate_json(estimate, answer.type), **more, **others_json(world, file)})
     else:
         console.answer(format_estimate(estimate))
         if estimate.text is None and options.stats:
@@ -51,4 +50,4 @@ def run(options: argparse.Namespace, console: Console) -> int:
         console.diagnostics(answer.remarks, world.sources(options.expression.strip()))
     if options.stats:
         show_stats([estimate], console)
-    return 0
+    return report_others(world, file, options, console)

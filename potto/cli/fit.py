@@ -64,7 +64,7 @@ def prepare(arguments: list[str]) -> list[str]:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    from potto.cli.opening import fail, opened
+    from potto.cli.opening import fail, opened, report_others
 
     chosen = settings_of(options, console)
     if chosen is None:
@@ -80,7 +80,6 @@ def run(options: argparse.Namespace, console: Console) -> int:
     answers: list[Estimate] = []
     try:
         file = opened(world, options.file)
-        world.require(file)
         with settings(**asdict(chosen)), accounts(options):
             found = _fitted(world, file, options, console, answers)
     except PottoError as error:
@@ -98,7 +97,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     _tell(found, options, console)
     if options.stats:
         show_stats(answers, console)
-    return 0 if found.converged else 1
+    return max(report_others(world, file, options, console), int(not found.converged))
 
 
 def _fitted(

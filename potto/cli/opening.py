@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from potto.cli.console import Console
 from potto.cli.files import STDIN, missing, read_stdin
@@ -50,3 +50,17 @@ def fail(error: PottoError, options: argparse.Namespace, console: Console) -> in
     else:
         console.diagnostics(error.located, error.sources)
     return 1
+
+
+def others_json(world: Library, file: str) -> dict[str, Any]:
+    """The errors of a file that an answer did not need, to stand beside it; nothing for none."""
+    errors = world.errors(file)
+    return all_to_json(errors, world.source) if errors else {}
+
+
+def report_others(world: Library, file: str, options: argparse.Namespace, console: Console) -> int:
+    """After an answer, show the errors of the file that it did not need; the exit status."""
+    errors = world.errors(file)
+    if not options.json:
+        console.diagnostics(errors, world.source)
+    return int(bool(errors))

@@ -104,7 +104,7 @@ class Picture:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    from potto.cli.opening import fail, opened
+    from potto.cli.opening import fail, opened, report_others
 
     settings = settings_of(options, console)
     if settings is None:
@@ -118,7 +118,6 @@ def run(options: argparse.Namespace, console: Console) -> int:
     start = time.perf_counter()
     try:
         file = opened(world, options.file)
-        world.require(file)
         picture = _picture(world, file, options)
         with accounts(options):
             found = _sampled(picture, grid, settings, console)
@@ -131,7 +130,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         console.complain(f"potto render: {error}")
         return 1
     _tell(picture, found, grid, time.perf_counter() - start, options, console)
-    return 0
+    return report_others(world, file, options, console)
 
 
 def _picture(world: World, file: str, options: argparse.Namespace) -> Picture:

@@ -25,6 +25,7 @@ from potto.runtime.machine import Machine
 from potto.runtime.shown import format_value
 from potto.settings import Settings
 from potto.source import Span
+from potto.spoiled import statement_errors
 from potto.syntax import nodes
 
 NOT_CONVERGED = declare("P0501", "an estimate that is not as accurate as was asked", "warning")
@@ -54,9 +55,14 @@ class Script:
         self.start = 0
 
     def run(self) -> Iterator[Shown | Located]:
-        """Run all statements; the last thing that comes out is the error, if there was one."""
+        """Run all statements but those that an error in the program spoils, which gives that error. One of evaluation
+        ends the run: it is the last thing that comes out."""
         for reference in statements(self.db, self.file):
             self.start = reference.start
+            wrong = statement_errors(self.db, self.file, reference)
+            if wrong:
+                yield from wrong
+                continue
             try:
                 yield from self.statement(reference.statement, {})
             except _Failed as failure:

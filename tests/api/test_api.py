@@ -290,3 +290,19 @@ def test_many_threads_at_once(renderer: Any, shader: Any) -> None:
     with ThreadPoolExecutor(8) as pool:
         together = list(pool.map(work, cs))
     np.testing.assert_allclose(together, alone, rtol=1e-10)
+
+
+def test_a_module_that_is_broken_in_part_warns_and_can_be_used() -> None:
+    with pytest.warns(potto.ProgramWarning, match="P0201"):
+        module = potto.compile("def f(x) x + missing\ndef g(x) 2*x\ndef h(x) f(x)\n")
+    assert module.g(3.0).value == 6.0
+    assert [d.code for d in module.diagnostics] == ["P0201"]
+    for use in (lambda: module.f, lambda: module.h, lambda: module.eval("h(1)")):
+        with pytest.raises(potto.PottoError) as caught:
+            use()
+        assert [d.code for d in caught.value.diagnostics] == ["P0201"]
+
+
+def test_a_module_of_nothing_but_errors_is_an_error() -> None:
+    with pytest.raises(potto.PottoError):
+        potto.compile("def f(x) x + missing\n")

@@ -20,9 +20,16 @@ def test_run_prints_values_and_duals(potto: Potto) -> None:
     assert (ran.status, ran.out, ran.err) == (0, "0.25 (0.25, 1)\n0.5\n", "")
 
 
-def test_run_stops_at_a_wrong_file_before_it_prints(potto: Potto) -> None:
+def test_an_error_spoils_the_statements_that_need_it_only(potto: Potto) -> None:
+    ran = potto("run", "main.po", main=f"print(1)\nprint(f(1) + 1)\n{WRONG}print(2 + nothing)\nprint(3)\n")
+    assert ran.status == 1 and ran.out == "1\n3\n"
+    assert ran.err.count("error[P0301]") == 1 and ran.err.count("error[P0201]") == 1
+    assert "`f` is broken by this; it is needed here" in ran.err
+
+
+def test_run_shows_errors_that_no_statement_meets(potto: Potto) -> None:
     ran = potto("run", "main.po", main="print(1)\n" + WRONG)
-    assert ran.status == 1 and ran.out == ""
+    assert ran.status == 1 and ran.out == "1\n"
     assert ran.err.startswith("error[P0301]: ") and "\n --> main.po:3:25\n" in ran.err
 
 
@@ -172,7 +179,7 @@ def test_live_expressions(potto: Potto) -> None:
     ran = potto("test", "main.po", main=HALF + "#> f(1/3)\n#= 0.334\n")
     assert ran.status == 1 and "main.po:3: f(1/3)" in ran.err and "expected 0.334" in ran.err
     ran = potto("test", "main.po", main="def f(t) (t\n")
-    assert ran.status == 1 and "P0102" in ran.err and "but not all files could be tested" in ran.out
+    assert ran.status == 1 and "P0102" in ran.err and "and there are errors" in ran.out
     ran = potto("test", "--json", "main.po", main=HALF + "#> nothing\n#= 1\n")
     assert ran.status == 1 and "not defined" in ran.json["tests"][0]["message"]
 
