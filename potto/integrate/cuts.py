@@ -8,7 +8,7 @@ then differ.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -49,6 +49,23 @@ class Edge:
 
 
 @dataclass
+class Meeting:
+    """Two jumps at one place that move apart, for some of the batch: `owner` (m,), place (m,), speeds (k, m).
+
+    merged_t: the speed with which both were integrated. crowded: there is a third one.
+    """
+
+    first: int
+    second: int
+    owner: Ints
+    x: Array
+    first_t: Array
+    second_t: Array
+    merged_t: Array
+    crowded: bool = False
+
+
+@dataclass
 class Cuts:
     """The outcome for one variable: orientation (B,), segments, whether anything moves, edges.
 
@@ -61,6 +78,7 @@ class Cuts:
     edges: list[Edge]
     bound_nan: Bools | None
     conflict: bool = False
+    meetings: list[Meeting] = field(default_factory=list)
 
 
 def as_array(x: Any, batch: int) -> Array:
@@ -128,14 +146,39 @@ def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, d
         x, e, t, rank, conflict = _sorted(plan, rows, x, e, t, inside)
     cuts = _pieces(x, e, t, rank, sign, beyond, edges)
     cuts.conflict = conflict
+    if conflict:
+        cuts.meetings = _meetings(plan, rows, inside, low.size, directions)
     return cuts
+
+
+def _meetings(plan: LevelPlan, rows: list[Row], inside: Bools, batch: int, directions: int) -> list[Meeting]:
+    """The pairs of jumps of different surfaces that coincide inside the bounds and move apart."""
+    jumps = [i for i, row in enumerate(rows) if row.cut >= 0 and plan.level.cuts[row.cut].decides]
+    met = np.zeros(batch, dtype=np.int64)
+    out: list[Meeting] = []
+    for n, i in enumerate(jumps):
+        for j in jumps[n + 1 :]:
+            if rows[i].cut == rows[j].cut:
+                continue
+            v, w = (_tangents(rows[r].t, batch, directions) for r in (i, j))
+            apart = np.abs(v - w) > 1e-9 * (np.abs(v) + np.abs(w))
+            x, e = as_array(rows[i].x, batch), sum(0.0 if rows[r].e is None else rows[r].e for r in (i, j))
+            on = inside[1 + i] & inside[1 + j] & (np.abs(x - rows[j].x) <= e) & apart.any(axis=0)
+            owner = np.nonzero(on & np.isfinite(v).all(axis=0) & np.isfinite(w).all(axis=0))[0]
+            if owner.size:
+                met[owner] += 1
+                merged = np.where(as_array(rows[j].x, batch) < x, w, v)[:, owner]
+                out.append(Meeting(rows[i].cut, rows[j].cut, owner, x[owner], v[:, owner], w[:, owner], merged))
+    for meeting in out:
+        meeting.crowded = bool((met[meeting.owner] > 1).any())
+    return out
 
 
 def standing(cuts: Cuts) -> Cuts:
     """The same cuts, none of which moves."""
     seg = cuts.segments
     seg.ta, seg.tb = np.zeros_like(seg.ta), np.zeros_like(seg.tb)
-    return replace(cuts, moving=False, edges=[], conflict=False)
+    return replace(cuts, moving=False, edges=[], conflict=False, meetings=[])
 
 
 def _any_turning(plan: LevelPlan, row: Row) -> bool:
@@ -176,6 +219,10 @@ def _sorted(
     # the bounds stay first and last even among equals: candidates were clipped to the upper bound
     member = np.arange(x.shape[1])
     x, e, inside = x[order, member], e[order, member], inside[order, member]
+    close = (x[1:] - x[:-1] <= e[1:] + e[:-1]) & inside[1:] & inside[:-1]
+    if close.any():  # to rounding they are at one place
+        for i in np.nonzero(close.any(axis=1))[0]:
+            x[i + 1] = np.where(close[i], x[i], x[i + 1])
     rank: Ints = np.where(inside, np.array([0, *(_rank(plan, r) for r in rows), 0])[order], 0)
     if t.shape[0]:
         t = t[:, order, member]

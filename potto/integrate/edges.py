@@ -13,9 +13,9 @@ import numpy as np
 
 from potto.core.printer import format_term
 from potto.integrate.cuts import Cuts, Edge, as_array
-from potto.integrate.pieces import Evaluator, Sums, gather, still, take
+from potto.integrate.pieces import Evaluator, Sided, Sums, gather, still, take
 from potto.integrate.plan import LevelPlan
-from potto.kernels.cells import Array, Cell, Mask, Value
+from potto.kernels.cells import Array, Cell, Ints, Mask, Value
 
 if TYPE_CHECKING:
     from potto.integrate.levels import Iteration
@@ -46,7 +46,19 @@ def report_edges(
         base = sums.t[:, :, edge.owner]
         forward = np.where(inward, base + change, base)
         backward = np.where(inward, base, base + change)
-        machine.note_edge(level.variable, surface, backward, forward)
+        told = tell(number, Sided(level.variable, surface), backward, forward, machine)
+        sums.t[:, :, edge.owner] = base if told is None else told
+
+
+def tell(number: int, what: Sided, backward: Array, forward: Array, machine: Evaluator) -> Array | None:
+    """Note two derivatives that differ, or the one that is wanted, if one is."""
+    if machine.side:
+        return forward if machine.side > 0 else backward
+    if number:
+        machine.note_sided(what)
+    else:
+        machine.note_edge(what, backward, forward)
+    return None
 
 
 def across(
@@ -54,24 +66,38 @@ def across(
     sides: dict[int, Mask], machine: Evaluator,
 ) -> tuple[Array, Array]:  # fmt: skip
     """(F with the edge's surface flipped minus F as it is) at the bound, per component, and its size."""
-    group = level.decided[[i for i, c in enumerate(level.level.cuts) if c.decides].index(edge.cut)]
+    group = group_of(level, edge.cut)
+    here, inner = around(level, edge.owner, edge.x, not edge.upper, env, sides, machine)
     frozen = machine.with_directions(0)
-    here = gather({n: still(v) for n, v in env.items()}, edge.owner)
-    here[level.variable] = Cell(edge.x)
-    step = 1e-7 * (1 + np.abs(edge.x)) * (-1 if edge.upper else 1)
-    beside = dict(here)
-    beside[level.variable] = Cell(edge.x + step)
-    inner: dict[int, Mask] = {g: take(m, edge.owner) for g, m in sides.items()}
-    if level.decided:
-        values = frozen.evaluate(level.surfaces, {n: beside[n] for n in level.surfaces.params}, None)
-        assert isinstance(values, tuple)
-        for g, value, turned in zip(level.decided, values, level.turned, strict=True):
-            assert isinstance(value, Cell)
-            side = as_array(value.v, edge.owner.size) >= 0
-            for outer in turned:
-                side = side ^ np.logical_not(inner[outer])
-            inner[g] = side
     with nullcontext() if machine.costs is None else machine.costs.apart():
         actual, _ = parent.inside(number, here, edge.owner.size, inner, frozen)
         flipped, _ = parent.inside(number, here, edge.owner.size, {**inner, group: ~np.asarray(inner[group])}, frozen)
     return flipped - actual, np.abs(actual) + np.abs(flipped)
+
+
+def group_of(level: LevelPlan, cut: int) -> int:
+    """The group whose side a cut of the level decides."""
+    return level.decided[[i for i, c in enumerate(level.level.cuts) if c.decides].index(cut)]
+
+
+def around(
+    level: LevelPlan, owner: Ints, x: Array, above: bool, env: dict[str, Value], sides: dict[int, Mask],
+    machine: Evaluator,
+) -> tuple[dict[str, Value], dict[int, Mask]]:  # fmt: skip
+    """The environment of some members at x, and the sides of all surfaces just above or just below it."""
+    here = gather({n: still(v) for n, v in env.items()}, owner)
+    here[level.variable] = Cell(x)
+    step = 1e-7 * (1 + np.abs(x)) * (1 if above else -1)
+    beside = {**here, level.variable: Cell(x + step)}
+    inner: dict[int, Mask] = {g: take(m, owner) for g, m in sides.items()}
+    if level.decided:
+        at = {n: beside[n] for n in level.surfaces.params}
+        values = machine.with_directions(0).evaluate(level.surfaces, at, None)
+        assert isinstance(values, tuple)
+        for g, value, turned in zip(level.decided, values, level.turned, strict=True):
+            assert isinstance(value, Cell)
+            side = as_array(value.v, owner.size) >= 0
+            for outer in turned:
+                side = side ^ np.logical_not(inner[outer])
+            inner[g] = side
+    return here, inner

@@ -67,18 +67,22 @@ def choose(a: Array, b: Array, left: Array, right: Array) -> Ints:
     return kind
 
 
-def points(seg: Segments, u: Array) -> tuple[Array, Array, Array]:
-    """x, dx/du and the label of each point; `u` is (P, n), row by row in the segments of `seg`, or one row for all."""
+def points(seg: Segments, u: Array, rest: Array | None = None) -> tuple[Array, Array, Array]:
+    """x, dx/du and the label of each point; `u` is (P, n), row by row in the segments of `seg`, or one row for all.
+
+    rest: 1 - u, where it is known better than it can be got from u.
+    """
     a, b = seg.a[:, None], seg.b[:, None]
     if not seg.kind.any():
         width = b - a
         return a + width * u, width, u
     u = np.broadcast_to(u, (seg.a.size, u.shape[1]))
+    rest = 1.0 - u if rest is None else rest
     x, slope, label = np.empty_like(u), np.empty_like(u), np.empty_like(u)
     for kind in np.unique(seg.kind):
         rows = np.nonzero(seg.kind == kind)[0]
         part = seg.pick(rows)
-        x[rows], slope[rows], label[rows] = _MAPS[int(kind)](part, u[rows])
+        x[rows], slope[rows], label[rows] = _MAPS[int(kind)](part, u[rows], rest[rows])
     return x, slope, label
 
 
@@ -101,12 +105,12 @@ def _label(seg: Segments, x: Array) -> Array:
     return (x - a) / (b - a)
 
 
-def _linear(seg: Segments, u: Array) -> tuple[Array, Array, Array]:
+def _linear(seg: Segments, u: Array, rest: Array) -> tuple[Array, Array, Array]:
     width = (seg.b - seg.a)[:, None]
     return seg.a[:, None] + width * u, width * np.ones_like(u), u
 
 
-def _left(seg: Segments, u: Array) -> tuple[Array, Array, Array]:
+def _left(seg: Segments, u: Array, rest: Array) -> tuple[Array, Array, Array]:
     """x = c + q², q linear in u: square roots at c <= a become smooth."""
     c = seg.left[:, None]
     q0, q1 = np.sqrt(seg.a[:, None] - c), np.sqrt(seg.b[:, None] - c)
@@ -115,7 +119,7 @@ def _left(seg: Segments, u: Array) -> tuple[Array, Array, Array]:
     return x, 2 * q * (q1 - q0), _label(seg, x)
 
 
-def _right(seg: Segments, u: Array) -> tuple[Array, Array, Array]:
+def _right(seg: Segments, u: Array, rest: Array) -> tuple[Array, Array, Array]:
     c = seg.right[:, None]
     q0, q1 = np.sqrt(c - seg.a[:, None]), np.sqrt(c - seg.b[:, None])
     q = q0 + (q1 - q0) * u
@@ -123,7 +127,7 @@ def _right(seg: Segments, u: Array) -> tuple[Array, Array, Array]:
     return x, -2 * q * (q1 - q0), _label(seg, x)
 
 
-def _both(seg: Segments, u: Array) -> tuple[Array, Array, Array]:
+def _both(seg: Segments, u: Array, rest: Array) -> tuple[Array, Array, Array]:
     """x = c + (d - c) sin²(φ/2), φ linear in u: square roots at both c <= a and d >= b become smooth."""
     c, d = seg.left[:, None], seg.right[:, None]
     half0 = np.arctan2(np.sqrt(seg.a[:, None] - c), np.sqrt(d - seg.a[:, None]))
@@ -134,21 +138,21 @@ def _both(seg: Segments, u: Array) -> tuple[Array, Array, Array]:
     return x, 2 * (d - c) * sine * cosine * (half1 - half0), _label(seg, x)
 
 
-def _up(seg: Segments, u: Array) -> tuple[Array, Array, Array]:
+def _up(seg: Segments, u: Array, rest: Array) -> tuple[Array, Array, Array]:
     """[a, inf): x = a + u/(1-u); moves with a."""
-    rest = np.maximum(1.0 - u, FARTHEST)
+    rest = np.maximum(rest, FARTHEST)
     return seg.a[:, None] + u / rest, 1.0 / (rest * rest), np.zeros_like(u)
 
 
-def _down(seg: Segments, u: Array) -> tuple[Array, Array, Array]:
+def _down(seg: Segments, u: Array, rest: Array) -> tuple[Array, Array, Array]:
     near = np.maximum(u, FARTHEST)
-    return seg.b[:, None] - (1.0 - u) / near, 1.0 / (near * near), np.ones_like(u)
+    return seg.b[:, None] - rest / near, 1.0 / (near * near), np.ones_like(u)
 
 
-def _whole(seg: Segments, u: Array) -> tuple[Array, Array, Array]:
+def _whole(seg: Segments, u: Array, rest: Array) -> tuple[Array, Array, Array]:
     """(-inf, inf): x = w/(1-w²), w = 2u - 1; nothing moves."""
     low = u < 0.5
-    near = np.maximum(np.where(low, u, 1.0 - u), FARTHEST)  # distance from the nearer end, exact near both
+    near = np.maximum(np.where(low, u, rest), FARTHEST)  # distance from the nearer end, exact near both
     w = np.where(low, 2 * near - 1, 1 - 2 * near)
     gap = 4 * near * (1 - near)
     return w / gap, 2 * (1 + w * w) / (gap * gap), np.zeros_like(u)
@@ -157,25 +161,28 @@ def _whole(seg: Segments, u: Array) -> tuple[Array, Array, Array]:
 _MAPS = {LINEAR: _linear, LEFT: _left, RIGHT: _right, BOTH: _both, UP: _up, DOWN: _down, WHOLE: _whole}
 
 
-def grade(u0: Array, u1: Array, end: Ints, t: Array) -> tuple[Array, Array]:
-    """u and du/dt for t (n,) in [0, 1] over pieces [u0, u1]; `end` < 0 or > 0 crowds points at the left or right end.
+def grade(u0: Array, u1: Array, end: Ints, t: Array) -> tuple[Array, Array, Array]:
+    """u, 1 - u and du/dt for t (n,) in [0, 1] over pieces [u0, u1].
 
-    Its magnitude is the power of t by which it does.
+    `end` < 0 or > 0 crowds points at the left or right end; its magnitude is the power of t by which it does.
     """
     width = (u1 - u0)[:, None]
     u = u0[:, None] + width * t
+    rest = (1.0 - u1)[:, None] + width * (1.0 - t)
     slope = width
     if end.any():
         slope = np.repeat(width, t.size, axis=1)
         power = np.abs(end).astype(float)[:, None]
         rows = np.nonzero(end < 0)[0]
         u[rows] = u0[rows, None] + width[rows] * t ** power[rows]
+        rest[rows] = 1.0 - u[rows]
         slope[rows] = width[rows] * power[rows] * t ** (power[rows] - 1)
         rows = np.nonzero(end > 0)[0]
         s = 1.0 - t
         u[rows] = u1[rows, None] - width[rows] * s ** power[rows]
+        rest[rows] = (1.0 - u1)[rows, None] + width[rows] * s ** power[rows]
         slope[rows] = width[rows] * power[rows] * s ** (power[rows] - 1)
-    return u, slope
+    return u, rest, slope
 
 
 def velocity(seg: Segments, label: Array, direction: int) -> tuple[Array, Array]:

@@ -10,12 +10,21 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from potto.core.terms import Lam
+from potto.core.terms import Lam, Term
 from potto.integrate import maps
 from potto.integrate.costs import Costs
 from potto.integrate.rules import gauss, leaning
 from potto.kernels.cells import Array, Cell, Ints, Mask, Trace, Value, map_arrays
 from potto.kernels.errors import not_a_number
+
+
+@dataclass(frozen=True)
+class Sided:
+    """Why derivatives on the two sides differ: a surface lies on a bound of a variable, or on another surface."""
+
+    variable: str
+    surface: Term
+    other: Term | None = None
 
 
 class Evaluator(Protocol):
@@ -36,7 +45,10 @@ class Evaluator(Protocol):
     def evaluate(self, lam: Lam, env: dict[str, Value], trace: Trace | None) -> Value: ...
     def count(self, evaluations: int) -> None: ...
     def exhausted(self) -> bool: ...
-    def note_edge(self, variable: str, surface: Any, backward: Array, forward: Array) -> None: ...
+    @property
+    def side(self) -> int: ...
+    def note_edge(self, what: Sided, backward: Array, forward: Array) -> None: ...
+    def note_sided(self, what: Sided) -> None: ...
     def note_unfinished(self, reason: str) -> None: ...
     def note_degenerate(self, variable: str) -> None: ...
 

@@ -84,7 +84,7 @@ class Work:
         whole = Pieces(np.arange(count), zero, one, np.zeros(count, dtype=np.int64))
         fresh = self.measure(whole, self.parent.order, True)
         if self.conflict and not self.last:
-            self.look_for_steps()
+            self.look_for_steps(fresh)
         found = totals(self, fresh, ends)
         if self.good_enough(fresh, found, ends):
             return sums(self, found, ends)
@@ -185,8 +185,8 @@ class Work:
             x, weight, label = maps.points(seg, rule.nodes[None])
         else:
             seg = self.seg.pick(p.segment)
-            u, du = maps.grade(p.u0, p.u1, p.end, rule.nodes)
-            x, dx, label = maps.points(seg, u)
+            u, rest, du = maps.grade(p.u0, p.u1, p.end, rule.nodes)
+            x, dx, label = maps.points(seg, u, rest)
             weight = dx * du
         if seg.kind.any() or p.end.any():
             x = maps.off_the_ends(seg, x)
@@ -241,7 +241,7 @@ class Work:
             p.most = p.ends = p.tail = np.empty((0, p.u0.size))
         p.floor = 4 * EPS * p.size + (size @ rule.slopes) * shake
         if self.ends is not None and self.last:
-            p.floor += self.noise(p)
+            p.floor += self.noise(p, seg)
         if self.k:
             # speeds are rounded too, and so are the places of the cuts, which matters where they are close together
             place = np.maximum(seg.ea, seg.eb) / (seg.b - seg.a)
@@ -253,7 +253,7 @@ class Work:
         if broken.any():
             p.error = np.where(broken, np.inf, p.error)
 
-    def noise(self, p: Pieces) -> Array:
+    def noise(self, p: Pieces, seg: Segments) -> Array:
         """What the integrand's own rounding, kept track of at the ends of segments, comes to in each channel: (C, P).
 
         More than a few units in the last place where terms of parameters cancel, or where sines of them have large
@@ -267,6 +267,7 @@ class Work:
         ]
         share = np.minimum(*shares)
         share = np.where((share > 4 * EPS) & (share < 1), share, 0.0)[:, p.segment]
+        share = np.where(seg.kind == maps.LINEAR, share, 0.0)  # at a turning point little is left to be rounded
         sizes = p.size.reshape(self.width, -1, p.u0.size)
         return np.asarray((share[:, None] * sizes).reshape(p.size.shape))
 
@@ -358,7 +359,7 @@ class Work:
         follows[1:-1] = (seg.owner[1:] == seg.owner[:-1]) & (seg.a[1:] == seg.b[:-1])
         return bool(seg.ta[:, ~(follows[:-1] & (seg.rank == 1))].any() or seg.tb[:, ~follows[1:]].any())
 
-    def look_for_steps(self) -> None:
+    def look_for_steps(self, whole: Pieces) -> None:
         """Whether the integral further in jumps where only its kinks were expected, which move in different ways.
 
         A surface that runs along the innermost variable leaves such a step. Looked at just beside the cut, since on
@@ -376,6 +377,7 @@ class Work:
             sides = {g: take(m, index) for g, m in self.sides.items()}
             with nullcontext() if self.machine.costs is None else self.machine.costs.apart():
                 values.append(self.parent.inside(self.number, here, index.size, sides, frozen)[0])
-        apart = np.abs(values[0] - values[1])
-        if (apart > DISCONTINUITY * (np.abs(values[0]) + np.abs(values[1]))).any():
+        mean = whole.size.reshape(self.width, -1, seg.a.size)[:, 0] / (seg.b - seg.a)
+        size = np.abs(values[0]) + np.abs(values[1]) + mean[:, follows] + mean[:, follows - 1]
+        if (np.abs(values[0] - values[1]) > DISCONTINUITY * size).any():
             self.machine.note_degenerate(self.level.variable)

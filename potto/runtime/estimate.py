@@ -14,16 +14,21 @@ import numpy as np
 
 @dataclass(frozen=True)
 class OneSided:
-    """A surface lies on an edge of the domain: the derivatives on the two sides of the parameters differ."""
+    """A surface lies on an edge of the domain, or on another surface that moves otherwise.
+
+    The derivatives on the two sides of the parameters differ. other: the other surface, if there is one.
+    """
 
     variable: str
     surface: str
     backward: Any
     forward: Any
+    other: str | None = None
 
     def __str__(self) -> str:
+        place = f"lies on a bound of `{self.variable}`" if self.other is None else f"coincides with {self.other}"
         return (
-            f"the surface {self.surface} lies on a bound of `{self.variable}`: the one-sided derivatives differ "
+            f"the surface {self.surface} {place}: the one-sided derivatives differ "
             f"({_number(self.backward)} backward, {_number(self.forward)} forward)"
         )
 

@@ -139,9 +139,11 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
 
 def _notes(books: Books) -> list[OneSided]:
     out: list[OneSided] = []
-    for variable, surface, backward, forward in books.edges:
-        note = OneSided(variable, f"{format_term(surface)} = 0", np.squeeze(backward), np.squeeze(forward))
-        if not any(o.surface == note.surface and o.variable == variable for o in out):
+    for what, backward, forward in books.edges:
+        other = None if what.other is None else f"{format_term(what.other)} = 0"
+        surface = f"{format_term(what.surface)} = 0"
+        note = OneSided(what.variable, surface, np.squeeze(backward), np.squeeze(forward), other)
+        if not any((o.surface, o.variable, o.other) == (surface, what.variable, other) for o in out):
             out.append(note)
     return out
 

@@ -12,7 +12,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -126,6 +126,8 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
         plan = plan_for(machine, order, linked)
         sums = counted(in_parts(plan, machine, plan.environment(env, linked.env), batch), plan, machine)
         if not machine.books.degenerate:
+            if outermost and machine.books.sided and not machine.side:
+                from_both_sides(machine, plan, plan.environment(env, linked.env), batch)
             return turned_round(machine, order, linked, env, batch, sums) if outermost else sums
     machine.note_unfinished(
         "surfaces run along the axes of several variables of integration at once: "
@@ -133,6 +135,16 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
     )
     sums.et = np.full_like(sums.et, np.inf)
     return sums
+
+
+def from_both_sides(machine: Machine, plan: Plan, env: dict[str, Value], batch: int) -> None:
+    """Note the two one-sided derivatives of an integral that further in has found them to differ."""
+    reasons = tuple(machine.books.sided)
+    machine.books.sided.clear()
+    backward, forward = (iterated(plan, replace(machine, side=side), env, batch).t for side in (-1, 1))
+    if (np.abs(forward - backward) > 1e-12 * (np.abs(forward) + np.abs(backward))).any():
+        for what in reasons:
+            machine.note_edge(what, backward, forward)
 
 
 def turned_round(

@@ -33,7 +33,7 @@ from potto.core.terms import Delta as DeltaTerm
 from potto.diagnostics import PottoError
 from potto.integrate import costs
 from potto.integrate.costs import Costs
-from potto.integrate.pieces import still
+from potto.integrate.pieces import Sided, still
 from potto.kernels import errors
 from potto.kernels.cells import Array, Cell, Number, Pattern, Trace, Value, pad, pattern
 from potto.kernels.compile import Kernel, counts, kernel
@@ -52,7 +52,8 @@ class Books:
     evaluations: int = 0
     depth: int = 0
     unfinished: list[str] = field(default_factory=list)
-    edges: list[tuple[str, Term, Array, Array]] = field(default_factory=list)
+    edges: list[tuple[Sided, Array, Array]] = field(default_factory=list)
+    sided: dict[Sided, None] = field(default_factory=dict)
     methods: set[str] = field(default_factory=set)
     degenerate: set[str] = field(default_factory=set)
     second: bool = False
@@ -127,6 +128,7 @@ class Machine:
     """One evaluation, carrying `directions` tangents; `rounding` where rounding errors are kept track of.
 
     frozen: surfaces, bounds and deltas stand still, so that tangents are those of the integrands alone.
+    side: -1 or 1 where one-sided derivatives are wanted, for parameters that shrink or grow.
     """
 
     linker: Linker
@@ -136,6 +138,7 @@ class Machine:
     rounding: bool = True
     root: bool = True
     frozen: bool = False
+    side: int = 0
 
     @property
     def rtol(self) -> float:
@@ -148,19 +151,23 @@ class Machine:
     def with_directions(self, directions: int) -> Machine:
         if directions == self.directions:
             return self
-        return Machine(self.linker, self.settings, self.books, directions, self.rounding, self.root, self.frozen)
+        return Machine(
+            self.linker, self.settings, self.books, directions, self.rounding, self.root, self.frozen, self.side
+        )
 
     def inside(self) -> Machine:
         """The machine for an integrand: rounding is estimated by the integrator, not kept track of."""
         if not (self.rounding or self.root):
             return self
-        return Machine(self.linker, self.settings, self.books, self.directions, False, False, self.frozen)
+        return Machine(self.linker, self.settings, self.books, self.directions, False, False, self.frozen, self.side)
 
     def tracking(self) -> Machine:
         """The machine with rounding errors kept track of."""
         if self.rounding:
             return self
-        return Machine(self.linker, self.settings, self.books, self.directions, True, self.root, self.frozen)
+        return Machine(
+            self.linker, self.settings, self.books, self.directions, True, self.root, self.frozen, self.side
+        )
 
     # Books
 
@@ -176,8 +183,12 @@ class Machine:
     def exhausted(self) -> bool:
         return self.books.evaluations > self.settings.max_evals * self.books.members
 
-    def note_edge(self, variable: str, surface: Any, backward: Array, forward: Array) -> None:
-        self.books.edges.append((variable, surface, backward, forward))
+    def note_edge(self, what: Sided, backward: Array, forward: Array) -> None:
+        self.books.edges.append((what, backward, forward))
+
+    def note_sided(self, what: Sided) -> None:
+        """What an integral finds that stands in another one: how much it comes to, that one will say."""
+        self.books.sided[what] = None
 
     def note_unfinished(self, reason: str) -> None:
         if reason not in self.books.unfinished:

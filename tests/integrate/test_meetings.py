@@ -1,0 +1,69 @@
+"""Surfaces that coincide at the parameters given and move apart: added up they have a derivative, multiplied two."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import potto
+
+# At t = 1/2 both conditions of each program change at the same place, with speeds 1 and 2.
+PROGRAM = """
+def added(t) integral [0, 1] ([x < t] + [x < 2*t - 0.5]) d(x)
+def times(t) integral [0, 1] [x < t]*[x < 2*t - 0.5] d(x)
+def either(t) integral [0, 1] max([x < t], [x < 2*t - 0.5]) d(x)
+def apart(t) integral [0, 1] exp(x)*([x < t] - [x < 2*t - 0.5]) d(x)
+def plane(t) integral ([0, 1], [0, 1]) ([x + y < t] + [x + y < 2*t - 0.5]) d(x, y)
+def corner(t) integral ([0, 1], [0, 1]) [x + y < t]*[x + y < 2*t - 0.5] d(x, y)
+def top(t) integral ([0, 1], [0, 1]) exp(x)*[y < 2*t] d(x, y)
+def three(t) integral [0, 1] [x < t]*[x < 2*t - 0.5]*[x < 3*t - 1] d(x)
+"""
+
+
+def rate(name: str) -> potto.Estimate:
+    found: potto.Estimate = potto.deriv(getattr(potto.compile(PROGRAM), name))((0.5, 1.0))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("added", 3.0),  # 1 + 2
+        ("apart", -np.exp(0.5)),  # e^(1/2) (1 - 2)
+        ("plane", 1.5),  # areas t^2/2 and (2 t - 1/2)^2/2
+    ],
+)
+def test_jumps_that_are_added_up_have_the_sum_of_their_derivatives(name: str, expected: float) -> None:
+    got = rate(name)
+    assert abs(got.tangent - expected) <= 1e-14 * abs(expected)
+    assert got.converged and not got.notes and got.tangent_error < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("name", "backward", "forward"),
+    [
+        ("times", 2.0, 1.0),  # min(t, 2 t - 1/2)
+        ("either", 1.0, 2.0),  # max(t, 2 t - 1/2)
+        ("corner", 1.0, 0.5),  # min(t, 2 t - 1/2)^2/2
+        ("top", 2 * (np.e - 1), 0.0),  # min(2 t, 1) (e - 1): a surface on a bound, further in
+    ],
+)
+def test_where_there_are_two_derivatives_both_are_told(name: str, backward: float, forward: float) -> None:
+    got = rate(name)
+    (note,) = got.notes
+    assert abs(note.backward - backward) <= 1e-13 and abs(note.forward - forward) <= 1e-13
+    assert min(abs(got.tangent - backward), abs(got.tangent - forward)) <= 1e-13
+
+
+def test_the_note_names_both_surfaces() -> None:
+    (note,) = rate("times").notes
+    assert str(note) == (
+        "the surface t - x = 0 coincides with t - 0.5*x - 0.25 = 0: the one-sided derivatives differ "
+        "(2 backward, 1 forward)"
+    )
+
+
+def test_three_at_one_place_are_not_vouched_for() -> None:
+    got = rate("three")
+    assert np.isinf(got.tangent_error) and not got.converged
+    assert "more than two surfaces meet" in got.reasons[0]
