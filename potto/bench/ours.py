@@ -53,16 +53,16 @@ class Ours:
             with settings(method=self.method, seed=seed, max_evals=MOST_EVALUATIONS, **turned):
                 if quantity == "value":
                     found = f(problem.at)
-                    return Answer(found.value, found.evals, _reported(found, found.error))
+                    return Answer(found.value, found.evals, _reported(found, found.value, found.error))
                 found = derived((problem.at, 1.0))
-                return Answer(found.tangent, found.evals, _reported(found, found.tangent_error))
+                return Answer(found.tangent, found.evals, _reported(found, found.tangent, found.tangent_error))
 
         return solve
 
 
-def _reported(found: Estimate, error: float) -> float:
-    """The error that an estimate admits: unknown where no sample fell on anything."""
-    return math.inf if error == 0 and not found.converged else error
+def _reported(found: Estimate, number: float, error: float) -> float:
+    """The error that an estimate admits: unknown where no sample fell on anything, which it says."""
+    return math.inf if number == error == 0 and not found.converged else error
 
 
 OURS = (Ours("quadrature", "rtol", False), Ours("qmc", "samples", True), Ours("mc", "samples", True))

@@ -16,7 +16,7 @@ from typing import Any, Literal, TextIO
 
 from potto.bench.adapter import Adapter, installed
 from potto.bench.measure import Run, slope
-from potto.bench.problems import Problem, Quantity
+from potto.bench.problems import QUANTITIES, Problem, Quantity, catalogue
 
 Measure = Literal["time", "evaluations"]
 TARGETS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-12)
@@ -102,8 +102,10 @@ def rates_table(found: Sequence[Rate]) -> str:
     if not found:
         return ""
     lines = ["error ~ evaluations^rate; Monte Carlo: -1/2, quasi-Monte Carlo behind smooth edges: about -1"]
-    columns = list(dict.fromkeys((r.problem, r.quantity) for r in found))
     methods = list(dict.fromkeys(r.method for r in found))
+    columns = list(dict.fromkeys((r.problem, r.quantity) for r in found))
+    places = {problem.id: place for place, problem in enumerate(catalogue())}
+    columns.sort(key=lambda column: (places.get(column[0], len(places)), QUANTITIES.index(column[1])))
     lines.append(f"  {'':<22}" + "".join(f"{m:>18}" for m in methods))
     by = {(r.problem, r.quantity, r.method): r.rate for r in found}
     for problem, quantity in columns:
