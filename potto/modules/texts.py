@@ -17,7 +17,7 @@ from potto.diagnostics import Diagnostic
 from potto.modules.free import Reference, references_in
 from potto.query import Database, query
 from potto.source import SourceText, Span
-from potto.syntax import Chunk, ParsedChunk, nodes, parse_chunk, split
+from potto.syntax import Chunk, ParsedChunk, defined_name, nodes, parse_chunk, split
 
 Importing = nodes.FromImport | nodes.Import
 
@@ -109,7 +109,10 @@ def parsed(db: Database, text: str, diffeo: bool) -> ParsedChunk:
 
 @query(keep=16384)
 def head(db: Database, text: str, diffeo: bool) -> Head:
-    """What a chunk is and what it names. Small, so that more of them are kept than of trees."""
+    """What a chunk is and what it names. Small, so that more of them are kept than of trees; mostly without a tree."""
+    defined = defined_name(text)
+    if defined is not None:
+        return Head("definition", *defined)
     item = parsed(db, text, diffeo).item
     match item:
         case None:

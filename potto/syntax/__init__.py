@@ -8,7 +8,7 @@ from potto.syntax.chunks import Chunk, split
 from potto.syntax.dump import dump_tree
 from potto.syntax.formatter import format_source
 from potto.syntax.live import Live, live_expressions
-from potto.syntax.parser import ParsedChunk, ParsedExpression, completeness, parse_chunk, parse_expression
+from potto.syntax.parser import ParsedChunk, ParsedExpression, completeness, defined_name, parse_chunk, parse_expression
 from potto.syntax.printer import print_expression, print_item, print_type
 from potto.syntax.tokens import RESERVED, Comment, Token
 from potto.syntax.walk import children, extent, node_at, walk, without_spans
@@ -24,6 +24,7 @@ __all__ = [
     "Token",
     "children",
     "completeness",
+    "defined_name",
     "dump_tree",
     "extent",
     "format_source",

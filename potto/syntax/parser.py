@@ -6,6 +6,7 @@ and holes or `ErrorExpr`s in it.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -20,7 +21,7 @@ from potto.syntax.messages import Stop, describe
 from potto.syntax.nesting import MAX_NESTING
 from potto.syntax.nodes import BrokenItem, Definition, ErrorExpr, Expr, Item
 from potto.syntax.repair import Edit, find_repair
-from potto.syntax.tokens import Comment, Token
+from potto.syntax.tokens import FIRST_NAME, RESERVED, Comment, Token
 from potto.syntax.walk import deeper_than, extent
 
 MOST_ERRORS = 16
@@ -262,12 +263,22 @@ def _head(tokens: list[Token]) -> list[Token]:
     return tokens[:end]
 
 
+_HEAD = re.compile(
+    rf"(?:[ \t\f]*(?:\#[^\n]*)?\n)*+\f*(?:def[ \t]+({FIRST_NAME.pattern})[ \t]*\(|({FIRST_NAME.pattern})[ \t]*=(?!=))"
+)
+
+
+def defined_name(text: str) -> tuple[str, Span] | None:
+    """The name that a chunk defines and its place, if its first line says so beyond doubt: without parsing it."""
+    found = None if "\r" in text else _HEAD.match(text)
+    if found is None or found.lastindex is None:
+        return None
+    name = found[found.lastindex]
+    return None if name in RESERVED else (name, Span(*found.span(found.lastindex)))
+
+
 def guess_name(text: str) -> str | None:
     """What a chunk was to define, if its start says so."""
-    import re
-
-    from potto.syntax.tokens import FIRST_NAME, RESERVED
-
     found = re.match(
         rf"(?:\s|#[^\n]*\n)*(?:(?:def|diffeo)[ \t]+({FIRST_NAME.pattern})|({FIRST_NAME.pattern})\s*[=:(])", text
     )
