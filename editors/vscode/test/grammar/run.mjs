@@ -1,7 +1,8 @@
 // Tests the grammar: assertions in language.po, and snapshots of every example program.
-// `--update` writes the snapshots anew; look at what changed before committing them.
+// A snapshot holds its program, so that it tests the grammar and nothing else: an example may change meanwhile.
+// `--update` takes the examples as they are now; look at what changed before committing it.
 import { spawnSync } from "node:child_process";
-import { copyFileSync, existsSync, mkdtempSync, readdirSync, rmSync } from "node:fs";
+import { copyFileSync, existsSync, mkdtempSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { dirname, join, relative, sep } from "node:path";
 import { fileURLToPath } from "node:url";
@@ -17,41 +18,42 @@ function run(tool, ...args) {
   return spawnSync(path, args, { cwd: root, stdio: "inherit" }).status === 0;
 }
 
+/** The example programs, by the names of their snapshots. */
 function programs(folder) {
   return readdirSync(folder, { withFileTypes: true }).flatMap((entry) => {
     const path = join(folder, entry.name);
-    return entry.isDirectory() ? programs(path) : /\.(po|diffeo)$/.test(entry.name) ? [path] : [];
+    if (entry.isDirectory()) return programs(path);
+    return /\.(po|diffeo)$/.test(entry.name) ? [[relative(examples, path).split(sep).join("."), readFileSync(path, "utf8")]] : [];
   });
+}
+
+/** The program that a snapshot is of. */
+function recorded(snapshot) {
+  const lines = readFileSync(snapshot, "utf8").split("\n");
+  return lines.filter((line) => line.startsWith(">")).map((line) => line.slice(1)).join("\n");
 }
 
 let good = run("vscode-tmgrammar-test", "--config", join(root, "package.json"), join(here, "language.po"));
 
-// The tool keeps a snapshot beside its program; ours are kept here, so it works on copies.
+// The tool keeps a snapshot beside its program, so it works on copies.
 const copies = mkdtempSync(join(tmpdir(), "potto-grammar-"));
 try {
-  const names = programs(examples).map((path) => {
-    const name = relative(examples, path).split(sep).join(".");
-    copyFileSync(path, join(copies, name));
-    return name;
-  });
+  const now = new Map(programs(examples));
+  const kept = readdirSync(snapshots).map((name) => name.replace(/\.snap$/, ""));
+  const names = update ? [...now.keys()] : kept;
   for (const name of names) {
-    const kept = join(snapshots, `${name}.snap`);
-    if (existsSync(kept)) copyFileSync(kept, join(copies, `${name}.snap`));
-    else if (!update) {
-      console.error(`no snapshot of ${name}: run with --update`);
-      good = false;
-    }
+    const snapshot = join(snapshots, `${name}.snap`);
+    writeFileSync(join(copies, name), update ? now.get(name) : recorded(snapshot));
+    if (existsSync(snapshot)) copyFileSync(snapshot, join(copies, `${name}.snap`));
   }
   const options = ["--config", join(root, "package.json"), ...(update ? ["--updateSnapshot"] : ["--expandDiff"])];
-  good = run("vscode-tmgrammar-snap", ...options, ...names.map((name) => join(copies, name))) && good;
-  if (update) for (const name of names) copyFileSync(join(copies, `${name}.snap`), join(snapshots, `${name}.snap`));
-  for (const kept of readdirSync(snapshots)) {
-    if (names.includes(kept.replace(/\.snap$/, ""))) continue;
-    if (update) rmSync(join(snapshots, kept));
-    else {
-      console.error(`${kept} is the snapshot of nothing`);
-      good = false;
-    }
+  good = names.length > 0 && run("vscode-tmgrammar-snap", ...options, ...names.map((name) => join(copies, name))) && good;
+  if (update) {
+    for (const name of names) copyFileSync(join(copies, `${name}.snap`), join(snapshots, `${name}.snap`));
+    for (const name of kept) if (!now.has(name)) rmSync(join(snapshots, `${name}.snap`));
+  } else {
+    const behind = [...now].filter(([name, text]) => !kept.includes(name) || recorded(join(snapshots, `${name}.snap`)) !== text);
+    if (behind.length) console.log(`*** examples that changed since their snapshots: ${behind.map(([name]) => name).join(", ")}; npm run snapshots`);
   }
 } finally {
   rmSync(copies, { recursive: true });
