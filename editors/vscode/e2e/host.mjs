@@ -12,7 +12,7 @@ export async function hostTests(code, report) {
   const log = [];
   const page = await open(
     code,
-    code.workspace,
+    code.hostWorkspace,
     [["extensionDevelopmentPath", remote(code, tests)], ["extensionTestsPath", remote(code, join(tests, "index.js"))]],
     async (page) => {
       await page.exposeFunction("codeAutomationLog", (kind, args) => void log.push(`${kind} ${args}`));
@@ -22,7 +22,7 @@ export async function hostTests(code, report) {
   const late = new Promise((resolve) => setTimeout(() => resolve("no exit"), PATIENCE).unref());
   const status = await Promise.race([exit, late]);
   await page.context().close();
-  const file = join(code.workspace, "host-results.json");
+  const file = join(code.hostWorkspace, "host-results.json");
   if (!existsSync(file)) throw new Error(`the tests in the extension host gave no results (${status}):\n${log.slice(-40).join("\n")}\n${code.said()}`);
   const { results, activation } = JSON.parse(readFileSync(file, "utf8"));
   console.log(`activation: ${activation.toFixed(1)} ms`);

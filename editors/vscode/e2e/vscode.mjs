@@ -31,6 +31,7 @@ const SETTINGS = {
   "editor.minimap.enabled": false,
   "editor.accessibilitySupport": "off",
   "files.simpleDialog.enable": true,
+  "task.saveBeforeRun": "never",
   "task.problemMatchers.neverPrompt": true,
 };
 
@@ -48,8 +49,12 @@ function freePort() {
 /** The server with the extension installed from its package, and a browser. Close it in the end, whatever happens. */
 export async function start(vsix, chromiumPath) {
   const folder = mkdtempSync(join(tmpdir(), "potto-e2e-"));
-  const workspace = join(folder, "workspace");
-  cpSync(join(here, "workspace"), workspace, { recursive: true });
+  const [hostWorkspace, workspace] = ["host", "ui"].map((name) => {
+    const made = join(folder, name, "workspace");
+    cpSync(join(here, "workspace"), made, { recursive: true });
+    symlinkSync(join(root, ".venv"), join(made, ".venv")); // where the extension is to find the language server
+    return made;
+  });
   const lost = join(folder, "lost"); // a workspace whose setting names no server
   mkdirSync(join(lost, ".vscode"), { recursive: true });
   cpSync(join(here, "workspace", "shapes.po"), join(lost, "shapes.po"));
@@ -59,7 +64,6 @@ export async function start(vsix, chromiumPath) {
   writeFileSync(join(data, "data", "Machine", "settings.json"), JSON.stringify(SETTINGS));
   const common = ["--accept-server-license-terms", "--server-data-dir", data, "--extensions-dir", join(data, "ext")];
   const main = join(inner, "out", "server-main.js");
-  symlinkSync(join(root, ".venv"), join(workspace, ".venv")); // where the extension is to find the language server
   // Terminals need a native module, which is built where there is a compiler.
   const terminal = existsSync(join(inner, "node_modules", "node-pty", "build", "Release", "pty.node"));
   const env = { ...process.env, POTTO_E2E_TERMINAL: terminal ? "1" : "" };
@@ -95,7 +99,7 @@ export async function start(vsix, chromiumPath) {
     await close();
     throw error;
   }
-  return { port, workspace, lost, browser, terminal, close, said: () => said };
+  return { port, hostWorkspace, workspace, lost, browser, terminal, close, said: () => said };
 }
 
 async function answering(url, server, said) {

@@ -14,7 +14,7 @@ import { utf16 } from "./text";
 export interface Api {
   readonly state: () => ServerState["kind"];
   readonly ready: () => Promise<boolean>;
-  /** From the first line that was loaded until everything was registered. */
+  /** What it took to load the extension and to register everything. */
   readonly activationMilliseconds: number;
 }
 
@@ -27,8 +27,10 @@ def cover(t)
 `;
 
 let server: Server | undefined;
+const loaded = performance.now() - began;
 
 export function activate(context: vscode.ExtensionContext): Api {
+  const started = performance.now();
   const made = new Server();
   server = made;
   const derivatives = new Derivatives(made);
@@ -39,7 +41,7 @@ export function activate(context: vscode.ExtensionContext): Api {
   return {
     state: () => made.state.kind,
     ready: async () => (await made.ready()) !== undefined,
-    activationMilliseconds: performance.now() - began,
+    activationMilliseconds: loaded + performance.now() - started,
   };
 }
 

@@ -1,19 +1,7 @@
 // The life of the language server: looked for, started, watched, restarted, and missed.
+// The client is loaded when there is a server, so that opening the first file waits for nothing.
 import * as vscode from "vscode";
-import {
-  type ClientCapabilities,
-  CloseAction,
-  type CloseHandlerResult,
-  ErrorAction,
-  type FeatureState,
-  LanguageClient,
-  type LanguageClientOptions,
-  RevealOutputChannelOn,
-  type ServerCapabilities,
-  type StaticFeature,
-  State,
-  TransportKind,
-} from "vscode-languageclient/node";
+import type { LanguageClient } from "vscode-languageclient/node";
 import { find, type Found } from "./finding";
 import { selectedInterpreter } from "./python";
 import { TraceChannel } from "./trace";
@@ -123,13 +111,13 @@ export class Server implements vscode.Disposable {
       return;
     }
     this.set({ kind: "starting", program });
-    const client = this.makeClient(program);
-    this.running = client;
-    client.onDidChangeState((event) => {
-      if (this.running !== client) return;
-      if (event.newState === State.Running) this.set({ kind: "running", program });
-      else if (event.newState === State.Starting) this.set({ kind: "starting", program });
+    const { makeClient } = await import("./client");
+    const client: LanguageClient = makeClient(program, this, {
+      running: () => this.running === client && this.set({ kind: "running", program }),
+      starting: () => this.running === client && this.set({ kind: "starting", program }),
+      closed: () => this.closed(program),
     });
+    this.running = client;
     try {
       await client.start();
     } catch (error) {
@@ -151,66 +139,13 @@ export class Server implements vscode.Disposable {
     }
   }
 
-  private makeClient(program: Found): LanguageClient {
-    const configuration = vscode.workspace.getConfiguration("potto");
-    const more = configuration.get<string[]>("server.arguments", []);
-    const folder = vscode.workspace.workspaceFolders?.[0]?.uri;
-    const options: LanguageClientOptions = {
-      documentSelector: [{ language: "potto", scheme: "file" }, { language: "potto", scheme: "untitled" }],
-      outputChannel: this.log,
-      traceOutputChannel: this.trace,
-      revealOutputChannelOn: RevealOutputChannelOn.Never,
-      initializationOptions: () => ({ potto: vscode.workspace.getConfiguration("potto") }),
-      synchronize: {
-        configurationSection: "potto",
-        fileEvents: vscode.workspace.createFileSystemWatcher("**/{*.po,*.diffeo,potto.toml}"),
-      },
-      diagnosticPullOptions: { onChange: true, onTabs: true },
-      errorHandler: {
-        error: (_error, _message, count) => ({
-          action: count !== undefined && count <= 3 ? ErrorAction.Continue : ErrorAction.Shutdown,
-        }),
-        closed: () => this.closed(program),
-      },
-    };
-    const client = new LanguageClient(
-      "potto",
-      "Potto",
-      {
-        command: program.command,
-        args: [...program.args, "lsp", ...more],
-        transport: TransportKind.stdio,
-        options: folder?.scheme === "file" ? { cwd: folder.fsPath } : {},
-      },
-      options,
-    );
-    client.registerFeature(new OwnCommands());
-    return client;
-  }
-
-  /** The server ended by itself: start it again, unless it does nothing else. */
-  private closed(program: Found): CloseHandlerResult {
+  /** The server ended by itself: whether to start it again, which helps unless it does nothing else. */
+  private closed(program: Found): boolean {
     const now = Date.now();
     this.crashes = [...this.crashes.filter((then) => now - then < MINUTES), now];
-    if (this.crashes.length < CRASHES) return { action: CloseAction.Restart, handled: true };
+    if (this.crashes.length < CRASHES) return true;
     this.running = undefined;
-    const reason = `it ended ${this.crashes.length} times within three minutes`;
-    this.set({ kind: "failed", program, reason });
-    return { action: CloseAction.DoNotRestart, handled: true };
+    this.set({ kind: "failed", program, reason: `it ended ${this.crashes.length} times within three minutes` });
+    return false;
   }
-}
-
-/** Commands are ours: what the server answers is shown, and what only an editor can do is offered to it. */
-class OwnCommands implements StaticFeature {
-  fillClientCapabilities(capabilities: ClientCapabilities): void {
-    capabilities.experimental = { commands: { commands: ["potto.preview", "potto.showReferences", "potto.rename"] } };
-  }
-  preInitialize(capabilities: ServerCapabilities): void {
-    delete capabilities.executeCommandProvider;
-  }
-  initialize(): void {}
-  getState(): FeatureState {
-    return { kind: "static" };
-  }
-  clear(): void {}
 }

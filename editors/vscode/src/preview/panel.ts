@@ -2,7 +2,6 @@
 import { randomBytes } from "node:crypto";
 import { posix } from "node:path";
 import * as vscode from "vscode";
-import { ResponseError } from "vscode-languageclient/node";
 import type { Server } from "../server";
 import type { FromPreview, Samples, Scene, ToPreview } from "./messages";
 
@@ -131,8 +130,8 @@ class Preview {
       const samples = await client.sendRequest<Samples>("potto/sample", params, source.token);
       this.send({ type: "samples", id, samples });
     } catch (error) {
-      const outdated =
-        source.token.isCancellationRequested || (error instanceof ResponseError && error.code === CONTENT_MODIFIED);
+      const { code } = error as { code?: unknown };
+      const outdated = source.token.isCancellationRequested || code === CONTENT_MODIFIED;
       this.send({ type: "failed", id, message: error instanceof Error ? error.message : String(error), outdated });
     } finally {
       this.asked.delete(id);
