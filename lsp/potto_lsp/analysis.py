@@ -171,7 +171,7 @@ class Analysis:
         try:
             self._verdicts.keep(key, file_diagnostics(self.db, key), file_diagnostics.__name__)
         except Exception as error:
-            self._failed(key, "verdict", error)
+            self.failed(key, "verdict", error)
 
     def _guarded(self, key: str) -> list[Diagnostic]:
         """The diagnostics of a file part by part; a part that fails is logged once for each of its texts."""
@@ -180,22 +180,23 @@ class Analysis:
             try:
                 found += part(db, key)
             except Exception as error:
-                self._failed(key, part.__name__, error)
+                self.failed(key, part.__name__, error)
         for name in names(db, key):
             try:
                 start = chunk_start(db, key, name)
                 found += [absolute(db, key, said, start) for said in definition_diagnostics(db, key, name)]
             except Exception as error:
-                self._failed(key, name, error)
+                self.failed(key, name, error)
         for reference in statements(db, key):
             try:
                 said = check_statement(db, key, reference.statement)
                 found += [absolute(db, key, one, reference.start) for one in said]
             except Exception as error:
-                self._failed(key, "statement", error)
+                self.failed(key, "statement", error)
         return found
 
-    def _failed(self, key: str, name: str, error: Exception) -> None:
+    def failed(self, key: str, name: str, error: Exception) -> None:
+        """A check failed by a bug of ours: logged once for each of its messages."""
         told = f"{type(error).__name__}: {error}"
         if self._failing.get((key, name)) != told:
             self._failing[key, name] = told

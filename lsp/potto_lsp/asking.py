@@ -31,6 +31,17 @@ def uri_of(params: Any) -> str | None:
     return uri if isinstance(uri, str) else None
 
 
+def about(params: Any) -> str | None:
+    """The document that parameters name anywhere: also those of what is resolved, of items and of commands."""
+    found = uri_of(params)
+    if found is not None or not isinstance(params, Mapping):
+        return found
+    data, item, arguments = params.get("data"), params.get("item"), params.get("arguments")
+    places = [each.get("uri") for each in (data, item) if isinstance(each, Mapping)]
+    places += arguments[:1] if isinstance(arguments, list) else []
+    return next((uri for uri in places if isinstance(uri, str)), None)
+
+
 @dataclass
 class Ask:
     """One request."""

@@ -139,7 +139,15 @@ class LiveValues:
         return [(point, value) for point, value in found if value is not None]
 
     def diagnostics(self, file: str) -> tuple[Located, ...]:
-        """What is wrong with the live expressions of an open file: as the checker sees them, and what came out."""
+        """What is wrong with the live expressions of an open file: as the checker sees them, and what came out. A bug
+        of ours costs these diagnostics alone."""
+        try:
+            return self._diagnostics(file)
+        except Exception as error:
+            self._session.analysis.failed(file, "live expressions", error)
+            return ()
+
+    def _diagnostics(self, file: str) -> tuple[Located, ...]:
         analysis = self._session.analysis
         document = analysis.document(file)
         if document is None or "#>" not in document.text.text:

@@ -15,9 +15,9 @@ from typing import Any, BinaryIO
 
 from potto import __version__
 from potto_lsp import errors
-from potto_lsp.asking import Ask, uri_of
+from potto_lsp.asking import Ask, about, uri_of
 from potto_lsp.client import Client
-from potto_lsp.crashes import Crashes
+from potto_lsp.crashes import Crashes, Version
 from potto_lsp.deferred import Deferred
 from potto_lsp.documents import Document, Documents
 from potto_lsp.errors import RequestError
@@ -42,7 +42,7 @@ class Server:
         self._shut_down = False
         self._jobs: dict[Id, Job] = {}
         self._replies: dict[Id, Reply | None] = {}
-        self._ids = itertools.count(1)
+        self._ids, self._edits = itertools.count(1), 0
         self._lock = Lock()
         self._crashes = Crashes(self.notify)
 
@@ -150,6 +150,7 @@ class Server:
     def edit(self, change: Callable[[], object]) -> None:
         """Change something that the analysis sees; files are checked afterwards."""
         assert self.worker is not None
+        self._edits += 1
 
         def run() -> None:
             change()
@@ -179,7 +180,7 @@ class Server:
         return ask.analysis.document(ask.file) is not document
 
     def _answer(self, id: Id, job: Job, feature: Feature, ask: Ask, document: Document | None) -> None:
-        version = (feature.method, uri_of(ask.params) or "", None if document is None else document.version)
+        version = self._version(feature, ask, document)
         if self._crashes.is_off(version):
             self._finish(id, job, result=None)
             return
@@ -197,6 +198,12 @@ class Server:
                 self._defer(id, job, result)
             else:
                 self._finish(id, job, result=result)
+
+    def _version(self, feature: Feature, ask: Ask, document: Document | None) -> Version:
+        """What a failure counts for: a method on a version of a file, or on the workspace until the next edit."""
+        uri = about(ask.params) or ""
+        named = document or self.documents.get(uri)
+        return feature.method, uri, self._edits if named is None else named.version
 
     def _defer(self, id: Id, job: Job, deferred: Deferred) -> None:
         """An answer that comes later."""

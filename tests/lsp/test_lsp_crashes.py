@@ -82,6 +82,38 @@ def test_three_failures_in_a_row_switch_a_feature_off(pipe: Pipe, monkeypatch: p
     assert pipe.ask(6, "textDocument/foldingRange", params)["result"] is not None
 
 
+def test_what_fails_for_the_workspace_is_off_until_the_next_edit(pipe: Pipe, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(ask: Any) -> None:
+        raise ZeroDivisionError("a bug")
+
+    feature = Feature("workspace/symbol", "outlines.workspace_symbols")
+    feature.__dict__["answer"] = broken
+    monkeypatch.setitem(server.FEATURES, "workspace/symbol", feature)
+    codes = [pipe.ask(id, "workspace/symbol", {"query": ""}).get("error", {}).get("code") for id in range(1, 6)]
+    assert codes == [-32603] * 3 + [None] * 2
+    pipe.send(method="textDocument/didOpen", params=document(1))
+    assert pipe.ask(9, "workspace/symbol", {"query": ""})["error"]["code"] == -32603
+
+
+def test_what_fails_to_resolve_is_off_for_its_file_alone(pipe: Pipe, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(ask: Any) -> str:
+        if ask.params["data"]["uri"] == "untitled:x":
+            raise ZeroDivisionError("a bug")
+        return "fine"
+
+    feature = Feature("completionItem/resolve", "completing.resolve")
+    feature.__dict__["answer"] = broken
+    monkeypatch.setitem(server.FEATURES, "completionItem/resolve", feature)
+    pipe.send(method="textDocument/didOpen", params=document(1))
+    bad, good = ({"label": "f", "data": {"uri": uri}} for uri in ("untitled:x", "untitled:y"))
+    answers = [pipe.ask(id, "completionItem/resolve", bad) for id in range(1, 5)]
+    assert ["error" in answer for answer in answers] == [True, True, True, False]
+    assert pipe.ask(9, "completionItem/resolve", good)["result"] == "fine"
+    change = {"textDocument": {"uri": "untitled:x", "version": 2}, "contentChanges": [{"text": "x = 1\n"}]}
+    pipe.send(method="textDocument/didChange", params=change)
+    assert "error" in pipe.ask(10, "completionItem/resolve", bad)
+
+
 def test_a_check_that_fails_costs_one_definition(
     pipe: Pipe, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -102,6 +134,21 @@ def test_a_check_that_fails_costs_one_definition(
     lines = [said["range"]["start"]["line"] for said in note["params"]["diagnostics"]]
     assert lines == [0, 2]
     assert "the check of g" in caplog.text
+
+
+def test_a_live_expression_that_fails_costs_no_other_diagnostics(
+    pipe: Pipe, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def broken(db: Any, file: str) -> Any:
+        raise ZeroDivisionError("a bug")
+
+    monkeypatch.setattr("potto.ide.live_diagnostics", broken)
+    with caplog.at_level(logging.ERROR):
+        pipe.send(method="textDocument/didOpen", params=document(1, "def f(t) one\n#> f(1)\n"))
+        while (note := pipe.read()).get("method") != "textDocument/publishDiagnostics":
+            pass
+    assert [said["code"] for said in note["params"]["diagnostics"]] == ["P0201"]
+    assert "live expressions" in caplog.text
 
 
 def test_a_client_that_does_not_read_does_not_stop_the_server() -> None:

@@ -170,6 +170,12 @@ def test_hints(client: Client, uri: Uri) -> None:
     assert isinstance(client.ask("textDocument/inlineValue", {**whole(uri("main")), "context": {}}), list)
 
 
+def test_hints_can_be_switched_off(client: Client, uri: Uri) -> None:
+    assert client.ask("textDocument/inlayHint", whole(uri("main")))
+    client.tell("workspace/didChangeConfiguration", {"settings": {"potto": {"hints": {"types": False}}}})
+    assert client.ask("textDocument/inlayHint", whole(uri("main"))) == []
+
+
 def test_semantic_tokens_whole_in_range_and_by_difference(client: Client, uri: Uri) -> None:
     document = {"textDocument": {"uri": uri("main")}}
     first = client.ask("textDocument/semanticTokens/full", document)

@@ -11,11 +11,14 @@ from potto_lsp import convert, protocol
 from potto_lsp.asking import Ask
 
 KINDS = {"type": 1, "parameter": 2}
+SETTINGS = {"type": "hints.types", "parameter": "hints.coordinates"}
 
 
 def inlay_hints(ask: Ask) -> list[protocol.InlayHint]:
     span = ask.span
-    found = [_hint(ask, hint) for hint in ide.inlay_hints(ask.db, ask.file, span)]
+    off = {kind for kind, setting in SETTINGS.items() if ask.analysis.settings.get(setting) is False}
+    hints = ide.inlay_hints(ask.db, ask.file, span)
+    found = [_hint(ask, hint) for hint in hints if hint.kind not in off]
     return found + _live(ask, span)
 
 
