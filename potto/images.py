@@ -141,6 +141,18 @@ def signed(parts: Array, low: float, high: float) -> Any:
     return _bytes(np.stack([1 - 0.95 * down, 1 - 0.85 * (up + down), 1 - 0.95 * up]))
 
 
+def coloured(
+    components: Sequence[Sequence[float]], signed_values: bool
+) -> tuple[list[tuple[int, int, int]], float, float]:
+    """The colours of pixels given by plain numbers, part by part, and the least and the largest number."""
+    parts = np.asarray(components, dtype=float)
+    low, high = limits(parts, even=signed_values)
+    if len(parts) >= 3 and not signed_values and low >= 0 and high <= 1:
+        low, high = 0.0, 1.0  # colours as they are meant
+    rgb = (signed if signed_values else shades)(parts, low, high)
+    return [(r, g, b) for r, g, b in rgb.tolist()], *limits(parts)
+
+
 def decades(parts: Array) -> Any:
     """The largest of the parts by its power of ten: black for 1e-16 and less, white for 1 and more."""
     with np.errstate(divide="ignore"):

@@ -79,7 +79,8 @@ def half_blocks(image: Image, *, unicode: bool = True, color: bool = True) -> st
     """An image as text: two pixels a character in colours, else one character of more or less ink a pixel pair."""
     rows = image.pixels
     if not (unicode and color):
-        inked = ("".join(map(_ink, top, bottom)).rstrip() for top, bottom in _pairs(rows))
+        ink = _ink_from_white if image.signed else _ink
+        inked = ("".join(map(ink, top, bottom)).rstrip() for top, bottom in _pairs(rows))
         return "\n".join(inked)
     lines = []
     for top, bottom in _pairs(rows):
@@ -98,6 +99,12 @@ def _pairs(rows: tuple[tuple[Color, ...], ...]) -> Iterator[tuple[tuple[Color, .
 def _ink(a: Color, b: Color) -> str:
     light = (sum(a) + sum(b)) / (6 * 255)
     return _RAMP[min(int(light * len(_RAMP)), len(_RAMP) - 1)]
+
+
+def _ink_from_white(a: Color, b: Color) -> str:
+    """The more ink the further from zero, which is white."""
+    least = min(*a, *b)
+    return _RAMP[min(int((255 - least) / 256 * len(_RAMP)), len(_RAMP) - 1)]
 
 
 # Real images

@@ -16,7 +16,6 @@ from potto.png import encode
 Color = tuple[int, int, int]
 COLORS: tuple[Color, ...] = ((31, 119, 180), (214, 39, 40), (44, 160, 44), (148, 103, 189), (255, 127, 14))
 WHITE: Color = (255, 255, 255)
-HOLE: Color = (128, 128, 128)
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,11 +168,12 @@ class Plot:
 
 @dataclass(frozen=True, slots=True)
 class Image:
-    """Pixels row by row from the top, and what the darkest and the lightest stand for."""
+    """Pixels row by row from the top, the least and the largest value; whether zero is white between two colours."""
 
     pixels: tuple[tuple[Color, ...], ...]
     low: float
     high: float
+    signed: bool = False
 
     @property
     def size(self) -> tuple[int, int]:
@@ -195,26 +195,16 @@ class Image:
         )
 
 
-def image_of(components: Sequence[Sequence[float]], columns: int) -> Image:
-    """An image of one component in greys, or of three as red, green and blue; scaled from the least to the largest."""
-    finite = [v for part in components for v in part if math.isfinite(v)]
-    low, high = (min(finite), max(finite)) if finite else (0.0, 1.0)
-    if len(components) >= 3 and low >= 0 and high <= 1:
-        low, high = 0.0, 1.0  # colours as they are meant
-    scale = high - low or 1.0
+def image_of(components: Sequence[Sequence[float]], columns: int, *, signed: bool = False) -> Image:
+    """An image of one component in greys, or of three as red, green and blue; scaled from the least to the largest.
 
-    def level(value: float) -> int:
-        return round(255 * (value - low) / scale)
+    signed: of a derivative; zero is white, what is above it red, what is below it blue.
+    """
+    from potto.images import coloured
 
-    flat: list[Color] = []
-    for values in zip(*components, strict=True):
-        if not all(map(math.isfinite, values)):
-            flat.append(HOLE)
-        elif len(values) >= 3:
-            flat.append((level(values[0]), level(values[1]), level(values[2])))
-        else:
-            flat.append((level(values[0]),) * 3)
-    return Image(tuple(tuple(flat[i : i + columns]) for i in range(0, len(flat), columns)), low, high)
+    colours, low, high = coloured(components, signed)
+    rows = (colours[i : i + columns] for i in range(0, len(colours), columns))
+    return Image(tuple(map(tuple, rows)), low, high, signed and len(components) < 3)
 
 
 def _finite(error: float) -> float:
@@ -255,4 +245,5 @@ def line(points: Sequence[tuple[float, float]]) -> set[tuple[int, int]]:
 
 def png(pixels: Sequence[Sequence[Color]]) -> bytes:
     """Pixels as a PNG file."""
+
     return encode(bytes(channel for row in pixels for pixel in row for channel in pixel), len(pixels[0]), len(pixels))

@@ -128,6 +128,8 @@ def grid(
     points = [[x for _ in range(rows) for x in across.tolist()], [y for y in down.tolist() for _ in range(columns)]]
     size = max(1, rows // BANDS) * columns if session.progress is not None else rows * columns
     found: list[list[float]] = []
+    if session.progress is not None:
+        session.progress(f"{axes.label}: {rows * columns} pixels")
     for start in range(0, rows * columns, size):
         stop = min(start + size, rows * columns)
         parts = _sampled(session, axes, [_array(place[start:stop]) for place in points])

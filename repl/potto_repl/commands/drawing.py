@@ -116,10 +116,11 @@ def image(session: Conversation, text: str) -> Part:
         axes = axes_of(session, what.strip(), 2, ":image f")
     else:
         axes = derivative_of(session, named[1], 2, named[2], ":image f by NAME")
-    picture = image_of(grid(session, axes, (x0, x1, y0, y1), pixels, pixels), pixels)
+    picture = image_of(grid(session, axes, (x0, x1, y0, y1), pixels, pixels), pixels, signed=axes.dual)
     session.last_picture = picture
     shown = half_blocks(picture, unicode=session.options.unicode, color=False)
-    scale = f"{axes.label}: {picture.low:.4g} (dark) to {picture.high:.4g} (light)"
+    dark, light = ("blue below 0", "red above") if picture.signed else ("dark", "light")
+    scale = f"{axes.label}: {picture.low:.4g} ({dark}) to {picture.high:.4g} ({light})"
     data = {"image": axes.label, "pixels": pixels, "low": picture.low, "high": picture.high, "_picture": picture,
             "_scale": scale}  # fmt: skip
     return Part("picture", f"{shown}\n{scale}", data)
