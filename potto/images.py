@@ -14,6 +14,7 @@ import numpy as np
 
 from potto.diagnostics import PottoError
 from potto.kernels.cells import Array
+from potto.kernels.errors import WRONG_CALL
 from potto.png import encode
 from potto.runtime.estimate import Estimate
 
@@ -66,7 +67,7 @@ Call = Callable[..., tuple[Sequence[Any], Estimate]]  # places to the parts that
 def sampled(call: Call, places: Sequence[Array], progress: Callable[[int], None] | None = None) -> Sampled:
     """The parts of a call at many places, band by band. `progress` is told how many are done.
 
-    Raises the PottoError of the first place if the call has no value at any.
+    Raises the PottoError of the first place if the call has no value at any, or if it is no call of the function.
     """
     count = places[0].size
     found = Sampled(np.empty((0, count)))
@@ -86,6 +87,8 @@ def _fill(call: Call, places: Sequence[Array], start: int, stop: int, found: Sam
     try:
         parts, answer = call(*here)
     except PottoError as error:
+        if any(diagnostic.code == WRONG_CALL.code for diagnostic in error.diagnostics):
+            raise  # as it would everywhere
         found.trouble = found.trouble or error
         if count == 1:
             found.holes += 1

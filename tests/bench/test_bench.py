@@ -22,6 +22,8 @@ from potto.bench.report import needed, table
 PROBLEMS = {p.id: p for p in catalogue()}
 STEP, QUAD, EIGHT = PROBLEMS["step"], PROBLEMS["eq1-quad"], PROBLEMS["eight"]
 
+METHODS = [pytest.param(a.name, marks=[pytest.mark.slow] if a.package == "jax" else []) for a in (*OURS, *PEERS)]
+
 
 def peer(name):
     return next(a for a in (*OURS, *PEERS) if a.name == name)
@@ -46,7 +48,7 @@ def test_the_integrand_is_one_function_for_numbers_and_arrays(problem):
     np.testing.assert_allclose(together, one_by_one, rtol=1e-12)
 
 
-@pytest.mark.parametrize("name", [a.name for a in (*OURS, *PEERS)])
+@pytest.mark.parametrize("name", METHODS)
 @pytest.mark.parametrize("problem", [STEP, QUAD, EIGHT], ids=lambda p: p.id)
 def test_a_method_gets_nearer_to_the_value(name, problem):
     """Not for what it says of itself: against the exact answer."""
@@ -57,7 +59,7 @@ def test_a_method_gets_nearer_to_the_value(name, problem):
     assert runs[-1].error < 0.15 and runs[-1].evaluations > 0 and runs[-1].seconds > 0
 
 
-@pytest.mark.parametrize("name", ["sum, complex step", "JAX of the sum"])
+@pytest.mark.parametrize("name", METHODS[-2:])
 def test_the_derivative_of_a_sum_lacks_the_boundary_however_many_points(name):
     """d/dt of int_0^1 e^x [x < t] is all boundary: the sum's derivative is 0, off by 100 %."""
     assert [run.value for run in runs_of(STEP, name, "derivative")] == [0.0, 0.0, 0.0]
