@@ -16,6 +16,7 @@ from potto.calculus.conditions import conditions_of
 from potto.calculus.diffeo import exported
 from potto.calculus.dual import dual
 from potto.calculus.expand import expanded
+from potto.calculus.guards import unguarded
 from potto.core.printer import format_term
 from potto.core.simplify import simplify
 from potto.core.terms import (
@@ -49,7 +50,8 @@ class PartFacts:
     """One integral of a definition, or its body around them, and the parts of its derivative; as Potto writes it.
 
     interior: the integral of the integrand's derivative. boundary: per surface its jump times its speed, at the
-    surface. bounds: what bounds that move bring in. reason: why a part has no symbolic form, or nothing.
+    surface. bounds: what bounds that move bring in. reason: why a part has no symbolic form (which is
+    empty then), or nothing.
     """
 
     value: str
@@ -69,6 +71,7 @@ class DerivativeFacts:
     surfaces: tuple[str, ...]
     integrals: tuple[PartFacts, ...]
     body: PartFacts | None
+    where: tuple[str, ...] = ()  # what the parameters of measures must be
 
     @property
     def text(self) -> str:
@@ -78,16 +81,16 @@ class DerivativeFacts:
             lines += _lines(item)
         if self.body is not None:
             lines += ["", "body" if self.integrals else "function", *_lines(self.body)]
-        lines += ["", *_part("surfaces", self.surfaces or ("none",))]
+        lines += ["", *_part("surfaces", self.surfaces or ("none",)), *_part("where", self.where)]
         return "\n".join(lines)
 
 
 def _lines(item: PartFacts) -> list[str]:
     note = (item.reason,) if item.reason else ()
-    boundary = item.boundary or ("0",)
+    boundary = item.boundary or (() if item.reason else ("0",))
     return [
         *_part("value", (item.value,)),
-        *_part("interior", (item.interior,)),
+        *_part("interior", (item.interior,) if item.interior else ()),
         *_part("boundary", boundary),
         *_part("bounds", item.bounds),
         *_part("note", note),
@@ -128,6 +131,7 @@ def derivative_facts(db: Database, file: str, name: str) -> DerivativeFacts | No
         body = body.body
     if not is_recursive(db, file, name):
         body = expanded(body, lambda g: _unless_recursive(db, g))
+    body, conditions = unguarded(body)
     tangents = _tangents(parameters, body)
     found = tuple(_integral_facts(node, tangents) for node in _outermost(body))
     type = interface(db, file, name).type
@@ -138,6 +142,7 @@ def derivative_facts(db: Database, file: str, name: str) -> DerivativeFacts | No
         tuple(_surfaces(db, core(db, file, name).term)),
         found,
         None if isinstance(body, Integral) else _body_facts(body, tangents),
+        conditions,
     )
 
 
@@ -178,12 +183,12 @@ def _integral_facts(node: Integral, tangents: Mapping[str, Term]) -> PartFacts:
         bounds = tuple(format_term(simplify(term)) for term in at_bounds(node, rate))
     except (PottoError, NoClosedForm) as error:
         reason = f"no symbolic form: {_why(error)}"
-    return PartFacts(format_term(node), interior or "?", boundary, bounds, reason)
+    return PartFacts(format_term(node), interior, boundary, bounds, reason)
 
 
 def _body_facts(body: Term, tangents: Mapping[str, Term]) -> PartFacts:
     """A body that is no integral by itself. Where a parameter crosses a surface, the derivative has a delta of it."""
-    interior, reason = "?", ""
+    interior, reason = "", ""
     boundary: tuple[str, ...] = ()
     try:
         interior = format_term(simplify(dual(body, tangents)[1]))

@@ -17,6 +17,7 @@ from potto.calculus.deltas import without_deltas
 from potto.calculus.derivative import NotSmooth
 from potto.calculus.dual import Differentiator, heads_of
 from potto.calculus.expand import Resolve
+from potto.calculus.guards import unguarded
 from potto.calculus.pivots import NoClosedForm, pivots
 from potto.calculus.sides import branches_of
 from potto.calculus.solve import factors
@@ -162,11 +163,12 @@ def describe(term: Term, name: str, type_text: str, resolve: Resolve) -> Derivat
     while isinstance(body, Lam):
         params.extend(body.params)
         body = body.body
+    body, conditions = unguarded(body)
     functions = {p: f"d{p}" for p in params if p in heads_of(term)}
     tangents: dict[str, Term] = {p: var(f"d{p}") for p in params}
     work = Differentiator(resolve)
-    notes: list[str] = []
-    tangent = ""
+    notes = [f"has a value where {condition}" for condition in conditions]
+    guards, tangent = len(notes), ""
     try:
         tangent = _text(work.dual(opened(body), tangents)[1], functions)
     except NoClosedForm as problem:
@@ -178,7 +180,7 @@ def describe(term: Term, name: str, type_text: str, resolve: Resolve) -> Derivat
     known = [work.carried_out(i) for i in _outermost(body)]
     integrals = tuple(_integral(i, work, tangents, functions) for i in known if isinstance(i, Integral))
     surfaces: tuple[SurfaceText, ...] = ()
-    if not integrals and not notes:
+    if not integrals and len(notes) == guards:
         plain = work.carried_out(body)
         tangent = _with_deltas(plain, work, tangents, functions, tangent)
         surfaces = _own_surfaces(plain, tangents)
@@ -220,7 +222,7 @@ def _integral(
     deltas: list[str] = []
     boundary: list[str] = []
     bounds: list[str] = []
-    interior, reason = "?", ""
+    interior, reason = "", ""
     try:
         interior = _text(rate(node.body), functions)
         for item in jumps(opened(node.body), node.variables, rate):
@@ -350,9 +352,9 @@ def _lines(found: DerivativeText) -> list[str]:
 
 def _of_integral(title: str, item: IntegralText) -> list[str]:
     lines = [f"D {title} = {item.head}"]
-    parts = [(item.interior, "interior")] if item.interior != "0" or not item.deltas else []
+    parts = [(item.interior, "interior")] if item.interior and (item.interior != "0" or not item.deltas) else []
     parts += [(text, "boundary") for text in item.deltas]
-    width = min(WIDTH, max(len(text) for text, _ in parts))
+    width = min(WIDTH, max((len(text) for text, _ in parts), default=0))
     for number, (text, kind) in enumerate(parts):
         lines.append(f"    {'+ ' if number else '  '}{text.ljust(width)}   # {kind}")
     lines.append(f"    d({item.variables})")

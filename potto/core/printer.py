@@ -7,6 +7,7 @@ Iverson bracket, its surface turned so that it reads as a comparison (`[x < t]` 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from potto.core.terms import (
@@ -29,7 +30,11 @@ from potto.core.terms import (
     Term,
     Tuple,
     Var,
+    integral,
+    lam,
     postorder,
+    sum_,
+    var,
 )
 
 # How tightly a text holds together; an operand looser than its place needs parentheses.
@@ -54,12 +59,60 @@ _Texts = dict[Term, _Text]
 
 
 def format_term(term: Term, limit: int = 20_000) -> str:
-    """A term as Potto source on one line. Parts longer than `limit` characters are left out as `...`."""
+    """A term as Potto source on one line. Parts longer than `limit` characters are left out as `...`.
+
+    Copies of bound variables, which have names that nobody can write (`k'1`), get names that one can (`k1`).
+    """
     texts: _Texts = {}
-    for node in postorder(term):
-        text = _node(node, texts)
+    nodes = tuple(postorder(term))
+    names = _written(nodes)
+    for node in nodes:
+        text = _node(node if not names else _renamed(node, names), texts)
         texts[node] = text if len(text.text) <= limit else _Text("...", _ATOM)
     return texts[term].text
+
+
+def _written(nodes: tuple[Term, ...]) -> Mapping[str, str]:
+    """For each name that nobody can write one that is used for nothing else in these nodes."""
+    used = dict.fromkeys(name for node in nodes for name in _names(node))
+    copies = [name for name in used if name.partition("'")[2].isdigit()]  # and not `delta'`, which is a derivative
+    names: dict[str, str] = {}
+    taken = set(used) if copies else set()
+    for name in copies:
+        stem, _, tail = name.partition("'")
+        candidate, number = stem, int(tail)
+        while candidate in taken:
+            candidate, number = f"{stem}{number}", number + 1
+        taken.add(candidate)
+        names[name] = candidate
+    return names
+
+
+def _names(node: Term) -> tuple[str, ...]:
+    match node:
+        case Var(name=name) | Global(name=name):
+            return (name,)
+        case Lam(params=names) | Integral(variables=names):
+            return names
+        case Sum(variable=name):
+            return (name,)
+        case _:
+            return ()
+
+
+def _renamed(node: Term, names: Mapping[str, str]) -> Term:
+    """The node itself with other names; its children, by which their texts are found, stay as they are."""
+    match node:
+        case Var(name=name):
+            return var(names.get(name, name))
+        case Lam(params=params):
+            return lam(tuple(names.get(p, p) for p in params), node.body)
+        case Integral(variables=variables, bounds=bounds):
+            return integral(tuple(names.get(v, v) for v in variables), bounds, node.body, node.hints)
+        case Sum(variable=name):
+            return sum_(names.get(name, name), node.lo, node.hi, node.body)
+        case _:
+            return node
 
 
 def _node(node: Term, texts: _Texts) -> _Text:

@@ -1,0 +1,36 @@
+"""What `potto deriv` and the editor print is Potto that one can write."""
+
+from __future__ import annotations
+
+import pytest
+
+from potto.calculus.explain import explain_derivative
+from potto.facts import derivative_facts
+from potto.library import Library
+from potto.syntax import parse_expression
+
+PROGRAMS = [
+    ("def f(s, t) integral (x ~ normal(0, s)) [x < t] d(x)", ("0 < s",)),
+    ("def f(a, t) 2*integral (x ~ uniform(0, a)) [x < t]*x d(x)", ("0 < a",)),
+    ("def f(r, t) integral (x ~ exponential(r)) exp(-t*x) d(x)", ("0 < r",)),
+    ("def f(a, m, b) integral (x ~ triangular(a, m, b)) x d(x)", ("a <= m and m <= b", "a < b")),
+    ("def f(n, t) integral [0, 1] (sum k in 1..n ([x < t/k] + k*t)) * (sum k in 1..n (k*t*x)) d(x)", ()),
+    ("def f(n, t) sum k in 1..n (integral [0, 1] [x < t/k] d(x))", ()),
+    ("def g(t) integral [0, 1] [x < t] d(x)\ndef f(t) integral [0, 1] g(t*x)*g(x) d(x)", ()),
+]
+
+
+@pytest.mark.parametrize(("program", "where"), PROGRAMS)
+def test_formulas_are_potto(program: str, where: tuple[str, ...]) -> None:
+    library = Library()
+    file = library.put("<text>", program + "\n")
+    facts = derivative_facts(library.db, file, "f")
+    assert facts is not None and facts.where == where
+    parts = [*facts.integrals, *((facts.body,) if facts.body is not None else ())]
+    formulas = [text for p in parts for text in (p.value, p.interior, *p.boundary, *p.bounds)]
+    shown = explain_derivative(library.db, file, "f")
+    formulas += [shown.tangent, *(text for i in shown.integrals for text in (i.integrand, i.interior, *i.deltas))]
+    for text in [*formulas, *where]:
+        assert "?" not in text and "'" not in text
+        assert not parse_expression(text).diagnostics, text
+    assert all(f"has a value where {condition}" in shown.notes for condition in where)
