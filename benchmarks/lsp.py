@@ -1,7 +1,8 @@
 """The language server against its goals: a real client over standard streams, 200 modules, 42,000 lines.
 
 Run: `python benchmarks/lsp.py [--json] [--quick]`. Times are of the wall clock between a message sent and the answer
-read; on a busy machine the tails are those of the machine.
+read; on a busy machine they are those of the machine, so the load is shown before and after, and beside the times how
+much of a processor the server has used for one such thing, in the mean.
 """
 
 from __future__ import annotations
@@ -109,6 +110,11 @@ class Client:
         status = Path(f"/proc/{self.process.pid}/status").read_text()
         return int(status.partition("VmRSS:")[2].split()[0]) / 1024
 
+    def processor(self) -> float:
+        """The seconds of processor time that the server has used so far, as Linux tells it."""
+        stat = Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()
+        return (int(stat[11]) + int(stat[12])) / os.sysconf("SC_CLK_TCK")
+
     def _read(self) -> None:
         stream = self.process.stdout
         assert stream is not None
@@ -138,20 +144,24 @@ def measure(folder: Path, texts: dict[str, str], rounds: int) -> Iterator[Row]:
     client = Client(folder)
     large = texts["large"]
     client.open("large", large)
-    diagnosed = client.diagnosed("large") - client.started
+    diagnosed, used = client.diagnosed("large") - client.started, client.processor()
     yield "G7", "start to `initialize` result", client.greeted * 1e3, "ms", 250, 150
     yield "G8", "start to diagnostics of the opened 2,000-line file, cold", diagnosed * 1e3, "ms", 700, 450
+    yield "", "- processor time", used * 1e3, "ms", 700, 450
     yield "G9", "whole workspace checked cold", checked(client), "s", 2.5, 1.2
+    yield "", "- processor time", client.processor(), "s", 2.5, 1.2
+    yield "G10", "memory then", client.memory(), "MB", 120, 90
     yield from typing(client, large, rounds)
     yield from signatures(client, texts, rounds)
     yield from questions(client, large, rounds)
-    yield "G10", "memory with the whole workspace checked", client.memory(), "MB", 120, 90
+    yield "G10", "memory with the whole workspace checked, and after all this", client.memory(), "MB", 120, 90
     yield "G12", f"longest pause over {rounds * 50:,} random edits", pauses(client, rounds * 50), "ms", 20, 10
     client.process.kill()
     client = Client(folder)
     client.open("large", large)
-    diagnosed = client.diagnosed("large") - client.started
-    yield "G8", "the same with what an earlier session has kept", diagnosed * 1e3, "ms", 350, 250
+    diagnosed, used = client.diagnosed("large") - client.started, client.processor()
+    yield "G8", "start to diagnostics of the opened file, known from earlier", diagnosed * 1e3, "ms", 350, 250
+    yield "", "- processor time", used * 1e3, "ms", 350, 250
     client.process.kill()
 
 
@@ -165,13 +175,15 @@ def typing(client: Client, large: str, rounds: int) -> Iterator[Row]:
     lines = large.split("\n")
     line = next(n for n in range(len(lines) // 2, len(lines)) if "sin(" in lines[n])
     column = lines[line].index("sin(")
-    client.quiet()
+    client.quiet(1.0)
     body, broken, top = [], [], []
+    used = client.processor()
     for turn in range(rounds):
         sent = client.change("large", replace(line, column, column, str(turn % 9 + 1) + "*"))
         body.append(client.diagnosed("large") - sent)
         sent = client.change("large", replace(line, column, column + 2, ""))
         body.append(client.diagnosed("large") - sent)
+    used = (client.processor() - used) / len(body)
     for _ in range(rounds):
         sent = client.change("large", replace(line, column, column, "("))
         broken.append(client.diagnosed("large") - sent)
@@ -183,6 +195,7 @@ def typing(client: Client, large: str, rounds: int) -> Iterator[Row]:
         top.append(client.diagnosed("large") - sent)
     yield "", "keystroke to diagnostics, body edit, median", statistics.median(body) * 1e3, "ms", 5, 2.5
     yield "G1", "keystroke to diagnostics, body edit in the 2,000-line module, p95", quantile(body, 0.95), "ms", 5, 2.5
+    yield "", "- processor time of one, mean, with all that follows in idle time", used * 1e3, "ms", 5, 2.5
     yield "G2", "the same while the text is broken, p95", quantile(broken, 0.95), "ms", 5, 2.5
     yield "G2", "the same with a line inserted at the top, p95", quantile(top, 0.95), "ms", 5, 2.5
 
@@ -195,7 +208,7 @@ def signatures(client: Client, texts: dict[str, str], rounds: int) -> Iterator[R
     for name in opened:
         client.open(name, texts[name])
     client.quiet()
-    near, far = [], []
+    near, far, used = [], [], client.processor()
     changed = texts["m0"].replace("def f1(t, k)", "def f1(t)").replace("def f0(t, k)", "def f0(t)")
     for turn in range(max(rounds // 5, 6)):
         sent = client.change("m0", {"text": texts["m0"] if turn % 2 else changed})
@@ -206,8 +219,10 @@ def signatures(client: Client, texts: dict[str, str], rounds: int) -> Iterator[R
         near.append(arrived - sent)
         far.append(max(client.quiet(0.15), arrived) - sent)
     yield "G3", "signature edit in a leaf to diagnostics of its open importers, p95", quantile(near, 0.95), "ms", 10, 3
+    used = (client.processor() - used) / len(far)
     what = f"the same, to diagnostics of all modules ({len(users)} import it), p95"
     yield "G4", what, quantile(far, 0.95), "ms", 40, 15
+    yield "", "- processor time of one, mean, the first one included", used * 1e3, "ms", 40, 15
 
 
 def questions(client: Client, large: str, rounds: int) -> Iterator[Row]:
@@ -273,8 +288,10 @@ def main() -> None:
             (Path(name) / f"{module}.po").write_text(text)
         lines = sum(text.count("\n") for text in texts.values())
         print(f"{len(texts)} modules, {lines:,} lines, one of {texts['large'].count(chr(10)):,}", file=sys.stderr)
+        print(f"load {os.getloadavg()[0]:.1f} of {os.cpu_count()} processors", file=sys.stderr)
         for row in measure(Path(name), texts, 20 if arguments.quick else 200):
             show(row, arguments.json)
+        print(f"load {os.getloadavg()[0]:.1f}", file=sys.stderr)
 
 
 def show(row: Row, as_json: bool) -> None:

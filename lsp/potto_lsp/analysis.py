@@ -9,15 +9,12 @@ import logging
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from potto.check import absolute, arranged, definition_diagnostics
-from potto.check import diagnostics as check_file
 from potto.diagnostics import Diagnostic
 from potto.modules import chunk_start, module_diagnostics, names, open_files, source, statements
 from potto.modules.texts import chunks, is_diffeo, parsed, syntax_diagnostics
 from potto.project import Project, Projects, read_project
 from potto.query import Database, query
 from potto.render import Located
-from potto.types import check_statement
 from potto_lsp.documents import Document
 from potto_lsp.text import Encoding, Text
 from potto_lsp.uris import to_key, to_uri
@@ -29,7 +26,9 @@ logger = logging.getLogger(__name__)
 @query
 def file_diagnostics(db: Database, file: str) -> tuple[Located, ...]:
     """All that there is to say about a file. As one memo, so that a file that an edit does not reach costs nothing."""
-    return check_file(db, file)
+    from potto.check import diagnostics  # slow to import, and what is known from earlier is told without it
+
+    return diagnostics(db, file)
 
 
 # What is forgotten of closed files, by what the queries are asked about: a chunk's text, a file, some definitions.
@@ -164,6 +163,8 @@ class Analysis:
         try:
             return file_diagnostics(self.db, key)
         except Exception:
+            from potto.check import arranged
+
             return tuple(Located(key, said) for said in arranged(self._guarded(key)))
 
     def keep(self, key: str) -> None:
@@ -175,6 +176,9 @@ class Analysis:
 
     def _guarded(self, key: str) -> list[Diagnostic]:
         """The diagnostics of a file part by part; a part that fails is logged once for each of its texts."""
+        from potto.check import absolute, definition_diagnostics
+        from potto.types import check_statement
+
         db, found = self.db, list[Diagnostic]()
         for part in (syntax_diagnostics, module_diagnostics):
             try:

@@ -7,6 +7,7 @@ it but `notify` and `request` belongs to the thread that owns the database.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from potto_lsp import memory
@@ -17,6 +18,7 @@ from potto_lsp.progress import Progress
 
 if TYPE_CHECKING:
     from potto.query import Database
+    from potto.render import Located
     from potto_lsp.analysis import Analysis
     from potto_lsp.evaluation import Evaluator
     from potto_lsp.live import LiveValues
@@ -31,7 +33,6 @@ class Session:
 
     analysis: Analysis
     publisher: Publisher
-    live: LiveValues
     evaluator: Evaluator
 
     def __init__(
@@ -56,17 +57,27 @@ class Session:
         with memory.loading():
             from potto_lsp.analysis import Analysis
             from potto_lsp.evaluation import Evaluator
-            from potto_lsp.live import LiveValues
             from potto_lsp.publishing import Publisher
 
             self.analysis = Analysis(self.client.encoding)
             self.analysis.settings = settings_of(self.client.options)
             self.publisher = Publisher(self.analysis, self.client, self.notify)
             self.evaluator = Evaluator(self.analysis)
-            self.live = LiveValues(self)
-            self.publisher.further = self.live.diagnostics
+            self.publisher.further = self._of_values
             self.set_folders(self.client.folders)
         return self.analysis.db
+
+    @cached_property
+    def live(self) -> LiveValues:
+        """The values of live expressions. Slow to import, so not before the first diagnostics are told."""
+        with memory.loading():
+            from potto_lsp.live import LiveValues
+        return LiveValues(self)
+
+    def _of_values(self, key: str) -> tuple[Located, ...]:
+        """What is to be said about the live expressions of an open file, if it has any."""
+        document = self.analysis.document(key)
+        return () if document is None or "#>" not in document.text.text else self.live.diagnostics(key)
 
     def set_folders(self, uris: list[str]) -> None:
         """The folders of the workspace."""

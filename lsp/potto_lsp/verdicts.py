@@ -12,6 +12,7 @@ from __future__ import annotations
 import json
 import logging
 import os
+import re
 import stat
 import sys
 import tempfile
@@ -20,7 +21,7 @@ from hashlib import blake2b
 from pathlib import Path
 from typing import Any
 
-from potto.diagnostics import KINDS, Diagnostic, Related
+from potto.diagnostics import Diagnostic, Related
 from potto.modules.texts import content
 from potto.query import Database
 from potto.render import Located
@@ -33,6 +34,7 @@ MOST_FILES = 500  # that are kept; the longest unused go first
 MOST_READ = 5_000  # texts and folders that a verdict may rest on
 MOST_BYTES = 4_000_000  # of one verdict
 
+_CODE = re.compile(r"P\d{4}")
 Reads = dict[str, str]  # what was read, and the digest of what it was
 
 
@@ -212,7 +214,7 @@ def _plain(located: Located) -> dict[str, Any]:
 def _located(plain: Mapping[str, Any]) -> Located:
     """The diagnostic in plain data. Raises ValueError, KeyError or TypeError if it is none."""
     code, severity = plain["code"], plain["severity"]
-    if severity not in ("error", "warning", "info", "hint") or code not in KINDS:
+    if severity not in ("error", "warning", "info", "hint") or not _CODE.fullmatch(code):
         raise ValueError(f"there is no diagnostic {code} that is {severity}")
     tags = tuple(tag for tag in plain["tags"] if tag in ("unnecessary", "deprecated"))
     related = tuple(

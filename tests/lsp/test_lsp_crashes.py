@@ -11,8 +11,10 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from potto_lsp import analysis, server
+from potto_lsp import server
 from potto_lsp.features import Feature
+
+from potto import check
 
 HOVER = "textDocument/hover"
 
@@ -117,7 +119,7 @@ def test_what_fails_to_resolve_is_off_for_its_file_alone(pipe: Pipe, monkeypatch
 def test_a_check_that_fails_costs_one_definition(
     pipe: Pipe, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    original = analysis.definition_diagnostics
+    original = check.definition_diagnostics
 
     def broken(db: Any, file: str, name: str) -> Any:
         if name == "g":
@@ -125,7 +127,6 @@ def test_a_check_that_fails_costs_one_definition(
         return original(db, file, name)
 
     monkeypatch.setattr("potto.check.definition_diagnostics", broken)
-    monkeypatch.setattr(analysis, "definition_diagnostics", broken)
     text = "def f(t) one\ndef g(t) two\ndef h(t) three\n"
     with caplog.at_level(logging.ERROR):
         pipe.send(method="textDocument/didOpen", params=document(1, text))

@@ -109,7 +109,7 @@ def test_what_is_not_whole_or_not_ours_is_not_there(cache: Path, folder: Path) -
     wrong = [
         "", "{", "[]", "3", '{"file": 1}', "[" * 100_000, whole[: len(whole) // 2], "\x00" * 10,
         json.dumps({**data, "file": "/other.po"}), json.dumps({**data, "reads": {}}), json.dumps({**data, "reads": 3}),
-        json.dumps({**data, "found": [{**data["found"][0], "code": "P9999"}]}),
+        json.dumps({**data, "found": [{**data["found"][0], "code": "Q1"}]}),
         json.dumps({**data, "found": [{**data["found"][0], "severity": "fatal"}]}),
         json.dumps({**data, "found": [{**data["found"][0], "span": [5, 2]}]}),
         json.dumps({**data, "found": [{**data["found"][0], "related": [1]}]}),
