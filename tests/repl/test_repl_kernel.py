@@ -27,6 +27,7 @@ def client(tmp_path_factory):
     client = manager.client()
     client.start_channels()
     client.wait_for_ready(timeout=30)
+    client.interrupt = manager.interrupt_kernel
     yield client
     client.stop_channels()
     manager.shutdown_kernel(now=True)
@@ -57,6 +58,23 @@ def test_pictures_are_images(client):
     assert "<svg" in shown[0][1]["data"]["image/svg+xml"]
     _, shown = run(client, ":image x*y 4")
     assert shown[0][1]["data"]["image/png"].startswith("iVBOR")
+
+
+def test_an_interrupt_ends_a_cell_and_keeps_what_was_defined(client):
+    import time
+
+    run(client, "def kept(t) 3*t")
+    message = client.execute("sum i in 1..9000000 (sum j in 1..50 (sin(i*j)))")
+    time.sleep(1)
+    start = time.perf_counter()
+    client.interrupt()
+    reply = client.get_shell_msg(timeout=30)
+    while reply["parent_header"].get("msg_id") != message:
+        reply = client.get_shell_msg(timeout=30)
+    assert reply["content"]["status"] == "error" and reply["content"]["ename"] == "KeyboardInterrupt"
+    assert time.perf_counter() - start < 2
+    _, shown = run(client, "kept(2)")
+    assert any("= 6 " in content["text"] for kind, content in shown if kind == "stream")
 
 
 def test_completion_inspection_and_completeness(client):

@@ -55,6 +55,7 @@ NUMBERS = {
     "_^2": 2,
     "Out[3] * 10": 3,
     "m": 1 + 4,
+    "fact(5)": 120,
     "fact(7)": 7,
     "_(3)": 9,
     ":eval f(0.9)": 0.9,
@@ -70,6 +71,11 @@ def test_the_numbers_are_closed_forms(session_of_a_new_user):
         data = replies[text].parts[0].data
         assert data["value"] == pytest.approx(value, rel=1e-9), text
         assert abs(data["value"] - value) <= data["error"] + 1e-15 * abs(value), text  # the error bar holds
+    pair = replies["(f(0.5), g(1))"].parts[0].data
+    assert pair["value"] == pytest.approx([0.5, 0.5], rel=1e-12)
+    slope = replies["deriv(f)((0.3, 1))"].parts[0].data
+    assert (slope["tangent"], slope["interior"], slope["boundary"]) == pytest.approx((1, 0, 1), rel=1e-12)
+    assert replies["for v in [1, 2, 3]:\n    print(v, f(v/4))"].text == "1 0.25\n2 0.5\n3 0.75"
     grad = replies[":grad g(0.5)"].parts[0].data["gradient"]
     assert grad["t"] == pytest.approx(0.5, rel=1e-12)  # the jump at x = t is t high
     assert replies[":grad disc(1)"].parts[0].data["gradient"]["r"] == pytest.approx(2 * math.pi, rel=1e-7)
