@@ -1,15 +1,13 @@
 """What there is to say about a name: of a program, a builtin, a measure, a word of the language.
 
-Owns `documentation`. The texts are those of the editor's hover, as plain text.
+Owns `documentation`. The texts are those of the editor's hover, as plain text; they are imported when they are asked
+for, so that the first answer does not wait for them.
 """
 
 from __future__ import annotations
 
 import re
 
-from potto.ide.documents import documentation as comment_of
-from potto.ide.hovers import builtin_markdown, measure_markdown
-from potto.ide.words import KEYWORDS, SPECIALS
 from potto.measures import MEASURES
 from potto.modules import DefinitionTarget
 from potto.primitives import PRIMITIVES
@@ -19,6 +17,9 @@ from potto.types import format_type, interface
 
 def documentation(db: Database, name: str, target: DefinitionTarget | None) -> str | None:
     """All there is to say about a name; None if it means nothing."""
+    from potto.ide.hovers import builtin_markdown, measure_markdown
+    from potto.ide.words import KEYWORDS, SPECIALS
+
     if target is not None:
         return _of_definition(db, name, target)
     if name in SPECIALS or (name in PRIMITIVES and PRIMITIVES[name].surface):
@@ -32,6 +33,8 @@ def documentation(db: Database, name: str, target: DefinitionTarget | None) -> s
 
 def documented() -> list[str]:
     """The names that are explained without being defined."""
+    from potto.ide.words import KEYWORDS, SPECIALS
+
     return [*PRIMITIVES, *MEASURES, *KEYWORDS, *SPECIALS]
 
 
@@ -43,6 +46,8 @@ def plain(markdown: str) -> str:
 
 
 def _of_definition(db: Database, name: str, target: DefinitionTarget) -> str:
+    from potto.ide.documents import documentation as comment_of
+
     found = interface(db, target.file, target.name)
     parts = [f"{name} : {format_type(found.type)}"]
     comment = comment_of(db, target.file, target.name)

@@ -76,7 +76,7 @@ def test_a_pipe_imports_no_terminal(tmp_path):
     done = subprocess.run([sys.executable, "-X", "importtime", "-m", "potto", "repl", "-c", "1 + 1"],
                           capture_output=True, text=True, cwd=tmp_path, check=False)  # fmt: skip
     assert done.stdout == "2 : Real\n"
-    for library in ("prompt_toolkit", "pygls", "mpmath", "lark", "asyncio"):
+    for library in ("prompt_toolkit", "pygls", "mpmath", "lark", "asyncio", "potto.ide"):
         assert f"| {library}\n" not in done.stderr.replace(" ", "").replace("|", "| "), library
 
 
