@@ -18,6 +18,7 @@ from potto.kernels.errors import wrong_call
 from potto.modules import statements
 from potto.query import Database
 from potto.render import Located, ProgramError
+from potto.runtime.advice import advice
 from potto.runtime.estimate import Estimate
 from potto.runtime.evaluate import Clock, Program, report
 from potto.runtime.functions import Closure
@@ -165,7 +166,7 @@ def remarks(estimate: Estimate, place: Span, settings: Settings) -> Iterator[Dia
         yield NOT_CONVERGED(
             place,
             f"this estimate did not reach the accuracy asked for: {reason}",
-            help="allow more evaluations (`--max-evals`) or ask for less accuracy (`--rtol`)",
+            help=advice(estimate.reasons),
         )
     for note in estimate.notes:
         yield ONE_SIDED(place, str(note))
