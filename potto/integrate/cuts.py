@@ -47,22 +47,23 @@ class Edge:
     root_t: Array
     bound_t: Array
 
+    def pick(self, index: Any) -> Edge:
+        return Edge(self.cut, self.owner[index], self.upper, self.x[index], self.root_t[:, index],
+                    self.bound_t[:, index])  # fmt: skip
+
 
 @dataclass
 class Meeting:
-    """Two jumps at one place that move apart, for some of the batch: `owner` (m,), place (m,), speeds (k, m).
+    """Jumps at one place that move apart, for some of the batch: `owner` (B,), place (B,), speeds (n, k, B).
 
-    merged_t: the speed with which both were integrated. crowded: there is a third one.
+    merged_t: the speed with which all of them were integrated, (k, B).
     """
 
-    first: int
-    second: int
+    cuts: tuple[int, ...]
     owner: Ints
     x: Array
-    first_t: Array
-    second_t: Array
+    speeds: Array
     merged_t: Array
-    crowded: bool = False
 
 
 @dataclass
@@ -152,25 +153,25 @@ def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, d
 
 
 def _meetings(plan: LevelPlan, rows: list[Row], inside: Bools, batch: int, directions: int) -> list[Meeting]:
-    """The pairs of jumps of different surfaces that coincide inside the bounds and move apart."""
+    """The jumps of different surfaces that coincide inside the bounds and move apart."""
     jumps = [i for i, row in enumerate(rows) if row.cut >= 0 and plan.level.cuts[row.cut].decides]
-    met = np.zeros(batch, dtype=np.int64)
+    x = np.stack([as_array(rows[i].x, batch) for i in jumps]) if jumps else np.zeros((0, batch))
+    e = np.stack([as_array(0.0 if rows[i].e is None else rows[i].e, batch) for i in jumps]) if jumps else x
+    t = np.stack([_tangents(rows[i].t, batch, directions) for i in jumps]) if jumps else np.zeros((0, 0, batch))
+    there = inside[[i + 1 for i in jumps]] & np.isfinite(t).all(axis=1)
     out: list[Meeting] = []
     for n, i in enumerate(jumps):
-        for j in jumps[n + 1 :]:
-            if rows[i].cut == rows[j].cut:
-                continue
-            v, w = (_tangents(rows[r].t, batch, directions) for r in (i, j))
-            apart = np.abs(v - w) > 1e-9 * (np.abs(v) + np.abs(w))
-            x, e = as_array(rows[i].x, batch), sum(0.0 if rows[r].e is None else rows[r].e for r in (i, j))
-            on = inside[1 + i] & inside[1 + j] & (np.abs(x - rows[j].x) <= e) & apart.any(axis=0)
-            owner = np.nonzero(on & np.isfinite(v).all(axis=0) & np.isfinite(w).all(axis=0))[0]
-            if owner.size:
-                met[owner] += 1
-                merged = np.where(as_array(rows[j].x, batch) < x, w, v)[:, owner]
-                out.append(Meeting(rows[i].cut, rows[j].cut, owner, x[owner], v[:, owner], w[:, owner], merged))
-    for meeting in out:
-        meeting.crowded = bool((met[meeting.owner] > 1).any())
+        other = np.array([rows[j].cut != rows[i].cut for j in jumps])
+        on = there & there[n] & (np.abs(x - x[n]) <= e + e[n]) & other[:, None]
+        apart = (np.abs(t - t[n]) > 1e-9 * (np.abs(t) + np.abs(t[n]))).any(axis=1)
+        here = np.nonzero((on & apart).any(axis=0) & ~on[:n].any(axis=0))[0]
+        on[n] = True
+        for pattern in np.unique(on[:, here], axis=1).T if here.size else ():
+            owner = here[(on[:, here] == pattern[:, None]).all(axis=0)]
+            met = np.nonzero(pattern)[0]
+            speeds = t[met][:, :, owner]
+            merged = np.take_along_axis(speeds, x[met][:, owner].argmin(axis=0)[None, None], axis=0)[0]
+            out.append(Meeting(tuple(rows[jumps[m]].cut for m in met), owner, x[n, owner], speeds, merged))
     return out
 
 

@@ -1,78 +1,166 @@
-"""Surfaces that lie on a bound: the derivative there is one-sided.
+"""Surfaces that lie on a bound, or on one another: what lies between them on either side of the present parameters.
 
-Owns `report_edges`. A cut counts only strictly inside the bounds, so a jump on a bound gives no boundary term; what
-the derivative is on either side of the present parameters follows from the integrand with that surface flipped.
+Owns `count_places`. A cut counts only strictly inside the bounds, and cuts at one place are integrated as one that
+moves with the first. What is missing follows from the integrand with surfaces flipped, in the order in which they are
+met as the parameters grow, or shrink:
+
+    at one place:  sum over crossings, left to right, of speed * (F before - F after)
+    at a bound:    sum over the stretches between it and the surfaces that come in of F there - F further in, times the
+                   rate at which the stretch grows
+
+Growing parameters put slower surfaces to the left of faster ones, shrinking ones to the right. Where both ways come to
+the same (jumps that are added up), that is the derivative; else there are two, and both are told.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from potto.core.printer import format_term
-from potto.integrate.cuts import Cuts, Edge, as_array
+from potto.core.terms import Term
+from potto.integrate.cuts import Cuts, Edge, Meeting, as_array
 from potto.integrate.pieces import Evaluator, Sided, Sums, gather, still, take
 from potto.integrate.plan import LevelPlan
-from potto.kernels.cells import Array, Cell, Ints, Mask, Value
+from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value
 
 if TYPE_CHECKING:
     from potto.integrate.levels import Iteration
 
+MOST_AT_ONE_PLACE = 4
 
-def report_edges(
+
+@dataclass(frozen=True)
+class Scene:
+    """One variable of an iteration as it is being integrated: everything that is needed to evaluate its integrand."""
+
+    parent: Iteration
+    number: int
+    level: LevelPlan
+    env: dict[str, Value]
+    sides: dict[int, Mask]
+    machine: Evaluator
+
+    def flips(self, cuts: Sequence[int], owner: Ints, x: Array, above: bool) -> Array:
+        """F just beside x with every subset of some cuts' surfaces flipped: (2^n, m, B); bit i stands for cut i."""
+        here, inner = around(self.level, owner, x, above, self.env, self.sides, self.machine)
+        groups = [group_of(self.level, cut) for cut in cuts]
+        frozen = self.machine.with_directions(0)
+        found = []
+        with nullcontext() if self.machine.costs is None else self.machine.costs.apart():
+            for bits in range(1 << len(groups)):
+                way = {g: ~np.asarray(inner[g]) for i, g in enumerate(groups) if bits >> i & 1}
+                found.append(self.parent.inside(self.number, here, owner.size, {**inner, **way}, frozen)[0])
+        return np.stack(found)
+
+    def surface(self, cut: int) -> Term:
+        return self.level.level.cuts[cut].surface
+
+
+def count_places(
     parent: Iteration, number: int, level: LevelPlan, cuts: Cuts, env: dict[str, Value], sides: dict[int, Mask],
     sums: Sums, machine: Evaluator,
 ) -> None:  # fmt: skip
-    """Say of surfaces on a bound what the derivative is on either side of the present parameters."""
-    for edge in cuts.edges:
-        if number and 2 * edge.owner.size < cuts.sign.size:
+    """Add to the tangents what surfaces on bounds and on one another contribute; say where they have two sides."""
+    scene = Scene(parent, number, level, env, sides, machine)
+    places: list[tuple[Ints, Callable[[], tuple[Array, Array, Array]], bool, Sided]] = []
+    for meeting in cuts.meetings:
+        named = Sided(level.variable, scene.surface(meeting.cuts[0]), scene.surface(meeting.cuts[1]))
+        places.append((meeting.owner, lambda m=meeting: at_one_place(scene, m), True, named))  # type: ignore[misc]
+    for group in _on_one_bound(cuts.edges, cuts.sign.size):
+        named = Sided(level.variable, scene.surface(group[0].cut))
+        places.append((group[0].owner, lambda g=group: at_a_bound(scene, g), False, named))  # type: ignore[misc]
+    for owner, changes, counts, named in places:
+        if number and 2 * owner.size < cuts.sign.size:
             continue  # single nodes of the variables further out: of measure zero
-        flip, scale = across(parent, number, level, edge, env, sides, machine)
-        speed = edge.bound_t - edge.root_t if edge.upper else edge.root_t - edge.bound_t
-        surface = level.level.cuts[edge.cut].surface
-        singular = ~np.isfinite(flip)[:, None, :] & (speed[None] != 0)
-        if singular.any():  # what comes in as the surface leaves the bound, no value here tells
-            sums.et[:, :, edge.owner] = np.where(singular, np.inf, sums.et[:, :, edge.owner])
-            where = f"{format_term(surface)} = 0 lies on a bound of `{level.variable}`"
-            machine.note_unfinished(f"{where}, and beyond it the integrand is not finite")
-        # where the surface comes in as the parameters grow, the growing side has the extra stretch
-        change = flip[:, None, :] * speed[None]
-        matters = np.abs(change) > 1e-12 * (np.abs(sums.t[:, :, edge.owner]) + scale[:, None, :] + 1e-300)
-        if not (matters & ~singular).any():
+        forward, backward, scale = changes()
+        unknown = ~(np.isfinite(forward) & np.isfinite(backward))
+        if unknown.any():
+            _not_known(scene, sums, owner, unknown, named)
+            forward, backward = np.where(unknown, 0.0, forward), np.where(unknown, 0.0, backward)
+        base = sums.t[:, :, owner]
+        differ = np.abs(forward - backward) > 1e-12 * (np.abs(base) + scale + 1e-300)
+        if machine.side:
+            sums.t[:, :, owner] = base + (forward if machine.side > 0 else backward)
             continue
-        inward = speed[None] > 0
-        base = sums.t[:, :, edge.owner]
-        forward = np.where(inward, base + change, base)
-        backward = np.where(inward, base, base + change)
-        told = tell(number, Sided(level.variable, surface), backward, forward, machine)
-        sums.t[:, :, edge.owner] = base if told is None else told
+        sums.t[:, :, owner] = base + (forward if counts else np.where(differ, 0.0, forward))
+        if differ.any():
+            machine.note_sided(named)
 
 
-def tell(number: int, what: Sided, backward: Array, forward: Array, machine: Evaluator) -> Array | None:
-    """Note two derivatives that differ, or the one that is wanted, if one is."""
-    if machine.side:
-        return forward if machine.side > 0 else backward
-    if number:
-        machine.note_sided(what)
+def _not_known(scene: Scene, sums: Sums, owner: Ints, unknown: Bools, named: Sided) -> None:
+    sums.et[:, :, owner] = np.where(unknown, np.inf, sums.et[:, :, owner])
+    if named.other is None:
+        where = f"{format_term(named.surface)} = 0 lies on a bound of `{scene.level.variable}`"
+        scene.machine.note_unfinished(f"{where}, and beyond it the integrand is not finite")
     else:
-        machine.note_edge(what, backward, forward)
-    return None
+        where = f"{format_term(named.surface)} = 0 and {format_term(named.other)} = 0 coincide"
+        scene.machine.note_unfinished(f"{where}, and what lies between them is not known")
 
 
-def across(
-    parent: Iteration, number: int, level: LevelPlan, edge: Edge, env: dict[str, Value],
-    sides: dict[int, Mask], machine: Evaluator,
-) -> tuple[Array, Array]:  # fmt: skip
-    """(F with the edge's surface flipped minus F as it is) at the bound, per component, and its size."""
-    group = group_of(level, edge.cut)
-    here, inner = around(level, edge.owner, edge.x, not edge.upper, env, sides, machine)
-    frozen = machine.with_directions(0)
-    with nullcontext() if machine.costs is None else machine.costs.apart():
-        actual, _ = parent.inside(number, here, edge.owner.size, inner, frozen)
-        flipped, _ = parent.inside(number, here, edge.owner.size, {**inner, group: ~np.asarray(inner[group])}, frozen)
-    return flipped - actual, np.abs(actual) + np.abs(flipped)
+def at_one_place(scene: Scene, meeting: Meeting) -> tuple[Array, Array, Array]:
+    """What the forward and the backward derivative have beyond that of the merged cut, (m, k, B); and their size."""
+    v, count = meeting.speeds, len(meeting.cuts)
+    if count > MOST_AT_ONE_PLACE:
+        nothing = np.full((1, *v.shape[1:]), np.nan)
+        return nothing, nothing, np.zeros_like(nothing)
+    f = scene.flips(meeting.cuts, meeting.owner, meeting.x, False)
+    merged = (f[0] - f[-1])[:, None] * meeting.merged_t
+    found = []
+    for sign in (1, -1):
+        order = np.argsort(sign * v, axis=0, kind="stable")
+        after = np.cumsum(1 << order, axis=0)
+        speed = np.take_along_axis(v, order, axis=0)
+        crossed = [(_picked(f, a - (1 << o)) - _picked(f, a)) * s for a, o, s in zip(after, order, speed, strict=True)]
+        found.append(np.sum(crossed, axis=0) - merged)
+    scale = np.abs(f).max(axis=0)[:, None] * np.abs(v).max(axis=0)
+    return found[0], found[1], scale
+
+
+def at_a_bound(scene: Scene, edges: Sequence[Edge]) -> tuple[Array, Array, Array]:
+    """What the forward and the backward derivative have beyond that without these surfaces, (m, k, B); their size."""
+    first = edges[0]
+    inward = np.stack([e.bound_t - e.root_t if e.upper else e.root_t - e.bound_t for e in edges])
+    if len(edges) > MOST_AT_ONE_PLACE:
+        nothing = np.full((1, *inward.shape[1:]), np.nan)
+        return nothing, nothing, np.zeros_like(nothing)
+    f = scene.flips([e.cut for e in edges], first.owner, first.x, not first.upper)
+    found = []
+    for sign in (1, -1):
+        speed = np.maximum(sign * inward, 0.0)
+        order = np.argsort(-speed, axis=0, kind="stable")
+        after, speed = np.cumsum(1 << order, axis=0), np.take_along_axis(speed, order, axis=0)
+        growth = speed - np.append(speed[1:], np.zeros((1, *speed.shape[1:])), axis=0)
+        gained = [
+            np.where(g > 0, (_picked(f, a) - f[0][:, None]) * g, 0.0) for a, g in zip(after, growth, strict=True)
+        ]
+        found.append(sign * np.sum(gained, axis=0))
+    return found[0], found[1], np.abs(f[0])[:, None] + np.abs(f[-1])[:, None]
+
+
+def _picked(f: Array, bits: Ints) -> Array:
+    """Of F by subsets (2^n, m, B) the one for each direction and member (k, B): (m, k, B)."""
+    return np.moveaxis(f[bits, :, np.arange(bits.shape[1])], -1, 0)
+
+
+def _on_one_bound(edges: Sequence[Edge], batch: int) -> list[list[Edge]]:
+    """Edges with those others that lie on the same bound of the same members, members with the same ones together."""
+    out: list[list[Edge]] = []
+    for upper in (False, True):
+        here = [e for e in edges if e.upper == upper]
+        if not here:
+            continue
+        on = np.zeros((len(here), batch), dtype=bool)
+        for n, edge in enumerate(here):
+            on[n, edge.owner] = True
+        for pattern in np.unique(on[:, on.any(axis=0)], axis=1).T:
+            owner = np.nonzero((on == pattern[:, None]).all(axis=0))[0]
+            out.append([e.pick(np.isin(e.owner, owner)) for e, there in zip(here, pattern, strict=True) if there])
+    return out
 
 
 def group_of(level: LevelPlan, cut: int) -> int:

@@ -13,9 +13,8 @@ import numpy as np
 from potto.core.terms import Term
 from potto.integrate import maps
 from potto.integrate.cuts import Cuts, as_array, frame_rows, segments, standing
-from potto.integrate.edges import report_edges
+from potto.integrate.edges import count_places
 from potto.integrate.maps import Segments
-from potto.integrate.meetings import count_meetings
 from potto.integrate.pieces import Evaluator, Sums, components, gather, still, take
 from potto.integrate.plan import LevelPlan, Plan, vanishes
 from potto.integrate.roots import searched_rows
@@ -55,10 +54,8 @@ class Iteration:
             seg, sides = seg.pick(keep), {g: take(m, keep) for g, m in sides.items()}
         work = Work(self, number, level, env, seg, sides, machine, cuts.moving and k > 0, batch, root, cuts.conflict)
         sums = work.integrate()
-        if cuts.meetings and k:
-            count_meetings(self, number, level, cuts, env, outer, sums, machine)
-        if cuts.edges and k:
-            report_edges(self, number, level, cuts, env, outer, sums, machine)
+        if k and (cuts.meetings or cuts.edges):
+            count_places(self, number, level, cuts, env, outer, sums, machine)
         sums.v *= cuts.sign
         sums.t *= cuts.sign
         if cuts.bound_nan is not None:

@@ -127,7 +127,7 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
         sums = counted(in_parts(plan, machine, plan.environment(env, linked.env), batch), plan, machine)
         if not machine.books.degenerate:
             if outermost and machine.books.sided and not machine.side:
-                from_both_sides(machine, plan, plan.environment(env, linked.env), batch)
+                from_both_sides(machine, plan, plan.environment(env, linked.env), batch, sums)
             return turned_round(machine, order, linked, env, batch, sums) if outermost else sums
     machine.note_unfinished(
         "surfaces run along the axes of several variables of integration at once: "
@@ -137,14 +137,15 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
     return sums
 
 
-def from_both_sides(machine: Machine, plan: Plan, env: dict[str, Value], batch: int) -> None:
-    """Note the two one-sided derivatives of an integral that further in has found them to differ."""
+def from_both_sides(machine: Machine, plan: Plan, env: dict[str, Value], batch: int, sums: Sums) -> None:
+    """Note the one-sided derivatives of an integral in which a part has two; where the whole has one, that is it."""
     reasons = tuple(machine.books.sided)
     machine.books.sided.clear()
     backward, forward = (iterated(plan, replace(machine, side=side), env, batch).t for side in (-1, 1))
-    if (np.abs(forward - backward) > 1e-12 * (np.abs(forward) + np.abs(backward))).any():
-        for what in reasons:
-            machine.note_edge(what, backward, forward)
+    same = np.abs(forward - backward) <= 1e-12 * (np.abs(forward) + np.abs(backward))
+    sums.t = np.where(same, forward, sums.t)
+    for what in () if same.all() else reasons:
+        machine.note_edge(what, backward, forward)
 
 
 def turned_round(

@@ -16,6 +16,8 @@ def apart(t) integral [0, 1] exp(x)*([x < t] - [x < 2*t - 0.5]) d(x)
 def plane(t) integral ([0, 1], [0, 1]) ([x + y < t] + [x + y < 2*t - 0.5]) d(x, y)
 def corner(t) integral ([0, 1], [0, 1]) [x + y < t]*[x + y < 2*t - 0.5] d(x, y)
 def top(t) integral ([0, 1], [0, 1]) exp(x)*[y < 2*t] d(x, y)
+def bound(t) integral [0, 1] [x < 1 - 2*t]*[x < 0.5 - t] d(x)
+def both_ways(t) integral [0, 1] ([x > t - 0.5] - [x > 0.5 - t]) d(x)
 def three(t) integral [0, 1] [x < t]*[x < 2*t - 0.5]*[x < 3*t - 1] d(x)
 """
 
@@ -30,6 +32,7 @@ def rate(name: str) -> potto.Estimate:
     [
         ("added", 3.0),  # 1 + 2
         ("apart", -np.exp(0.5)),  # e^(1/2) (1 - 2)
+        ("both_ways", -1.0),  # of two surfaces on one bound one comes in as t grows, one as it shrinks
         ("plane", 1.5),  # areas t^2/2 and (2 t - 1/2)^2/2
     ],
 )
@@ -45,6 +48,8 @@ def test_jumps_that_are_added_up_have_the_sum_of_their_derivatives(name: str, ex
         ("times", 2.0, 1.0),  # min(t, 2 t - 1/2)
         ("either", 1.0, 2.0),  # max(t, 2 t - 1/2)
         ("corner", 1.0, 0.5),  # min(t, 2 t - 1/2)^2/2
+        ("three", 3.0, 1.0),  # min(t, 2 t - 1/2, 3 t - 1)
+        ("bound", -1.0, 0.0),  # two surfaces on one bound: max(min(1 - 2 t, 1/2 - t), 0)
         ("top", 2 * (np.e - 1), 0.0),  # min(2 t, 1) (e - 1): a surface on a bound, further in
     ],
 )
@@ -61,9 +66,3 @@ def test_the_note_names_both_surfaces() -> None:
         "the surface t - x = 0 coincides with t - 0.5*x - 0.25 = 0: the one-sided derivatives differ "
         "(2 backward, 1 forward)"
     )
-
-
-def test_three_at_one_place_are_not_vouched_for() -> None:
-    got = rate("three")
-    assert np.isinf(got.tangent_error) and not got.converged
-    assert "more than two surfaces meet" in got.reasons[0]
