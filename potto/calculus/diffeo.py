@@ -352,13 +352,14 @@ def _authors(
 def _wrong(what: _Map, refuted: Refuted) -> Problem:
     at = ", ".join(f"{n} = {v:.6g}" for n, v in refuted.point.items())
     back = ", ".join(f"{n} = {v:.6g}" for n, v in refuted.back.items())
+    off = f", which is off by {refuted.off:.1e}" if math.isfinite(refuted.off) else ""
     hint = "" if what.where else "; if it is right on one branch only, select that with `where`"
     nowhere = not all(math.isfinite(v) for v in refuted.back.values())
     return Problem(
         WRONG_INVERSE,
         f"this inverse does not lead back: it is not defined where the map leads from {at}"
         if nowhere
-        else f"this inverse does not lead back: from {at} it gives {back}",
+        else f"this inverse does not lead back: from {at} it gives {back}{off}",
         "not the inverse",
         ("checked at sample points",),
         f"correct the inverse{hint}",

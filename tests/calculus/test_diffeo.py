@@ -230,6 +230,33 @@ def test_a_given_inverse_is_proven_or_says_that_it_was_sampled() -> None:
     assert not sampled.proven and "sample points" in sampled.notes[0]
 
 
+@pytest.mark.parametrize(
+    ("inverse", "right"),
+    [
+        ("log(u + sqrt(u^2 + 1))", True),  # asinh, which symbols don't decide
+        ("log(u + sqrt(u^2 + 1)) + 1e-9", False),
+        ("log(u + sqrt(u^2 + 1 + 1e-18))", False),  # no double shows this
+        ("log(u + sqrt(u^2 + 1))*(1 + 1e-11)", False),
+    ],
+)
+def test_an_inverse_that_is_off_by_a_little_is_wrong(inverse: str, right: bool) -> None:
+    said = check(f"diffeo d(x) = (sinh(x)) inverse (u) . ({inverse})")
+    assert [d.code for d in said if d.severity == "error"] == ([] if right else ["P0403"])
+    assert right or "which is off by" in said[0].message
+
+
+@pytest.mark.parametrize(
+    "program",
+    [
+        "diffeo d(x) = (0.1*sinh(0.3*x)) inverse (u) . (log(10*u + sqrt((10*u)^2 + 1))/0.3)",  # decimals are exact
+        "diffeo d(x) = (1.4142135623730951*sinh(x)) inverse (u) . "
+        "(log(u/sqrt(2) + sqrt((u/sqrt(2))^2 + 1)))",  # a rounded constant is as good as its digits
+    ],
+)
+def test_constants_of_an_inverse_count_as_they_are_written(program: str) -> None:
+    assert [d.code for d in check(program) if d.severity == "error"] == []
+
+
 def test_a_wrong_inverse_shows_the_point() -> None:
     (found,) = check("diffeo d(x) = (x^2) inverse (u) . (sqrt(u))")
     assert "x = -" in found.message and "where" in found.help
