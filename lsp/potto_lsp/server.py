@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 import logging
+import os
 from collections.abc import Callable, Mapping
 from threading import Lock
 from typing import Any, BinaryIO
@@ -29,6 +30,12 @@ from potto_lsp.work import Job, Worker
 
 logger = logging.getLogger(__name__)
 Id = int | str
+
+
+def leave() -> None:
+    """End at once: no question would ever be answered. A client notices that and may start another server."""
+    logging.shutdown()
+    os._exit(70)
 
 
 class Server:
@@ -138,7 +145,7 @@ class Server:
             info = {"name": "potto", "version": __version__}
             self._send({"id": id, "result": {"capabilities": capabilities(client.encoding), "serverInfo": info}})
             self.session = Session(client, self.notify, self.request, self.later)
-            self.worker = Worker(self.session.load, self.session.idle)
+            self.worker = Worker(self.session.load, self.session.idle, leave)
             self.worker.start()
             if client.process is not None:
                 from potto_lsp.parent import watch

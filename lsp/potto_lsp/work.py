@@ -49,10 +49,16 @@ class Job:
 
 
 class Worker:
-    """A queue of jobs and the thread that does them. `idle` gives the steps of what to do when there are none."""
+    """A queue of jobs and the thread that does them. `idle` gives the steps of what to do when there are none;
+    `dead` is called if it cannot start."""
 
-    def __init__(self, start: Callable[[], Database], idle: Callable[[], Iterator[Callable[[], None]]]) -> None:
-        self._start, self._idle = start, idle
+    def __init__(
+        self,
+        start: Callable[[], Database],
+        idle: Callable[[], Iterator[Callable[[], None]]],
+        dead: Callable[[], None] = lambda: None,
+    ) -> None:
+        self._start, self._idle, self._dead = start, idle, dead
         self._db: Database | None = None
         self._inbox: SimpleQueue[Job | None] = SimpleQueue()
         self._quick: deque[Job] = deque()
@@ -85,6 +91,7 @@ class Worker:
             self._db = self._start()
         except BaseException:
             logger.critical("the analysis cannot start", exc_info=True)
+            self._dead()
             raise
         while True:
             job = self._next()

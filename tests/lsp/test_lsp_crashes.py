@@ -6,6 +6,8 @@ import io
 import json
 import logging
 import os
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 from typing import Any
@@ -170,3 +172,22 @@ def test_messages_that_end_too_early() -> None:
     assert list(messages(io.BytesIO(b"Content-Length: 10\r\n\r\n{}"))) == []
     assert list(messages(io.BytesIO(b"nonsense\r\n\r\nContent-Length: x\r\n\r\nContent-Length: 2\r\n\r\n{}"))) == [{}]
     assert list(messages(io.BytesIO(b"Content-Length: 99999999999999\r\n\r\n"))) == []
+
+
+def test_a_server_that_cannot_start_its_analysis_ends() -> None:
+    """It would answer nothing for ever; one that ends is started again."""
+    code = (
+        "import sys, potto_lsp.session as s\n"
+        "def load(self): raise ImportError('half of an installation')\n"
+        "s.Session.load = load\n"
+        "from potto.__main__ import main\nsys.exit(main(['lsp']))"
+    )
+    greeting = {"jsonrpc": "2.0", "id": 1, "method": "initialize", "params": {"capabilities": {}}}
+    body = json.dumps(greeting).encode()
+    process = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE)  # fmt: skip
+    assert process.stdin is not None and process.stderr is not None
+    process.stdin.write(b"Content-Length: %d\r\n\r\n%b" % (len(body), body))
+    process.stdin.flush()  # and it stays open
+    assert process.wait(30) == 70
+    assert b"half of an installation" in process.stderr.read()
