@@ -37,10 +37,17 @@ _texts = itertools.count(1)
 
 
 class Workspace:
-    """A folder of programs. Modules are found in it by their dotted names, and import each other from it."""
+    """A folder of programs. Modules are found in it by their dotted names, and import each other from it.
+
+    Raises PottoError if there is no such folder.
+    """
 
     def __init__(self, root: str | os.PathLike[str] = ".", *, roots: Sequence[str | os.PathLike[str]] = ()) -> None:
         self.root = os.path.abspath(root)
+        for folder in (self.root, *map(os.path.abspath, roots)):
+            if not os.path.isdir(folder):
+                what = "is a file, not a folder" if os.path.exists(folder) else "does not exist"
+                raise PottoError([NO_MODULE(NOWHERE, f"the folder of a workspace {what}: {display_name(folder)}")])
         self._world = World([self.root, *roots])
 
     def module(self, name: str) -> Module:

@@ -133,7 +133,7 @@ atan2 = register(
         mpmath="atan2",
         doc="The angle of the point (x, y), between -pi and pi. Its arguments are y, then x.",
         partials=_angle_partials,
-        domain=((1e-3, 1e3), (-1e3, 1e3)),
+        domain=((-1e3, 1e3), (-1e3, 1e3)),
         kinks=lambda y, x: (y,),  # the cut along the negative x-axis; its jump is `calculus.branch_cuts`
         example="atan2(1, -1)",
     )

@@ -146,7 +146,9 @@ def _parse(lexed: Lexed, text: str, start: str, diffeo: bool = False) -> _Parse:
         if not stop.at.text:
             found = _without_doubled(found, stop)
         if not _explained(stop, found):
-            stops.append(describe(stop, edits or []))
+            said = describe(stop, edits or [])
+            if all(d.code != kinds.UNFINISHED.code or d.span != said.span for d in found):  # an `integral` alone
+                stops.append(said)
         if edits is None:
             break
         tokens = _patched(tokens, stop.index, edits)

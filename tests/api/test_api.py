@@ -306,3 +306,11 @@ def test_a_module_that_is_broken_in_part_warns_and_can_be_used() -> None:
 def test_a_module_of_nothing_but_errors_is_an_error() -> None:
     with pytest.raises(potto.PottoError):
         potto.compile("def f(x) x + missing\n")
+
+
+def test_a_workspace_needs_its_folder(tmp_path: Path) -> None:
+    for root, said in ((tmp_path / "nowhere", "does not exist"), (Path(__file__), "is a file, not a folder")):
+        with pytest.raises(potto.PottoError, match=said):
+            potto.Workspace(root)
+        with pytest.raises(potto.PottoError, match=said):
+            potto.Workspace(tmp_path, roots=[root])

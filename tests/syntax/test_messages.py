@@ -31,6 +31,17 @@ def test_an_expression_is_missing() -> None:
     """)
 
 
+def test_an_integral_alone_is_one_mistake() -> None:
+    check_messages("""
+        x = integral
+        #   ^^^^^^^^ error[P0104]: expected the bounds after `integral`
+        def f(t) integral
+        #        ^^^^^^^^ error[P0104]: expected the bounds after `integral`
+        y = (integral)
+        #    ^^^^^^^^ error[P0104]: expected the bounds after `integral`
+    """)
+
+
 def test_brackets() -> None:
     check_messages("""
         x = (1 + 2
