@@ -101,13 +101,13 @@ def chunks(db: Database, file: str) -> tuple[ChunkRef, ...]:
     return split(text) if isinstance(text, str) else ()
 
 
-@query(keep=4096)
+@query(keep=512)
 def parsed(db: Database, text: str, diffeo: bool) -> ParsedChunk:
     """The tree of a chunk's text. Keyed by the text alone: an undo parses nothing."""
     return parse_chunk(text, diffeo)
 
 
-@query(keep=16384)
+@query(keep=4096)
 def head(db: Database, text: str, diffeo: bool) -> Head:
     """What a chunk is and what it names. Small, so that more of them are kept than of trees; mostly without a tree."""
     defined = defined_name(text)
@@ -127,7 +127,7 @@ def head(db: Database, text: str, diffeo: bool) -> Head:
             return Head("statement")
 
 
-@query(keep=16384)
+@query(keep=2048)
 def chunk_references(db: Database, text: str, diffeo: bool) -> tuple[Reference, ...]:
     """What a chunk refers to, as `references_in` says it."""
     item = parsed(db, text, diffeo).item

@@ -40,7 +40,7 @@ def used_imports(db: Database, file: str) -> frozenset[str]:
     return frozenset(found)
 
 
-@query(keep=16384)
+@query(keep=2048)
 def occurring_names(db: Database, text: str, diffeo: bool) -> frozenset[str]:
     """The free names of a chunk, and its modules with all that is in front of a dot in them."""
     found: set[str] = set()
