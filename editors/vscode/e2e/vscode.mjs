@@ -22,6 +22,7 @@ const SETTINGS = {
   "git.enabled": false,
   "security.workspace.trust.enabled": false,
   "telemetry.telemetryLevel": "off",
+  "terminal.integrated.gpuAcceleration": "off",
   "update.mode": "none",
   "workbench.colorTheme": "Default Dark Modern",
   "workbench.enableExperiments": false,

@@ -143,7 +143,10 @@ export class Server implements vscode.Disposable {
   private closed(program: Found): boolean {
     const now = Date.now();
     this.crashes = [...this.crashes.filter((then) => now - then < MINUTES), now];
-    if (this.crashes.length < CRASHES) return true;
+    if (this.crashes.length < CRASHES) {
+      this.set({ kind: "starting", program });
+      return true;
+    }
     this.running = undefined;
     this.set({ kind: "failed", program, reason: `it ended ${this.crashes.length} times within three minutes` });
     return false;

@@ -38,10 +38,10 @@ export async function openRepl(server: Server, document: vscode.TextDocument | u
 export async function runSelection(server: Server, editor: vscode.TextEditor): Promise<void> {
   const texts = editor.selections.map((selection) => selected(editor.document, selection)).filter((text) => text.trim());
   if (!texts.length) return;
-  const fresh = prompt === undefined || prompt.terminal.exitStatus !== undefined;
+  const before = prompt?.terminal;
   const terminal = await openRepl(server, editor.document);
   if (!terminal) return;
-  if (fresh) await new Promise((resolve) => setTimeout(resolve, 1500)); // it reads once it has drawn its prompt
+  if (terminal !== before) await new Promise((resolve) => setTimeout(resolve, 1500)); // it reads once it has drawn its prompt
   for (const text of texts) terminal.sendText(`${PASTE}${entryOf(text)}${PASTED}`, true);
 }
 

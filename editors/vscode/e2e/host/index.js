@@ -275,17 +275,19 @@ const TESTS = {
     const { document } = await open("renderer.po");
     await vscode.commands.executeCommand("potto.restartServer");
     assert.ok(await api().ready(), api().state());
-    const children = fs.readdirSync("/proc").filter((id) => {
-      try {
-        const parent = fs.readFileSync(`/proc/${id}/stat`, "utf8").replace(/.*\) /, "").split(" ")[1];
-        return Number(parent) === process.pid && fs.readFileSync(`/proc/${id}/cmdline`, "utf8").includes("lsp");
-      } catch {
-        return false;
-      }
-    });
-    assert.equal(children.length, 1);
-    process.kill(Number(children[0]), "SIGKILL");
-    await eventually(() => api().state(), (state) => state !== "running");
+    const servers = () =>
+      fs.readdirSync("/proc").filter((id) => {
+        try {
+          const [state, parent] = fs.readFileSync(`/proc/${id}/stat`, "utf8").replace(/.*\) /, "").split(" ");
+          const command = fs.readFileSync(`/proc/${id}/cmdline`, "utf8").split("\0");
+          return state !== "Z" && Number(parent) === process.pid && command.includes("lsp");
+        } catch {
+          return false;
+        }
+      });
+    const [old] = await eventually(servers, (found) => found.length === 1);
+    process.kill(Number(old), "SIGKILL");
+    await eventually(servers, (found) => found.length === 1 && found[0] !== old);
     await eventually(() => api().state(), (state) => state === "running");
     const [hover] = await eventually(() => run("HoverProvider", document.uri, find(document, "cover(t)")), (found) => found.length > 0);
     assert.match(text(hover.contents), /cover/);

@@ -126,6 +126,8 @@ function layout(): void {
   view = views.get(viewKey()) ?? homeView();
   drawn = undefined;
   cross = undefined;
+  status.textContent = "evaluating…";
+  status.dataset["settled"] = "false";
   const flat = choice?.axes.length === 2;
   const names = choice?.wrt === null ? ["value"] : ["value", "slope"];
   pictures.className = flat ? "images" : "curves";
