@@ -108,24 +108,28 @@ def task(
     text: str,
     more: Mapping[str, Any] | None = None,
     shape: Callable[[Result], Result] = lambda result: result,
+    quiet: bool = False,
 ) -> Deferred:
-    """What the evaluation process answers, when it does; `shape` makes the answer of it."""
-    waiting: list[tuple[Task, Working]] = []
+    """What the evaluation process answers, when it does; `shape` makes the answer of it. `quiet`: without progress."""
+    waiting: list[tuple[Task, Working | None]] = []
 
     def start(finish: Callable[[Any | RequestError], None]) -> None:
         def done(answer: Result) -> None:
-            working.end()
+            if working is not None:
+                working.end()
             finish(shape(answer["result"]) if "result" in answer else Refusal(str(answer["error"])))
 
         title = f"Potto: {text or os.path.basename(file)}"
         token = ask.optional("workDoneToken")
-        working = Working(ask.session, title, token if isinstance(token, int | str) else None, stop)
+        token = token if isinstance(token, int | str) else None
+        working = None if quiet else Working(ask.session, title, token, stop)
         waiting.append((ask.session.evaluator.put(Task(do, file, text, done, more or {})), working))
 
     def stop() -> None:
         for each, working in waiting:
             each.cancelled.set()
-            working.end()
+            if working is not None:
+                working.end()
 
     return Deferred(start, stop)
 

@@ -51,7 +51,8 @@ def sample(ask: Ask) -> Deferred:
         raise InvalidParams("`values` is an object, and `wrt` the name of a parameter")
     if not isinstance(rtol, int | float | None) or (rtol is not None and not 0 < rtol < 1):
         raise InvalidParams("`rtol` is between 0 and 1")
-    return task(ask, "sample", ask.file, name, {"axes": axes, "values": values or {}, "wrt": wrt, "rtol": rtol})
+    more = {"axes": axes, "values": values or {}, "wrt": wrt, "rtol": rtol}
+    return task(ask, "sample", ask.file, name, more, quiet=True)  # what is drawn shows how far it is
 
 
 def _is_axis(axis: Any) -> bool:
