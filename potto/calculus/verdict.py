@@ -17,7 +17,7 @@ from potto.calculus.normal import is_zero
 from potto.calculus.ranges import ranges
 from potto.calculus.solve import Sections, sections
 from potto.core.printer import format_term
-from potto.core.terms import Branch, If, Prim, Term, postorder, var
+from potto.core.terms import Branch, If, Integral, Prim, Term, postorder, var
 from potto.diagnostics import Kind, declare
 from potto.primitives import PRIMITIVES
 
@@ -167,12 +167,18 @@ def _empty(surface: Term, box: Box) -> Problem | None:
 
 
 def no_inverse(surface: Term, variables: Sequence[str], reasons: Sequence[str]) -> Problem:
+    help = "write the condition so that one variable can be isolated, or name it as a diffeomorphism with its `inverse`"
+    inner = next((node for node in postorder(surface) if isinstance(node, Integral)), None)
+    if inner is not None:  # neither can be done: an inverse is a formula, and is verified as one
+        reasons = (*reasons, "what an integral comes to is found by numbers, and the surface has to be known before")
+        what = " or ".join(f"`{name}`" for name in variables if name in inner.free)
+        help = f"write what `{format_term(inner)}` comes to as a formula in {what}" if what else help
     return Problem(
         NO_INVERSE,
         f"no inverse was found for `{format_term(surface)}` in {listed(variables, 'or')}",
         "cannot be solved for where it is 0",
         tuple(reasons),
-        "write the condition so that one variable can be isolated, or name it as a diffeomorphism with its `inverse`",
+        help,
     )
 
 
