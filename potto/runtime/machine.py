@@ -69,6 +69,7 @@ class Linker:
         self.lookup = lookup
         self.terms: dict[tuple[str, str], Term] = {}
         self.exactness: dict[Term, bool] = {}
+        self.placed: dict[Integral, Integral] = {}
         self.constants: dict[tuple[str, str], Value] = {}
         self.duals: dict[tuple[Lam, bool], Lam] = {}
         self.reaches: dict[tuple[Term, ...], tuple[tuple[str, str, bytes], ...]] = {}
@@ -339,8 +340,12 @@ class Machine:
 
     def integral(self, term: Integral, env: dict[str, Value]) -> Value:
         from potto.runtime.integrals import integrate
-        from potto.runtime.prepare import held, prepared
+        from potto.runtime.prepare import held, placed, prepared
 
+        known = self.linker.placed.get(term)
+        if known is None:
+            known = self.linker.placed[term] = placed(term, lambda g: self.linker.term(g.module, g.name))
+        term = known
         if self.frozen:
             term, stopped = held(term)
             env = {**env, **{new: pad(still(env[old]), self.directions) for old, new in stopped}}

@@ -10,9 +10,11 @@ from __future__ import annotations
 from functools import lru_cache
 
 from potto.calculus.deltas import without_deltas
+from potto.calculus.expand import Resolve, expanded
 from potto.core.terms import (
     Branch,
     Delta,
+    Global,
     Integral,
     Prim,
     Sum,
@@ -46,6 +48,20 @@ def prepared(term: Integral) -> Term:
     if isinstance(body, Prim) and body.op == "add":
         return _apart(term, body)
     return term
+
+
+def placed(term: Integral, resolve: Resolve) -> Integral:
+    """The integral with the calls of definitions that place its deltas carried out: `delta(cond (x, y) c)`."""
+    nodes = postorder(term)
+    if not any(isinstance(n, Delta) and any(isinstance(g, Global) for g in postorder(*n.coordinates)) for n in nodes):
+        return term
+    memo: dict[Term, Term] = {}
+    for node in nodes:
+        new = rebuild(node, tuple(memo[c] for c in children(node)))
+        memo[node] = expanded(new, resolve) if isinstance(new, Delta) else new
+    found = memo[term]
+    assert isinstance(found, Integral)
+    return found
 
 
 @lru_cache(maxsize=1024)

@@ -314,3 +314,13 @@ def test_a_workspace_needs_its_folder(tmp_path: Path) -> None:
             potto.Workspace(root)
         with pytest.raises(potto.PottoError, match=said):
             potto.Workspace(tmp_path, roots=[root])
+
+
+def test_a_delta_of_a_declared_diffeomorphism_is_integrated_out() -> None:
+    """The length of x + y = 0.7 in the unit square over the gradient, sqrt(2): 0.7, and -c for every other c in [-1, 0]."""
+    module = potto.compile(
+        "diffeo cond(x, y; c) = (x + y + c, x - y + c)\n"
+        "def f(c) integral ([0, 1], [0, 1]) delta(cond (x, y) c) d(x, y)\n"
+    )
+    assert module.f(-0.7).value == pytest.approx(0.7, rel=1e-12)
+    assert potto.grad(module.f, wrt="c")(-0.7).tangent == pytest.approx(-1.0, rel=1e-12)
