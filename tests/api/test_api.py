@@ -317,7 +317,7 @@ def test_a_workspace_needs_its_folder(tmp_path: Path) -> None:
 
 
 def test_a_delta_of_a_declared_diffeomorphism_is_integrated_out() -> None:
-    """The length of x + y = 0.7 in the unit square over the gradient, sqrt(2): 0.7, and -c for every other c in [-1, 0]."""
+    """The length of x + y = -c in the unit square, over the gradient sqrt(2): that is -c for c in [-1, 0]."""
     module = potto.compile(
         "diffeo cond(x, y; c) = (x + y + c, x - y + c)\n"
         "def f(c) integral ([0, 1], [0, 1]) delta(cond (x, y) c) d(x, y)\n"
