@@ -4,6 +4,9 @@ Owns `is_zero` and `shorter`, which decide whether a determinant vanishes, wheth
 an author's inverse is right. Atoms are variables and what is no polynomial; sin^2 + cos^2 = 1, cosh^2 - sinh^2 = 1,
 sqrt(u)^2 = u and exp(a + b) = exp(a) exp(b) are used. Equal normal forms mean equal values wherever both are defined;
 unequal ones mean nothing.
+
+Not `core.normal_form`, which puts terms in order and must keep their values everywhere, so that it has no quotients and
+uses no identity between atoms. What is decided and solved here may be defined at more points than the term was.
 """
 
 from __future__ import annotations
