@@ -1,6 +1,7 @@
 // The packaged extension in a real Visual Studio Code: first what its providers give, then what a person sees.
 // usage: node run.mjs CHROMIUM [host|ui]; pictures go to test-results/. The exit status is 1 if anything failed.
 import { existsSync, mkdirSync, rmSync } from "node:fs";
+import { spawnSync } from "node:child_process";
 import { join } from "node:path";
 import { hostTests } from "./host.mjs";
 import { uiTests } from "./ui.mjs";
@@ -26,6 +27,18 @@ function report(result) {
   if (error) console.log(error.replace(/^/gm, "         "));
   if (error && process.env.POTTO_E2E_FAIL_FAST) throw new Error("stopped at the first failure");
 }
+/** The injection into Markdown, with the grammar of Markdown that Visual Studio Code has. */
+function fences() {
+  const since = Date.now();
+  const extension = join(here, "..");
+  const markdown = join(here, "node_modules/code-server/lib/vscode/extensions/markdown-basics/syntaxes/markdown.tmLanguage.json");
+  const tool = join(extension, "node_modules", ".bin", "vscode-tmgrammar-snap");
+  const options = ["--config", join(extension, "package.json"), "-g", markdown, "--scope", "text.html.markdown", "--expandDiff"];
+  const { status, stdout } = spawnSync(tool, [...options, join(here, "markdown", "fence.md")], { encoding: "utf8" });
+  report({ name: "grammar: fences in Markdown", error: status === 0 ? null : stdout, milliseconds: Date.now() - since });
+}
+
+if (only === undefined) fences();
 const code = await start(vsix, chromiumPath);
 try {
   if (only !== "ui") await hostTests(code, report);
