@@ -20,7 +20,7 @@ _CHANGING = ((r"(?:^.*[│└].*\n)+.*\n", "[picture]\n"), (r"± \([^)]*\)", "±
              (r"[\d,.]+ (?:ms|s)\b", "# ms"), (r"± \d\.\de-\d+", "± #"), (r"[\d,]+ evaluations", "# evaluations"),
              (r"slope \d\.\de-\d+", "slope #"), (r"= \d\.\d+e-\d\d\b", "= #"), (r"\d+ steps", "# steps"),
              (r"\d+ points, error at most \d\.\de-\d+", "# points, error at most #"),
-             (r"\d\.\de-1\d apart|\b0 apart", "# apart"))  # fmt: skip
+             (r"\d\.\de-1\d apart|\b0 apart", "# apart"), (r"\b\d\.\de-1\d\b", "#"))  # fmt: skip
 
 
 def settled(text):
