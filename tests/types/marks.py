@@ -20,7 +20,7 @@ from potto.query import Database
 from potto.source import SourceText
 from potto.types import Typed, check_definition, check_statement, format_type, interface, typed_names
 
-FOLDER = "/work/"
+FOLDER = "/project/"
 _MARK = re.compile(r"^\s*#\s*(?P<carets>\^+) (?P<severity>error|warning|hint)\[(?P<code>P\d{4})\]: (?P<text>.*)$")
 _FILE = re.compile(r"^# file: (\S+)$")
 
