@@ -29,6 +29,7 @@ class Problem:
     source: str
     value: float
     tangent: float
+    definitions: str = ""
 
 
 PROBLEMS = (
@@ -65,13 +66,55 @@ PROBLEMS = (
         (math.exp(2 * T) - 1) / 2 + 1 - T,
         math.exp(2 * T) - 1,
     ),
+    # Several roots along a line: int_0^1 (1/2 + asin(t y)/pi) dy
+    Problem(
+        "waves",
+        "integral ([0, 1], [0, 1]) [sin(4*pi*x) < t*y] d(x, y)",
+        0.5 + (math.asin(T) + (math.sqrt(1 - T * T) - 1) / T) / math.pi,
+        (1 - math.sqrt(1 - T * T)) / (math.pi * T * T),
+    ),
+    # Parallel to one variable here and to the other there: two squares
+    Problem("product", "integral ([0, 1], [0, 1]) [(x - t)*(y - t) > 0] d(x, y)", T**2 + (1 - T) ** 2, 4 * T - 2),
+    # Nearly parallel to the innermost variable: int_0^1 (t - y/1000) dy
+    Problem("steep", "integral ([0, 1], [0, 1]) [x + 0.001*y < t] d(x, y)", T - 0.0005, 1.0),
+    # An eighth of a ball
+    Problem(
+        "ball",
+        "integral ([0, 1], [0, 1], [0, 1]) [x^2 + y^2 + z^2 < t] d(x, y, z)",
+        math.pi * T**1.5 / 6,
+        math.pi * math.sqrt(T) / 4,
+    ),
+    # A condition in a function that is called: int_0^t (1 - (x/t)^2) dx
+    Problem(
+        "called",
+        "integral ([0, 1], [0, 1]) below(x/t, y) d(x, y)",
+        2 * T / 3,
+        2 / 3,
+        "def below(u, v) if [u^2 + v < 1] then 1 else 0\n",
+    ),
+    # A bound that follows x to infinity: half of int_0^t s exp(-s) ds
+    Problem(
+        "infinite wedge",
+        "integral ([0, inf], [x, inf]) exp(-x - y)*[x + y < t] d(x, y)",
+        (1 - (1 + T) * math.exp(-T)) / 2,
+        T * math.exp(-T) / 2,
+    ),
+    # A curve in a domain that moves: x^2 < y < t for x below sqrt(t)
+    Problem("moving domain", "integral ([0, 1], [0, t]) [y > x^2] d(x, y)", 2 * T**1.5 / 3, math.sqrt(T)),
+    # int_0^1 int_0^1 exp(3 [x < t] + [(x - t)(y - t) > 0]) where two surfaces coincide
+    Problem(
+        "coincident",
+        "integral ([0, 1], [0, 1]) exp(3*[x < t] + [(x - t)*(y - t) > 0]) d(x, y)",
+        T * (math.exp(4) * T + math.exp(3) * (1 - T)) + (1 - T) * (T + math.e * (1 - T)),
+        2 * T * math.exp(4) + (1 - 2 * T) * math.exp(3) + (1 - 2 * T) - 2 * math.e * (1 - T),
+    ),
     Problem("reversed", "integral ([1, 0], [0, 1]) [x*y < t] d(x, y)", -T * (1 - math.log(T)), math.log(T)),
 )
 
 
 def scores(problem: Problem, method: str, seeds: range) -> tuple[list[float], list[float]]:
     """(estimate - exact)/standard error, of the value and of the derivative."""
-    f = potto.deriv(potto.compile(f"def f(t) {problem.source}").f)
+    f = potto.deriv(potto.compile(f"{problem.definitions}def f(t) {problem.source}").f)
     values, tangents = [], []
     for seed in seeds:
         with potto.settings(method=method, samples=SAMPLES, seed=seed):
@@ -117,3 +160,22 @@ def test_reported_errors_cover_what_is_wrong(problem: Problem, method: str) -> N
         assert missed <= 1, (missed, len(found))
         if method == "mc":
             check_mean(found)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("method", "steepest", "flattest"), [("mc", -0.6, -0.4), ("qmc", -2.2, -0.8)])
+@pytest.mark.parametrize("name", ["triangle", "disc", "ball", "waves", "called", "moving domain"])
+def test_errors_fall_with_the_number_of_samples(name: str, method: str, steepest: float, flattest: float) -> None:
+    """As its square root for independent points, about as its inverse or faster for Sobol points."""
+    problem = next(p for p in PROBLEMS if p.name == name)
+    f = potto.deriv(potto.compile(f"{problem.definitions}def f(t) {problem.source}").f)
+    counts, errors = (1 << 10, 1 << 16), []
+    for count in counts:
+        off = []
+        for seed in range(40):
+            with potto.settings(method=method, samples=count, seed=seed):
+                answer = f((T, 1.0))
+            off.append((answer.value - problem.value, answer.tangent - problem.tangent))
+        errors.append(np.sqrt(np.mean(np.square(off), axis=0)))
+    slopes = np.log(errors[1] / errors[0]) / math.log(counts[1] / counts[0])
+    assert all(steepest < slope < flattest for slope in slopes), slopes

@@ -123,8 +123,18 @@ def test_programs_over_two_variables(number: int) -> None:
     check(number)
 
 
+# A thousand programs, whose reported errors all cover what is wrong with their values and derivatives.
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("start", range(1000, 1500, 50))
-def test_many_programs(start: int) -> None:
-    outcomes = [check(number) for number in range(start, start + 50)]
-    assert outcomes.count("compared") >= 35, outcomes
+@pytest.mark.parametrize("start", range(10_000, 10_840, 70))
+def test_many_programs_over_one_variable(start: int) -> None:
+    outcomes = [check(number, flat=True) for number in range(start, start + 70)]
+    assert outcomes.count("compared") >= 60, outcomes
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("start", range(1000, 1160, 20))
+def test_many_programs_over_two_variables(start: int) -> None:
+    outcomes = [check(number) for number in range(start, start + 20)]
+    assert outcomes.count("compared") >= 12, outcomes
