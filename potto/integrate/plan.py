@@ -87,6 +87,7 @@ class Plan:
     decisions: plain terms and the values that they had when the plan was made; it holds where they are the same.
     reaches: whether every jump can be forced; if not, boundary terms may be missing.
     box: how members of a batch are recognized that no surface cuts, where that can be told.
+    doublings: how often its surfaces double what quadrature takes, about: up to three times each.
     """
 
     term: Integral
@@ -97,6 +98,7 @@ class Plan:
     decisions: tuple[tuple[Term, float | None], ...]
     reaches: bool = True
     box: Box | None = None
+    doublings: int = 0
 
     @cached_property
     def single(self) -> bool:
@@ -174,7 +176,9 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve) -> P
     kept = tuple((t, v) for t, v in decisions.items() if not isinstance(t, Const))
     body = function_of(term.body)
     box = box_of(term, found, body) if reaches else None
-    return Plan(term, tuple(levels), tuple(groups), body, vanishing, kept, reaches, box)
+    surfaces = {f.surface for f in found if f.kind != "center"}
+    doublings = sum(min(3, len(surface.free.intersection(term.variables))) for surface in surfaces)
+    return Plan(term, tuple(levels), tuple(groups), body, vanishing, kept, reaches, box, doublings)
 
 
 def level_plan(level: Level, decided: tuple[int, ...], groups: Sequence[Group]) -> LevelPlan:
@@ -197,7 +201,13 @@ def level_plan(level: Level, decided: tuple[int, ...], groups: Sequence[Group]) 
     deciding, turned = _deciding(decided, groups)
     surfaces = function_of(tuple_(deciding))
     return LevelPlan(
-        level, function_of(tuple_(tuple(terms))), tuple(rows), tuple(searched), tuple(families), decided, surfaces,
+        level,
+        function_of(tuple_(tuple(terms))),
+        tuple(rows),
+        tuple(searched),
+        tuple(families),
+        decided,
+        surfaces,
         turned,
     )
 

@@ -39,7 +39,11 @@ PILOTS = 64
 BATCH = 4096  # members integrated at once
 FEW = 64  # members for which it does not pay to look for those that nothing cuts
 MOST_PLANS = 1024
+# Up to how many variables iterated quadrature is never in question; what it takes beyond them, in evaluations, and how
+# much of that is acceptable. From LOOSE on, a relative accuracy is reached by fewer samples.
 MOST_LEVELS = 3
+PER_LEVEL, AFFORDABLE = 12, 1_000_000
+LOOSE = 1e-3
 # From how many errors of the value on an error of a derivative is looked at again from another side, and for how many
 # members at most.
 STEEP = 1e3
@@ -113,7 +117,7 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
     method = machine.settings.method
     if outermost:
         machine.books.members = max(machine.books.members, batch)
-    if outermost and (method in ("mc", "qmc") or (method == "auto" and len(term.variables) > MOST_LEVELS)):
+    if outermost and (method in ("mc", "qmc") or (method == "auto" and too_many(machine, term, linked))):
         from potto.integrate.sampling import sample
 
         plan = plan_for(machine, term, linked)
@@ -172,6 +176,15 @@ def turned_round(
         sums.t[:, :, index] = np.where(better, other.t, sums.t[:, :, index])
         sums.et[:, :, index] = np.where(better, other.et, sums.et[:, :, index])
     return sums
+
+
+def too_many(machine: Machine, term: Integral, linked: Linked) -> bool:
+    """Whether an integral has too many variables and surfaces for quadrature, or too few digits are asked for."""
+    count = len(term.variables)
+    if count <= MOST_LEVELS:
+        return False
+    doublings = plan_for(machine, term, linked).doublings
+    return machine.settings.rtol >= LOOSE or PER_LEVEL**count * 2**doublings > AFFORDABLE
 
 
 def counted(sums: Sums, plan: Plan, machine: Machine) -> Sums:
