@@ -140,8 +140,8 @@ class Closing:
             case ListValue(item):
                 return ListValue(self.value(item))
             case Closure(inputs, result, effects):
-                own = {**self.sources, **{s: s for s in inputs_of(inputs) if s not in self.sources}}
-                self.sources = own
+                for source in inputs_of(inputs):  # a function inside a choice or a list has numbers of its own
+                    self.sources.setdefault(source, _source(len(self.sources)))
                 return Closure(tuple(map(self.value, inputs)), self.value(result), self._effects(effects))
             case Abstract(ports, result, taint):
                 trees = tuple(map(self._tree, ports))

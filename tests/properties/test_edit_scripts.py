@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import random
 from collections.abc import Hashable
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -20,7 +19,6 @@ from potto.library import Library
 from potto.modules import definition, names, statements
 from potto.modules.texts import content
 from potto.types import interface
-from potto.types.values import HAZY
 
 ROOT = "/edited"
 SCRIPTS = int(os.environ.get("POTTO_SCRIPTS", "1500"))
@@ -34,10 +32,7 @@ def seen(lib: Library, offsets: dict[str, list[int]]) -> dict[Hashable, Any]:
         found[name, "diagnostics"] = lib.diagnostics(file)
         found[name, "statements"] = statements(lib.db, file)
         for each in names(lib.db, file):
-            met = interface(lib.db, file, each)
-            # What goes where in a definition with an error nobody uses, and it tells inputs apart by identity.
-            met = met if lib.is_sound(file, each) else replace(met, flow=HAZY)
-            found[name, each] = (definition(lib.db, file, each), met)
+            found[name, each] = (definition(lib.db, file, each), interface(lib.db, file, each))
         for offset in offsets[name]:
             found[name, offset] = ide.hover(lib.db, file, offset)
     return found
