@@ -1,34 +1,31 @@
 """Integrals as kernels meet them: over whatever batch they stand in.
 
-Owns `integrate`: makes the batch one axis, finds (or makes) the plan for the functions and plain values at hand,
-chooses the method, and gives the result the shape of the batch again.
+Owns `integrate`: makes the batch one axis, asks for the plan (`plans`), chooses the method, and gives the result the
+shape of the batch again.
 """
 
 from __future__ import annotations
 
 import itertools
 import operator
-import threading
-from collections import OrderedDict
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from potto.calculus.deciding import deciding
 from potto.calculus.surfaces import TooDeep
-from potto.core.terms import Deriv, Integral, Lam, Term, Var, deriv, integral, substitute, var
+from potto.core.terms import Integral, integral
 from potto.diagnostics import PottoError
 from potto.integrate.boxes import uncut
 from potto.integrate.levels import Iteration
 from potto.integrate.pieces import Sums
-from potto.integrate.plan import Plan, make
+from potto.integrate.plan import Plan
 from potto.kernels import errors
 from potto.kernels.cells import Array, Cell, Number, Value, all_arrays, map_arrays
-from potto.runtime.functions import Closure, Derivative
+from potto.runtime.plans import Linked, link, plan_for, split_by_decisions
 
 if TYPE_CHECKING:
     from potto.runtime.machine import Machine
@@ -38,7 +35,6 @@ ORDERS = (4, 6, 8, 10)
 PILOTS = 64
 BATCH = 4096  # members integrated at once
 FEW = 64  # members for which it does not pay to look for those that nothing cuts
-MOST_PLANS = 1024
 # Up to how many variables iterated quadrature is never in question; what it takes beyond them, in evaluations, and how
 # much of that is acceptable. From LOOSE on, a relative accuracy is reached by fewer samples.
 MOST_LEVELS = 3
@@ -48,14 +44,6 @@ LOOSE = 1e-3
 # members at most.
 STEEP = 1e3
 MOST_SPOILT = 256
-
-
-@dataclass
-class Linked:
-    """The functions that an integral calls, as terms whose free variables have names of their own."""
-
-    functions: dict[str, Lam | Deriv]
-    env: dict[str, Value]
 
 
 def integrate(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
@@ -292,126 +280,3 @@ def _shaped(sums: Sums, shape: tuple[int, ...]) -> Value:
     if sums.v.shape[0] == 1:
         return cell(0)
     return tuple(cell(c) for c in range(sums.v.shape[0]))
-
-
-# Functions that an integral calls
-
-
-def link(env: dict[str, Value]) -> Linked:
-    functions: dict[str, Lam | Deriv] = {}
-    extended: dict[str, Value] = dict(env)
-
-    def add(name: str, function: Closure) -> None:
-        derivative = isinstance(function, Derivative)
-        while isinstance(function, Derivative):
-            function = function.primal
-        renamed: dict[str, Term] = {}
-        for inner, value in function.captured.items():
-            own = f"{name}@{inner}"
-            renamed[inner] = var(own)
-            extended[own] = value
-            if isinstance(value, Closure):
-                add(own, value)
-        linked = substitute(function.lam, renamed)
-        assert isinstance(linked, Lam)
-        functions[name] = deriv(linked) if derivative else linked
-
-    for name, value in env.items():
-        if isinstance(value, Closure):
-            add(name, value)
-    return Linked(functions, extended)
-
-
-# Plans
-
-_plans: OrderedDict[Any, list[Plan]] = OrderedDict()
-_lock = threading.Lock()
-
-
-def plan_for(machine: Machine, term: Integral, linked: Linked) -> Plan:
-    """The plan for these functions and plain values; made once."""
-    functions = tuple((name, f.digest) for name, f in sorted(linked.functions.items()))
-    key = (term.digest, functions, machine.linker.reached(term, *linked.functions.values()))
-    with _lock:
-        candidates = list(_plans.get(key, ()))
-    for plan in candidates:
-        if all(decide(machine, t, linked) == value for t, value in plan.decisions):
-            return plan
-    plan = make(
-        term,
-        lambda head: linked.functions.get(head.name) if isinstance(head, Var) else machine.linker.function(head),
-        lambda plain: decide(machine, plain, linked),
-        lambda head: _plainly(head, linked) if isinstance(head, Var) else machine.linker.function(head),
-    )
-    with _lock:
-        _plans.setdefault(key, []).append(plan)
-        _plans.move_to_end(key)
-        if len(_plans) > MOST_PLANS:
-            _plans.popitem(last=False)
-    return plan
-
-
-def _plainly(head: Var, linked: Linked) -> Lam | Deriv | None:
-    """The function that a name stands for, unless it stands for one on duals."""
-    return linked.functions.get(head.name) if type(linked.env.get(head.name)) is Closure else None
-
-
-def decide(machine: Machine, plain: Term, linked: Linked) -> float | None:
-    """The value of a plain term over parameters, where it is one number for the whole batch."""
-    env: dict[str, Value] = {}
-    for name in plain.free:
-        value = linked.env.get(name)
-        if value is None:
-            return None
-        if isinstance(value, Cell):
-            flat = np.asarray(value.v)
-            if flat.ndim and flat.size and not (flat == flat.flat[0]).all():
-                return None
-            env[name] = Cell(float(flat.flat[0]))
-        else:
-            env[name] = value.still() if isinstance(value, Closure) else value
-    try:
-        result = machine.with_directions(0).term(plain, env)
-    except PottoError:
-        return None
-    if isinstance(result, Cell):
-        number = np.asarray(result.v)
-        return float(number.flat[0])
-    return None
-
-
-def split_by_decisions(machine: Machine, term: Integral, linked: Linked, batch: int) -> list[Any] | None:
-    """Members of the batch for which recursions and sums under the integral take the same course, if not all do."""
-    if batch == 1:
-        return None
-    deciding = deciding_names(machine, term, linked)
-    rows = []
-    for name in sorted(deciding):
-        value = linked.env.get(name)
-        if isinstance(value, Cell) and isinstance(value.v, np.ndarray) and value.v.size > 1:
-            rows.append(value.v)
-    if not rows:
-        return None
-    _, where = np.unique(np.stack(rows), axis=1, return_inverse=True)
-    where = np.asarray(where).reshape(-1)
-    count = int(where.max()) + 1
-    return [np.nonzero(where == g)[0] for g in range(count)] if count > 1 else None
-
-
-def deciding_names(machine: Machine, term: Integral, linked: Linked) -> frozenset[str]:
-    """Parameters that reach the condition of a recursion or the bounds of a sum under the integral."""
-    functions = tuple(f.digest for _, f in sorted(linked.functions.items()))
-    key = (term.digest, functions, machine.linker.reached(term, *linked.functions.values()))
-    found = _deciding.get(key)
-    if found is None:
-        found = deciding(
-            (term.body, *(bound for pair in term.bounds for bound in pair), *linked.functions.values()),
-            lambda head: linked.functions.get(head.name) if isinstance(head, Var) else machine.linker.function(head),
-        )
-        if len(_deciding) > MOST_PLANS:
-            _deciding.clear()
-        _deciding[key] = found
-    return found
-
-
-_deciding: dict[Any, frozenset[str]] = {}
