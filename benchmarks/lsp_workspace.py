@@ -8,7 +8,6 @@ and a top, and no cycles.
 from __future__ import annotations
 
 MODULES, LINES, LARGE = 200, 42_000, 2_000
-LEAF = "m0"
 
 
 def module_name(number: int) -> str:

@@ -5,7 +5,6 @@ Owns the way from absolute offsets to what is memoized relative to chunks, and b
 
 from __future__ import annotations
 
-import re
 from bisect import bisect_right
 from dataclasses import dataclass
 
@@ -14,8 +13,6 @@ from potto.modules import ChunkRef, chunks, is_diffeo, parsed, source
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import ParsedChunk
-
-WORD = re.compile(r"\\?[^\W\d]\w*")
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ those decisions come out the same.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -99,10 +99,6 @@ class Plan:
     reaches: bool = True
     box: Box | None = None
     doublings: int = 0
-
-    @cached_property
-    def single(self) -> bool:
-        return len(self.levels) == 1
 
     def environment(self, env: dict[str, Value], everything: dict[str, Value]) -> dict[str, Value]:
         """What the plan is evaluated in: also what functions have captured, if calls of them were carried out."""
@@ -238,7 +234,6 @@ def _deciding(
 
 # Where the integrand is exactly zero, told from the sides alone
 
-Zero = Callable[[Mapping[int, Mask]], Any]
 
 
 def _vanishing(body: Term, numbers: Mapping[tuple[int, ...], tuple[int, int]]) -> Any:

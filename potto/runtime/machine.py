@@ -42,7 +42,6 @@ from potto.settings import Settings
 
 DEEPEST_CALLS = 3000
 MOST_TERMS = 10_000_000
-SUM_CHUNK = 1 << 18
 
 
 @dataclass

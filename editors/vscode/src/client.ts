@@ -20,11 +20,12 @@ interface Channels {
   readonly trace: vscode.LogOutputChannel;
 }
 
-/** What becomes of a client; `closed` says whether to start the server again. */
+/** What becomes of a client; `closed` says whether to start the server again, `lost` that the client did not manage to. */
 interface Events {
   running(): void;
   starting(): void;
   closed(): boolean;
+  lost(): void;
 }
 
 export function makeClient(program: Found, { log, trace }: Channels, events: Events): LanguageClient {
@@ -42,9 +43,9 @@ export function makeClient(program: Found, { log, trace }: Channels, events: Eve
     },
     diagnosticPullOptions: { onChange: true, onTabs: true },
     errorHandler: {
-      error: (_error, _message, count) => ({
-        action: count !== undefined && count <= 3 ? ErrorAction.Continue : ErrorAction.Shutdown,
-      }),
+      // What is written to a server that has just died fails, often many times before its end is noticed. To shut down
+      // for that would keep it from being started again.
+      error: () => ({ action: ErrorAction.Continue, handled: true }),
       closed: () => ({ action: events.closed() ? CloseAction.Restart : CloseAction.DoNotRestart, handled: true }),
     },
   };
@@ -63,6 +64,7 @@ export function makeClient(program: Found, { log, trace }: Channels, events: Eve
   client.onDidChangeState(({ newState }) => {
     if (newState === State.Running) events.running();
     else if (newState === State.Starting) events.starting();
+    else events.lost();
   });
   return client;
 }

@@ -116,10 +116,13 @@ export class Server implements vscode.Disposable {
       running: () => this.running === client && this.set({ kind: "running", program }),
       starting: () => this.running === client && this.set({ kind: "starting", program }),
       closed: () => this.closed(program),
+      lost: () => started && this.lost(client, program),
     });
     this.running = client;
+    let started = false;
     try {
       await client.start();
+      started = true;
     } catch (error) {
       this.running = undefined;
       this.set({ kind: "failed", program, reason: String(error) });
@@ -148,7 +151,20 @@ export class Server implements vscode.Disposable {
       return true;
     }
     this.running = undefined;
-    this.set({ kind: "failed", program, reason: `it ended ${this.crashes.length} times within three minutes` });
+    this.fail(program);
     return false;
+  }
+
+  /** A client that ran has no server any more, and none came up in its place: another client may have more luck. */
+  private lost(client: LanguageClient, program: Found): void {
+    if (this.running !== client) return;
+    this.running = undefined;
+    client.dispose().catch((error: unknown) => this.log.warn(String(error)));
+    if (this.crashes.length < CRASHES) void this.start();
+    else this.fail(program);
+  }
+
+  private fail(program: Found): void {
+    this.set({ kind: "failed", program, reason: `it ended ${this.crashes.length} times within three minutes` });
   }
 }
