@@ -155,12 +155,14 @@ class Session:
         return Valued(shown.text, shown.estimates, format_type(inferred.type), self._keep(entry, source, shown))
 
     def _keep(self, entry: str, source: SourceText, shown: Shown) -> tuple[str, ...]:
-        """Let `_` and `_3` stand for the expression of entry 3 in later entries."""
+        """Let `_` and `_3` be the answer to entry 3 in later entries: its value, or the expression of a function."""
         self._answers += 1
         number, text = f"_{self.number}", source.text[shown.span.start : shown.span.end]
         before = self.prelude
         answer, last = f"<Out {self._answers}>", f"<Last {self._answers}>"
         self._put(answer, f"{number} = ({text})\n", tuple(dict.fromkeys((entry, *before))))
+        if shown.value is not None:
+            self.world.hold(answer, number, shown.value)
         self._put(last, f"_ = {number}\n", (answer, *before))  # apart, for `text` may use the `_` before
         self._see((last,))
         return ("_", number)

@@ -17,6 +17,7 @@ from potto.check import absolute, definition_diagnostics, has_errors
 from potto.core.terms import Term
 from potto.diagnostics import Diagnostic, PottoError
 from potto.elaborate import core, elaborate_expression
+from potto.kernels.cells import Value
 from potto.library import Library
 from potto.modules import chunk_start
 from potto.render import Located, ProgramError
@@ -52,6 +53,7 @@ class World(Library):
     def __init__(self, roots: Sequence[str | os.PathLike[str]] = ()) -> None:
         super().__init__(roots)
         self._local = threading.local()
+        self._held: dict[tuple[str, str], Value] = {}
 
     # Evaluating
 
@@ -76,7 +78,11 @@ class World(Library):
         if getattr(self._local, "revision", None) != revision:
             self._local.revision = revision
             self._local.memory = {}
-            self._local.program = Program(self.lookup)
+            self._local.program = Program(self.lookup, self._held)
+
+    def hold(self, file: str, name: str, value: Value) -> None:
+        """Let a definition have this value, with its error, from now on: its term is not evaluated again."""
+        self._held[file, name] = value
 
     def own(self, key: str, text: str) -> str:
         """Give a pseudo file its text, for this world and for those that its functions are given to."""

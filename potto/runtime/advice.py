@@ -1,12 +1,14 @@
 """What to do about an estimate that is not as accurate as was asked: told by why it is not.
 
-Owns `advice`. The reasons are those of `Estimate.reasons`; one that is not known here gets advice that suits all.
+Owns `advice` and `ROUGH`, of which a reader need not be warned: that answer came with its error. The reasons are those
+of `Estimate.reasons`; one that is not known here gets advice that suits all.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
+ROUGH = "an answer that it is made of is no more accurate"
 _LESS = "ask for less accuracy (`--rtol`)"
 _MORE = "allow more evaluations (`--max-evals`) or " + _LESS
 # What a reason has in it, and what helps then. More evaluations help where it is they that ran out, and nowhere else.

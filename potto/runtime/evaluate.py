@@ -21,6 +21,7 @@ from potto.diagnostics import PottoError
 from potto.kernels import compile as compiling
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Value
+from potto.runtime.advice import ROUGH
 from potto.runtime.estimate import Estimate, OneSided
 from potto.runtime.functions import Closure, Derivative
 from potto.runtime.machine import Books, Linker, Machine
@@ -30,10 +31,10 @@ Lookup = Callable[[str, str], Term]
 
 
 class Program:
-    """The definitions that terms refer to, for any number of evaluations."""
+    """The definitions that terms refer to, for any number of evaluations; those `held` have their values already."""
 
-    def __init__(self, lookup: Lookup) -> None:
-        self.linker = Linker(lookup)
+    def __init__(self, lookup: Lookup, held: Mapping[tuple[str, str], Value] | None = None) -> None:
+        self.linker = Linker(lookup, held)
 
     def machine(self, settings: Settings) -> Machine:
         return Machine(self.linker, settings, Books())
@@ -123,9 +124,9 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
     reasons = list(books.unfinished)
     flat = [*_flat(numbers, bounds), *_flat(tangents, tangent_bounds)]
     scale = max((_largest(v) for v, _ in flat), default=0.0)
-    missed = [_missed(v, e, scale, settings) for v, e in flat]
-    if not reasons and any(missed):
-        reasons.append(next(m for m in missed if m))
+    missed = next((m for v, e in flat if (m := _missed(v, e, scale, settings))), None)
+    if not reasons and missed is not None:
+        reasons.append(ROUGH if any(_rough(value, settings) for value in books.used.values()) else missed)
     return Estimate(
         numbers,
         bounds,
@@ -135,6 +136,15 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
         reasons=tuple(reasons),
         **common,  # type: ignore[arg-type]
     )
+
+
+def _rough(value: Value, settings: Settings) -> bool:
+    """Whether an answer is itself less accurate than is asked for now."""
+    if isinstance(value, tuple | list):
+        return any(_rough(item, settings) for item in value)
+    if not isinstance(value, Cell) or not value.e:
+        return False
+    return _missed(value.v, value.e, _largest(value.v), settings) is not None
 
 
 def _notes(books: Books) -> list[OneSided]:
@@ -151,8 +161,8 @@ def _notes(books: Books) -> list[OneSided]:
 def numbers_of(value: Value) -> Any:
     if isinstance(value, Cell):
         return value.v if isinstance(value.v, np.ndarray) else float(value.v)
-    if isinstance(value, tuple):
-        return tuple(numbers_of(v) for v in value)
+    if isinstance(value, tuple | list):
+        return type(value)(map(numbers_of, value))
     raise errors.not_a_number(value)
 
 
@@ -160,8 +170,8 @@ def bounds_of(value: Value) -> Any:
     if isinstance(value, Cell):
         e = value.e
         return 0.0 if e is None else (e if isinstance(e, np.ndarray) else float(e))
-    if isinstance(value, tuple):
-        return tuple(bounds_of(v) for v in value)
+    if isinstance(value, tuple | list):
+        return type(value)(map(bounds_of, value))
     raise errors.not_a_number(value)
 
 
@@ -183,7 +193,7 @@ def tangents_of(value: Value) -> tuple[Any, Any]:
 def _flat(numbers: Any, bounds: Any) -> list[tuple[Any, Any]]:
     if numbers is None:
         return []
-    if isinstance(numbers, tuple):
+    if isinstance(numbers, tuple | list):
         return [pair for n, b in zip(numbers, bounds, strict=True) for pair in _flat(n, b)]
     return [(numbers, bounds)]
 

@@ -7,7 +7,7 @@ else. Calls, lazy sides, sums and integrals of generated code come here.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -46,7 +46,7 @@ MOST_TERMS = 10_000_000
 
 @dataclass
 class Books:
-    """What one evaluation has done so far."""
+    """What one evaluation has done so far. used: answers of before that it is made of."""
 
     evaluations: int = 0
     depth: int = 0
@@ -58,18 +58,23 @@ class Books:
     second: bool = False
     members: int = 1
     integrals: int = 0
+    used: dict[tuple[str, str], Value] = field(default_factory=dict)
     costs: Costs | None = field(default_factory=costs.books)
 
 
 class Linker:
-    """The definitions that a program refers to. `lookup` gives the term of a definition or raises PottoError."""
+    """The definitions that a program refers to. `lookup` gives the term of a definition or raises PottoError.
 
-    def __init__(self, lookup: Callable[[str, str], Term]) -> None:
+    held: definitions that have a value already, which is not computed again.
+    """
+
+    def __init__(self, lookup: Callable[[str, str], Term], held: Mapping[tuple[str, str], Value] | None = None) -> None:
         self.lookup = lookup
+        self.held = held if held is not None else {}
         self.terms: dict[tuple[str, str], Term] = {}
         self.exactness: dict[Term, bool] = {}
         self.placed: dict[Integral, Integral] = {}
-        self.constants: dict[tuple[str, str], Value] = {}
+        self.constants: dict[tuple[str, str, Settings], Value] = {}
         self.duals: dict[tuple[Lam, bool], Lam] = {}
         self.reaches: dict[tuple[Term, ...], tuple[tuple[str, str, bytes], ...]] = {}
         self.kernels: dict[tuple[Lam, tuple[Pattern, ...], int, bool], Kernel] = {}  # the ones met, without a lookup
@@ -228,7 +233,11 @@ class Machine:
         term = self.linker.term(module, name)
         if isinstance(term, Lam):
             return Closure(term, {}, self.rounding or self.linker.inexact(term), (module, name))
-        key = (module, name)
+        known = self.linker.held.get((module, name))
+        if known is not None:
+            self.books.used[module, name] = known
+            return pad(known, self.directions)
+        key = (module, name, self.settings)
         if key not in self.linker.constants:
             self.enter()
             still = replace(self, directions=0, rounding=True, frozen=False)

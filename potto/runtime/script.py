@@ -18,7 +18,7 @@ from potto.kernels.errors import wrong_call
 from potto.modules import statements
 from potto.query import Database
 from potto.render import Located, ProgramError
-from potto.runtime.advice import advice
+from potto.runtime.advice import ROUGH, advice
 from potto.runtime.estimate import Estimate
 from potto.runtime.evaluate import Clock, Program, report
 from potto.runtime.functions import Closure
@@ -38,11 +38,12 @@ Environment = dict[str, Value]
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """What one statement printed: its text, and the numbers behind it."""
+    """What one statement printed: its text, and the numbers behind it. A single value without functions is kept."""
 
     span: Span
     text: str
     estimates: tuple[Estimate, ...]
+    value: Value | None = None
 
 
 class Script:
@@ -87,14 +88,16 @@ class Script:
     def show(self, span: Span, arguments: tuple[nodes.Expr, ...], env: Environment) -> Iterator[Shown | Located]:
         texts: list[str] = []
         estimates: list[Estimate] = []
+        kept: Value | None = None
         for argument in arguments:
             value, estimate = self.value(argument, env)
             texts.append(format_value(value))
             if estimate is not None:
                 estimates.append(estimate)
+                kept = value if len(arguments) == 1 else None
                 place = argument.span.shift(self.start)
                 yield from (Located(self.file, d) for d in remarks(estimate, place, self.settings))
-        yield Shown(span.shift(self.start), " ".join(texts), tuple(estimates))
+        yield Shown(span.shift(self.start), " ".join(texts), tuple(estimates), kept)
 
     def items(self, iterable: nodes.Expr, env: Environment) -> list[Value]:
         value, _ = self.value(iterable, env)
@@ -161,7 +164,7 @@ def remarks(estimate: Estimate, place: Span, settings: Settings) -> Iterator[Dia
             "this is not a number",
             help="a builtin was used where it is not defined, or a parameter is not a number itself",
         )
-    elif not estimate.converged and settings.method in ("auto", "quadrature"):
+    elif not estimate.converged and settings.method in ("auto", "quadrature") and estimate.reasons != (ROUGH,):
         reason = "; ".join(estimate.reasons)
         yield NOT_CONVERGED(
             place,

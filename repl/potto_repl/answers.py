@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 
 from potto.calculus.again import NoText, first_derivative
 from potto.calculus.explain import describe
@@ -15,17 +16,20 @@ from potto.core.printer import format_term
 from potto.core.terms import App, Deriv, Global, Lam, Term
 from potto.elaborate import elaborate_expression
 from potto.modules import statements
+from potto.render import Located
 from potto.runtime.estimate import Estimate
 from potto.runtime.shown import as_dual
 from potto.session import Defined, Imported, Outcome, Said, Valued
 from potto.source import Span
 from potto.syntax import nodes
 from potto_repl.reply import Part, answer, diagnostic, note
-from potto_repl.session import Conversation
+from potto_repl.session import Conversation, plain_names
 from potto_repl.symbols import pretty
-from potto_repl.values import is_dual, parts_of, value_parts
+from potto_repl.values import Parts, is_dual, parts_of, value_parts
 
 NOT_DEFINED = "P0201"
+ANSWER = re.compile("_[0-9]*")  # the names under which answers stay at hand
+FEW = 8  # answers that are listed
 LONG = 100  # characters of a formula that an answer still shows
 
 
@@ -37,11 +41,28 @@ def entry_parts(session: Conversation, text: str) -> Iterator[Part]:
             found = outcome.located.diagnostic
             session.last_code = found.code
             if found.code == NOT_DEFINED and outcome.located.file == f"<In {session.number}>":
-                missing.append(session.entries[-1].text[found.span.start : found.span.end])
+                name = plain_names(session.entries[-1].text)[found.span.start : found.span.end]
+                if ANSWER.fullmatch(name):
+                    outcome = Said(_no_answer(session, outcome.located, name))
+                else:
+                    missing.append(name)
         yield from outcome_parts(session, outcome)
     advice = _advice(session, list(dict.fromkeys(missing)))
     if advice:
         yield Part("help", advice)
+
+
+def _no_answer(session: Conversation, located: Located, name: str) -> Located:
+    """What is said of an answer that there never was, over the place where it is written: `Out[3]`, `_3` or `_`."""
+    found = located.diagnostic
+    numbers = [e.number for e in session.entries for o in e.outcomes if isinstance(o, Valued) and o.names]
+    listed = ", ".join(f"`_{number}`" for number in numbers[-FEW:])
+    which = "the last answers" if len(numbers) > FEW else "the answers"
+    help = f"{which} are {listed}" if numbers else "an expression gives one, such as `1 + 1`"
+    written = re.compile(r"Out\[\d+\]|_\d*").match(session.entries[-1].text, found.span.start)
+    span = Span(written.start(), written.end()) if written is not None else found.span
+    message = f"there is no answer {name[1:]}" if name != "_" else "there is no answer yet"
+    return replace(located, diagnostic=replace(found, span=span, message=message, help=help))
 
 
 def outcome_parts(session: Conversation, outcome: Outcome) -> Iterator[Part]:
@@ -76,8 +97,22 @@ def _valued(session: Conversation, outcome: Valued) -> Iterator[Part]:
     parts = None
     if isinstance(estimate.value, tuple) and is_dual(session.world, file, expr):
         estimate = as_dual(estimate)
-        parts = parts_of(session.world, file, expr, estimate, session.settings)
+        parts = _kept_parts(session, file, expr, estimate)
     yield from value_parts(estimate, outcome.type, session.settings, name=name, parts=parts)
+
+
+def _kept_parts(session: Conversation, file: str, expr: nodes.Expr, dual: Estimate) -> Parts | None:
+    """The parts of a derivative: those of the answer before, where an answer is another one by its name."""
+    term = elaborate_expression(session.db, file, expr).term
+    path: list[tuple[str, str]] = []
+    while isinstance(term, Global) and ANSWER.fullmatch(term.name):
+        if (term.module, term.name) in session.parts:
+            return session.parts[term.module, term.name]
+        path.append((term.module, term.name))
+        term = session.world.lookup(term.module, term.name)
+    found = parts_of(session.world, file, expr, dual, session.settings)
+    session.parts.update(dict.fromkeys(path, found))
+    return found
 
 
 def _in_symbols(session: Conversation, name: str) -> tuple[str, str]:
@@ -85,7 +120,7 @@ def _in_symbols(session: Conversation, name: str) -> tuple[str, str]:
     term = elaborate_expression(session.db, session.file, nodes.Name(Span(0, 0), name)).term
     while isinstance(term, Global):
         known = session.world.lookup(term.module, term.name)
-        if isinstance(known, Lam) and not re.fullmatch("_[0-9]*", term.name):
+        if isinstance(known, Lam) and not ANSWER.fullmatch(term.name):
             break  # a function that has a name
         term = known
     text, head = format_term(term), term

@@ -10,13 +10,16 @@ import os
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from potto.diagnostics import Diagnostic
 from potto.session import Defined, Imported, Outcome, Session
 from potto.settings import DEFAULTS, Settings
 from potto.source import SourceText
 from potto_repl.options import Options
+
+if TYPE_CHECKING:
+    from potto_repl.values import Parts
 
 TYPING = "<typing>"
 _OUT = re.compile(r"\bOut\[(\d+)\]")
@@ -52,6 +55,7 @@ class Conversation(Session):
         self.undoing: list[Before] = []
         self.written: dict[str, SourceText] = {}  # entries as they were typed, where that differs from what was run
         self.broken: set[str] = set()  # loaded files that mean what they meant before
+        self.parts: dict[tuple[str, str], Parts | None] = {}  # of derivatives that were answered, by their definition
         self.last_code: str | None = None
         self.last_picture: Any = None
         self.watching = False

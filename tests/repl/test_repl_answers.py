@@ -136,6 +136,64 @@ def test_answers_stay_at_hand(talk):
     assert talk.data("Out[2] + _3")["value"] == pytest.approx(1.25, rel=1e-12)
 
 
+def test_an_answer_is_the_value_that_was_answered(talk):
+    talk.all(JUMP, ":method mc", ":set samples 1000", "f(0.3)")
+    first = talk.session.entries[-1].outcomes[0].estimates[0]
+    talk.all(":set seed 8", ":set samples 5000", "def f(t) 100*t")  # nothing of this changes what was answered
+    again = talk.data("_")
+    assert (again["value"], again["error"]) == (first.value, first.error) and 1e-3 < first.error < 0.1
+    assert again["evals"] == 0
+    twice = talk.data("_2 * 2")
+    assert (twice["value"], twice["error"]) == pytest.approx((2 * first.value, 2 * first.error), rel=1e-12)
+    talk(":method quadrature")
+    reply = talk("Out[2]")  # the error that it came with: nothing to be warned of
+    assert not reply.failed and "P0501" not in reply.text and reply.parts[0].data["converged"] is False
+
+
+def test_an_answer_stands_still_in_a_derivative(talk):
+    talk.all(JUMP, "f(0.25)")
+    data = talk.data("deriv(\\t . _*t^2)((3, 1))")
+    assert (data["value"], data["tangent"]) == pytest.approx((2.25, 1.5), rel=1e-12)
+    talk("g = \\t . integral [0, 1] [x < _2*t] d(x)")
+    assert talk.data("deriv(g)((2, 1))")["tangent"] == pytest.approx(0.25, rel=1e-12)
+    talk("\\x . f(x)^2")  # a function goes on as a function
+    assert talk.data("deriv(_)((0.5, 1))")["tangent"] == pytest.approx(1, rel=1e-12)
+
+
+def test_an_answer_outlives_its_file(talk):
+    path = talk.write("m.po", "def h(t) integral [0, t] x d(x)\n")
+    talk.all(f":load {path}", "h(2)", "(h(1), [h(3), 4])")
+    talk.write("m.po", "def h(t) 7*t\n")
+    talk.all(":reload")
+    assert talk.data("h(2)")["value"] == 14
+    assert talk.data("_1")["value"] == pytest.approx(2, rel=1e-12)
+    assert talk("_2").text.startswith("_5 = (0.5, [4.5, 4])")
+
+
+def test_a_sampled_derivative_keeps_its_parts(talk):
+    talk.all(WEIGHTED, ":method mc", ":set samples 500", "deriv(g)((0.3, 1))", ":set seed 9")
+    before = talk.session.parts
+    data = talk.data("_")
+    (kept,) = set(before.values())
+    assert data["interior"] == kept.interior and data["interior"] + data["boundary"] == pytest.approx(data["tangent"])
+
+
+def test_an_answer_that_there_never_was(talk):
+    assert "there is no answer yet" in talk("_").text
+    talk.all("1 + 1", "3")
+    text = talk("Out[7] + _9").text
+    assert "there is no answer 7" in text and "the answers are `_2`, `_3`" in text and "^^^^^^" in text
+    assert "there is no answer 9" in text and "define `Ou`" not in text
+
+
+def test_a_constant_is_as_accurate_as_is_asked_for_each_time(talk):
+    talk.all("def h(t) integral [0, 1] exp(-t*x^2) d(x)", "a = h(3)", ":plot a*x")
+    exact = math.sqrt(math.pi / 12) * math.erf(math.sqrt(3))
+    assert talk.data(":eval a")["value"] == pytest.approx(exact, rel=1e-14)
+    rows = talk.data(":error a")["table"]
+    assert len({row["evals"] for row in rows}) > 6 and rows[0]["error"] > 100 * rows[5]["error"]
+
+
 def test_carets_stand_under_what_was_typed(talk):
     talk(JUMP)
     talk("f(0.25)")

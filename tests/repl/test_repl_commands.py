@@ -149,6 +149,20 @@ def test_error_is_a_work_precision_table(talk):
     assert "tangent" in talk(":error deriv(g)((0.3, 1))").text
 
 
+def test_error_in_one_dimension_shows_samples_that_are_better_than_random_ones(talk):
+    talk.all("def h(t) integral [0, 1] exp(-t*x^2) d(x)", WEIGHTED)
+    for text, steepest in (("h(3)", -1.0), ("g(0.3)", -0.9), ("deriv(g)((0.3, 1))", -0.9)):
+        table = talk.data(f":error {text}")["table"]
+        rows = {m: [row for row in table if row["method"] == m] for m in ("mc", "qmc")}
+        slopes = {
+            m: math.log(r[-1]["error"] / r[0]["error"]) / math.log(r[-1]["evals"] / r[0]["evals"])
+            for m, r in rows.items()
+        }
+        assert slopes["qmc"] < steepest < -0.6 < slopes["mc"] < -0.4, (text, slopes)
+        assert all(row["actual"] <= row["error"] for row in table if row["method"] == "qmc")
+        assert rows["qmc"][-1]["error"] < rows["mc"][-1]["error"] / 20
+
+
 def test_settings(talk):
     assert "rtol       1e-10" in talk(":set").text
     talk(":set rtol=1e-4")
