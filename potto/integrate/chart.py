@@ -3,18 +3,24 @@
 Owns `Chart`: each variable runs from bound to bound as its label runs from 0 to 1, so that a moving or a slanted domain
 is a fixed cube, and no point is ever outside of it. Points carry the tangents of the parameters (labels held fixed)
 and, where asked for, those by labels.
+
+Cuts are known here too. A stretch between two of them that is so narrow that points would hardly fall in it gets a
+share of the points all the same, and these count for less (`crowded`): means stay unbiased, and nothing thin between
+surfaces is missed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from potto.integrate.cuts import as_array
+from potto.integrate.cuts import as_array, frame_rows
+from potto.integrate.pieces import still
 from potto.integrate.plan import LevelPlan, Plan
+from potto.integrate.rules import EPS
 from potto.kernels.cells import Array, Cell, Number, Value, map_arrays, pad
 
 
@@ -28,11 +34,12 @@ class Point:
 
 @dataclass(frozen=True)
 class Chart:
-    """The chart of one plan, for one set of parameters."""
+    """The chart of one plan, for one set of parameters. share: the least part of the points for a stretch of labels."""
 
     plan: Plan
     machine: Any
     env: dict[str, Value]
+    share: float = 0.0
 
     def start(self, count: int, directions: int) -> Point:
         """No variable placed yet."""
@@ -42,11 +49,12 @@ class Chart:
     def place(
         self, point: Point, labels: Sequence[Array | None], first: int, stop: int,
         marked: Mapping[int, int] | None = None, held: int | None = None, directions: int | None = None,
+        crowding: Container[int] = (),
     ) -> Point:  # fmt: skip
         """The point with the variables first..stop-1 put at their labels; those whose label is None are left out.
 
         marked: the directions in which labels move. held: the variable that parameters don't move; its bounds' motion
-        is someone else's affair.
+        is someone else's affair. crowding: the variables whose labels are given as drawn, to be `crowded`.
         """
         k = self.machine.directions if directions is None else directions
         env, volume = dict(point.env), point.volume
@@ -57,6 +65,9 @@ class Chart:
                 continue
             level = self.plan.levels[number]
             lo, hi = self.bounds(level, env, machine)
+            weight: Array | None = None
+            if self.share and number in crowding:
+                u, weight = self.crowded(level, env, u)
             x, length = stretch(lo, hi, u, k)
             if marked and number in marked:
                 rates = list(x.t)
@@ -67,7 +78,25 @@ class Chart:
                 x = Cell(x.v, None, tuple(None if d < self.machine.directions else y for d, y in enumerate(x.t)))
             env[level.variable] = x
             volume = _times(volume, length)
+            if weight is not None:
+                volume = _times(volume, Cell(weight))
         return Point(env, volume)
+
+    def crowded(self, level: LevelPlan, env: dict[str, Value], u: Array) -> tuple[Array, Array | None]:
+        """Labels for drawn numbers, and their weights: so that every stretch between cuts gets its share of points."""
+        if not level.rows:
+            return u, None
+        here = {name: still(env[name]) for name in level.frame.params}
+        values = self.machine.with_directions(0).evaluate(level.frame, here, None)
+        assert isinstance(values, tuple)
+        lo, hi, rows = frame_rows(level, values)
+        with np.errstate(invalid="ignore", over="ignore"):
+            cuts = np.stack([label_of(lo, hi, as_array(row.x, u.size)) for row in rows if row.cut >= 0] or [u[:0]])
+        if not cuts.size:
+            return u, None
+        inside = (cuts > 0) & (cuts < 1)
+        ends = np.concatenate((np.zeros((1, u.size)), np.where(inside, cuts, 1.0), np.ones((1, u.size))))
+        return crowd(np.sort(ends, axis=0), self.share, u)
 
     def bounds(self, level: LevelPlan, env: dict[str, Value], machine: Any) -> tuple[Cell, Cell]:
         values = machine.evaluate(level.bounds, {p: env[p] for p in level.bounds.params}, None)
@@ -75,6 +104,28 @@ class Chart:
         lo, hi = values
         assert isinstance(lo, Cell) and isinstance(hi, Cell)
         return (_held(lo), _held(hi)) if self.machine.frozen else (lo, hi)
+
+
+def crowd(ends: Array, share: float, u: Array) -> tuple[Array, Array | None]:
+    """Points of [0, 1] for numbers u (n,) evenly spread over it, and the weights with which they count.
+
+    ends: (s + 1, n) the ends of stretches, from 0 to 1. A stretch shorter than `share` gets that much of the points.
+    """
+    length = np.diff(ends, axis=0)
+    thin = (length > 8 * EPS) & (length < share)
+    if not thin.any():
+        return u, None
+    count = thin.sum(axis=0)
+    least = np.minimum(share, 0.5 / np.maximum(count, 1))
+    rest = 1 - np.where(thin, length, 0.0).sum(axis=0)
+    part = np.where(thin, least, length * ((1 - count * least) / rest))
+    upto = np.cumsum(part, axis=0)
+    at = np.minimum((u >= upto).sum(axis=0), length.shape[0] - 1)[None]
+    start, size, whole = (np.take_along_axis(x, at, axis=0)[0] for x in (upto - part, part, length))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        weight = np.where(size > 0, whole / size, 1.0)
+    first = np.take_along_axis(ends, at, axis=0)[0]
+    return np.clip(first + (u - start) * weight, first, first + whole), weight
 
 
 def _held(bound: Cell) -> Cell:

@@ -28,14 +28,16 @@ import numpy as np
 from potto.calculus.derivative import NotSmooth, partial
 from potto.calculus.linear import affine
 from potto.calculus.ranges import range_of
-from potto.calculus.sweep import Level, Product, cut_along
+from potto.calculus.sweep import Product
 from potto.core.simplify import simplify
-from potto.core.terms import Integral, Term, add, const, mul, neg, sub, substitute, var
+from potto.core.terms import Term, const, mul
 from potto.integrate.chart import Chart, Point, label_of
 from potto.integrate.cuts import as_array, frame_rows
+from potto.integrate.lines import End, Line, label_name, leaving, line, offset
 from potto.integrate.pieces import Sums, still
-from potto.integrate.plan import LevelPlan, Plan, function_of, level_plan
+from potto.integrate.plan import Plan, function_of
 from potto.integrate.roots import searched_rows
+from potto.integrate.rules import EPS
 from potto.kernels.cells import Array, Bools, Cell, Mask, pad
 
 # How much flatter than the steepest a pivot may be to do alone: its weight then varies by that factor at most.
@@ -43,58 +45,10 @@ STEEP = 4.0
 # A root that phi's own slope puts further away than this (in labels) is not one that phi passes through smoothly.
 OFF = 1e-6
 ASIDE = 1e-7
+ROUNDING = 16 * EPS  # of what crosses at one point
 LINES = 1 << 11  # lines searched at once
 
 Integrand = Callable[[Point, dict[int, Mask], int], Sums]
-
-
-@dataclass(frozen=True)
-class Line:
-    """A surface along one variable, with the labels of the others given.
-
-    follows: the variables further in whose bounds change along the line; in the surface they are written by their
-    labels. None of `plan` if the surface does not vary along the line.
-    """
-
-    follows: frozenset[int]
-    plan: LevelPlan | None
-
-
-# Of a pair of bounds the one that is infinite: (which of the two, its sign); None if both are finite or both infinite.
-End = tuple[int, float] | None
-
-
-@lru_cache(maxsize=4096)
-def line(term: Integral, surface: Term, pivot: int, last: int, ends: tuple[End, ...]) -> Line:
-    """The line along variable number `pivot`, for a surface whose innermost variable is number `last`."""
-    follows: list[int] = []
-    moving = {term.variables[pivot]}
-    for number in range(pivot + 1, last + 1):
-        if any(b.free & moving for b in term.bounds[number]):
-            moving.add(term.variables[number])
-            follows.append(number)
-    for number in reversed(follows):
-        name = term.variables[number]
-        surface = substitute(surface, {name: _by_label(*term.bounds[number], ends[number], var(label_name(name)))})
-    if follows:
-        surface = simplify(surface)
-    name = term.variables[pivot]
-    if name not in surface.free:
-        return Line(frozenset(follows), None)
-    level = Level(name, *term.bounds[pivot], (), (cut_along(surface, name),))
-    return Line(frozenset(follows), level_plan(level, (), ()))
-
-
-def _by_label(lo: Term, hi: Term, end: End, label: Term) -> Term:
-    """The variable by its label; where a bound is infinite, by how far it is from the other (`offset`)."""
-    if end is None:
-        return add(lo, mul(sub(hi, lo), label))
-    which, sign = end
-    return add((hi, lo)[which], label if sign > 0 else neg(label))
-
-
-def label_name(variable: str) -> str:
-    return f"{variable}@label"
 
 
 def factors(plan: Plan, drawn: int) -> list[tuple[Term, int, tuple[tuple[int, Term | None], ...]]]:
@@ -235,8 +189,8 @@ class Surface:
             return joined([self.crossing(u[i : i + LINES], pivot) for i in range(0, n, LINES)])
         labels: list[Array | None] = list(u.T)
         labels.insert(pivot, None)
-        before = self.chart.place(self.chart.start(n, k), labels, 0, pivot)
-        lo, hi, roots = self.roots(before, labels, pivot, along, n)
+        before = self.chart.place(self.chart.start(n, k), labels, 0, pivot, crowding=range(pivot))
+        lo, hi, roots, weight = self.roots(before, labels, pivot, along, n)
         t, et = nothing.t, nothing.et
         seen: list[Array] = []
         for root in roots:
@@ -248,29 +202,40 @@ class Surface:
                 labels[pivot] = np.where(inside, label_of(lo, hi, root), 0.5)
                 more, error = self.at(labels, pivot, inside, n)
                 t, et = t + more, et + error
+        if weight is not None:
+            t, et = t * weight, et * weight
         return Sums(nothing.v, nothing.e, t, et)
 
     def roots(
         self, before: Point, labels: list[Array | None], pivot: int, along: Line, n: int
-    ) -> tuple[Cell, Cell, list[Array]]:
-        """The bounds of the pivot and where the surface is crossed along it, nan for those that are not there."""
+    ) -> tuple[Cell, Cell, list[Array], Array | None]:
+        """The bounds of the pivot and where the surface is crossed along it, nan for those that are not there.
+
+        The label of the surface's innermost variable is crowded where the pivot is further out, and put into `labels`;
+        with what weight, comes last.
+        """
         machine = self.machine.with_directions(0)
         point = Point({name: still(v) for name, v in before.env.items()}, Cell(1.0))
+        weight: Array | None = None
         for number in range(pivot + 1, self.number + 1):
             u = labels[number]
             if u is None:
                 continue
             level = self.chart.plan.levels[number]
+            if number == self.number and number not in along.follows:
+                ends = leaving(self.chart.plan.term, self.term, pivot, number)
+                u, weight = self.chart.crowded(ends, point.env, u)
+                labels[number] = u
             if number not in along.follows:
                 point = self.chart.place(point, labels, number, number + 1, directions=0)
             else:
-                point.env[label_name(level.variable)] = Cell(_offset(self.ends[number], u))
+                point.env[label_name(level.variable)] = Cell(offset(self.ends[number], u))
         assert along.plan is not None
         values = machine.evaluate(along.plan.frame, {p: point.env[p] for p in along.plan.frame.params}, None)
         assert isinstance(values, tuple)
         lo, hi, rows = frame_rows(along.plan, values)
         rows += searched_rows(along.plan, point.env, lo, hi, n, machine)
-        return lo, hi, [as_array(r.x, n) for r in rows]
+        return lo, hi, [as_array(r.x, n) for r in rows], weight
 
     def at(self, labels: list[Array | None], pivot: int, inside: Bools, n: int) -> tuple[Array, Array]:
         """[F] phi_theta |phi_j|/|grad phi|^2 at points of the surface, and its error: (m, k, n) each."""
@@ -278,7 +243,7 @@ class Surface:
         axes = self.axes if len(self.pivots) > 1 else (pivot,)
         marked = {axis: k + i for i, axis in enumerate(axes)}
         wide = k + len(axes)
-        point = self.chart.place(self.chart.start(n, wide), labels, 0, self.stop, marked, self.held, wide)
+        point = self.placed(labels, pivot, marked, n)
         phi, slopes = self.slopes(point, wide, n)
         j = marked[pivot]
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
@@ -301,7 +266,16 @@ class Surface:
             below = self.integrand(frozen, {g: np.logical_not(mask) for g, mask in sides.items()}, n)
         rates = np.where(counts, rates, 0.0)
         jump, error = np.where(counts, above.v - below.v, 0.0), np.where(counts, above.e + below.e, 0.0)
-        return jump[:, None, :] * rates, error[:, None, :] * np.abs(rates)
+        t = jump[:, None, :] * rates
+        return t, error[:, None, :] * np.abs(rates) + ROUNDING * np.abs(t)
+
+    def placed(self, labels: list[Array | None], pivot: int, marked: dict[int, int], n: int) -> Point:
+        """Points with every variable at its label, those of the axes moving. Cuts along the pivot's way are not known
+        before it is, so that only further out, and further in, labels are crowded."""
+        wide = self.machine.directions + len(marked)
+        crowding = (*range(pivot), *range(self.number + 1, self.stop))
+        start = self.chart.start(n, wide)
+        return self.chart.place(start, labels, 0, self.stop, marked, self.held, wide, crowding)
 
     def sides(self, point: Point, n: int) -> dict[int, Mask]:
         """The sides of what the surface decides, just above it."""
@@ -324,7 +298,7 @@ class Surface:
             u = labels[pivot]
             assert u is not None
             moved = [*labels[:pivot], u + side, *labels[pivot + 1 :]]
-            point = self.chart.place(self.chart.start(n, wide), moved, 0, self.stop, marked, self.held, wide)
+            point = self.placed(moved, pivot, marked, n)
             found.append(self.slopes(point, wide, n))
         (below, _), (above, slopes) = found
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
@@ -341,14 +315,6 @@ class Surface:
         assert isinstance(value, Cell)
         t = value.t or (None,) * wide
         return as_array(value.v, n), np.stack([as_array(0.0 if x is None else x, n) + np.zeros(n) for x in t])
-
-
-def _offset(end: End, u: Array) -> Array:
-    """What a label says of a variable whose bounds are not known yet: the label, or how far from the finite bound."""
-    if end is None:
-        return u
-    with np.errstate(divide="ignore"):
-        return u / (1 - u) if end[1] > 0 else (1 - u) / u
 
 
 def joined(parts: list[Sums]) -> Sums:

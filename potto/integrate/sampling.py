@@ -10,7 +10,7 @@ independent scramblings of Sobol points. Samples that fall nowhere count as zero
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -22,7 +22,9 @@ from potto.integrate.levels import Iteration
 from potto.integrate.means import Moments, Replicates, added
 from potto.integrate.pieces import Sums, components, still
 from potto.integrate.plan import Plan, function_of
+from potto.integrate.rules import EPS
 from potto.integrate.sobol import MOST, Sobol
+from potto.integrate.unseen import MISSED, Largest, peaks
 from potto.kernels.cells import Array, Cell, Mask, Value, map_arrays
 
 SIGMAS = 4.0  # a reported error in standard errors: too small once in 16,000 times
@@ -35,6 +37,13 @@ EXACT = 1  # variables left to quadrature: two are no better for the time they t
 # The quadrature of the innermost variable, below sampling errors that are larger.
 INNER_ORDER = 6
 INNER_RTOL = 1e-7
+
+# The least part of the points of one variable for each stretch between its cuts: of independent ones; of evenly spread
+# ones, which each boost is a step for, in up to FLAT variables and in more.
+CROWDED = {"mc": 2.0**-4, "flat": 2.0**-6, "deep": 2.0**-8}
+FLAT = 2
+
+ROUNDING = 8 * EPS  # of a sample
 
 # How many variables are drawn, and the function of them that a mean is taken of.
 Mean = tuple[int, Callable[[Array], Sums]]
@@ -60,15 +69,20 @@ def _plain(plan: Plan, machine: Any, env: dict[str, Value]) -> Sums:
     """Independent points: the means' variances add up, and the errors that integrands come with."""
     generator = np.random.default_rng(machine.settings.seed)
     run = _Run(plan, machine, env, 0)
-    found = []
+    found, count = [], machine.settings.samples
     for dims, f in run.means():
-        moments = Moments()
-        for u in _random(generator, machine.settings.samples if dims else 1, dims):
-            moments.add(f(u))
+        moments, largest = Moments(), Largest()
+        for u in _random(generator, count if dims else 1, dims):
+            samples = f(u)
+            moments.add(samples)
+            largest.add(samples)
         found.append(moments)
+        run.largest.append(largest)
     mean, variance = added([m.mean for m in found]), added([m.variance for m in found])
-    run.look(mean.v, mean.t)
-    return Sums(mean.v, SIGMAS * np.sqrt(variance.v) + mean.e, mean.t, SIGMAS * np.sqrt(variance.t) + mean.et)
+    mean.e, mean.et = mean.e + SIGMAS * np.sqrt(variance.v), mean.et + SIGMAS * np.sqrt(variance.t)
+    mean = run.widened(mean, count)
+    run.look(mean)
+    return mean
 
 
 def _random(generator: np.random.Generator, count: int, dims: int) -> Iterator[Array]:
@@ -85,24 +99,26 @@ def _quasi(plan: Plan, machine: Any, env: dict[str, Value], method: str) -> Sums
     points = [Sobol(dims, REPLICATES, (settings.seed, i)) for i, (dims, _) in enumerate(means)]
     found = Replicates(REPLICATES, STUDENT)
     count = 1 << min(max(4, int(np.log2(max(settings.samples // REPLICATES, 16)))), MOST)
+    run.largest = [Largest() for _ in means]
     done, size = 0, min(FIRST, count)
     while done < count:
-        for sequence, (dims, f) in zip(points, means, strict=True):
+        for sequence, (dims, f), largest in zip(points, means, run.largest, strict=True):
             if dims:
                 seen: list[tuple[Array, Sums]] = []
                 for u in sequence.blocks(done, size, CHUNK // REPLICATES):
                     samples = f(u.reshape(-1, dims))
                     found.add(samples)
+                    largest.add(samples)
                     if dims == 1:
                         seen.append((u[:, :, 0], samples))
                 found.look_for_steps(seen)
             elif not done:
                 found.fix(f(np.zeros((1, 0))))
         done, size = size, 2 * size
-        sums = found.estimate(done)
+        sums = run.widened(found.estimate(done), REPLICATES * done)
         if machine.exhausted() or (method == "auto" and _enough(sums, settings)):
             break
-    run.look(sums.v, sums.t)
+    run.look(sums)
     return sums
 
 
@@ -121,10 +137,12 @@ class _Run:
     machine: Any
     env: dict[str, Value]
     exact: int
+    largest: list[Largest] = field(default_factory=list)
 
     @cached_property
     def chart(self) -> Chart:
-        return Chart(self.plan, self.machine, self.env)
+        kind = "mc" if not self.exact else "flat" if self.drawn <= FLAT else "deep"
+        return Chart(self.plan, self.machine, self.env, CROWDED[kind])
 
     @cached_property
     def drawn(self) -> int:
@@ -162,15 +180,36 @@ class _Run:
             for pivot in surface.pivots:
                 yield surface.stop - 1, partial(surface.crossing, pivot=pivot)
 
-    def look(self, v: Array, t: Array) -> None:
-        if not v.any() and not t.any():
-            self.machine.note_unfinished("no sample fell where it counts: the error estimate says nothing")
+    @cached_property
+    def peaks(self) -> Sums | None:
+        """The largest magnitudes of the interior's samples near what is known to be the center of something."""
+        return peaks(self.chart, self.drawn, lambda point, n: self.integrand(point, {}, n), self.machine.settings.seed)
+
+    def widened(self, mean: Sums, points: int) -> Sums:
+        """The mean with what so many points may not have seen added to its errors."""
+        for largest in self.largest:
+            mean.e = mean.e + largest.tail("v", points)
+            mean.et = mean.et + largest.tail("t", points)
+        if self.drawn and self.peaks is not None:
+            seen = self.largest[0]
+            mean.e = mean.e + MISSED / points * np.maximum(self.peaks.v - seen.top("v"), 0.0)
+            mean.et = mean.et + MISSED / points * np.maximum(self.peaks.t - seen.top("t"), 0.0)
+        return mean
+
+    def look(self, mean: Sums) -> None:
+        """Say so where all samples are 0, and give the error that this has in the worst case."""
+        if mean.v.any() or mean.t.any():
+            return
+        self.machine.note_unfinished("no sample fell where it counts: the error estimate says nothing")
+        if self.plan.groups:
+            mean.e, mean.et = np.full_like(mean.e, np.inf), np.full_like(mean.et, np.inf)
 
     # The integrand
 
     def interior(self, u: Array) -> Sums:
         n = u.shape[0]
-        point = self.chart.place(self.chart.start(n, self.machine.directions), list(u.T), 0, self.drawn)
+        start = self.chart.start(n, self.machine.directions)
+        point = self.chart.place(start, list(u.T), 0, self.drawn, crowding=range(self.drawn))
         return self.integrand(point, {}, n)
 
     def integrand(self, point: Point, sides: dict[int, Mask], n: int) -> Sums:
@@ -210,7 +249,8 @@ class _Run:
     def weighted(self, sums: Sums, volume: Cell, n: int) -> Sums:
         k = self.machine.directions
         size = _full(volume.v, n)
-        v, e, t, et = sums.v * size, sums.e * np.abs(size), sums.t * size, sums.et * np.abs(size)
+        v, t = sums.v * size, sums.t * size
+        e, et = sums.e * np.abs(size) + ROUNDING * np.abs(v), sums.et * np.abs(size) + ROUNDING * np.abs(t)
         if any(x is not None for x in volume.t[:k]):
             rates = np.stack([_full(x, n) for x in volume.t[:k]])
             t, et = t + sums.v[:, None] * rates, et + sums.e[:, None] * np.abs(rates)
