@@ -5,16 +5,21 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.stamp
 VSCODE := editors/vscode
 
-.PHONY: demo test quick check format clean vsix e2e
+TESTS := $(BIN)/python -m pytest -n auto --maxprocesses 8 --dist worksteal
+
+.PHONY: demo test quick fuzz check format clean vsix e2e
 
 demo: $(STAMP)  ## the paper's programs, evaluated and differentiated
 	@PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python examples/demo.py
 
 test: $(STAMP)  ## every test
-	$(BIN)/python -m pytest
+	$(TESTS)
 
 quick: $(STAMP)  ## the tests that take no time
-	$(BIN)/python -m pytest -m "not slow"
+	$(TESTS) -m "not slow"
+
+fuzz: $(STAMP)  ## every law, with examples that nobody has seen
+	$(TESTS) --hypothesis-profile=explore tests/properties tests/primitives
 
 check: $(STAMP)  ## lints, types, floors
 	$(BIN)/ruff check .

@@ -185,7 +185,11 @@ class Terminal:
 
     @staticmethod
     def columns() -> int:
-        return shutil.get_terminal_size().columns
+        """As the terminal has it now: COLUMNS may have been right once."""
+        try:
+            return os.get_terminal_size(sys.__stdout__.fileno()).columns if sys.__stdout__ else 80
+        except (OSError, ValueError):
+            return shutil.get_terminal_size().columns
 
     def edit(self, text: str) -> str | None:
         """The text as the person's editor leaves it; None if that fails."""
