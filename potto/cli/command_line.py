@@ -39,7 +39,7 @@ def dispatch(arguments: list[str]) -> int:
 
 def _without_command(arguments: list[str]) -> int:
     if not arguments or arguments[0] in ("-h", "--help", "help"):
-        sys.stdout.write(_overview())
+        (sys.stdout if arguments else sys.stderr).write(_overview())
         return 0 if arguments else 2
     if arguments[0] in ("-V", "--version"):
         sys.stdout.write(f"potto {__version__}\n")

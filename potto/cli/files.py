@@ -10,10 +10,11 @@ from potto.library import NO_PROGRAMS
 from potto.modules.folders import HEAVY, is_translation
 from potto.modules.kinds import UNREADABLE
 from potto.modules.lookup import SUFFIXES
-from potto.render import Located
+from potto.render import Located, ProgramError
 from potto.source import Span
 
 STDIN = "<stdin>"
+MAIN = "main.po"
 
 
 def expand(paths: Sequence[str]) -> tuple[list[str], list[Located]]:
@@ -43,6 +44,17 @@ def walk(folder: str) -> Iterator[str]:
             path = os.path.join(where, name)
             if name.endswith(SUFFIXES) and not (name.endswith(".po") and is_translation(path)):
                 yield path
+
+
+def main_of(folder: str) -> str:
+    """The program that a folder stands for where one file is asked for. Raises ProgramError if it has none."""
+    main = os.path.join(folder, MAIN)
+    if os.path.isfile(main):
+        return main
+    first = next(walk(folder), None)
+    help = f"name a program in it, such as `{first}`" if first else "name a program"
+    message = f"`{folder}` is a folder without a `{MAIN}`"
+    raise ProgramError([Located(folder, UNREADABLE(Span(0, 0), message, help=help))], lambda file: None)
 
 
 def missing(path: str) -> Located:

@@ -7,7 +7,7 @@ import os
 from typing import TYPE_CHECKING, Any
 
 from potto.cli.console import Console
-from potto.cli.files import STDIN, missing, read_stdin
+from potto.cli.files import STDIN, main_of, missing, read_stdin
 from potto.diagnostics import PottoError
 from potto.render import Located, ProgramError, all_to_json
 from potto.source import SourceText
@@ -17,11 +17,14 @@ if TYPE_CHECKING:
 
 
 def opened(world: Library, path: str) -> str:
-    """The key of a file that a command works on. Raises ProgramError if there is no program there."""
+    """The key of a file that a command works on, of a folder its `main.po`. Raises ProgramError if there is no
+    program there."""
     if path == "-":
         return open_stdin(world)
     if not os.path.exists(path):
         raise ProgramError([missing(path)], no_sources)
+    if os.path.isdir(path):
+        path = main_of(path)
     key = world.key(path)
     world.must_exist(key)
     return key

@@ -142,10 +142,12 @@ def _picture(world: World, file: str, options: argparse.Namespace) -> Picture:
     names = tuple(n for n in function.parameters if n not in given)
     axes = names if options.axes is None else tuple(n.strip() for n in options.axes.split(","))
     if len(axes) != 2 or not all(axes):
+        many = len(names) > 2
+        what = "give the others a value, `c=0.5`, until two are left" if many else "name a function of two numbers"
         left = ", ".join(f"`{n}`" for n in names) or "none"
         raise wrong_call(
-            f"an image has two axes, and `{options.name}` has {len(names)} parameters that are given nothing: {left}",
-            "give the others a value, `c=0.5`, until two are left",
+            f"an image has two axes, and the parameters of `{options.name}` that are given nothing are: {left}",
+            what,
         )
     known = dict.fromkeys(options.wrt)
     return Picture(function, given, axes, tuple(known))

@@ -23,7 +23,7 @@ from potto.runtime.estimate import Estimate
 from potto.runtime.evaluate import Clock, Program, report
 from potto.runtime.functions import Closure
 from potto.runtime.machine import Machine
-from potto.runtime.shown import format_value
+from potto.runtime.shown import as_dual, format_value, gives_dual
 from potto.settings import Settings
 from potto.source import Span
 from potto.spoiled import statement_errors
@@ -123,8 +123,11 @@ class Script:
         place = expr.span
         try:
             with Clock() as clock:
-                value = evaluate_in(self.db, self.file, expr, env, self.program, machine)
-            return value, (report(value, machine, clock) if not _has_functions(value) else None)
+                value, dual = evaluate_in(self.db, self.file, expr, env, self.program, machine)
+            if _has_functions(value):
+                return value, None
+            estimate = report(value, machine, clock)
+            return value, as_dual(estimate) if dual else estimate
         except PottoError as error:
             raise self.failed(error, place) from None
 
@@ -137,13 +140,16 @@ class Script:
 
 def evaluate_in(
     db: Database, file: str, expr: nodes.Expr, env: Environment, program: Program, machine: Machine
-) -> Value:
-    """The value of an expression that may use the file's names and those of an environment. Raises PottoError."""
+) -> tuple[Value, bool]:
+    """The value of an expression that may use the file's names and those of an environment, and whether it is that of
+    a derivative. Raises PottoError."""
     elaborated = elaborate_expression(db, file, expr, tuple(env))
     wrong = [d for d in elaborated.diagnostics if d.severity == "error"]
     if wrong:
         raise PottoError(wrong)
-    return program.value(machine, elaborated.term, {n: v for n, v in env.items() if n in elaborated.term.free})
+    term = elaborated.term
+    value = program.value(machine, term, {n: v for n, v in env.items() if n in term.free})
+    return value, gives_dual(term, program.linker, env)
 
 
 def placed(diagnostic: Diagnostic, place: Span, start: int) -> Diagnostic:

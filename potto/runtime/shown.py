@@ -6,18 +6,21 @@ Owns the forms of values of every kind, and how a pair becomes a dual; the digit
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from potto.core.terms import App, Deriv, Global, If, Lam, Term
+from potto.core.terms import App, Deriv, Global, If, Lam, Term, Var
 from potto.kernels.cells import Cell, Value
 from potto.runtime.estimate import Estimate
 from potto.runtime.functions import Derivative
 from potto.runtime.machine import Linker
 from potto.runtime.printing import format_error, format_number, format_tuple
 
+NOTHING: Mapping[str, Value] = MappingProxyType({})
 MOST_ITEMS = 12  # of an array that are shown
 
 
@@ -111,8 +114,9 @@ def estimate_json(estimate: Estimate, type: str | None = None) -> dict[str, Any]
 # Duals
 
 
-def gives_dual(term: Term, linker: Linker) -> bool:
-    """Whether the value of a term is that of a derivative, and so a dual: found by following what is called."""
+def gives_dual(term: Term, linker: Linker, env: Mapping[str, Value] = NOTHING) -> bool:
+    """Whether the value of a term is that of a derivative, and so a dual: found by following what is called. `env` has
+    what its free names stand for."""
     groups = 0
     for _ in range(1000):
         match term:
@@ -126,6 +130,8 @@ def gives_dual(term: Term, linker: Linker) -> bool:
                 term = term.then
             case Deriv():
                 return groups > 0
+            case Var(name=name):
+                return groups > 0 and isinstance(env.get(name), Derivative)
             case _:
                 return False
     return False

@@ -310,7 +310,7 @@ def _needs_deriv(actual: Type, expected: Type) -> bool:
             if isinstance(expects, TupleOf) and expects.dual and isinstance(resolve(mine.type), Real):
                 return True
         given, wanted = resolve(given.result), resolve(wanted.result)
-    return False
+    return isinstance(wanted, TupleOf) and wanted.dual and isinstance(given, Real)
 
 
 def comparison(expr: nodes.Expr, what: str) -> Diagnostic:

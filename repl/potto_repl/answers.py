@@ -18,14 +18,13 @@ from potto.elaborate import elaborate_expression
 from potto.modules import statements
 from potto.render import Located
 from potto.runtime.estimate import Estimate
-from potto.runtime.shown import as_dual
 from potto.session import Defined, Imported, Outcome, Said, Valued
 from potto.source import Span
 from potto.syntax import nodes
 from potto_repl.reply import Part, answer, diagnostic, note
 from potto_repl.session import Conversation, plain_names
 from potto_repl.symbols import pretty
-from potto_repl.values import Parts, is_dual, parts_of, value_parts
+from potto_repl.values import Parts, parts_of, value_parts
 
 NOT_DEFINED = "P0201"
 ANSWER = re.compile("_[0-9]*")  # the names under which answers stay at hand
@@ -95,8 +94,7 @@ def _valued(session: Conversation, outcome: Valued) -> Iterator[Part]:
     estimate = outcome.estimates[0]
     file, expr = _expression(session, name)
     parts = None
-    if isinstance(estimate.value, tuple) and is_dual(session.world, file, expr):
-        estimate = as_dual(estimate)
+    if estimate.tangent is not None:
         parts = _kept_parts(session, file, expr, estimate)
     yield from value_parts(estimate, outcome.type, session.settings, name=name, parts=parts)
 

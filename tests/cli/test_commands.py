@@ -51,6 +51,43 @@ def test_run_as_json(potto: Potto) -> None:
     assert value == pytest.approx(0.25, rel=1e-15, abs=0) and answer["diagnostics"] == []
 
 
+def test_run_as_json_keeps_duals_apart(potto: Potto) -> None:
+    """Also those of a function that a loop goes through, and of tuples; a pair that is none stays one value."""
+    script = (
+        "def pair(t) (t, t^2)\nprint(deriv(f)((0.25, 1)))\n"
+        "for g in [deriv(f)]:\n    g((0.25, 1))\n    d = g\n    print(d((0.25, 1)), pair(3))\nderiv(pair)((3, 1))\n"
+    )
+    outputs = potto("run", "--json", "main.po", main=HALF + script).json["output"]
+    first, second, third, fourth, fifth = [value for output in outputs for value in output["values"]]
+    for dual in (first, second, third):
+        assert math.isclose(dual["value"], 0.25, rel_tol=1e-14) and math.isclose(dual["tangent"], 1, rel_tol=1e-14)
+    assert fourth["value"] == [3, 9] and fourth["tangent"] is None
+    assert fifth["value"] == [3, 9] and fifth["tangent"] == [1, 6] and fifth["tangent_error"] is not None
+
+
+def test_a_folder_stands_for_its_main_program(potto: Potto, tmp_path: Path) -> None:
+    (tmp_path / "scene").mkdir()
+    (tmp_path / "scene" / "other.po").write_text("print(1)\n")
+    ran = potto("run", "scene")
+    assert ran.status == 1 and "P0208" in ran.err
+    assert f"name a program in it, such as `{Path('scene', 'other.po')}`" in ran.err
+    (tmp_path / "scene" / "main.po").write_text(HALF + "print(f(0.5))\n")
+    assert potto("run", "scene").out == "0.5\n"
+    assert potto("eval", "scene", "f(0.25)").out == "0.25\n"
+    assert "deriv(f)" in potto("deriv", "scene", "f").out
+
+
+def test_a_plain_function_for_that_of_a_dual_is_told_the_way(potto: Potto) -> None:
+    ran = potto("eval", "main.po", r"deriv(g)((1, 1), \y . 1)", main="def g(x, s) s(x)\n")
+    assert ran.status == 1 and "P0306" in ran.err
+    assert "= help: give the derivative of the function: `deriv(…)`" in ran.err
+
+
+def test_no_command_is_a_wrong_command_line(potto: Potto) -> None:
+    ran = potto()
+    assert ran.status == 2 and ran.out == "" and "usage: potto COMMAND" in ran.err
+
+
 def test_eval_json_of_a_dual(potto: Potto) -> None:
     answer = potto("eval", "main.po", "deriv(f)((0.25, 1))", "--json", main=HALF).json
     assert math.isclose(answer["value"], 0.25, rel_tol=1e-14)
