@@ -7,7 +7,7 @@ changed is not sent again. A client that asks itself (`textDocument/diagnostic`)
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -45,6 +45,7 @@ class Publisher:
         self._sent: dict[str, tuple[str, Document | None]] = {}
         self._ids = itertools.count(1)
         self._wrong_projects: set[str] = set()
+        self._shown: set[str] = set()  # files of which a client that asks has been told that something is wrong
         self.whole_workspace = True
         self.further: Callable[[str], tuple[Located, ...]] = lambda key: ()  # what others have to say about a file
 
@@ -125,6 +126,8 @@ class Publisher:
     def answer(self, key: str, previous: object) -> dict[str, Any]:
         """The answer to `textDocument/diagnostic`."""
         report = self.report(key)
+        if report.items:
+            self._shown.add(key)
         if previous == report.id:
             return {"kind": "unchanged", "resultId": report.id}
         return {"kind": "full", "resultId": report.id, "items": report.items}
@@ -134,6 +137,16 @@ class Publisher:
         document = self._analysis.document(key)
         version = None if document is None else document.version
         return {"uri": self._analysis.uri(key), "version": version, **self.answer(key, previous)}
+
+    def gone(self, known: Iterable[str]) -> list[dict[str, Any]]:
+        """Empty reports of files that a client knows, or may still show, and that are no programs any more.
+
+        A client that asks for a file a last time before it closes it shows that answer until it hears of it again, and
+        does not say that it does: files that were deleted or renamed while they were open are named every time.
+        """
+        programs = set(self._analysis.programs())
+        keys = [key for key in dict.fromkeys((*known, *sorted(self._shown))) if key not in programs]
+        return [{"uri": self._analysis.uri(key), "version": None, "kind": "full", "items": []} for key in keys]
 
     # Project files
 

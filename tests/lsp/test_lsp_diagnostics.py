@@ -111,6 +111,18 @@ def test_the_workspace_is_pulled(server: Server, uri: Uri) -> None:
     assert again[-1]["items"] == []
 
 
+def test_a_file_that_is_deleted_after_it_was_asked_for_is_clean(server: Server, uri: Uri, tmp_path: Path) -> None:
+    """Also if the client does not say that it still shows what it was told before the file was closed."""
+    client = server(PULLS, bad=PLAIN)
+    answer = client.ask("textDocument/diagnostic", {"textDocument": {"uri": uri("bad")}})
+    assert codes(answer) == ["P0301"]
+    client.tell("textDocument/didClose", {"textDocument": {"uri": uri("bad")}})
+    (tmp_path / "bad.po").unlink()
+    client.tell("workspace/didChangeWatchedFiles", {"changes": [{"uri": uri("bad"), "type": 3}]})
+    items = client.ask("workspace/diagnostic", {"previousResultIds": []})["items"]
+    assert [(item["uri"], item["kind"], item["items"]) for item in items] == [(uri("bad"), "full", [])]
+
+
 def test_files_that_change_on_disk(server: Server, uri: Uri, tmp_path: Path) -> None:
     client = server(WATCHES, main="from other import f\ndef g(t) f(t)\n")
     assert client.asked.get(timeout=10)["params"]["registrations"][0]["method"] == "workspace/didChangeWatchedFiles"

@@ -1,4 +1,4 @@
-// The client of the language server: how it is started, and what of the protocol is ours.
+// The client of the language server: what of the protocol is ours.
 import * as vscode from "vscode";
 import {
   type ClientCapabilities,
@@ -11,62 +11,44 @@ import {
   type ServerCapabilities,
   State,
   type StaticFeature,
-  TransportKind,
 } from "vscode-languageclient/node";
-import type { Found } from "./finding";
+import type { ServerProcess } from "./process";
 
 interface Channels {
   readonly log: vscode.LogOutputChannel;
   readonly trace: vscode.LogOutputChannel;
 }
 
-/** What becomes of a client; `closed` says whether to start the server again, `lost` that the client did not manage to. */
-interface Events {
-  running(): void;
-  starting(): void;
-  closed(): boolean;
-  lost(): void;
-}
-
-export function makeClient(program: Found, { log, trace }: Channels, events: Events): LanguageClient {
-  const more = vscode.workspace.getConfiguration("potto").get<string[]>("server.arguments", []);
-  const folder = vscode.workspace.workspaceFolders?.[0]?.uri;
+/** A client that speaks with a process. It is used once: after the process has ended, another one is made. */
+export function makeClient(process: ServerProcess, { log, trace }: Channels, stopped: () => void): LanguageClient {
   const options: LanguageClientOptions = {
     documentSelector: [{ language: "potto", scheme: "file" }, { language: "potto", scheme: "untitled" }],
     outputChannel: log,
     traceOutputChannel: trace,
     revealOutputChannelOn: RevealOutputChannelOn.Never,
     initializationOptions: () => ({ potto: vscode.workspace.getConfiguration("potto") }),
-    synchronize: {
-      configurationSection: "potto",
-      fileEvents: vscode.workspace.createFileSystemWatcher("**/{*.po,*.diffeo,potto.toml}"),
-    },
+    initializationFailedHandler: () => false,
+    synchronize: { configurationSection: "potto" }, // which files are watched, the server says
     diagnosticPullOptions: { onChange: true, onTabs: true },
     errorHandler: {
-      // What is written to a server that has just died fails, often many times before its end is noticed. To shut down
-      // for that would keep it from being started again.
+      // What is written to a server that has just died fails, often many times before its end is noticed.
       error: () => ({ action: ErrorAction.Continue, handled: true }),
-      closed: () => ({ action: events.closed() ? CloseAction.Restart : CloseAction.DoNotRestart, handled: true }),
+      closed: () => ({ action: CloseAction.DoNotRestart, handled: true }),
     },
   };
-  const client = new LanguageClient(
-    "potto",
-    "Potto",
-    {
-      command: program.command,
-      args: [...program.args, "lsp", ...more],
-      transport: TransportKind.stdio,
-      options: folder?.scheme === "file" ? { cwd: folder.fsPath } : {},
-    },
-    options,
-  );
+  const client = new QuietClient("potto", "Potto", () => Promise.resolve(process.child), options);
   client.registerFeature(new OwnCommands());
-  client.onDidChangeState(({ newState }) => {
-    if (newState === State.Running) events.running();
-    else if (newState === State.Starting) events.starting();
-    else events.lost();
+  client.onDidChangeState(({ oldState, newState }) => {
+    if (oldState === State.Running && newState !== State.Running) stopped();
   });
   return client;
+}
+
+/** Its troubles go to the output channel; the user gets one message for each, which is the status's business. */
+class QuietClient extends LanguageClient {
+  override error(message: string, data?: unknown): void {
+    super.error(message, data, false);
+  }
 }
 
 /** Commands are ours: what the server answers is shown, and what only an editor can do is offered to it. */

@@ -6,13 +6,15 @@ import { Derivatives, evaluate } from "./answers";
 import { openPreview } from "./preview/panel";
 import { onInterpreterChanged } from "./python";
 import { Server, type ServerState } from "./server";
-import { showMenu, showStatus } from "./status";
+import { explain, showMenu, showStatus } from "./status";
 import { openRepl, runFile, runSelection } from "./terminal";
 import { utf16 } from "./text";
 
 /** What other extensions, and tests, may use. */
 export interface Api {
   readonly state: () => ServerState["kind"];
+  /** The state in words. */
+  readonly explanation: () => string;
   readonly ready: () => Promise<boolean>;
   /** What it took to load the extension and to register everything. */
   readonly activationMilliseconds: number;
@@ -25,6 +27,8 @@ def cover(t)
 #> deriv(cover)(dt=(0.5, 1))
 #= (0.125, 0.5)
 `;
+
+const SETTLED = 1000; // ms after a program was written, until what it needs is there too
 
 let server: Server | undefined;
 const loaded = performance.now() - began;
@@ -40,6 +44,7 @@ export function activate(context: vscode.ExtensionContext): Api {
   setImmediate(() => void made.start());
   return {
     state: () => made.state.kind,
+    explanation: () => explain(made.state),
     ready: async () => (await made.ready()) !== undefined,
     activationMilliseconds: loaded + performance.now() - started,
   };
@@ -100,16 +105,43 @@ function registerCommands(context: vscode.ExtensionContext, server: Server, deri
 }
 
 function watch(context: vscode.ExtensionContext, server: Server): void {
+  const elsewhere = (): void => {
+    if (!vscode.workspace.getConfiguration("potto").get("server.path")) void server.restart();
+  };
   context.subscriptions.push(
     vscode.workspace.onDidChangeConfiguration((event) => {
       if (event.affectsConfiguration("potto.server")) void server.restart();
+      else if (event.affectsConfiguration("python.defaultInterpreterPath")) elsewhere();
       if (event.affectsConfiguration("potto.trace")) server.trace.refresh();
     }),
     vscode.workspace.onDidGrantWorkspaceTrust(() => void server.start()),
+    onInterpreterChanged(elsewhere),
+    whenInstalled(() => server.lookAgain()),
   );
-  void onInterpreterChanged(() => {
-    if (!vscode.workspace.getConfiguration("potto").get("server.path")) void server.restart();
-  }).then((listening) => listening && context.subscriptions.push(listening));
+}
+
+/** Call back when Potto may have been installed: into the workspace, in a terminal, or while another window was used. */
+function whenInstalled(look: () => void): vscode.Disposable {
+  let timer: NodeJS.Timeout | undefined;
+  const soon = (): void => {
+    clearTimeout(timer);
+    timer = setTimeout(look, SETTLED);
+  };
+  const environments = vscode.workspace.createFileSystemWatcher("**/{.venv,venv,env}");
+  const programs = vscode.workspace.createFileSystemWatcher("**/{.venv,venv,env}/{bin,Scripts}/potto*");
+  return vscode.Disposable.from(
+    environments,
+    programs,
+    environments.onDidCreate(soon),
+    environments.onDidChange(soon), // one in the place of another
+    programs.onDidCreate(soon),
+    programs.onDidChange(soon),
+    vscode.window.onDidChangeWindowState(({ focused }) => focused && soon()),
+    vscode.window.onDidCloseTerminal(soon),
+    vscode.window.onDidChangeActiveTextEditor((editor) => editor?.document.languageId === "potto" && soon()),
+    vscode.workspace.onDidChangeWorkspaceFolders(soon),
+    { dispose: () => clearTimeout(timer) },
+  );
 }
 
 /** A file that a command is about: the one given, else the one that is edited. */

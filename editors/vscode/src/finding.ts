@@ -104,7 +104,7 @@ async function isProgram(path: string): Promise<boolean> {
 /** What `--version` says, if it is an answer of Potto's. */
 export function versionOf(program: Program): Promise<string | undefined> {
   return new Promise((resolve) => {
-    execFile(program.command, [...program.args, "--version"], { timeout: PATIENCE }, (error, stdout) => {
+    execFile(program.command, [...program.args, "--version"], { timeout: PATIENCE, killSignal: "SIGKILL" }, (error, stdout) => {
       const said = /^potto\s+(\S+)/i.exec(stdout.trim());
       resolve(error || !said ? undefined : said[1]);
     });

@@ -30,11 +30,25 @@ export async function selectedInterpreter(): Promise<string | undefined> {
   return setting && /[/\\]/.test(setting) ? setting.replaceAll("${workspaceFolder}", folder?.fsPath ?? "") : undefined;
 }
 
-/** Call back when another environment is selected. */
-export async function onInterpreterChanged(changed: () => void): Promise<vscode.Disposable | undefined> {
-  try {
-    return (await environments())?.onDidChangeActiveEnvironmentPath(changed);
-  } catch {
-    return undefined;
-  }
+/** Call back when another environment is selected; also if the Python extension comes later. */
+export function onInterpreterChanged(changed: () => void): vscode.Disposable {
+  let listening: vscode.Disposable | undefined;
+  let gone = false;
+  const listen = async (): Promise<void> => {
+    if (listening) return;
+    try {
+      const found = (await environments())?.onDidChangeActiveEnvironmentPath(changed);
+      if (gone || listening) found?.dispose();
+      else listening = found;
+    } catch {
+      // It does not work: neither does selecting an environment.
+    }
+  };
+  void listen();
+  const installed = vscode.extensions.onDidChange(() => void listen());
+  return new vscode.Disposable(() => {
+    gone = true;
+    installed.dispose();
+    listening?.dispose();
+  });
 }

@@ -36,7 +36,8 @@ export function showStatus(server: Server): vscode.Disposable {
   );
 }
 
-function explain(state: ServerState): string {
+/** A state in words. */
+export function explain(state: ServerState): string {
   switch (state.kind) {
     case "off":
       return "Potto: the language server is stopped";

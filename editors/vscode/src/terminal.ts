@@ -56,15 +56,24 @@ function selected(document: vscode.TextDocument, selection: vscode.Selection): s
 
 /** Run a file as a script, in the terminal of a task. */
 export async function runFile(server: Server, document: vscode.TextDocument): Promise<void> {
-  if (document.isDirty || document.isUntitled) if (!(await document.save())) return;
+  const saved = await savedAs(document);
+  if (!saved) return;
   const program = await programOrComplaint(server);
   if (!program) return;
-  const execution = new vscode.ProcessExecution(program.command, [...program.args, "run", document.uri.fsPath]);
-  const folder = vscode.workspace.getWorkspaceFolder(document.uri) ?? vscode.TaskScope.Workspace;
-  const name = `run ${vscode.workspace.asRelativePath(document.uri)}`;
+  const execution = new vscode.ProcessExecution(program.command, [...program.args, "run", saved.fsPath]);
+  const folder = vscode.workspace.getWorkspaceFolder(saved) ?? vscode.TaskScope.Workspace;
+  const name = `run ${vscode.workspace.asRelativePath(saved)}`;
   const task = new vscode.Task({ type: "process" }, folder, name, NAME, execution);
   task.presentationOptions = { reveal: vscode.TaskRevealKind.Always, panel: vscode.TaskPanelKind.Dedicated, clear: true };
   await vscode.tasks.executeTask(task);
+}
+
+/** The file that holds a text as it is now: one without a name gets one first, if the user gives it. */
+async function savedAs(document: vscode.TextDocument): Promise<vscode.Uri | undefined> {
+  if (document.isUntitled) return vscode.workspace.save(document.uri);
+  if (document.uri.scheme === "file") return !document.isDirty || (await document.save()) ? document.uri : undefined;
+  void vscode.window.showInformationMessage("Save this program as a file on disk first.");
+  return undefined;
 }
 
 async function programOrComplaint(server: Server): Promise<{ command: string; args: readonly string[] } | undefined> {

@@ -28,6 +28,4 @@ def workspace(ask: Ask) -> dict[str, Any]:
         items.append(publisher.workspace_answer(key, ids.get(key)))
         if number % TREES == TREES - 1 and not ask.session.checked:
             ask.analysis.forget_trees()
-    gone = [key for key in ids if key not in programs]
-    items += [{"uri": ask.analysis.uri(key), "version": None, "kind": "full", "items": []} for key in gone]
-    return {"items": items}
+    return {"items": [*items, *publisher.gone(ids)]}

@@ -4,40 +4,8 @@ const fs = require("node:fs");
 const path = require("node:path");
 const vscode = require("vscode");
 
-const folder = vscode.workspace.workspaceFolders[0].uri;
-const uri = (name) => vscode.Uri.joinPath(folder, name);
-const run = (command, ...args) => vscode.commands.executeCommand(`vscode.execute${command}`, ...args);
-const api = () => vscode.extensions.getExtension("potto.potto").exports;
-
-/** Open a file; tests edit documents and never save them, and each starts with the text that is on disk. */
-async function open(name) {
-  const document = await vscode.workspace.openTextDocument(uri(name));
-  const editor = await vscode.window.showTextDocument(document);
-  const whole = new vscode.Range(document.positionAt(0), document.positionAt(document.getText().length));
-  const disk = fs.readFileSync(document.uri.fsPath, "utf8");
-  if (document.getText() !== disk) await editor.edit((edit) => edit.replace(whole, disk));
-  return { document, editor };
-}
-
-/** The position of a word, or of a place in it. */
-function find(document, word, after = 0) {
-  const offset = document.getText().indexOf(word);
-  assert.ok(offset >= 0, `${word} is not in the text`);
-  return document.positionAt(offset + after);
-}
-
-/** Wait until something holds; what it gave. */
-async function eventually(ask, holds, seconds = 20) {
-  const until = Date.now() + 1000 * seconds;
-  for (;;) {
-    const found = await ask();
-    if (holds(found)) return found;
-    if (Date.now() > until) assert.fail(`not so in ${seconds} s: ${JSON.stringify(found)}`);
-    await new Promise((resolve) => setTimeout(resolve, 50));
-  }
-}
-
-const text = (contents) => contents.map((content) => (typeof content === "string" ? content : content.value)).join("\n");
+const { api, eventually, find, folder, open, run, text, uri } = require("./helpers");
+const { LIFE } = require("./life");
 
 const TESTS = {
   async "the extension is off until a Potto file is opened"() {
@@ -270,38 +238,13 @@ const TESTS = {
     await vscode.commands.executeCommand("editor.action.commentLine");
     await eventually(() => document.getText(), (text) => /\n {4}# x$/.test(text));
   },
-
-  async "a server that dies is started again"() {
-    const { document } = await open("renderer.po");
-    await vscode.commands.executeCommand("potto.restartServer");
-    assert.ok(await api().ready(), api().state());
-    const servers = () =>
-      fs.readdirSync("/proc").filter((id) => {
-        try {
-          const [state, parent] = fs.readFileSync(`/proc/${id}/stat`, "utf8").replace(/.*\) /, "").split(" ");
-          const command = fs.readFileSync(`/proc/${id}/cmdline`, "utf8").split("\0");
-          return state !== "Z" && Number(parent) === process.pid && command.includes("lsp");
-        } catch {
-          return false;
-        }
-      });
-    const [old] = await eventually(servers, (found) => found.length === 1);
-    process.kill(Number(old), "SIGKILL");
-    const dead = Date.now() + 100;
-    while (Date.now() < dead); // its end goes unnoticed while requests are written to it
-    for (let i = 0; i < 10; i++) void run("HoverProvider", document.uri, find(document, "cover(t)", i % 5));
-    await eventually(servers, (found) => found.length === 1 && found[0] !== old);
-    await eventually(() => api().state(), (state) => state === "running");
-    const [hover] = await eventually(() => run("HoverProvider", document.uri, find(document, "cover(t)")), (found) => found.length > 0);
-    assert.match(text(hover.contents), /cover/);
-  },
 };
 
 exports.run = async () => {
   const only = process.env.POTTO_E2E_ONLY;
   const results = [];
-  for (const [name, test] of Object.entries(TESTS)) {
-    if (only && results.length && !name.includes(only)) continue;
+  for (const [name, test] of Object.entries({ ...TESTS, ...LIFE })) {
+    if (only && results.length && !new RegExp(only).test(name)) continue;
     const started = Date.now();
     let error = null;
     let skipped;

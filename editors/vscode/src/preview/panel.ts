@@ -6,6 +6,7 @@ import type { Server } from "../server";
 import type { FromPreview, Samples, Scene, ToPreview } from "./messages";
 
 const CONTENT_MODIFIED = -32801;
+const LATER = 500; // ms after a file has changed, when the server knows of it too
 const panels = new Map<string, Preview>();
 
 /** Open the preview of a file, or show another function in the one that is open. */
@@ -16,9 +17,11 @@ export async function openPreview(
   name: string | undefined,
   position: vscode.Position | undefined,
 ): Promise<void> {
-  const client = await server.ready();
-  if (!client) return;
-  const scenes = await scenesOf(server, uri);
+  if (!(await server.ready())) return;
+  const scenes = await scenesOf(server, uri).catch((error: unknown) => {
+    void vscode.window.showErrorMessage(`There is no preview: ${messageOf(error)}`);
+  });
+  if (!scenes) return;
   const shown = name ?? at(scenes, position);
   if (shown === undefined || !scenes.some((scene) => scene.name === shown)) {
     void vscode.window.showInformationMessage(
@@ -32,6 +35,8 @@ export async function openPreview(
   if (open) open.show(shown);
   else panels.set(uri.toString(), new Preview(context, server, uri, shown));
 }
+
+const messageOf = (error: unknown): string => (error instanceof Error ? error.message : String(error));
 
 async function scenesOf(server: Server, uri: vscode.Uri): Promise<readonly Scene[]> {
   return (await server.client?.sendRequest<readonly Scene[]>("potto/scenes", { textDocument: { uri: uri.toString() } })) ?? [];
@@ -47,17 +52,18 @@ class Preview {
   private readonly panel: vscode.WebviewPanel;
   private readonly gone: vscode.Disposable[] = [];
   private readonly asked = new Map<number, vscode.CancellationTokenSource>();
+  private timer: NodeJS.Timeout | undefined;
 
   constructor(
     context: vscode.ExtensionContext,
     private readonly server: Server,
-    private readonly uri: vscode.Uri,
+    private uri: vscode.Uri,
     private shown: string,
   ) {
     const roots = ["dist", "media"].map((folder) => vscode.Uri.joinPath(context.extensionUri, folder));
     this.panel = vscode.window.createWebviewPanel(
       "potto.preview",
-      `Preview ${posix.basename(uri.path)}`,
+      title(uri),
       { viewColumn: vscode.ViewColumn.Beside, preserveFocus: true },
       { enableScripts: true, localResourceRoots: roots, retainContextWhenHidden: true },
     );
@@ -66,14 +72,47 @@ class Preview {
     this.gone.push(
       this.panel.webview.onDidReceiveMessage((message: FromPreview) => void this.received(message)),
       this.panel.onDidDispose(() => this.dispose()),
-      vscode.workspace.onDidChangeTextDocument((event) => {
-        // Another file may be imported here: what did not change is computed anew, and drawn as it was.
-        if (event.document.languageId === "potto" && event.contentChanges.length) void this.refresh();
-      }),
       server.onDidChangeState((state) => {
         if (state.kind === "running") void this.refresh();
       }),
     );
+    this.follow();
+  }
+
+  /** Follow the program. It may import other files: what did not change is computed anew, and drawn as it was. */
+  private follow(): void {
+    const programs = vscode.workspace.createFileSystemWatcher("**/*.{po,diffeo}");
+    const later = (): void => {
+      clearTimeout(this.timer);
+      this.timer = setTimeout(() => void this.refresh(), LATER);
+    };
+    const unlessOpen = (uri: vscode.Uri): void => {
+      if (!vscode.workspace.textDocuments.some((document) => document.uri.toString() === uri.toString())) later();
+    };
+    this.gone.push(
+      programs,
+      programs.onDidChange(unlessOpen),
+      programs.onDidCreate(unlessOpen),
+      programs.onDidDelete(later),
+      vscode.workspace.onDidChangeTextDocument((event) => {
+        if (event.document.languageId === "potto" && event.contentChanges.length) void this.refresh();
+      }),
+      vscode.workspace.onDidRenameFiles(({ files }) => {
+        for (const { oldUri, newUri } of files) if (this.move(oldUri, newUri)) later();
+      }),
+      { dispose: () => clearTimeout(this.timer) },
+    );
+  }
+
+  /** A file, or a folder, has another name: whether it is ours. */
+  private move(from: vscode.Uri, to: vscode.Uri): boolean {
+    const [old, own] = [from.toString(), this.uri.toString()];
+    if (own !== old && !own.startsWith(`${old}/`)) return false;
+    panels.delete(own);
+    this.uri = vscode.Uri.parse(to.toString() + own.slice(old.length));
+    panels.set(this.uri.toString(), this);
+    this.panel.title = title(this.uri);
+    return true;
   }
 
   show(name: string): void {
@@ -132,7 +171,7 @@ class Preview {
     } catch (error) {
       const { code } = error as { code?: unknown };
       const outdated = source.token.isCancellationRequested || code === CONTENT_MODIFIED;
-      this.send({ type: "failed", id, message: error instanceof Error ? error.message : String(error), outdated });
+      this.send({ type: "failed", id, message: messageOf(error), outdated });
     } finally {
       this.asked.delete(id);
       source.dispose();
@@ -140,9 +179,10 @@ class Preview {
   }
 
   private async save(name: string, png: string): Promise<void> {
-    const folder = vscode.Uri.joinPath(this.uri, "..");
+    const beside = this.uri.scheme === "untitled" ? undefined : vscode.Uri.joinPath(this.uri, "..");
+    const folder = beside ?? vscode.workspace.workspaceFolders?.[0]?.uri;
     const target = await vscode.window.showSaveDialog({
-      defaultUri: vscode.Uri.joinPath(folder, `${name}.png`),
+      ...(folder ? { defaultUri: vscode.Uri.joinPath(folder, `${name}.png`) } : {}),
       filters: { PNG: ["png"] },
     });
     if (!target) return;
@@ -150,10 +190,12 @@ class Preview {
     try {
       await vscode.workspace.fs.writeFile(target, data);
     } catch (error) {
-      void vscode.window.showErrorMessage(`The picture was not saved: ${String(error)}`);
+      void vscode.window.showErrorMessage(`The picture was not saved: ${messageOf(error)}`);
     }
   }
 }
+
+const title = (uri: vscode.Uri): string => `Preview ${posix.basename(uri.path)}`;
 
 function page(webview: vscode.Webview, root: vscode.Uri): string {
   const nonce = randomBytes(16).toString("base64");
@@ -173,7 +215,7 @@ function page(webview: vscode.Webview, root: vscode.Uri): string {
   <main id="pictures"></main>
   <p id="probe" aria-live="off"></p>
   <p id="status" role="status"></p>
-  <p id="problem" role="alert" hidden></p>
+  <div id="problem" role="alert" hidden><pre></pre><button type="button">Try again</button></div>
   <section id="parameters" aria-label="Parameters"></section>
   <script nonce="${nonce}" src="${script}"></script>
 </body>

@@ -37,11 +37,7 @@ const sampler = new Sampler(
   (id, request) => host.postMessage({ type: "sample", id, request }),
   (id) => host.postMessage({ type: "cancel", id }),
   arrived,
-  (message) => {
-    problem.hidden = false;
-    problem.textContent = message;
-    pictures.classList.add("stale");
-  },
+  complain,
 );
 const controls = new Controls(at("choices"), at("parameters"), changed, [
   ["reset", "Reset view", () => setView(homeView())],
@@ -57,14 +53,23 @@ new ResizeObserver(draw).observe(pictures);
 new MutationObserver(draw).observe(document.body, { attributes: true }); // another theme
 host.postMessage({ type: "ready" });
 
+problem.querySelector("button")?.addEventListener("click", () => ask(true));
+
+/** Say what is wrong, and dim what was drawn before. */
+function complain(message: string): void {
+  const text = problem.querySelector("pre");
+  if (text) text.textContent = message;
+  problem.hidden = false;
+  pictures.classList.add("stale");
+  if (status.dataset["settled"] !== "true") status.textContent = "";
+}
+
 /** The functions are these now: go on with the one that is shown, or with the one that is asked for. */
 function show(message: ToPreview & { type: "scenes" }): void {
   ({ scenes, finest } = message);
   const next = scenes.find((other) => other.name === (message.show ?? scene?.name)) ?? (scene ? undefined : scenes[0]);
   if (!next) {
-    problem.hidden = false;
-    problem.textContent = scene ? `There is no function ${scene.name} that can be drawn any more.` : "There is nothing to draw.";
-    pictures.classList.add("stale");
+    complain(scene ? `There is no function ${scene.name} that can be drawn any more.` : "There is nothing to draw.");
     return;
   }
   const same = scene !== undefined && JSON.stringify({ ...scene, range: 0 }) === JSON.stringify({ ...next, range: 0 });

@@ -56,7 +56,8 @@ export function span(arrays: Iterable<ArrayLike<number>>): [number, number] {
 /** A number in few digits. */
 export function short(number: number, digits = 6): string {
   if (!Number.isFinite(number)) return Number.isNaN(number) ? "no value" : number > 0 ? "∞" : "−∞";
-  const text = Number(number.toPrecision(digits)).toString();
+  const rounded = Number(number.toPrecision(digits));
+  const text = rounded !== 0 && Math.abs(rounded) < 1e-3 ? rounded.toExponential() : rounded.toString();
   return text.replaceAll("-", "−").replace("e+", "e");
 }
 

@@ -82,7 +82,7 @@ test("numbers travel whole", () => {
 });
 
 test("numbers are written to the digits that their errors bear out", () => {
-  assert.equal(estimated(0.123456789, 1e-4), "0.1235 ± 0.0001");
+  assert.equal(estimated(0.123456789, 1e-4), "0.1235 ± 1e−4");
   assert.equal(estimated(-2, 0), "−2 ± 0");
   assert.equal(estimated(NaN, NaN), "no value");
   assert.equal(short(1.5e-9), "1.5e−9");
