@@ -46,7 +46,8 @@ class Analysis:
         self.encoding = encoding
         self.projects: tuple[Project, ...] = ()
         self._found, self.folders = Projects(), tuple[str, ...]()
-        self.settings: Mapping[str, Any] = {}
+        self._settings: Mapping[str, Any] = {}
+        self._levels: dict[str, Mapping[str, str]] = {}
         self._documents: dict[str, Document] = {}
         self._texts: dict[str, Text] = {}
         self._failing: dict[tuple[str, str], str] = {}
@@ -57,6 +58,16 @@ class Analysis:
 
     # What the client has
 
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """The client's settings."""
+        return self._settings
+
+    @settings.setter
+    def settings(self, settings: Mapping[str, Any]) -> None:
+        self._settings = settings
+        self._levels.clear()
+
     def set_folders(self, uris: Iterable[str]) -> None:
         """The folders of the workspace; their project files are read."""
         keys = [key for key in map(to_key, uris) if not key.startswith("<")]
@@ -66,6 +77,7 @@ class Analysis:
     def reload_projects(self) -> None:
         """Read the project files again."""
         self._found.forget()
+        self._levels.clear()
         around = [self._found.of(key) or read_project(key) for key in self.folders]
         inside = [self._found.of(key) for key in self._documents]
         self.projects = tuple(
@@ -208,6 +220,9 @@ class Analysis:
 
     def levels(self, key: str) -> Mapping[str, str]:
         """How lints count in a file: the innermost project's word, then the client's settings."""
-        project = self._found.of(key)
-        lints = self.settings.get("lints")
-        return {**(project.lints if project is not None else {}), **(lints if isinstance(lints, Mapping) else {})}
+        levels = self._levels.get(key)
+        if levels is None:
+            project, lints = self._found.of(key), self._settings.get("lints")
+            levels = {**(project.lints if project is not None else {}), **(lints if isinstance(lints, Mapping) else {})}
+            self._levels[key] = levels
+        return levels

@@ -22,14 +22,18 @@ if TYPE_CHECKING:
     from potto_lsp.documents import Document
     from potto_lsp.text import Text
 
+TOGETHER = 20  # closed files that are looked at in one step
 Notify = Callable[[str, Any], None]
 
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What there is to say about a file, as messages; the same `id` means the same messages."""
+    """What there is to say about a file, as messages; the same `id` means the same messages.
 
-    found: tuple[Located, ...]
+    found: what the checks have said, and what others have.
+    """
+
+    found: tuple[tuple[Located, ...], tuple[Located, ...]]
     text: Text
     levels: Mapping[str, str]
     items: list[protocol.Diagnostic]
@@ -54,13 +58,15 @@ class Publisher:
         from potto.project import levelled
 
         analysis = self._analysis
-        found = (*analysis.diagnostics(key), *self.further(key))
-        text, levels = analysis.text(key), analysis.levels(key)
+        found = checked, further = analysis.diagnostics(key), self.further(key)
         old = self._reports.get(key)
-        elsewhere = any(located.diagnostic.related for located in found)  # in files that may have changed
+        if old is not None and not checked and not further and not old.items:
+            return old  # most files at most keystrokes: nothing was wrong, and nothing is
+        text, levels = analysis.text(key), analysis.levels(key)
+        elsewhere = any(located.diagnostic.related for said in found for located in said)  # in files that may differ
         if old is not None and old.found == found and old.text is text and old.levels == levels and not elsewhere:
             return old
-        items = convert.diagnostics(analysis, self._client, levelled(found, levels), key)
+        items = convert.diagnostics(analysis, self._client, levelled((*checked, *further), levels), key)
         if old is not None and old.items == items:
             new = Report(found, text, levels, old.items, old.id)
         else:
@@ -77,15 +83,26 @@ class Publisher:
 
     def steps(self) -> Iterator[Callable[[], None]]:
         """Check the files one by one and push what is new."""
-        open_keys = list(self._analysis.documents)[::-1]
-        for key in open_keys:
+        yield from self._each(1)
+
+    def steps_again(self) -> Iterator[Callable[[], None]]:
+        """The same when all files have been checked: then most of those that are closed take microseconds, so there are
+        several to a step."""
+        yield from self._each(TOGETHER)
+
+    def _each(self, together: int) -> Iterator[Callable[[], None]]:
+        for key in list(self._analysis.documents)[::-1]:
             yield lambda key=key: self.push(key)  # type: ignore[misc]
         if not self.whole_workspace:
             return
-        for key in self._analysis.programs():
-            if key not in self._analysis.documents:
-                yield lambda key=key: self.push(key)  # type: ignore[misc]
+        closed = [key for key in self._analysis.programs() if key not in self._analysis.documents]
+        for first in range(0, len(closed), together):
+            yield lambda first=first: self._push_all(closed[first : first + together])  # type: ignore[misc]
         yield self._clear_gone
+
+    def _push_all(self, keys: list[str]) -> None:
+        for key in keys:
+            self.push(key)
 
     def push(self, key: str) -> None:
         """Check a file and tell the client if there is something new. An edited file is always told of: the client

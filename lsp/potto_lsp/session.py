@@ -96,7 +96,7 @@ class Session:
     def idle(self) -> Iterator[Callable[[], None]]:
         """The steps of what is done when there is nothing else to do."""
         if self.checked:
-            yield from self.publisher.steps()
+            yield from self.publisher.steps_again()
             while self.to_parse:
                 key = self.to_parse.pop()
                 yield lambda key=key: self.analysis.parse(key)  # type: ignore[misc]

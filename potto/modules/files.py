@@ -95,7 +95,7 @@ class Files:
         """Set the workspace's folders. What is in them is listed when it is first asked for."""
         with self.db.evaluating():
             self.db.set_input(("roots",), tuple(dict.fromkeys(self.key(root) for root in roots)), DISK)
-            if ("workspace",) in self.db.input_keys():
+            if self.db.has_input(("workspace",)):
                 self._list_workspace()
 
     def open(self, path: str | os.PathLike[str], text: str | None = None) -> str:
@@ -110,7 +110,7 @@ class Files:
     def set_text(self, key: str, text: str) -> None:
         """The text of an open editor or of a pseudo file. It wins over the disk until `close`."""
         with self.db.evaluating():
-            appears = ("workspace",) in self.db.input_keys() and self.db.get_input(("overlay", key)) is None
+            appears = self.db.has_input(("workspace",)) and self.db.get_input(("overlay", key)) is None
             self.db.set_input(("overlay", key), text, OPEN)
             if appears:
                 self._list_workspace()
@@ -135,7 +135,7 @@ class Files:
             for key in self.db.input_keys() if keys is None else ():
                 if isinstance(key, tuple) and key[0] == "folder":
                     self.db.set_input(key, list_folder(key[1]), DISK)
-            if keys is None and ("workspace",) in self.db.input_keys():
+            if keys is None and self.db.has_input(("workspace",)):
                 self._list_workspace()
         return tuple(differ)
 

@@ -17,9 +17,8 @@ from potto.query import Database, query
 from potto.syntax import nodes
 
 _HEADS = re.compile(
-    r"^\f*(?:(?P<imports>(?:from|import)\b.*(?:\n[ \t]+\S.*)*)|(?:(?:def|diffeo)[ \t]+)?(?P<name>[^\W\d]\w*))",
-    re.MULTILINE,
-)
+    r"\n\f*(?:(?P<imports>(?:from|import)\b.*(?:\n[ \t]+\S.*)*)|(?:(?:def|diffeo)[ \t]+)?(?P<name>[^\W\d]\w*))"
+)  # with the end of the line before: what is between is passed over as fast as memory is read
 _WORD = re.compile(r"[^\W\d]\w*")
 
 
@@ -76,7 +75,7 @@ def _words_at(db: Database, file: str) -> _Words:
     if not isinstance(text, str):
         return _Words(frozenset(), frozenset())
     defined, imported = set[str](), set[str]()
-    for found in _HEADS.finditer(text):
+    for found in _HEADS.finditer("\n" + text):
         if found["name"] is not None:
             defined.add(found["name"])
         else:

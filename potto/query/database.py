@@ -73,6 +73,10 @@ class Database(Engine):
         node = self._inputs[key] = Input(value, self.revision, durability)
         return node
 
+    def has_input(self, key: Hashable) -> bool:
+        """Whether an input was ever set or read."""
+        return key in self._inputs
+
     def input_keys(self) -> tuple[Hashable, ...]:
         """The keys of all inputs that were set or read."""
         with self.evaluating():

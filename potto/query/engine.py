@@ -30,7 +30,8 @@ from potto.query.nodes import (
 )
 
 STEPS: Final = 10
-LEAVES: Final = 64  # of a memo that are kept: to look at more takes as long as to walk
+LEAVES: Final = 512  # of a memo that are kept: to look at more takes as long as to walk
+LEAVES_FIRST: Final = 8  # that are run for this on the way to one memo, before it is left to the walk
 SEGMENT: Final = 40  # levels of running queries on one thread: at 20 frames a level still below the limit
 
 
@@ -131,9 +132,15 @@ class Engine:
         might not ask for it any more.
         """
         revision, since, last_changed = self.revision, memo.verified_at, self._last_changed
-        if last_changed[memo.durability] > since and not (places[-1] == 0 and self._stands(memo, STEPS)):
+        stands: bool | Memo = last_changed[memo.durability] <= since
+        if not stands and -LEAVES_FIRST < places[-1] <= 0:
+            stands = self._stands(memo, STEPS)
+            if isinstance(stands, Memo):
+                places[-1] -= 1
+                return stands
+        if not stands:
             durability, deps = DURABILITIES, memo.deps
-            for place in range(places[-1], len(deps)):
+            for place in range(max(places[-1], 0), len(deps)):
                 dep = deps[place]
                 source = dep.source
                 if source is not None and source.verified_at < revision:
@@ -141,7 +148,7 @@ class Engine:
                         source.verified_at = revision
                     elif source.index >= 0 or source.provisional:
                         return True
-                    elif self._stands(source, STEPS):  # as most do: no need to go there and come back
+                    elif self._stands(source, STEPS) is True:  # as most do: no need to go there and come back
                         source.verified_at = revision
                         if self._logs:
                             self._log("reused", source.query.name, source.args)
@@ -160,10 +167,11 @@ class Engine:
             self._log("reused", memo.query.name, memo.args)
         return False
 
-    def _stands(self, memo: Memo, steps: int) -> bool:
+    def _stands(self, memo: Memo, steps: int) -> bool | Memo:
         """Whether nothing that a memo hangs on has changed, which saves the walk through all that lies between.
 
-        What it hangs on may hang on something else in turn; beyond so many steps that is left to the walk.
+        What it hangs on may hang on something else in turn; beyond so many steps that is left to the walk. Instead of
+        False the one node that must run for this to be known, as it has cut edits off before and may do so again.
         """
         since, revision, leaves = memo.verified_at, self.revision, memo.leaves
         if leaves is None or not steps or memo.index >= 0 or memo.provisional or self._last_changed[1] > since:
@@ -171,14 +179,22 @@ class Engine:
         for leaf in leaves:
             source = leaf.source
             if source is not None and source.verified_at < revision:
-                if source.verified_at < 0 or source is memo or not self._stands(source, steps - 1):
+                if source.verified_at < 0 or source is memo:
                     return False
+                below = self._stands(source, steps - 1)
+                if below is not True:
+                    cuts = source.cuts or leaf is not source  # the entry of a table stands when the others do not
+                    return source if below is False and cuts and self._runs_alone(source) else below
                 source.verified_at = revision
                 if self._logs:
                     self._log("reused", source.query.name, source.args)
             if leaf.changed_at > since:
                 return False
         return True
+
+    def _runs_alone(self, memo: Memo) -> bool:
+        """Whether a memo can run before what lies between it and who hangs on it."""
+        return memo.index < 0 and not memo.provisional and self._memos[memo.query].get(memo.args) is memo
 
     def _run_again(self, memo: Memo, asked: bool) -> bool:
         """Run a memo that is found stale; False if that gave no value and it was not asked for by itself."""

@@ -13,8 +13,10 @@ from dataclasses import dataclass
 
 from potto.syntax.tokens import normalized
 
-_STARTS = re.compile(r"^\f*([^\s])|^([^\S\n]+)[^\s]|^[^\S\n]*+\n(?:[^\S\n]*+\n)*+", re.MULTILINE)
-"""A line that starts with code or a comment in its first column, an indented one, or a run of blank ones."""
+_LINE = re.compile(r"\n(?:#.*\n)*\f*([^\s])")
+"""A line with code or a comment in its first column, and the comment lines directly above it. It begins with the end of
+the line before, so that blank and indented lines are passed over as fast as memory is read."""
+_INDENTED = re.compile(r"\n[^\S\n]+[^\s]")
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,22 +37,32 @@ def split(text: str) -> tuple[Chunk, ...]:
 def _starts(text: str) -> list[int]:
     starts: list[int] = []
     comments: list[int] = []  # where the blocks of comments since the last code start
-    adjacent = False  # whether the last block of comments goes on up to this line
     if text.startswith("\ufeff"):
         text = "\n" + text[1:]
-    for found in _STARTS.finditer(normalized(text)):
-        kind = found.lastindex
-        if kind == 1 and found.group(1) == "#":
-            if not adjacent:
-                comments.append(found.start())
-            adjacent = True
-        elif kind is None:
-            adjacent = False
-        elif starts and (kind == 2 or found.group(1) in ")]"):
-            comments, adjacent = [], False
+    text = "\n" + normalized(text)  # a line starts in `text` where in this one the line before ends
+    end = 0  # of the last comment
+    for found in _LINE.finditer(text):
+        start, first = found.start(), found[1]
+        if comments or not starts:
+            comments = _passed(text, end, start, starts, comments)
+        if not comments or start != end:
+            comments.append(start)
+        if first == "#":
+            end = text.find("\n", found.end())
+            end = len(text) if end < 0 else end
+        elif starts and first in ")]":
+            comments = []
         else:
-            if not adjacent:
-                comments.append(found.start())
             starts += comments
-            comments, adjacent = [], False
-    return starts + comments
+            comments = []
+    return starts + _passed(text, end, len(text), starts, comments)
+
+
+def _passed(text: str, end: int, start: int, starts: list[int], comments: list[int]) -> list[int]:
+    """The comments that are still to be given to a chunk, behind the blank and indented lines from `end` to `start`."""
+    indented = _INDENTED.search(text, end, start)
+    if indented is None:
+        return comments
+    if not starts:  # there is no chunk yet that it could go on with
+        starts += comments if comments and indented.start() == end else [*comments, indented.start()]
+    return []

@@ -151,3 +151,36 @@ class TestAgainstLark:
                 index = rng.randrange(len(tokens) - 1)
                 fewer = tokens[:index] + tokens[index + 1 :]
                 assert self.accepts(fewer) == self.ours(fewer)
+
+
+def chunk_starts(text: str) -> list[int]:
+    """Where chunks start, line by line."""
+    starts: list[int] = []
+    comments: list[int] = []
+    adjacent, at = False, 0
+    lines = ("\n" + text[1:] if text.startswith("\ufeff") else text).replace("\r\n", " \n").replace("\r", "\n")
+    for line in lines.split("\n"):
+        code = line.lstrip("\f")
+        first = code[:1].strip()
+        if not line.strip():
+            adjacent = False
+        elif first == "#":
+            comments += [] if adjacent else [at]
+            adjacent = True
+        elif starts and (not first or first in ")]"):
+            comments, adjacent = [], False
+        else:
+            starts += comments if adjacent else [*comments, at]
+            comments, adjacent = [], False
+        at += len(line) + 1
+    return starts + comments
+
+
+PIECES = ["\ufeff", "#", "x", "def f", "\n", "\n\n", " ", "    y", "\t", ")", "]", "\f", "\r", "\r\n", "# c\n"]
+
+
+def test_chunks_start_where_a_walk_over_the_lines_says() -> None:
+    rng = random.Random(1)
+    for _ in range(20_000):
+        text = "".join(rng.choice(PIECES) for _ in range(rng.randrange(12)))
+        assert [chunk.start for chunk in split(text)] == chunk_starts(text), text
