@@ -1,8 +1,9 @@
 """Sections of surfaces that have no closed form: periodic families, and roots found by numbers.
 
 Owns `searched_rows`. A family is a root for each integer in a range that the bounds give. Where nothing is known but
-the surface itself, sign changes are looked for on a grid that is refined where the surface comes close to zero
-without crossing it, and each is bracketed and polished; how a root moves follows from the surface's own derivatives.
+the surface itself, cells with one root each are told apart by enclosures (`isolate`); where these are not to be had (a
+call, a conditional) sign changes are looked for on a grid that is refined where the surface comes close to zero without
+crossing it. Each is polished; how a root moves follows from the surface's own derivatives.
 """
 
 from __future__ import annotations
@@ -12,9 +13,11 @@ from typing import Any
 import numpy as np
 
 from potto.core.terms import Lam, Term, lam
-from potto.integrate.cuts import Row, as_array
+from potto.integrate.cuts import SEARCHED, Row, as_array
+from potto.integrate.isolate import Brackets, isolated, slope_of
 from potto.integrate.pieces import still
 from potto.integrate.plan import LevelPlan, function_of
+from potto.integrate.rules import EPS
 from potto.kernels.cells import Array, Cell, Value, pad
 
 GRID = 64
@@ -81,11 +84,34 @@ def _search(
 ) -> list[Row]:
     low, high = as_array(np.minimum(lo.v, hi.v), batch), as_array(np.maximum(lo.v, hi.v), batch)
     function = lam(tuple(sorted(surface.free)), surface)
-    columns = {
-        n: Cell(v.v[:, None] if isinstance(v.v, np.ndarray) else v.v) if isinstance(v, Cell) else v
-        for n, v in env.items()
-        if n in function.params
-    }
+    slope = slope_of(surface, variable)
+    if slope is None:
+        a, b = _on_a_grid(function, variable, env, low, high, machine)
+    else:
+        brackets = isolated(surface, slope, variable, env, low, high)
+        if not brackets.complete:
+            machine.note_unfinished("a condition without a closed form has too many roots, or roots too close together")
+        a, b = _padded(brackets, batch)
+    roots = _polished(function, variable, env, a, b, machine)
+    return [_moving(cut, function, variable, env, roots[:, i], machine) for i in range(roots.shape[1])]
+
+
+def _padded(found: Brackets, batch: int) -> tuple[Array, Array]:
+    """Brackets as rows, one for each member, in order and padded with nan."""
+    order = np.lexsort((found.a, found.owner))
+    owner = found.owner[order]
+    count = np.bincount(owner, minlength=batch)
+    slot = np.arange(owner.size) - (np.cumsum(count) - count)[owner]
+    a, b = np.full((2, batch, int(count.max(initial=0))), np.nan)
+    a[owner, slot], b[owner, slot] = found.a[order], found.b[order]
+    return a, b
+
+
+def _on_a_grid(
+    function: Lam, variable: str, env: dict[str, Value], low: Array, high: Array, machine: Any
+) -> tuple[Array, Array]:
+    """Brackets where nothing but values is known of the surface."""
+    columns = _columns(function, env)
     still = machine.with_directions(0)
 
     def psi(x: Array) -> Array:
@@ -93,9 +119,15 @@ def _search(
         return np.broadcast_to(value, x.shape)
 
     x = _grid(low[:, None], high[:, None], np.linspace(0.0, 1.0, GRID + 1)[None, :])
-    a, b = _brackets(psi, x)
-    roots = _bisect(psi, a, b)
-    return [_moving(cut, function, variable, env, roots[:, i], machine) for i in range(roots.shape[1])]
+    return _brackets(psi, x)
+
+
+def _columns(function: Lam, env: dict[str, Value]) -> dict[str, Value]:
+    return {
+        n: Cell(v.v[:, None] if isinstance(v.v, np.ndarray) else v.v) if isinstance(v, Cell) else v
+        for n, v in env.items()
+        if n in function.params
+    }
 
 
 def _grid(low: Array, high: Array, s: Array) -> Array:
@@ -134,29 +166,55 @@ def _brackets(psi: Any, x: Array) -> tuple[Array, Array]:
     return a, b
 
 
-def _bisect(psi: Any, a: Array, b: Array) -> Array:
+def _polished(function: Lam, variable: str, env: dict[str, Value], a: Array, b: Array, machine: Any) -> Array:
+    """The roots in brackets (B, r): Newton's steps where they stay inside and shrink, halves elsewhere."""
     if a.shape[1] == 0:
         return a
-    fa = psi(a)
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (a + b)
-        f = psi(middle)
-        left = fa * np.sign(f) <= 0
-        b = np.where(left, middle, b)
-        fa = np.where(left, fa, f)
-        a = np.where(left, a, middle)
-    return 0.5 * (a + b)
+    columns = {n: pad(v, 1) for n, v in _columns(function, env).items()}
+    one = machine.with_directions(1)
+
+    def psi(x: Array) -> tuple[Array, Array]:
+        value = _call(function, {**columns, variable: Cell(x, None, (1.0,))}, one)
+        slope = 0.0 if value.t[0] is None else value.t[0]
+        return np.broadcast_to(value.v, x.shape), np.broadcast_to(slope, x.shape)
+
+    with np.errstate(all="ignore"):
+        left = np.sign(psi(a)[0])
+        right = np.sign(psi(b)[0])
+        left = np.where((left == 0) | np.isnan(left), -right, left)
+        x = _between(a, b)
+        for turn in range(BISECTIONS):
+            f, slope = psi(x)
+            below = left * f > 0
+            a, b = np.where(below, x, a), np.where(below, b, x)
+            step = x - f / slope
+            good = (step > a) & (step < b) & (turn % 3 < 2)
+            new = np.where(f == 0, x, np.where(good, step, _between(a, b)))
+            still = (np.abs(new - x) <= EPS * np.abs(x)) | np.isnan(x) | (np.abs(b - a) <= EPS * np.abs(x))
+            x = new
+            if still.all():
+                break
+    return x
+
+
+def _between(a: Array, b: Array) -> Array:
+    """A point between the ends, also of what is not finite."""
+    middle = 0.5 * (a + b)
+    up, down = np.maximum(2 * np.abs(a), 1.0), -np.maximum(2 * np.abs(b), 1.0)
+    far = np.where(np.isinf(b), up, np.where(np.isinf(a), down, middle))
+    return np.where(np.isinf(a) & np.isinf(b), 0.0, far)
 
 
 def _moving(cut: int, function: Lam, variable: str, env: dict[str, Value], root: Array, machine: Any) -> Row:
-    """The root as a candidate cut: dx = -psi_theta / psi_x."""
+    """The root as a candidate cut: dx = -psi_theta / psi_x; how far it is off is psi's own rounding over psi_x."""
     k = machine.directions
-    if not k:
-        return Row(root, (), cut, False)
     here = {n: pad(v, k + 1) for n, v in env.items()}
     here[variable] = Cell(root, None, (None,) * k + (1.0,))
-    value = _call(function, here, machine.with_directions(k + 1))
+    value = _call(function, here, machine.tracking().with_directions(k + 1))
     slope = 0.0 if value.t[k] is None else value.t[k]
-    # What stands still does so also where the surface is flat, and 0/0 would say nothing.
-    t = tuple(None if x is None else np.where(np.asarray(x) == 0, 0.0, -np.asarray(x) / slope) for x in value.t[:k])
-    return Row(root, t, cut, False)
+    with np.errstate(all="ignore"):
+        off = (np.abs(value.v) + (0.0 if value.e is None else value.e)) / np.abs(slope)
+        off = np.where(np.isfinite(off), off, 0.0) + SEARCHED * EPS * np.abs(root)
+        # What stands still does so also where the surface is flat, and 0/0 would say nothing.
+        t = tuple(None if x is None else np.where(np.asarray(x) == 0, 0.0, -np.asarray(x) / slope) for x in value.t[:k])
+    return Row(root, t, cut, False, off)

@@ -1,0 +1,127 @@
+"""Intervals with one root each: of a surface along one variable, for a whole batch at once.
+
+Owns `isolated`. A cell over which the enclosure of the surface leaves out 0 has no root; one over which that of its
+slope does has at most one, and the signs at its ends tell. All others are halved. So no root is missed, however narrow
+what brings it forth; what is given up on, once there are too many cells, is told.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from potto.calculus.derivative import NotSmooth, partial
+from potto.core.simplify import simplify
+from potto.core.terms import Term
+from potto.integrate.enclose import Interval, enclosure, known
+from potto.kernels.cells import Array, Bools, Cell, Ints, Value
+
+FINEST = 48  # halvings of the whole
+CELLS, CELLS_EACH = 1 << 16, 1 << 9  # at most so many open at once, or so many for each member
+
+
+@dataclass
+class Brackets:
+    """owner: (r,) whose; a, b: (r,) ends of cells with a sign change each. complete: whether these are all."""
+
+    owner: Ints
+    a: Array
+    b: Array
+    complete: bool
+
+
+@lru_cache(maxsize=4096)
+def slope_of(surface: Term, variable: str) -> Term | None:
+    """The surface's derivative along the variable if both can be enclosed."""
+    if not known(surface):
+        return None
+    try:
+        slope = simplify(partial(surface, variable))
+    except NotSmooth:
+        return None
+    return slope if known(slope, jumps=True) else None
+
+
+def isolated(surface: Term, slope: Term, variable: str, env: dict[str, Value], low: Array, high: Array) -> Brackets:
+    """The sign changes of a surface between bounds (B,), which may be infinite."""
+    fixed: dict[str, Interval] = {}
+    for name in surface.free - {variable}:
+        value = env[name]
+        assert isinstance(value, Cell)
+        fixed[name] = value.v, value.v
+    cells = _Cells(surface, slope, variable, fixed, low, high)
+    there = np.nonzero(low < high)[0]
+    owner, s0, s1 = there, np.zeros(there.size), np.ones(there.size)
+    found: list[tuple[Ints, Array, Array]] = []
+    most = max(CELLS, CELLS_EACH * there.size)
+    complete = True
+    for _ in range(FINEST):
+        if not owner.size:
+            break
+        if owner.size > most:
+            complete = False
+            break
+        settled, crossed, open_ = cells.judged(owner, s0, s1)
+        found.append((owner[settled][crossed], s0[settled][crossed], s1[settled][crossed]))
+        owner, s0, s1 = owner[open_], s0[open_], s1[open_]
+        middle = 0.5 * (s0 + s1)
+        owner, s0, s1 = np.concatenate((owner, owner)), np.concatenate((s0, middle)), np.concatenate((middle, s1))
+    crossed = cells.crossed(owner, s0, s1)
+    found.append((owner[crossed], s0[crossed], s1[crossed]))
+    owners, s0, s1 = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return Brackets(owners, cells.x(owners, s0), cells.x(owners, s1), complete)
+
+
+@dataclass
+class _Cells:
+    surface: Term
+    slope: Term
+    variable: str
+    fixed: dict[str, Interval]
+    low: Array
+    high: Array
+
+    def x(self, owner: Ints, s: Array) -> Array:
+        """The places of labels in [0, 1], also where a bound is infinite."""
+        low, high = self.low[owner], self.high[owner]
+        with np.errstate(all="ignore"):
+            x = low + (high - low) * s
+            if np.isfinite(x).all():
+                return np.where(s == 1, high, x)
+            up, down = low + s / (1 - s), high - (1 - s) / s
+            whole = (2 * s - 1) / (4 * s * (1 - s))
+        x = np.where(np.isinf(high), np.where(np.isinf(low), whole, up), np.where(np.isinf(low), down, x))
+        return np.where(s == 0, low, np.where(s == 1, high, x))
+
+    def at(self, owner: Ints) -> dict[str, Interval]:
+        return {n: (v[0][owner], v[1][owner]) if isinstance(v[0], np.ndarray) else v for n, v in self.fixed.items()}
+
+    def judged(self, owner: Ints, s0: Array, s1: Array) -> tuple[Ints, Bools, Ints]:
+        """The cells with at most one root, whether they have one, and the cells that are to be halved."""
+        a, b = self.x(owner, s0), self.x(owner, s1)
+        box = {**self.at(owner), self.variable: (a, b)}
+        (lo, hi), (least, most) = (
+            tuple(np.broadcast_to(end, a.shape) for end in ends) for ends in enclosure((self.surface, self.slope), box)
+        )
+        middle = self.x(owner, 0.5 * (s0 + s1))
+        here = enclosure((self.surface,), {**self.at(owner), self.variable: (middle, middle)})[0]
+        reach = np.maximum(b - middle, middle - a)
+        with np.errstate(invalid="ignore", over="ignore"):  # mean values: closer than the enclosure in small cells
+            far = np.maximum(np.abs(least), np.abs(most)) * reach
+            apart = (here[0] - far > 0) | (here[1] + far < 0)
+        free = (lo > 0) | (hi < 0) | apart
+        settled = ~free & ((least >= 0) | (most <= 0))
+        index = np.nonzero(settled)[0]
+        return index, self.crossed(owner[index], s0[index], s1[index]), np.nonzero(~free & ~settled)[0]
+
+    def crossed(self, owner: Ints, s0: Array, s1: Array) -> Bools:
+        """Whether the surface's sign changes over cells. A root on an end belongs to the cell on its right."""
+        values = []
+        for s in (s0, s1):
+            x = self.x(owner, s)
+            lo, hi = enclosure((self.surface,), {**self.at(owner), self.variable: (x, x)})[0]
+            values.append(np.broadcast_to(np.where((lo == -np.inf) & (hi == np.inf), np.nan, 0.5 * (lo + hi)), x.shape))
+        left, right = values
+        return np.asarray((left * np.sign(right) < 0) | ((left == 0) & (right != 0)) | ((right == 0) & (s1 == 1)))

@@ -1,0 +1,129 @@
+"""Conditions without a closed form in the variable that they cut: no root may be missed, however close to another.
+
+The region below a wave, y < a*sin(w*x + p) + b*x + t in the unit square: between the wave's turning points, which are
+known in closed form, it crosses 0 and 1 once at most, so that bisection by mpmath gives its area and how that grows.
+"""
+
+from __future__ import annotations
+
+import itertools
+import random
+from typing import Any
+
+import mpmath as mp
+import numpy as np
+import pytest
+from scipy import special
+
+import potto
+from potto.core.terms import const, mul, prim, var
+from potto.integrate.enclose import enclosure
+
+# a, w, p, b, t
+KEPT = [
+    (1.0, 100.0, 0.0, 0.3, 0.3),
+    (1.0, 300.0, 0.0, 0.3, 0.3),
+    (1.0, 700.0, 0.0, 0.3, 0.3),
+    (0.4, 2000.0, 0.1, -0.2, 0.6),
+    (1.0, 100.0, 0.0, 0.3, -1.0299),  # just above the bottom: tops that barely reach it, two roots close together
+    (0.5, 3.0, 0.2, 0.0001, 0.2),
+]
+
+
+@mp.workdps(40)
+def below(a: Any, w: Any, p: Any, b: Any, t: Any) -> tuple[Any, Any]:
+    """The area of y < a*sin(w*x + p) + b*x + t in the unit square, and its derivative by t."""
+    a, w, p, b, t = map(mp.mpf, (a, w, p, b, t))
+
+    def wave(x: Any) -> Any:
+        return a * mp.sin(w * x + p) + b * x + t
+
+    def integral(x: Any) -> Any:
+        return -a / w * mp.cos(w * x + p) + b * x * x / 2 + t * x
+
+    cuts = [mp.mpf(0), mp.mpf(1)]
+    if abs(b) < abs(a * w):
+        turn = mp.acos(-b / (a * w))
+        for k in range(int(w / (2 * mp.pi)) + 3):
+            cuts += [x for x in ((turn + 2 * mp.pi * k - p) / w, (-turn + 2 * mp.pi * k - p) / w) if 0 < x < 1]
+    cuts.sort()
+    places = list(cuts)
+    for low, high in itertools.pairwise(cuts):
+        for level in (0, 1):
+            if (wave(low) - level) * (wave(high) - level) < 0:
+                places.append(mp.findroot(lambda x, level=level: wave(x) - level, (low, high), solver="anderson"))
+    places.sort()
+    area = rate = mp.mpf(0)
+    for low, high in itertools.pairwise(places):
+        middle = wave((low + high) / 2)
+        if middle >= 1:
+            area += high - low
+        elif middle > 0:
+            area += integral(high) - integral(low)
+            rate += high - low
+    return area, rate
+
+
+def random_waves() -> list[tuple[float, ...]]:
+    r = random.Random(20)
+    return [
+        (r.uniform(0.1, 2), 10 ** r.uniform(0, 2.7), r.uniform(-3, 3), r.uniform(-1, 1), r.uniform(-1, 1.5))
+        for _ in range(40)
+    ]
+
+
+@pytest.mark.parametrize("order", ["x, y", "y, x"])
+@pytest.mark.parametrize("wave", [*KEPT, *random_waves()], ids=str)
+def test_every_root_of_a_wave_is_found(wave: tuple[float, ...], order: str) -> None:
+    a, w, p, b, t = wave
+    text = f"def f(t) integral ([0, 1], [0, 1]) [y < {a!r}*sin({w!r}*x + {p!r}) + {b!r}*x + t] d({order})"
+    found = potto.grad(potto.compile(text).f, "t")(t=t)
+    area, rate = below(*wave)
+    for got, error, exact in ((found.value, found.error, area), (found.tangent, found.tangent_error, rate)):
+        assert abs(got - exact) <= error, (got, error, exact)
+        assert error <= 1e-8 * (abs(exact) + 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "exact"),
+    [
+        # a peak 1e-5 wide in the section: (width where exp(-q^2) > h) has closed forms
+        ("integral ([0, 1], [0, 1]) [y < exp(-((x - 0.4567)/1e-5)^2) - t] d(y, x)", None),
+        ("integral ([0, 1], [0, 1]) [y < 1e-10/(1e-10 + (x - 0.4567)^2) - t] d(y, x)", "lorentz"),
+    ],
+)
+def test_roots_on_a_narrow_peak_are_found(text: str, exact: str | None) -> None:
+    t, s = mp.mpf(0.25), mp.mpf(1e-5)
+    if exact is None:
+        half = mp.sqrt(-mp.log(t))
+        area = s * (mp.sqrt(mp.pi) * mp.erf(half) - 2 * half * t)
+    else:
+        half = mp.sqrt(1 / t - 1)
+        area = mp.sqrt(mp.mpf(1e-10)) * (2 * mp.atan(half) - 2 * half * t)
+    found = potto.grad(potto.compile(f"def f(t) {text}").f, "t")(t=0.25)
+    assert abs(found.value - area) <= found.error
+    assert abs(found.tangent + 2 * half * s) <= found.tangent_error + 1e-12 * s
+    assert found.error <= 1e-8 * area
+
+
+def test_an_enclosure_holds_what_its_term_takes() -> None:
+    x, y = var("x"), var("y")
+    terms = [
+        prim("sin", mul(const(7.0), x)), prim("cos", prim("exp", x)), prim("tan", x), prim("pow", x, const(3.0)),
+        prim("pow", x, const(-2.0)), prim("div", y, x), prim("mul", x, x, y), prim("hypot", x, y),
+        prim("atan2", y, x), prim("abs", x), prim("max", x, y), prim("cosh", x), prim("erfc", x),
+        prim("sqrt", prim("add", x, const(4.0))), prim("clamp", x, const(-0.3), const(0.4)),
+    ]  # fmt: skip
+    r = np.random.default_rng(3)
+    low = r.uniform(-3, 3, (2, 400))
+    high = low + 10 ** r.uniform(-6, 0.5, (2, 400))
+    found = enclosure(tuple(terms), {"x": (low[0], high[0]), "y": (low[1], high[1])})
+    at = low + (high - low) * r.uniform(0, 1, (60, 2, 400))
+    px, py = at[:, 0], at[:, 1]
+    with np.errstate(all="ignore"):
+        values = [np.sin(7 * px), np.cos(np.exp(px)), np.tan(px), px**3, px**-2.0, py / px, px * px * py,
+                  np.hypot(px, py), np.arctan2(py, px), np.abs(px), np.maximum(px, py), np.cosh(px), special.erfc(px),
+                  np.sqrt(px + 4), np.clip(px, -0.3, 0.4)]  # fmt: skip
+    for term, (lo, hi), value in zip(terms, found, values, strict=True):
+        known = ~np.isnan(value)
+        assert np.all((value >= lo) | ~known) and np.all((value <= hi) | ~known), term
