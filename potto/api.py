@@ -326,8 +326,9 @@ class GradientFunction:
         for name in wrt:
             if name not in parameters:
                 near = difflib.get_close_matches(name, [p for p in parameters if p], 1)
-                hint = f"did you mean `{near[0]}`?" if near else ""
-                raise wrong_call(f"{print_expression(function._expr)} has no parameter `{name}`", hint)
+                named = ", ".join(f"`{p}`" for p in parameters if p)
+                hint = f"did you mean `{near[0]}`?" if near else f"its parameters are {named}" if named else ""
+                raise wrong_call(f"`{print_expression(function._expr)}` has no parameter `{name}`", hint)
         self._function = function
         self._wrt = wrt
 

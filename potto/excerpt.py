@@ -7,6 +7,7 @@ cursor or the direction of writing are shown as something harmless. Long lines a
 
 from __future__ import annotations
 
+import textwrap
 import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -14,6 +15,7 @@ from dataclasses import dataclass, field
 from potto.source import SourceText, Span
 
 TAB = 4
+LEAST = 8  # cells for a label
 WIDTH = 100  # cells of source shown of one line
 ALL_LINES_UP_TO = 4  # a span over more lines shows its first two and its last
 
@@ -72,8 +74,11 @@ class Excerpt:
         return out
 
 
-def excerpt(source: SourceText, marks: Sequence[Mark]) -> Excerpt:
-    """The lines that the marks touch, each followed by its marks; what lies between distant ones is left out."""
+def excerpt(source: SourceText, marks: Sequence[Mark], room: int = WIDTH) -> Excerpt:
+    """The lines that the marks touch, each followed by its marks; what lies between distant ones is left out.
+
+    room: how many cells of a line there are.
+    """
     by_line: dict[int, list[_Piece]] = {}
     for mark in marks:
         for number, piece in _pieces(source, mark):
@@ -82,10 +87,10 @@ def excerpt(source: SourceText, marks: Sequence[Mark]) -> Excerpt:
     previous: int | None = None
     for number in sorted(by_line):
         if previous is not None and number == previous + 2:
-            result.rows.append(_Row(previous + 2, _Line(source.line(previous + 1), []).text))
+            result.rows.append(_Row(previous + 2, _Line(source.line(previous + 1), [], room).text))
         elif previous is not None and number > previous + 2:
             result.rows.append(_Row(None, "", "gap"))
-        result.rows += _line_rows(number, source.line(number), by_line[number])
+        result.rows += _line_rows(number, source.line(number), by_line[number], room)
         previous = number
     return result
 
@@ -112,8 +117,8 @@ def _pieces(source: SourceText, mark: Mark) -> list[tuple[int, _Piece]]:
     return pieces
 
 
-def _line_rows(number: int, line: str, pieces: list[_Piece]) -> list[_Row]:
-    shown = _Line(line, pieces)
+def _line_rows(number: int, line: str, pieces: list[_Piece], room: int) -> list[_Row]:
+    shown = _Line(line, pieces, room)
     rows = [_Row(number + 1, shown.text)]
     placed = sorted(((*shown.cells(piece), piece) for piece in pieces), key=lambda item: (item[0], item[1]))
     canvas = [" "] * max(end for _, end, _ in placed)
@@ -121,8 +126,10 @@ def _line_rows(number: int, line: str, pieces: list[_Piece]) -> list[_Row]:
         canvas[start:end] = ("^" if piece.primary else "-") * (end - start)
     style = "primary" if any(piece.primary for piece in pieces) else "secondary"
     labelled = [(start, piece) for start, _, piece in placed if piece.label]
-    inline = max(placed, key=lambda item: (item[1], item[0]))[2]
-    tail = f" {_label(inline.label)}" if inline.label else ""
+    inline: _Piece | None = max(placed, key=lambda item: (item[1], item[0]))[2]
+    tail = f" {_label(inline.label)}" if inline is not None and inline.label else ""
+    if room < WIDTH and len(canvas) + len(tail) > room:
+        inline, tail = None, ""
     rows.append(_Row(None, "".join(canvas) + tail, style))
     hanging = [(start, piece) for start, piece in labelled if piece is not inline]
     while hanging:  # the rightmost hangs highest; a bar leads from each mark to its label further down
@@ -131,7 +138,12 @@ def _line_rows(number: int, line: str, pieces: list[_Piece]) -> list[_Row]:
         for left, _ in hanging:
             if left < start:
                 bars[left] = "|"
-        rows.append(_Row(None, "".join(bars) + _label(piece.label), style))
+        label = _label(piece.label)
+        if room < WIDTH:
+            bars = bars[: max(room - len(label), 0)]
+        beside = max(room - len(bars), LEAST)
+        for part in textwrap.wrap(label, beside) if room < WIDTH and len(label) > beside else [label]:
+            rows.append(_Row(None, "".join(bars) + part, style))
     return rows
 
 
@@ -142,8 +154,8 @@ def _label(text: str) -> str:
 class _Line:
     """One line as it is shown, and where its columns come to stand. Cut around the marks when it is too long."""
 
-    def __init__(self, line: str, pieces: Sequence[_Piece]) -> None:
-        self.first, stop = _window(line, pieces)
+    def __init__(self, line: str, pieces: Sequence[_Piece], room: int) -> None:
+        self.first, stop = _window(line, pieces, room)
         self.left = "..." if self.first > 0 else ""
         self.starts: list[int] = []
         shown = [self.left]
@@ -164,17 +176,18 @@ class _Line:
         return start, max(end, start + 1)
 
 
-def _window(line: str, pieces: Sequence[_Piece]) -> tuple[int, int]:
+def _window(line: str, pieces: Sequence[_Piece], room: int) -> tuple[int, int]:
     """The columns of a line to show: all of a short one, else those around the primary mark (or the first)."""
-    if len(line) <= WIDTH:
+    if len(line) <= room:
         return 0, len(line)
+    room -= 0 if room == WIDTH else 6  # for the dots on both sides
     main = next((p for p in pieces if p.primary), pieces[0] if pieces else _Piece(0, 0, "", True))
-    last = max([p.end for p in pieces if p.end - main.start < WIDTH * 3 // 4] or [main.end])
-    if last <= WIDTH - 10:
-        return 0, WIDTH
-    spare = max(WIDTH - (last - main.start), WIDTH // 4)
-    start = max(0, min(main.start - spare // 2, len(line) - WIDTH))
-    return start, min(len(line), start + WIDTH)
+    last = max([p.end for p in pieces if p.end - main.start < room * 3 // 4] or [main.end])
+    if last <= room - 10:
+        return 0, room
+    spare = max(room - (last - main.start), room // 4)
+    start = max(0, min(main.start - spare // 2, len(line) - room))
+    return start, min(len(line), start + room)
 
 
 def width(text: str) -> int:

@@ -7,15 +7,19 @@ no file itself. Columns shown to people count from 1 in code points; JSON ranges
 from __future__ import annotations
 
 import os
+import re
+import textwrap
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from potto.diagnostics import Diagnostic, PottoError, Related
-from potto.excerpt import Excerpt, Mark, excerpt, printable
+from potto.excerpt import WIDTH, Excerpt, Mark, excerpt, printable
 from potto.source import Position, SourceText, Span
 
 Sources = Callable[[str], SourceText | None]
+BESIDE, LEAST = 6, 14  # columns beside an excerpt, for its gutter; the least that is shown
+NARROW = 60  # columns of a screen on which what goes on is not indented as far as it began
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,23 +63,28 @@ def display_name(file: str) -> str:
     return file if relative.startswith("..") else relative
 
 
-def render(located: Located, sources: Sources, *, palette: Palette = PLAIN, inline_header: bool = False) -> str:
+def render(
+    located: Located, sources: Sources, *, palette: Palette = PLAIN, inline_header: bool = False,
+    columns: int | None = None,
+) -> str:  # fmt: skip
     """One diagnostic as text, without a final newline.
 
     `inline_header` puts the place in front of the message (`file:line:col: severity[CODE]: message`), as `potto check`
-    does; otherwise it stands on a line of its own after ` --> `.
+    does; otherwise it stands on a line of its own after ` --> `. columns: how wide a screen it has to fit on, if any.
     """
     diagnostic, file = located.diagnostic, located.file
     source = sources(file) if file is not None else None
     head = palette.paint(palette.severity(diagnostic.severity), f"{diagnostic.severity}[{diagnostic.code}]")
-    message = palette.paint(palette.bold, ": " + printable(diagnostic.message))
+    named = len(f"{diagnostic.severity}[{diagnostic.code}]")
+    message = palette.paint(palette.bold, broken(": " + printable(diagnostic.message), columns, 2, named))
     if file is None or source is None:
         place = f"{printable(display_name(file))}: " if file is not None else ""
-        return "\n".join([place + head + message, *_footer(diagnostic, palette, 1)])
+        return "\n".join([place + head + message, *_footer(diagnostic, palette, 1, columns)])
     place = _place(file, source, diagnostic.span)
     here, elsewhere = _marks(located, source, sources)
-    blocks: list[tuple[str | None, Excerpt]] = [(None, excerpt(source, here))]
-    blocks += [(f, excerpt(s, [mark])) for f, s, mark in elsewhere]
+    room = WIDTH if columns is None else min(max(columns - BESIDE, LEAST), WIDTH)
+    blocks: list[tuple[str | None, Excerpt]] = [(None, excerpt(source, here, room))]
+    blocks += [(f, excerpt(s, [mark], room)) for f, s, mark in elsewhere]
     width = max(block.gutter_width for _, block in blocks)
     lines = [f"{place}: {head}{message}"] if inline_header else [head + message]
     if not inline_header:
@@ -86,7 +95,25 @@ def render(located: Located, sources: Sources, *, palette: Palette = PLAIN, inli
             where = _place(other, other_source, mark.span)
             lines.append(f"{' ' * width}{palette.paint(palette.gutter, ':::')} {where}")
         lines += block.lines(width, palette.gutter, palette.severity(diagnostic.severity), palette.off)
-    return "\n".join([*lines, *_footer(diagnostic, palette, width)])
+    return "\n".join([*lines, *_footer(diagnostic, palette, width, columns)])
+
+
+def broken(text: str, columns: int | None, indent: int, used: int = 0) -> str:
+    """Prose in lines of at most so many columns; `used` are taken on the first. Later ones are indented.
+
+    What stands in backticks stays on one line, where it is short enough for that.
+    """
+    if columns is None or used + len(text) < columns:
+        return text
+    width, first = max(columns - 1, indent + 8), "\0" * used
+
+    def whole(code: re.Match[str]) -> str:
+        return code[0].replace(" ", "\1") if len(code[0]) < width / 2 else code[0]
+
+    together = re.sub(r"`[^`\n]+`", whole, text)
+    lines = textwrap.wrap(first + together, width, subsequent_indent=" " * indent, break_long_words=False,
+                          break_on_hyphens=False)  # fmt: skip
+    return "\n".join(lines).removeprefix(first).replace("\1", " ")
 
 
 def _place(file: str, source: SourceText, span: Span) -> str:
@@ -117,15 +144,17 @@ def _marks(
     return here, elsewhere
 
 
-def _footer(diagnostic: Diagnostic, palette: Palette, width: int) -> list[str]:
+def _footer(diagnostic: Diagnostic, palette: Palette, width: int, columns: int | None) -> list[str]:
     equals = " " * (width + 1) + palette.paint(palette.gutter, "=") + " "
     indent = " " * (width + 3)
     lines: list[str] = []
     for word, text in [*(("note", note) for note in diagnostic.notes), ("help", diagnostic.help)]:
         if text:
             first, *rest = printable(text, keep_newlines=True).split("\n")
-            lines.append(f"{equals}{palette.paint(palette.bold, word)}: {first}")
-            lines += [indent + " " * (len(word) + 2) + line for line in rest]
+            deep = len(indent) + (len(word) + 2 if columns is None or columns >= NARROW else 0)
+            head = broken(f"{word}: {first}", columns, deep, len(indent)).removeprefix(word)
+            lines.append(f"{equals}{palette.paint(palette.bold, word)}{head}")
+            lines += [broken(" " * deep + line, columns, deep) for line in rest]
     return lines
 
 

@@ -91,11 +91,16 @@ def judge(coordinates: Sequence[Term], variables: Sequence[str], box: Box, whole
     return no_inverse(surface, mine, reasons)
 
 
-def _solved(coordinates: Sequence[Term], variables: Sequence[str], name: str, found: Sections | None) -> Verdict:
+def _solved(
+    coordinates: Sequence[Term], variables: Sequence[str], name: str, found: Sections | None
+) -> Verdict | Problem:
     """The coordinates that are missing are the other variables: with the first one solved for `name`, that inverts."""
     missing = tuple(var(v) for v in variables if v != name) if len(coordinates) < len(variables) else ()
     completed = (coordinates[0], *missing) if missing else tuple(coordinates)
-    det = determinant(jacobian(completed, variables)) if len(completed) == len(variables) else None
+    try:
+        det = determinant(jacobian(completed, variables)) if len(completed) == len(variables) else None
+    except NotSmooth as problem:
+        return no_inverse(coordinates[0], list(variables), [f"for `{name}`: {problem}"])
     return Verdict(name, missing, det, found)
 
 

@@ -45,6 +45,7 @@ FLAT = 2
 
 ROUNDING = 8 * EPS  # of a sample
 
+Told = Callable[[float], None]  # how much of the work is done
 # How many variables are drawn, and the function of them that a mean is taken of.
 Mean = tuple[int, Callable[[Array], Sums]]
 
@@ -54,10 +55,16 @@ def sample(plan: Plan, machine: Any, env: dict[str, Value], batch: int, method: 
 
     "auto" stops where the accuracy asked for is reached; otherwise all `samples` are taken.
     """
-    rows = []
+    rows: list[Sums] = []
+    machine.sampled(0.0, method == "auto")
+
+    def told(share: float) -> None:
+        machine.sampled((len(rows) + share) / batch, method == "auto")
+
     for i in range(batch):
         member = {n: map_arrays(v, _member(i)) for n, v in env.items()}
-        rows.append(_plain(plan, machine, member) if method == "mc" else _quasi(plan, machine, member, method))
+        rows.append(_plain(plan, machine, member, told) if method == "mc"
+                    else _quasi(plan, machine, member, method, told))  # fmt: skip
     return Sums(*(np.stack([getattr(r, name) for r in rows], axis=-1) for name in ("v", "e", "t", "et")))
 
 
@@ -65,17 +72,20 @@ def _member(i: int) -> Callable[[Array], Any]:
     return lambda a: float(a[i])
 
 
-def _plain(plan: Plan, machine: Any, env: dict[str, Value]) -> Sums:
+def _plain(plan: Plan, machine: Any, env: dict[str, Value], told: Told) -> Sums:
     """Independent points: the means' variances add up, and the errors that integrands come with."""
     generator = np.random.default_rng(machine.settings.seed)
     run = _Run(plan, machine, env, 0)
-    found, count = [], machine.settings.samples
-    for dims, f in run.means():
-        moments, largest = Moments(), Largest()
+    found: list[Moments] = []
+    count, means = machine.settings.samples, list(run.means())
+    for dims, f in means:
+        moments, largest, done = Moments(), Largest(), 0
         for u in _random(generator, count if dims else 1, dims):
             samples = f(u)
             moments.add(samples)
             largest.add(samples)
+            done += len(u)
+            told((len(found) + (done / count if dims else 1)) / len(means))
         found.append(moments)
         run.largest.append(largest)
     mean, variance = added([m.mean for m in found]), added([m.variance for m in found])
@@ -91,7 +101,7 @@ def _random(generator: np.random.Generator, count: int, dims: int) -> Iterator[A
         yield generator.random((min(CHUNK, count - start), dims))
 
 
-def _quasi(plan: Plan, machine: Any, env: dict[str, Value], method: str) -> Sums:
+def _quasi(plan: Plan, machine: Any, env: dict[str, Value], method: str, told: Told) -> Sums:
     """Scrambled Sobol points, twice as many until there are as many as asked for, or enough of them."""
     settings = machine.settings
     run = _Run(plan, machine, env, min(EXACT, len(plan.levels) - 1))
@@ -102,15 +112,18 @@ def _quasi(plan: Plan, machine: Any, env: dict[str, Value], method: str) -> Sums
     run.largest = [Largest() for _ in means]
     done, size = 0, min(FIRST, count)
     while done < count:
-        for sequence, (dims, f), largest in zip(points, means, run.largest, strict=True):
+        for number, (sequence, (dims, f), largest) in enumerate(zip(points, means, run.largest, strict=True)):
             if dims:
                 seen: list[tuple[Array, Sums]] = []
+                now = 0
                 for u in sequence.blocks(done, size, CHUNK // REPLICATES):
                     samples = f(u.reshape(-1, dims))
                     found.add(samples)
                     largest.add(samples)
                     if dims == 1:
                         seen.append((u[:, :, 0], samples))
+                    now += u.shape[1]
+                    told((done + (number * (size - done) + now) / len(means)) / count)
                 found.look_for_steps(seen)
             elif not done:
                 found.fix(f(np.zeros((1, 0))))

@@ -8,7 +8,7 @@ else. Calls, lazy sides, sums and integrals of generated code come here.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -31,35 +31,17 @@ from potto.core.terms import (
 )  # fmt: skip
 from potto.core.terms import Delta as DeltaTerm
 from potto.diagnostics import PottoError
-from potto.integrate import costs
 from potto.integrate.costs import Costs
 from potto.integrate.pieces import Sided, still
 from potto.kernels import errors
 from potto.kernels.cells import Array, Cell, Number, Pattern, Trace, Value, pad, pattern
 from potto.kernels.compile import Kernel, counts, kernel
+from potto.runtime.books import Books
 from potto.runtime.functions import Closure, Derivative, Paired
 from potto.settings import Settings
 
 DEEPEST_CALLS = 3000
 MOST_TERMS = 10_000_000
-
-
-@dataclass
-class Books:
-    """What one evaluation has done so far. used: answers of before that it is made of."""
-
-    evaluations: int = 0
-    depth: int = 0
-    unfinished: list[str] = field(default_factory=list)
-    edges: list[tuple[Sided, Array, Array]] = field(default_factory=list)
-    sided: dict[Sided, None] = field(default_factory=dict)
-    methods: set[str] = field(default_factory=set)
-    degenerate: set[str] = field(default_factory=set)
-    second: bool = False
-    members: int = 1
-    integrals: int = 0
-    used: dict[tuple[str, str], Value] = field(default_factory=dict)
-    costs: Costs | None = field(default_factory=costs.books)
 
 
 class Linker:
@@ -181,9 +163,14 @@ class Machine:
         return self.books.costs
 
     def count(self, evaluations: int) -> None:
-        self.books.evaluations += evaluations
-        if self.books.costs is not None:
-            self.books.costs.add(evaluations)
+        self.books.count(evaluations, self.settings.max_evals)
+
+    def sampled(self, share: float, limit: bool) -> None:
+        """So much of the sampling of an integral is done, with `limit` of the most that it may take; 0 begins it."""
+        gauge = self.books.gauge
+        if gauge is not None:
+            gauge.samplings += share == 0
+            gauge.sampled(share, limit)
 
     def exhausted(self) -> bool:
         return self.books.evaluations > self.settings.max_evals * self.books.members

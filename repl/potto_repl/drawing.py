@@ -1,7 +1,7 @@
 """Pictures in a terminal: braille for curves, half blocks for images, and real images where the terminal has them.
 
-Owns `braille`, `half_blocks`, `protocol` and `inline`. Which protocol a terminal speaks is told by its name; it is
-never asked, for the answer could come late and end up in the input.
+Owns `braille`, `half_blocks`, `shrunk`, `protocol` and `inline`. Which protocol a terminal speaks is told by its
+name; it is never asked, for the answer could come late and end up in the input.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import os
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Literal
 
 from potto_repl.pictures import Color, Curve, Image, Plot, line
@@ -18,6 +19,11 @@ _DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
 _RAMP = " .:-=+*#%@"
 _MARKS = "*+ox#"
 _ANSI = (34, 31, 32, 35, 33)
+
+
+def room_for_curves(columns: int) -> int:
+    """How wide curves are drawn on a screen of so many columns: beside them stand the numbers of the axis."""
+    return max(6, min(columns - 14, 72))
 
 
 def braille(plot: Plot, width: int = 60, height: int = 12, *, unicode: bool = True, color: bool = False) -> str:
@@ -39,7 +45,8 @@ def braille(plot: Plot, width: int = 60, height: int = 12, *, unicode: bool = Tr
     for r in range(height):
         drawn = "".join(_cell(cells[r][c], owners[r][c], unicode, color) for c in range(width))
         lines.append(f"{labels.get(r, ''):>{margin}} {bar}{drawn}".rstrip())
-    foot = f"{plot.lo:.4g}".ljust(width - len(f"{plot.hi:.4g}")) + f"{plot.hi:.4g}"
+    first, last = f"{plot.lo:.4g}", f"{plot.hi:.4g}"
+    foot = f"{first} {last:>{max(width - len(first) - 1, 0)}}"
     corner = "└" + "─" * width if unicode else "+" + "-" * width
     lines += [" " * (margin + 1) + corner, " " * (margin + 2) + foot]
     if len(plot.labels) > 1:
@@ -89,6 +96,17 @@ def half_blocks(image: Image, *, unicode: bool = True, color: bool = True) -> st
         )
         lines.append(cells + "\x1b[0m")
     return "\n".join(lines)
+
+
+def shrunk(image: Image, columns: int) -> Image:
+    """The image in at most so many columns: of the pixels that are too many, the ones in the middle of the others."""
+    width, height = image.size
+    if width <= columns:
+        return image
+    rows = max(1, round(height * columns / width))
+    across = [int((i + 0.5) * width / columns) for i in range(columns)]
+    down = [int((i + 0.5) * height / rows) for i in range(rows)]
+    return replace(image, pixels=tuple(tuple(image.pixels[y][x] for x in across) for y in down))
 
 
 def _pairs(rows: tuple[tuple[Color, ...], ...]) -> Iterator[tuple[tuple[Color, ...], tuple[Color, ...]]]:

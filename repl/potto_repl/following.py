@@ -30,9 +30,14 @@ def bring(session: Conversation, path: str) -> list[Part]:
         return refreshed(session)
     start = time.perf_counter()
     session.remember(f"`:load {path}`")
-    with session.db.recording() as events:
-        outcomes = session.load(os.path.expanduser(path))
-        total = _elaborated(session)
+    try:
+        with session.db.recording() as events:
+            outcomes = session.load(os.path.expanduser(path))
+            total = _elaborated(session)
+    except BaseException:  # interrupted: nothing was loaded that could be taken back
+        if session.loaded == list(session.undoing[-1].loaded):
+            session.undoing.pop()
+        raise
     parts = [diagnostic(o.located, session.source) for o in outcomes if isinstance(o, Said)]
     brought = [o for o in outcomes if isinstance(o, Imported)]
     if not brought:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from potto.render import COLORS, PLAIN, Palette
-from potto_repl.drawing import Protocol, braille, half_blocks, inline
+from potto_repl.drawing import Protocol, braille, half_blocks, inline, room_for_curves, shrunk
 from potto_repl.pictures import Image, Plot
 from potto_repl.reply import Part
 from potto_repl.symbols import ascii_only
@@ -18,13 +18,17 @@ DIM, OFF = "\x1b[2m", "\x1b[0m"
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What the screen can do. `answers`: whether an answer says under which name it stays at hand."""
+    """What the screen can do.
+
+    answers: whether an answer says under which name it stays at hand. breaks: whether prose is broken to its width.
+    """
 
     color: bool = False
     unicode: bool = True
     width: int = 80
     images: Protocol = "blocks"
     answers: bool = True
+    breaks: bool = False
 
     @property
     def palette(self) -> Palette:
@@ -33,7 +37,8 @@ class Look:
 
 def painted(part: Part, look: Look) -> str:
     """A part as it is written, without a final newline."""
-    text = _picture(part, look) if part.kind == "picture" else part.shown(look.palette)
+    columns = look.width if look.breaks else None
+    text = _picture(part, look) if part.kind == "picture" else part.shown(look.palette, columns)
     name = (part.data or {}).get("name")
     if not look.answers and name and text.startswith(f"{name} = "):
         text = text.removeprefix(f"{name} = ")
@@ -46,10 +51,12 @@ def _picture(part: Part, look: Look) -> str:
     data = part.data or {}
     picture = data.get("_picture")
     if isinstance(picture, Plot):
-        width = max(20, min(look.width - 14, 72))
-        shown = braille(picture, width, data.get("_height", 12), unicode=look.unicode, color=look.color)
+        width, height = room_for_curves(look.width), data.get("_height", 12)
+        shown = braille(picture, width, height, unicode=look.unicode, color=look.color)
         return f"{shown}\n{data['_scale']}" if data.get("_scale") else shown
     if isinstance(picture, Image):
+        if look.breaks and (not look.color or look.images == "blocks"):
+            picture = shrunk(picture, look.width)
         if not look.color:
             shown = half_blocks(picture, unicode=look.unicode, color=False)
         else:

@@ -11,10 +11,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
-from potto.render import Located, Palette, Sources, render, to_json
+from potto.render import Located, Palette, Sources, broken, render, to_json
 from potto.source import SourceText
 
 Kind = Literal["answer", "output", "note", "tail", "error", "help", "diagnostic", "picture"]
+_GOES_ON = re.compile(r"(?!\w+ : )[\w`(\"'\[$]")  # how a line begins that may belong to the paragraph above
 COMPLAINTS: frozenset[Kind] = frozenset(("error", "help", "diagnostic"))
 
 
@@ -24,7 +25,7 @@ class Part:
 
     answer: what was asked for. output: what a program printed. note: what is good to know. tail: what it cost; shown
     to people only. error, help: a command that could not be carried out, and what to do. diagnostic: about a program.
-    picture: an image, as pixels in `data`.
+    picture: an image, as pixels in `data`. `prose`: its lines may be broken where a screen is narrow.
     """
 
     kind: Kind
@@ -32,6 +33,7 @@ class Part:
     data: Mapping[str, Any] | None = None
     located: Located | None = None
     sources: Mapping[str, SourceText] = field(default_factory=dict)
+    prose: bool = False
 
     @property
     def is_error(self) -> bool:
@@ -48,14 +50,18 @@ class Part:
         """The part as text without colours."""
         return self.shown(Palette())
 
-    def shown(self, palette: Palette) -> str:
-        """The part as text, a diagnostic in the colours of a palette."""
+    def shown(self, palette: Palette, columns: int | None = None) -> str:
+        """The part as text, a diagnostic in the colours of a palette; prose in lines of so many columns."""
         if self.located is not None:
-            return render(self.located, self.sources.get, palette=palette)
+            return render(self.located, self.sources.get, palette=palette, columns=columns)
         if self.kind == "error":
-            return palette.paint(palette.error, "error") + palette.paint(palette.bold, f": {self.text}")
+            said = broken(f": {self.text}", columns, 2, len("error"))
+            return palette.paint(palette.error, "error") + palette.paint(palette.bold, said)
         if self.kind == "help":
-            return f"  = {palette.paint(palette.bold, 'help')}: {self.text}"
+            said = broken(f"  = help: {self.text}", columns, 4)
+            return said.replace("help", palette.paint(palette.bold, "help"), 1)
+        if self.prose or self.kind in ("note", "tail"):
+            return self.text if columns is None else _broken_lines(self.text, columns)
         return self.text
 
     def json(self) -> dict[str, Any] | None:
@@ -97,6 +103,22 @@ class Refusal(Exception):
     def parts(self) -> tuple[Part, ...]:
         said = (Part("error", self.message),)
         return (*said, Part("help", self.help)) if self.help else said
+
+
+def _broken_lines(text: str, columns: int) -> str:
+    """Lines of prose, broken with their own indentation; a line that must be broken takes the next one of its
+    paragraph along. Code stays whole: what stands four blanks in, or between fences."""
+    lines: list[str] = []
+    code = False
+    for line in text.split("\n"):
+        fence = line.startswith("```")
+        code ^= fence
+        if not (code or fence) and lines and len(lines[-1]) >= columns and _GOES_ON.match(line):
+            lines[-1] += f" {line}"
+        else:
+            lines.append(line)
+    return "\n".join(broken(line, columns, indent) if (indent := len(line) - len(line.lstrip())) < 4 else line
+                     for line in lines)  # fmt: skip
 
 
 def answer(text: str, **data: Any) -> Part:

@@ -6,7 +6,8 @@ axes. A derivative counts with its tangent. Where the program has no value, a pi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -27,6 +28,8 @@ from potto_repl.reply import Refusal
 from potto_repl.session import Conversation
 
 Pair = tuple[float, float]  # a value and its error
+TRIAL = 4  # points of a curve that say how long the others will take, where somebody watches
+MOMENT = 0.2  # seconds between two looks at how far it is
 BANDS = 16  # of an image, one after the other, where somebody watches
 RTOL = 1e-5  # of a picture: finer than any pixel
 
@@ -109,12 +112,27 @@ def curves(session: Conversation, axes: Axes, lo: float, hi: float) -> list[Curv
 
     def evaluate(places: Sequence[float]) -> list[Point]:
         nonlocal asked
-        asked += len(places)
-        if session.progress is not None:
-            session.progress(f"{axes.label}: {asked} points")
-        return list(zip(*_sampled(session, axes, [_array(places)]), strict=True))
+        before, asked = asked, asked + len(places)
+        found: list[Point] = []
+        for start, stop in _portions(len(places), session.progress is not None):
+            if session.progress is not None:
+                done = before + start
+                session.progress(f"{axes.label}: {done} of {asked} points", done / asked, open=True)
+            found += zip(*_sampled(session, axes, [_array(places[start:stop])]), strict=True)
+        return found
 
     return followed(evaluate, lo, hi)
+
+
+def _portions(count: int, watched: bool) -> Iterator[tuple[int, int]]:
+    """Where to break off: a few points first where somebody watches, then as many as take a moment."""
+    start, size = 0, TRIAL if watched else count
+    while start < count:
+        begun = time.perf_counter()
+        stop = min(start + size, count)
+        yield start, stop
+        spent, start = time.perf_counter() - begun, stop
+        size = max(TRIAL, int(size * MOMENT / max(spent, MOMENT / count)))
 
 
 def grid(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 
 from potto_repl.editing import is_over
@@ -45,7 +46,7 @@ class Simple:
         from potto_repl.respond import stream
         from potto_repl.symbols import readable
 
-        look = Look(unicode=self.unicode)
+        look = Look(unicode=self.unicode, width=shutil.get_terminal_size().columns, breaks=True)
         try:
             for part in stream(self.loader.session, readable(text)):
                 say(painted(part, look))

@@ -70,7 +70,7 @@ class Terminal:
         self.unicode = unicode
         self.vi = vi
         self.suggests = True
-        self.progress = Progress(sys.stdout)
+        self.progress = Progress(sys.stdout, self.columns, dim=color)
         self.checker = Checker(loader, self._checked)
         self.lexers = (PottoLexer(loader, self.checker.wrong), PottoLexer(loader, self.checker.wrong))
         self.prompt_session: PromptSession[str] = PromptSession(
@@ -133,12 +133,14 @@ class Terminal:
         self.checker.stop()
         try:
             with self.progress:
+                from potto.runtime.books import Gauge, watching
                 from potto_repl.respond import stream
                 from potto_repl.symbols import readable
 
                 self._attach()
-                for part in stream(self.loader.session, readable(text)):
-                    self.show(part)
+                with watching(Gauge()) as self.progress.gauge:
+                    for part in stream(self.loader.session, readable(text)):
+                        self.show(part)
         except KeyboardInterrupt:
             self.say("interrupted; everything that was defined is still there")
 
@@ -150,13 +152,11 @@ class Terminal:
         if part.kind == "tail" and not session.options.details:
             return
         color = self.color and session.options.theme != "none"
-        look = Look(color, self.unicode and session.options.unicode, self.columns(), protocol())
+        look = Look(color, self.unicode and session.options.unicode, self.columns(), protocol(), breaks=True)
         self.say(painted(part, look))
 
     def say(self, text: str) -> None:
-        self.progress.clear()
-        sys.stdout.write(text + "\n")
-        sys.stdout.flush()
+        self.progress.say(text + "\n")
 
     # What the session needs of the terminal
 

@@ -237,6 +237,16 @@ def test_a_condition_on_an_integral_says_why_and_what_to_write_instead() -> None
     assert not check("def f(t) integral [0, 1] [clamp(x*t, 0, 1) > 0.1] d(x)")
 
 
+def test_an_integral_in_a_condition_may_not_jump_with_another_variable() -> None:
+    # solved for u it is u = t/g(v), but g's own surface moves with v
+    program = """
+        def g(x) integral [0, 1] [u < x]*u d(u)
+        def f(t) integral ([0, 1], [0, 1]) [u*g(v) < t] d(v, u)
+    """
+    (said,) = check(program)
+    assert said.code == "P0402" and "a surface inside an integral moves with" in said.notes[0]
+
+
 @pytest.mark.parametrize(
     ("inverse", "right"),
     [

@@ -6,15 +6,13 @@ import json
 import os
 import subprocess
 import sys
-import time
 
 import pexpect
-import pyte
 import pytest
+from screens import Screen
 
 JUMP = "def f(t)\n    integral [0, 1] [x < t] d(x)\n"
 POTTO = [sys.executable, "-m", "potto", "repl"]
-AT_ONCE = 0.2  # seconds; what an interrupt may take
 
 
 def run(folder, text="", *arguments, **environment):
@@ -88,50 +86,6 @@ def test_the_first_prompt_imports_no_numbers():
 # A terminal
 
 
-class Screen:
-    """A prompt on a terminal of its own, and what one sees there."""
-
-    def __init__(self, folder, *arguments, columns=80, **environment):
-        self.terminal = pyte.Screen(columns, 40)
-        self.stream = pyte.Stream(self.terminal)
-        self.process = pexpect.spawn(
-            sys.executable, ["-m", "potto", "repl", *arguments], cwd=str(folder), encoding="utf-8",
-            dimensions=(40, columns), timeout=20,
-            env={**os.environ, "TERM": "xterm", "PROMPT_TOOLKIT_NO_CPR": "1", "POTTO_HISTORY": str(folder / "history"),
-                 **environment},
-        )  # fmt: skip
-        self.process.logfile_read = self
-        self.process.expect("po>")
-
-    def write(self, text):
-        self.stream.feed(text)
-
-    def flush(self):
-        pass
-
-    def say(self, line, want):
-        self.process.sendline(line)
-        self.process.expect(want)
-        self.process.expect(r"po>")
-
-    def settle(self, holds):
-        """Read on until the screen is as it should be: a prompt is redrawn in several writes."""
-        until = time.monotonic() + 20
-        while not holds(self.text):
-            assert time.monotonic() < until, self.text
-            self.process.expect([pexpect.TIMEOUT, r".+"], timeout=0.1)
-
-    @property
-    def text(self):
-        return "\n".join(line.rstrip() for line in self.terminal.display).rstrip()
-
-    def leave(self):
-        self.process.sendeof()
-        self.process.expect(pexpect.EOF)
-        self.process.close()
-        return self.process.exitstatus
-
-
 def test_a_talk_on_a_screen(tmp_path):
     screen = Screen(tmp_path)
     screen.say("6*7", r"_1 = 42")
@@ -143,31 +97,6 @@ def test_a_talk_on_a_screen(tmp_path):
     assert "2 po> def f(t)\n  ...     integral [0, 1] [x < t] d(x)" in screen.text
     assert screen.leave() == 0
     assert "+def f(t)\n+    integral" in (tmp_path / "history").read_text()
-
-
-def test_an_interrupt_ends_the_evaluation_and_nothing_else(tmp_path):
-    screen = Screen(tmp_path)
-    screen.say("def f(t) 2*t", "f : ")
-    screen.say(":set samples 1000000000", "samples")
-    screen.say(":set max_evals 1000000000", "max_evals")
-    rough = "integral ([0,1],[0,1]) sin(300*u*v*x)*[sin(20*u)*y+v*v>0.3] d(u,v)"
-    slow = [
-        "integral ([0,1],[0,1],[0,1]) sin(1000*x*y*z)*[sin(20*x)+y*y>z] d(x,y,z)",
-        "sum i in 1..9000000 (sum j in 1..50 (sin(i*j)))",
-        f":image {rough} 128",
-        "integral ([0,1],[0,1],[0,1]) sin(x*y*z) d(x,y,z)",  # by samples
-    ]
-    for line in slow:
-        screen.say(f":method {'mc' if line is slow[-1] else 'auto'}", "method")
-        screen.process.sendline(line)
-        screen.process.expect(r"Ctrl-C stops")
-        start = time.perf_counter()
-        screen.process.sendintr()
-        screen.process.expect("interrupted")
-        screen.process.expect("po>")
-        assert time.perf_counter() - start < AT_ONCE + 0.05 + 0.3  # pexpect waits 50 ms; a loaded machine a little more
-    screen.say("f(4)", r"= 8 ")
-    assert screen.leave() == 0
 
 
 def test_ctrl_c_drops_a_half_typed_block(tmp_path):

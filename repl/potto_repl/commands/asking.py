@@ -111,7 +111,7 @@ def show_doc(session: Conversation, text: str) -> Part:
         return show_module(session, target.file)
     if found is None:
         raise _unknown(session, name)
-    return answer(found, name=name, doc=found)
+    return Part("answer", found, {"name": name, "doc": found}, prose=True)
 
 
 def _target(session: Conversation, name: str) -> DefinitionTarget | ModuleTarget | None:
@@ -191,4 +191,4 @@ def explain(session: Conversation, text: str) -> Part:
     if page is None:
         near = difflib.get_close_matches(code, pages.codes(), 1)
         raise Refusal(f"there is no diagnostic {code}", f"did you mean `{near[0]}`?" if near else "")
-    return answer(page.text.rstrip(), code=code, title=page.title)
+    return Part("answer", page.text.rstrip(), {"code": code, "title": page.title}, prose=True)

@@ -6,7 +6,7 @@ import math
 import re
 
 from potto.runtime.printing import format_error
-from potto_repl.drawing import braille, half_blocks
+from potto_repl.drawing import braille, half_blocks, room_for_curves
 from potto_repl.expressions import split_items
 from potto_repl.pictures import Curve, Plot, image_of
 from potto_repl.registry import command
@@ -43,7 +43,7 @@ def plot(session: Conversation, text: str) -> Part:
             drawn.append(part)
     picture = Plot(tuple(labels), tuple(drawn), lo, hi, axis)
     session.last_picture = picture
-    width = max(20, min(session.width() - 14, 72))
+    width = room_for_curves(session.width())
     low, high = picture.span
     jumps = [{"of": label, "at": x, "before": a, "after": b}
              for label, curve in zip(labels, drawn, strict=True) for x, a, b in curve.jumps]  # fmt: skip

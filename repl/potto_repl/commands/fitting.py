@@ -9,20 +9,21 @@ import math
 import re
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 
 from potto.api import Function
-from potto.fitting import Step
+from potto.fitting import Fit, Step
 from potto.fitting import fit as fitted
 from potto.runtime.printing import format_number
 from potto.settings import settings
-from potto_repl.drawing import braille
+from potto_repl.drawing import braille, room_for_curves
 from potto_repl.expressions import checked, split_items
 from potto_repl.pictures import Curve, Plot
 from potto_repl.registry import command
 from potto_repl.reply import Part, Refusal
 from potto_repl.sampled import free_names
 from potto_repl.session import Conversation, plain_names
-from potto_repl.values import seconds
+from potto_repl.values import largest, seconds, with_error
 
 ROUNDING = 1e-16  # of the largest value: what lies below says nothing
 FEWEST = 3  # steps that are worth a picture
@@ -37,22 +38,28 @@ def fit(session: Conversation, text: str) -> Iterator[Part]:
     Parameters after `with` keep what they are given: `:fit loss c=-0.5 with shader=lin_shader`.
     """
     name, start, fixed = _read(plain_names(text))
-    free = [n for n in free_names(session, name) if n in start or n in fixed]
+    free = free_names(session, name)
+    for n in free:
+        if n not in start and n not in fixed:
+            raise Refusal(f"`{n}` has no value", f"let it start somewhere, `{n}=1`, or stay as it is, `with {n}=1`")
     asked = checked(session, f"\\({', '.join(free)}) . ({name})" if free else name, ":fit loss t=0.5")
     function = Function(session.world, session.file, asked.expr, asked.type)
     given = {n: _fixed(session, value) for n, value in fixed.items()}
     begun = time.perf_counter()
+    if session.progress is not None:
+        session.progress(f"fitting {name}")
     values = {n: float(session.evaluate(v, session.settings).estimate.value) for n, v in start.items()}
 
     def told(step: Step) -> None:
         if session.progress is not None and time.perf_counter() - begun > PATIENCE:
             session.progress(f"step {step.number}, value {step.value:.6g}, slope {step.slope:.1e}")
 
-    with settings(method=session.settings.method, rtol=session.settings.rtol):
+    with settings(**asdict(session.settings)):
         found = fitted(function, values, given=given, progress=told)
-    error = max(found.slope * 1e-3, 1e-12)
-    best = [f"{n} = {format_number(v, max(error, 1e-9 * abs(v)))}" for n, v in found.parameters.items()]
-    said = [f"{name} = {found.value:.10g} at {', '.join(best)}"]
+        least = function(**found.parameters, **given)
+    doubts = _doubts(found, largest(least.error))
+    best = [f"{n} = {format_number(v, doubts[n])}" for n, v in found.parameters.items()]
+    said = [f"{name} = {with_error(least.value, least.error)} at {', '.join(best)}"]
     said.append(f"  slope {found.slope:.1e}{'' if found.converged else ': ' + found.reason}")
     data = {"fit": name, "value": found.value, "parameters": found.parameters, "slope": found.slope,
             "steps": len(found.steps) - 1, "converged": found.converged}  # fmt: skip
@@ -61,6 +68,21 @@ def fit(session: Conversation, text: str) -> Iterator[Part]:
     if count >= FEWEST:
         yield _course(session, name, [step.value for step in found.steps])
     yield Part("tail", f"{count} steps, {found.evaluations} evaluations, {seconds(time.perf_counter() - begun)}")
+
+
+def _doubts(found: Fit, error: float) -> dict[str, float]:
+    """How far each parameter may be off the minimum; digits beyond that are not shown.
+
+    A slope that is left says so, and so does an error of the value: on a parabola through the last step at which the
+    value was larger by more than its error, this is how far away the value rises by its error.
+    """
+    step = next((step for step in reversed(found.steps) if step.value - found.value > error), None)
+    share = 0.0 if step is None else math.sqrt(error / (step.value - found.value))
+    away = dict.fromkeys(found.parameters, 0.0)
+    if step is not None:
+        away = {n: abs(v - p) for (n, v), p in zip(found.parameters.items(), step.parameters, strict=True)}
+    return {n: max(1e-9 * abs(v), min(1e-3 * found.slope, 1e-3 * abs(v)), 1e-12, share * away[n])
+            for n, v in found.parameters.items()}  # fmt: skip
 
 
 def _course(session: Conversation, name: str, values: Sequence[float]) -> Part:
@@ -72,8 +94,7 @@ def _course(session: Conversation, name: str, values: Sequence[float]) -> Part:
     picture = Plot((label,), (Curve.even(heights, 0, len(values) - 1),), 0, len(values) - 1, "step")
     session.last_picture = picture
     said = f"{label} from step to step"
-    width = max(20, min(session.width() - 14, 72))
-    shown = braille(picture, width, HEIGHT, unicode=session.options.unicode)
+    shown = braille(picture, room_for_curves(session.width()), HEIGHT, unicode=session.options.unicode)
     data = {"course": list(values), "_picture": picture, "_scale": said, "_height": HEIGHT}
     return Part("picture", f"{shown}\n{said}", data)
 
