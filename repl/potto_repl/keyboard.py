@@ -1,14 +1,21 @@
 """The keyboard between two prompts: keys are kept for the next one, and not echoed into the answer.
 
-Owns `quiet_keys` and `loud_keys`. Ctrl-C stays an interrupt throughout. Without a terminal both do nothing.
+Owns `quiet_keys`, `loud_keys` and `kept_interrupts`. Ctrl-C stays an interrupt throughout. Without a terminal the first
+two do nothing.
 """
 
 from __future__ import annotations
 
+import _thread
+import signal
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from types import FrameType
 from typing import Any
+
+MOMENT = 0.01  # seconds until an interrupt that could not be raised comes again
 
 _before: list[Any] = []
 
@@ -46,6 +53,45 @@ def loud_keys() -> Iterator[None]:
         yield
     finally:
         _set(here)
+
+
+@contextmanager
+def kept_interrupts() -> Iterator[None]:
+    """Let no Ctrl-C get lost or do harm: where nothing can be raised, or a module is half imported, it comes again."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    hook, handler = sys.unraisablehook, signal.getsignal(signal.SIGINT)
+
+    def lost(what: sys.UnraisableHookArgs) -> None:
+        if isinstance(what.exc_value, KeyboardInterrupt):
+            _again()
+        else:
+            hook(what)
+
+    sys.unraisablehook = lost
+    signal.signal(signal.SIGINT, _interrupted)
+    try:
+        yield
+    finally:
+        sys.unraisablehook = hook
+        signal.signal(signal.SIGINT, handler)
+
+
+def _interrupted(_number: int, frame: FrameType | None) -> None:
+    while frame is not None:
+        if frame.f_code.co_filename.startswith("<frozen importlib"):
+            _again()
+            return
+        frame = frame.f_back
+    raise KeyboardInterrupt
+
+
+def _again() -> None:
+    """Interrupt once more, in a moment."""
+    timer = threading.Timer(MOMENT, _thread.interrupt_main)
+    timer.daemon = True
+    timer.start()
 
 
 def _attributes() -> Any:

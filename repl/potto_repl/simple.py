@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import shutil
-import sys
 
 from potto_repl.editing import is_over
+from potto_repl.keyboard import kept_interrupts
 from potto_repl.start import Loader, greeting, say
 
 
@@ -17,6 +17,10 @@ class Simple:
         self.unicode = unicode
 
     def run(self, file: str | None) -> int:
+        with kept_interrupts():
+            return self._run(file)
+
+    def _run(self, file: str | None) -> int:
         say(greeting())
         self.loader.start()
         if file is not None:
@@ -42,13 +46,14 @@ class Simple:
         return text
 
     def answer(self, text: str) -> None:
-        from potto_repl.paint import Look, painted
-        from potto_repl.respond import stream
-        from potto_repl.symbols import readable
-
-        look = Look(unicode=self.unicode, width=shutil.get_terminal_size().columns, breaks=True)
         try:
-            for part in stream(self.loader.session, readable(text)):
+            session = self.loader.session  # waited for, so that only one thread imports what it needs
+            from potto_repl.paint import Look, painted
+            from potto_repl.respond import stream
+            from potto_repl.symbols import readable
+
+            look = Look(unicode=self.unicode, width=shutil.get_terminal_size().columns, breaks=True)
+            for part in stream(session, readable(text)):
                 say(painted(part, look))
         except KeyboardInterrupt:
-            sys.stdout.write("interrupted\n")
+            say("interrupted; everything that was defined is still there")

@@ -56,6 +56,7 @@ class Loader:
 
     def _load(self) -> None:
         try:
+            from potto_repl import respond  # noqa: F401  (all that answers: no other thread may import it meanwhile)
             from potto_repl.options import Options
             from potto_repl.session import Conversation
 

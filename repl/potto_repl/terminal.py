@@ -28,7 +28,7 @@ from prompt_toolkit.styles import DynamicStyle
 
 from potto_repl.beside import Checker, Progress
 from potto_repl.highlight import PottoCompleter, PottoLexer, style
-from potto_repl.keyboard import loud_keys, quiet_keys
+from potto_repl.keyboard import kept_interrupts, loud_keys, quiet_keys
 from potto_repl.keys import bindings
 from potto_repl.start import Loader, greeting
 
@@ -101,7 +101,7 @@ class Terminal:
 
     def run(self, file: str | None = None) -> int:
         """Talk until the person leaves; the exit status."""
-        with quiet_keys():
+        with quiet_keys(), kept_interrupts():
             return self._run(file)
 
     def _run(self, file: str | None) -> int:
@@ -133,11 +133,11 @@ class Terminal:
         self.checker.stop()
         try:
             with self.progress:
+                self._attach()
                 from potto.runtime.books import Gauge, watching
                 from potto_repl.respond import stream
                 from potto_repl.symbols import readable
 
-                self._attach()
                 with watching(Gauge()) as self.progress.gauge:
                     for part in stream(self.loader.session, readable(text)):
                         self.show(part)

@@ -81,6 +81,8 @@ def test_samples_are_interrupted_and_settings_kept(screen):
 
 
 def test_a_file_whose_loading_was_interrupted_is_loaded_the_next_time(tmp_path, talk):
+    from potto_repl.keyboard import kept_interrupts
+
     path = talk.write("large.po", large(60))
     talk("kept = 5")
     interrupted = 0
@@ -88,7 +90,8 @@ def test_a_file_whose_loading_was_interrupted_is_loaded_the_next_time(tmp_path, 
         old = signal.signal(signal.SIGALRM, _interrupt)
         signal.setitimer(signal.ITIMER_REAL, delay)
         try:
-            respond(talk.session, f":load {path}")
+            with kept_interrupts():
+                respond(talk.session, f":load {path}")
         except KeyboardInterrupt:
             interrupted += 1
             assert len(talk.session.undoing) == 1 + len(talk.session.loaded) and talk.data("kept")["value"] == 5
@@ -103,6 +106,18 @@ def test_a_file_whose_loading_was_interrupted_is_loaded_the_next_time(tmp_path, 
 
 def _interrupt(*_):
     raise KeyboardInterrupt
+
+
+def test_an_interrupt_where_nothing_can_be_raised_comes_again():
+    from potto_repl.keyboard import kept_interrupts
+
+    class Tidy:
+        def __del__(self):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt), kept_interrupts():
+        Tidy()
+        time.sleep(5)
 
 
 # The line that is shown meanwhile
