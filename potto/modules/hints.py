@@ -6,9 +6,66 @@ import difflib
 import os.path
 from collections.abc import Iterable
 
+from potto.modules.builtins import is_builtin
 from potto.modules.lookup import SUFFIXES, folders
 from potto.modules.workspace import definers, module_name
 from potto.query import Database
+
+_ELSEWHERE = {
+    "ln": "the natural logarithm is `log`",
+    "log2": "write `log(x)/log(2)`",
+    "log10": "write `log(x)/log(10)`",
+    "arcsin": "write `asin`",
+    "arccos": "write `acos`",
+    "arctan": "write `atan`",
+    "arctan2": "write `atan2`",
+    "fabs": "write `abs`",
+    "power": "write `x^y`",
+    "sgn": "write `sign`; what varies with a variable of integration jumps in brackets, `2*[x > 0] - 1`",
+    "heaviside": "write the jump in brackets: `[x > 0]`",
+    "Heaviside": "write the jump in brackets: `[x > 0]`",
+    "mod": "Potto has no remainder; `x - floor(x/n)*n` is one",
+    "π": "write `pi`",
+    "Pi": "write `pi`",
+    "PI": "write `pi`",
+    "∞": "write `inf`",
+    "infinity": "write `inf`",
+    "True": "a comparison in brackets is 1 or 0; write `1`",
+    "true": "a comparison in brackets is 1 or 0; write `1`",
+    "False": "a comparison in brackets is 1 or 0; write `0`",
+    "false": "a comparison in brackets is 1 or 0; write `0`",
+    "None": "every expression has a value; leave it out",
+    "null": "every expression has a value; leave it out",
+    "len": "a list has no length here; `for v in list: …` goes through it",
+    "range": "write the list, `[1, 2, 3]`; `sum i in 1..n (…)` adds over a range",
+    "integrate": "write `integral [lo, hi] body d(x)`",
+    "quad": "write `integral [lo, hi] body d(x)`",
+    "grad": "write `deriv(f)((x, 1))`: the value and the derivative",
+    "diff": "write `deriv(f)((x, 1))`: the value and the derivative",
+    "derivative": "write `deriv(f)((x, 1))`: the value and the derivative",
+    "dirac": "write `delta`",
+    "return": "the last line of a definition is its result, without `return`",
+    "lambda": "a function without a name is written `\\x . e`",
+    "elif": "write `else if`",
+}
+"""What is called otherwise in other languages, and how it is written here."""
+
+_LIBRARIES = frozenset({"math", "cmath", "numpy", "np", "scipy", "sympy", "jax", "jnp", "torch", "random", "maths"})
+
+
+def known_elsewhere(name: str) -> str:
+    """How to write what another language calls `name`; nothing if it is not known."""
+    return _ELSEWHERE.get(name, "")
+
+
+def library_hint(module: str, names: Iterable[str] = ()) -> str:
+    """What is said of a module that is one of Python, or is only asked for builtins."""
+    builtins = [name for name in names if is_builtin(name)]
+    if builtins:
+        return f"`{builtins[0]}` is a builtin: it needs no import"
+    if module.partition(".")[0] in _LIBRARIES:
+        return "modules of Python can't be imported; builtins such as `sqrt` and `pi` need no import"
+    return ""
 
 
 def near_names(name: str, candidates: Iterable[str], count: int = 2) -> tuple[str, ...]:

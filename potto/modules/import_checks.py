@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from potto.diagnostics import Diagnostic, Kind
 from potto.modules.builtins import is_builtin
 from potto.modules.graph import import_cycle
-from potto.modules.hints import did_you_mean, elsewhere, looked_in, near_modules, near_names
+from potto.modules.hints import did_you_mean, elsewhere, library_hint, looked_in, near_modules, near_names
 from potto.modules.kinds import (
     CIRCULAR,
     HIDES_BUILTIN,
@@ -97,12 +97,13 @@ def _names_modules(db: Database, file: str, item: Importing) -> bool:
 
 def _no_module(db: Database, file: str, item: Importing) -> Diagnostic:
     near = near_modules(db, file, item.module)
+    wanted = [imported.name for imported in written_names(item)] if isinstance(item, nodes.FromImport) else []
     return NO_MODULE(
         item.module_span,
         f"there is no module `{item.module}`",
         label="not found",
         notes=looked_in(db, file, item.module),
-        help=did_you_mean(near),
+        help=did_you_mean(near) or library_hint(item.module, wanted),
     )
 
 

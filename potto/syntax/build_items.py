@@ -131,7 +131,7 @@ def equation(context: Context, v: Values) -> Item:
         return Definition(span, left.id, left.span, (), None, (), body, False)
     function, groups = _called(left)
     if isinstance(function, Name) and groups is not None:
-        shown = context.text[left.span.start : left.span.end]
+        shown = function.id + "".join(f"({', '.join(p.name for p in group)})" for group in groups)
         context.report(
             kinds.DEFINITION_HEAD(
                 left.span, "a function with parameters is defined with `def`", help=f"write `def {shown} …`"

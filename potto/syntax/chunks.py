@@ -1,9 +1,10 @@
 """A file cut into chunks: one for each top-level definition or statement.
 
-Owns `Chunk` and `split`. A chunk starts at each line with code in its first column, whatever brackets are open: so that
-a stray bracket can't swallow the next definition. Two things go with the chunk above or below: a line that starts with
-a closing bracket, which can start nothing, belongs to the chunk above it; comment lines directly above a definition
-belong to the definition. Other comments in the first column are chunks of their own, unless an indented line follows.
+Owns `Chunk` and `split`. A chunk starts at each line with code in its first column, also while a bracket is open that
+nothing closes before the next definition: so that a stray bracket can't swallow it. Some things go with the chunk above
+or below: a line that starts with a closing bracket, which can start nothing, and the lines within brackets that are
+closed belong to the chunk above them; comment lines directly above a definition belong to the definition. Other
+comments in the first column are chunks of their own, unless an indented line follows.
 """
 
 from __future__ import annotations
@@ -11,12 +12,17 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from potto.syntax.tokens import normalized
+from potto.syntax.tokens import FIRST_NAME, normalized
 
 _LINE = re.compile(r"\n(?:#.*\n)*\f*([^\s])")
 """A line with code or a comment in its first column, and the comment lines directly above it. It begins with the end of
 the line before, so that blank and indented lines are passed over as fast as memory is read."""
+_BRACKETS = re.compile(r"""[(\[]|[)\]]|"[^"\n]*"?|\#[^\n]*|\n""")
+_ITEM = re.compile(rf"(?:def|diffeo|from|import|for|print)\b|{FIRST_NAME.pattern}[ \t]*=(?!=)")
+"""The start of a line in the first column that is no part of an expression."""
 _INDENTED = re.compile(r"\n[^\S\n]+[^\s]")
+
+MOST_WASTED = 200_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +47,7 @@ def _starts(text: str) -> list[int]:
         text = "\n" + text[1:]
     text = "\n" + normalized(text)  # a line starts in `text` where in this one the line before ends
     end = 0  # of the last comment
+    lookahead, closed = _Lookahead(text), 0  # up to where the brackets that were open above a line go
     for found in _LINE.finditer(text):
         start, first = found.start(), found[1]
         if comments or not starts:
@@ -50,8 +57,10 @@ def _starts(text: str) -> list[int]:
         if first == "#":
             end = text.find("\n", found.end())
             end = len(text) if end < 0 else end
-        elif starts and first in ")]":
+        elif starts and (first in ")]" or found.end() < closed):
             comments = []
+        elif starts and (close := lookahead.closes(starts[-1], found.start(1))):
+            comments, closed = [], close
         else:
             starts += comments
             comments = []
@@ -66,3 +75,32 @@ def _passed(text: str, end: int, start: int, starts: list[int], comments: list[i
     if not starts:  # there is no chunk yet that it could go on with
         starts += comments if comments and indented.start() == end else [*comments, indented.start()]
     return []
+
+
+class _Lookahead:
+    """Finds where open brackets are closed. What it reads in vain is bounded, so that a file of nothing but opening
+    brackets costs no more than its length."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self.wasted = 0
+
+    def closes(self, start: int, line: int) -> int:
+        """Where the brackets end that a chunk has left open above a line; 0 if none is, or an item starts before."""
+        text = self.text
+        opened = text.count("(", start, line) + text.count("[", start, line)
+        if opened <= text.count(")", start, line) + text.count("]", start, line) or self.wasted > MOST_WASTED:
+            return 0
+        depth, at = 0, line
+        for found in _BRACKETS.finditer(text, start):
+            char, at = found.group(), found.end()
+            if char in ("(", "["):
+                depth += 1
+            elif char in (")", "]"):
+                depth -= 1
+                if depth <= 0 and at > line:
+                    return at
+            elif char == "\n" and at >= line and (depth <= 0 or _ITEM.match(text, at)):
+                break
+        self.wasted += at - start
+        return 0

@@ -17,7 +17,16 @@ from potto.syntax.head import BlockTracker
 from potto.syntax.nesting import Nesting
 from potto.syntax.sums import mark_bodies
 from potto.syntax.tokens import FIRST_NAME, KEYWORDS, MASTER, NUMBER_PREFIX, OPERATORS, Comment, Token, normalized
-from potto.syntax.unknown import foreign_operator, no_return, string_literal, unknown_character
+from potto.syntax.unknown import (
+    bad_number,
+    foreign_arithmetic,
+    foreign_comment,
+    foreign_operator,
+    no_return,
+    reserved_word,
+    string_literal,
+    unknown_character,
+)
 
 MAX_LENGTH = 250_000
 _new = tuple.__new__  # a token without the detour over NamedTuple's own `__new__`, which costs as much again
@@ -97,7 +106,10 @@ class _Lexer:
             word = word.partition(".")[0]
             end = start + len(word)
         kind = KEYWORDS.get(word)
-        if kind is None:
+        if kind is not None and len(tokens) == 1 and tokens[0].kind == "DEF":
+            nesting.report(reserved_word(word, Span(start, end)))
+            kind = "NAME"
+        elif kind is None:
             kind = "MEMBER" if "." in word else "NAME"
             if word == "return" and self._returns(end):
                 nesting.report(no_return(Span(start, end)))
@@ -175,6 +187,10 @@ class _Lexer:
         elif kind == "STRING":
             self.nesting.report(string_literal(word, Span(start, end)))
             self._add("NAME", "", start, end)
+        elif kind == "FOREIGN":
+            plain, said = foreign_arithmetic(word, Span(start, end))
+            self.nesting.report(said)
+            self._add("BINOP", plain, start, end)
         else:
             end, diagnostic = unknown_character(self.text, start)
             if diagnostic is not None:
@@ -185,10 +201,7 @@ class _Lexer:
         prefix = NUMBER_PREFIX.match(word)
         assert prefix is not None, "a bad number starts with a digit"
         good = prefix.group()
-        tail = word[len(good) :]
-        help = f"to multiply, write `{good}*{tail}`" if FIRST_NAME.fullmatch(tail) else "write `2`, `0.5` or `1e-3`"
-        shown = word if len(word) <= 40 else word[:39] + "…"
-        self.nesting.report(kinds.BAD_NUMBER(Span(start, end), f"`{shown}` is not a number", help=help))
+        self.nesting.report(bad_number(word, good, Span(start, end)))
         self._add("NUMBER", good, start, end)
 
     # Lines
@@ -201,10 +214,13 @@ class _Lexer:
             assert found is not None, "the pattern matches an empty line"
             blanks, char = found.group(1), found.group(2)
             at = found.end(1)
-            if char == "#":
+            if char == "#" or (char == "/" and text.startswith("//", at)):
                 end = text.find("\n", at)
                 end = len(text) if end < 0 else end
-                self.comments.append(Comment(Span(at, end), text[at:end], True))
+                if char == "#":
+                    self.comments.append(Comment(Span(at, end), text[at:end], True))
+                else:
+                    self.nesting.report(foreign_comment(Span(at, at + 2)))
                 at = end
             elif char:
                 self._set_indent(blanks, position, at, first)

@@ -12,8 +12,10 @@ from typing import Any
 from potto.diagnostics import Diagnostic, Related
 from potto.source import Span
 from potto.syntax import kinds
+from potto.syntax.habits import tuple_without_parentheses
 from potto.syntax.repair import Edit
 from potto.syntax.tokens import RESERVED, Token
+from potto.syntax.unknown import reserved_word
 
 _OPENING = frozenset(
     [
@@ -49,6 +51,7 @@ class Stop:
     possible: frozenset[str]
     tokens: list[Token]
     index: int
+    text: str
 
     @property
     def at(self) -> Token:
@@ -81,12 +84,21 @@ class Stop:
         return next((v for v in reversed(self.values) if isinstance(v, Token) and v.kind in kinds), None)
 
     @property
+    def continues(self) -> Token | None:
+        """The first word of the line where it stopped, if that line goes on with the one above."""
+        line = self.text.rfind("\n", 0, self.at.start) + 1
+        first = next((token for token in self.tokens if token.text and token.start >= line), None)
+        layout = any(t.kind in ("NEWLINE", "INDENT") and first and t.start == first.start for t in self.tokens)
+        return None if line == 0 or layout else first
+
+    @property
     def ended(self) -> bool:
         """Whether nothing more is written from here on."""
         return not any(token.text for token in self.tokens[self.index :])
 
 
 _SUM_HELP = "write `sum i in 1..n (body)`"
+_LET_HELP = "write `let a = 1 in a + 2`; a name that has a line to itself needs no `let`: `a = 1`"
 _PARTS: tuple[tuple[str, tuple[str, ...], str, str], ...] = (
     ("THEN", ("IF",), "expected `then` after the condition of `if`", "write `if p then a else b`"),
     ("ELSE", ("IF",), "expected `else` after the first choice of `if`", "an `if` has a value either way"),
@@ -95,7 +107,7 @@ _PARTS: tuple[tuple[str, tuple[str, ...], str, str], ...] = (
     ("DOTDOT", ("SUM",), "expected `..` and the last value of the variable of `sum`", _SUM_HELP),
     ("IN", ("SUM",), "expected `in` after the variable of `sum`", _SUM_HELP),
     ("IN", ("FOR",), "expected `in` after the variable of `for`", "write `for v in list:`"),
-    ("IN", ("LET",), "expected `in` after the names of `let`", "write `let a = 1 in a + 2`"),
+    ("IN", ("LET",), "expected `in` after the names of `let`", _LET_HELP),
     ("DOT", ("LAMBDA",), "expected `.` after the parameters of a lambda", "write `\\x . e`"),
 )
 """What is missing, within which construct, and what to say of it."""
@@ -117,6 +129,11 @@ def describe(stop: Stop, edits: list[Edit]) -> Diagnostic:
 def _special(stop: Stop) -> Diagnostic | None:
     """Stops whose cause shows without the repair."""
     opened, at, before = stop.opened, stop.at, stop.before
+    if at.kind == "COMMA" and opened is not None and opened.kind == "LET":
+        return kinds.UNEXPECTED(at.span, "unexpected `,`", help="separate the names of a `let` by `;`, or by lines")
+    unpacked = tuple_without_parentheses(stop)
+    if unpacked is not None:
+        return unpacked
     if at.kind == "DOT" and stop.after is not None and stop.after.kind == "NUMBER" and stop.after.start == at.end:
         number = at.text + stop.after.text
         return kinds.BAD_NUMBER(
@@ -161,6 +178,12 @@ def _from(opened: Token) -> tuple[Related, ...]:
 
 def _replaced(stop: Stop, edit: Edit) -> Diagnostic:
     at = stop.at
+    if at.kind == "EQ" and stop.before is not None and stop.before == stop.continues:
+        return kinds.INDENTATION(
+            stop.before.span,
+            "this line is indented more than the one above, so it goes on with that",
+            help="indent the lines of a block alike",
+        )
     if at.kind == "EQ":
         return kinds.EQUALS(at.span, "`=` names a value; it does not compare", help="to compare, write `==`")
     if at.kind == "BINOP":
@@ -168,11 +191,7 @@ def _replaced(stop: Stop, edit: Edit) -> Diagnostic:
     named = stop.after is not None and stop.after.kind in ("EQ", "COMMA", "RPAR", "DOT")
     if "NUMBER" in stop.possible and not named:
         return _unexpected(stop)
-    return kinds.RESERVED_WORD(
-        at.span,
-        f"`{at.text}` is a reserved word and can't be a name",
-        help=f"choose another name, such as `{at.text}_`",
-    )
+    return reserved_word(at.text, at.span)
 
 
 def _inserted(stop: Stop, kind: str) -> Diagnostic:
@@ -200,7 +219,9 @@ def _missing_expression(stop: Stop) -> Diagnostic:
     if "INDENT" in stop.possible and not (before is not None and before.kind in ("BINOP", "STAR", "SIGN")):
         return _no_body(stop)
     if at.kind == "D" and at.text:
-        return kinds.MISSING_EXPRESSION(at.span, "expected what is integrated before `d(...)`")
+        return kinds.MISSING_EXPRESSION(
+            at.span, "expected what is integrated before `d(...)`", help="write `integral [lo, hi] body d(x)`"
+        )
     if before is None:
         return kinds.MISSING_EXPRESSION(stop.place, f"expected an expression before `{_shown(at)}`")
     if at.text and at.text in RESERVED and at.kind not in ("BINOP", "NOT"):

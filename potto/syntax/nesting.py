@@ -6,17 +6,21 @@ integral has its `d(...)`: the parser need not guess at brackets.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 
 from potto.diagnostics import Diagnostic, Related
 from potto.source import Span
 from potto.syntax import kinds
-from potto.syntax.tokens import Token
+from potto.syntax.tokens import FIRST_NAME, Token
 
 MAX_NESTING = 100
 MOST_MESSAGES = 50
 _CLOSER = {"LPAR": "RPAR", "LSQB": "RSQB"}
 _CHARACTER = {"LPAR": "(", "RPAR": ")", "LSQB": "[", "RSQB": "]"}
+
+_DIFFERENTIAL = re.compile(rf"\bd ?({FIRST_NAME.pattern})\Z")
+"""`dx` or `d x`, as mathematics writes it."""
 
 
 @dataclass(slots=True)
@@ -86,6 +90,7 @@ class Nesting:
 
     def _end_integral(self, opener: _Open) -> None:
         last = self.tokens[-1].end
+        written = _DIFFERENTIAL.search(self.text, max(opener.start, last - 40), last)
         word = "∫" if self.text[opener.start] == "∫" else "integral"
         self.report(
             kinds.NO_DIFFERENTIAL(
@@ -93,7 +98,7 @@ class Nesting:
                 f"this `{word}` has no `d(...)`",
                 label="which variables does it integrate over?",
                 related=(Related(Span(last, last), "the integral ends here"),),
-                help="end the integral with its variables: `d(x)`",
+                help=f"write `d({written[1]})`" if written else "end the integral with its variables: `d(x)`",
             )
         )
         self.tokens += [Token(kind, "", last, last) for kind in ("D", "LPAR", "RPAR")]

@@ -16,6 +16,7 @@ from potto.syntax import kinds
 from potto.syntax.chunks import split
 from potto.syntax.engine import Engine
 from potto.syntax.groups import Context
+from potto.syntax.habits import foreign_statement, habit
 from potto.syntax.lexer import MAX_LENGTH, Lexed, lex
 from potto.syntax.messages import Stop, describe
 from potto.syntax.nesting import MAX_NESTING
@@ -70,6 +71,9 @@ def parse_chunk(text: str, diffeo: bool = False) -> ParsedChunk:
     item, diagnostics = None, lexed.diagnostics
     if not lexed.too_deep:
         item, diagnostics = _bounded(_parse(lexed, text, "chunk", diffeo))
+    foreign = foreign_statement(lexed.tokens) if diagnostics else None
+    if foreign is not None:
+        item, diagnostics = BrokenItem(Span(0, len(text)), None), [foreign]
     if item is None:
         item = _salvage(text, lexed.tokens, diffeo)
     return ParsedChunk(item, _sorted(diagnostics), comments)
@@ -139,12 +143,15 @@ def _parse(lexed: Lexed, text: str, start: str, diffeo: bool = False) -> _Parse:
     stops: list[Diagnostic] = []
     for _ in range(MOST_ERRORS):
         if index >= len(tokens):
-            found += stops + _causes(engine.context.diagnostics, stops)
+            found += stops + _causes(engine.context.diagnostics, found + stops)
             return _Parse(engine.result, tokens, found, first_stop, stops)
         stop, engine, edits = _stopped(engine, tokens, index, Context(text, diffeo))
         first_stop = first_stop or stop
         if not stop.at.text:
             found = _without_doubled(found, stop)
+        said = habit(stop)
+        if said is not None:
+            return _Parse(None, tokens, [*found, *stops, said], first_stop, stops)
         if not _explained(stop, found):
             said = describe(stop, edits or [])
             if all(d.code != kinds.UNFINISHED.code or d.span != said.span for d in found):  # an `integral` alone
@@ -160,19 +167,20 @@ def _stopped(
     engine: Engine, tokens: list[Token], index: int, context: Context
 ) -> tuple[Stop, Engine, list[Edit] | None]:
     """A stop at `index`, with an automaton that stands where its repair begins."""
+    text = context.text
     if len(tokens) > LONG or index == 0:
         edits = find_repair(engine.tables, engine.end, tokens, index, engine.states, None)
-        return Stop(engine.values[:], engine.possible(), tokens, index), engine, edits
+        return Stop(engine.values[:], engine.possible(), tokens, index, text), engine, edits
     # The token without an action has already led to reductions, after which less can follow than before. Read again, up
     # to where it had not been seen; and note the state before the word ahead of it, which may be what is wrong.
     again = Engine(context, engine.start)
     again.run(tokens[: index - 1], 0)
-    behind = Stop(again.values[:], again.possible(), tokens, index - 1)
+    behind = Stop(again.values[:], again.possible(), tokens, index - 1, text)
     states = again.states[:]
     again.run(tokens[:index], index - 1)
     edits = find_repair(again.tables, again.end, tokens, index, again.states, states)
     if not edits or not edits[0].back:
-        return Stop(again.values[:], again.possible(), tokens, index), again, edits
+        return Stop(again.values[:], again.possible(), tokens, index, text), again, edits
     before = Engine(context, engine.start)
     context.diagnostics.clear()
     before.run(tokens[: index - 1], 0)
@@ -195,10 +203,10 @@ def _without_doubled(found: list[Diagnostic], stop: Stop) -> list[Diagnostic]:
 
 
 def _causes(found: list[Diagnostic], stops: list[Diagnostic]) -> list[Diagnostic]:
-    """A line that is no result because it was not understood has its message already."""
-    code = kinds.LAST_LINE.code
+    """A line that is no result because it was not understood has its message already; so has what is no name."""
+    codes = (kinds.LAST_LINE.code, kinds.NOT_A_NAME.code)
     places = [stop.span for stop in stops]
-    return [d for d in found if d.code != code or not any(d.span.start <= p.start < d.span.end for p in places)]
+    return [d for d in found if d.code not in codes or not any(d.span.start <= p.start < d.span.end for p in places)]
 
 
 def _patched(tokens: list[Token], index: int, edits: list[Edit]) -> list[Token]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import unicodedata
 
 from potto.diagnostics import Diagnostic
 from potto.source import Span
 from potto.syntax import kinds
-from potto.syntax.tokens import PLAIN_OPERATOR
+from potto.syntax.tokens import FIRST_NAME, PLAIN_OPERATOR
 
 _MEANT = {
     "!": "write `not`",
@@ -29,6 +30,12 @@ _MEANT = {
     "¬": "write `not`",
     "²": "write `^2`",
     "³": "write `^3`",
+    "–": "write `-`",
+    "—": "write `-`",
+    "⋅": "write `*`",
+    "∗": "write `*`",
+    "'": "the derivative of `f` is `deriv(f)`; a name has letters, digits and `_`",
+    "’": "the derivative of `f` is `deriv(f)`; a name has letters, digits and `_`",
     "“": "Potto has no text strings",
     "”": "Potto has no text strings",
     "`": "Potto has no backquotes",
@@ -40,6 +47,39 @@ def foreign_operator(word: str, span: Span) -> tuple[str, Diagnostic]:
     plain = PLAIN_OPERATOR[word]
     message = f"`{word}` is written `{plain}` in Potto"
     return plain, kinds.OTHER_LANGUAGE(span, message, help=f"write `{plain}`")
+
+
+def foreign_arithmetic(word: str, span: Span) -> tuple[str, Diagnostic]:
+    """What stands for `//` or `+=` in the tree, and the message that says what to write."""
+    if word == "//":
+        return "/", kinds.OTHER_LANGUAGE(span, "Potto has no `//`", help="write `/`, or `floor(x/y)` to round down")
+    plain = word[0]
+    help = f"give the new value a name of its own: `y = x {plain} …`"
+    return plain, kinds.OTHER_LANGUAGE(span, f"Potto has no `{word}`: a name keeps its value", help=help)
+
+
+def foreign_comment(span: Span) -> Diagnostic:
+    """The message for a line that starts with `//`."""
+    return kinds.OTHER_LANGUAGE(span, "a comment starts with `#`, not with `//`", help="write `#`")
+
+
+def reserved_word(word: str, span: Span) -> Diagnostic:
+    """The message for a word of the language where a name is needed."""
+    message = f"`{word}` is a reserved word and can't be a name"
+    return kinds.RESERVED_WORD(span, message, help=f"choose another name, such as `{word}_`")
+
+
+def bad_number(word: str, good: str, span: Span) -> Diagnostic:
+    """The message for a word that starts like a number; `good` is as much of it as is one."""
+    tail = word[len(good) :]
+    if re.fullmatch("[0-9_]+[0-9]", word):
+        help = f"write `{word.replace('_', '')}`"
+    elif re.fullmatch("0[xX][0-9a-fA-F]+|0[bB][01]+|0[oO][0-7]+", word):
+        help = f"write `{int(word, 0)}`"
+    else:
+        help = f"to multiply, write `{good}*{tail}`" if FIRST_NAME.fullmatch(tail) else "write `2`, `0.5` or `1e-3`"
+    shown = word if len(word) <= 40 else word[:39] + "…"
+    return kinds.BAD_NUMBER(span, f"`{shown}` is not a number", help=help)
 
 
 def string_literal(word: str, span: Span) -> Diagnostic:

@@ -23,6 +23,7 @@ from potto.types.types import (
     UNKNOWN,
     Diffeo,
     Function,
+    ListOf,
     Meta,
     Parameter,
     Real,
@@ -87,7 +88,9 @@ def _apply_unknown(inference: Inference, node: nodes.Apply, callee: Meta, types:
     made = Function(tuple(Parameter(None, type) for type in types), result)
     if not unify(known, made):
         message = "a function cannot be applied to itself"
-        inference.report(kinds.MISMATCH(node.function.span, message, label="its type would contain itself"))
+        inference.report(kinds.MISMATCH(
+            node.function.span, message, label="its type would contain itself", help="to multiply, write `*`"
+        ))  # fmt: skip
         return UNKNOWN
     inference.plans[id(node)] = Plan((tuple((place,) for place in range(len(types))),))
     return result
@@ -115,6 +118,8 @@ def _not_a_function(inference: Inference, node: nodes.Apply, callee: Type) -> Di
         help = "to multiply, write `*` between the two"
     elif isinstance(callee, TupleOf | Diffeo):
         help = "a call binds to what stands before it: write the operator between the two, or a comma"
+    elif isinstance(callee, ListOf):
+        help = "a list has no indices: go through it in a script, `for v in list: …`"
     label = "a number" if is_number else describe(callee)
     message = f"this is {describe(callee)}, not a function, so it cannot be applied"
     return kinds.NOT_A_FUNCTION(node.function.span, message, label=label, help=help)

@@ -31,8 +31,7 @@ def _integral(inference: Inference, node: nodes.Integral) -> Type:
         inference.integrals += 1
         body = inference.infer(node.body)
         inference.integrals -= 1
-    _summed(inference, body, node.body, "the integrand")
-    return body
+    return _summed(inference, body, node.body, "the integrand")
 
 
 Bounds = nodes.Interval | nodes.MeasureBound
@@ -102,19 +101,20 @@ def _sum(inference: Inference, node: nodes.Sum) -> Type:
     with inference.scope.inside():
         inference.local(node.variable, node.variable.name, node.variable.span, "index", REAL)
         body = inference.infer(node.body)
-    _summed(inference, body, node.body, "what is summed")
-    return body
+    return _summed(inference, body, node.body, "what is summed")
 
 
-def _summed(inference: Inference, type: Type, expr: nodes.Expr, what: str) -> None:
-    """What is integrated or summed is a number or a tuple of such."""
+def _summed(inference: Inference, type: Type, expr: nodes.Expr, what: str) -> Type:
+    """What is integrated or summed is a number or a tuple of such; the type of the whole."""
     found = resolve(type)
     if isinstance(found, Truth):
         inference.report(comparison(expr, f"{what} must be a number"))
+        return REAL
     elif isinstance(found, Meta):
         inference.later(lambda: _summed_late(inference, found, expr, what))
     else:
         _summed_late(inference, found, expr, what)
+    return type
 
 
 def _summed_late(inference: Inference, type: Type, expr: nodes.Expr, what: str) -> None:

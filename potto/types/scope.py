@@ -14,7 +14,7 @@ from typing import Literal
 
 from potto.diagnostics import Diagnostic
 from potto.modules.builtins import CONSTANTS, PROJECTIONS, SPECIALS, is_builtin
-from potto.modules.hints import did_you_mean, elsewhere, near_names
+from potto.modules.hints import did_you_mean, elsewhere, known_elsewhere, near_names
 from potto.modules.lookup import Defined, DefinitionTarget, find_module, meaning, preludes, resolve_module
 from potto.modules.texts import imports, names
 from potto.primitives import PRIMITIVES
@@ -139,10 +139,10 @@ def undefined(outside: Outside, scope: Iterable[str], node: nodes.Name) -> Diagn
             node.span,
             "`print` is a statement, not a function",
             label="only at the top of a script",
-            help="print at the top of a script, in a line of its own",
+            help="write `print(…)` at the top of a script, in a line of its own",
         )
     near = near_names(name, (*scope, *_file_names(outside), *builtin_names()))
-    help = did_you_mean(near)
+    help = known_elsewhere(name) or did_you_mean(near)
     module = elsewhere(outside.db, outside.file, name)
     if module is not None:
         help = f"the module `{module}` defines it: add `from {module} import {name}`"
@@ -169,6 +169,8 @@ def undefined_member(outside: Outside, scope: Scope, node: nodes.Member) -> Diag
 
 
 def _no_module(node: nodes.Member, what: str, help: str = "") -> Diagnostic:
+    if not help and is_builtin(node.name) and not what.startswith(f"`{node.path}`"):
+        help = f"`{node.name}` is a builtin: write it without `{node.path}.`"
     if not help and "." not in node.path:
         help = f"for one more parameter of a function write blanks around the dot: `{node.path} . {node.name}`"
     message = f"{what}, so `{node.path}.{node.name}` is not defined"

@@ -88,6 +88,18 @@ def test_no_command_is_a_wrong_command_line(potto: Potto) -> None:
     assert ran.status == 2 and ran.out == "" and "usage: potto COMMAND" in ran.err
 
 
+@pytest.mark.parametrize(
+    ("line", "help"),
+    [
+        ("from maths import sin", "`sin` is a builtin: it needs no import"),
+        ("import numpy as np", "modules of Python can't be imported; builtins such as `sqrt` and `pi` need no import"),
+    ],
+)
+def test_modules_of_python_are_told_apart(potto: Potto, line: str, help: str) -> None:
+    ran = potto("check", "main.po", main=f"{line}\n")
+    assert ran.status == 1 and ran.out.count("error[") == 1 and f"= help: {help}" in ran.out
+
+
 def test_eval_json_of_a_dual(potto: Potto) -> None:
     answer = potto("eval", "main.po", "deriv(f)((0.25, 1))", "--json", main=HALF).json
     assert math.isclose(answer["value"], 0.25, rel_tol=1e-14)

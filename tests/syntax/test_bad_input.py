@@ -57,6 +57,8 @@ ENORMOUS: dict[str, Callable[[], str]] = {
     "30,000 quotes": lambda: "x = " + "'" * 30_000,
     "digits": lambda: "x = " + "1" * 240_000,
     "a number with many points": lambda: "x = " + "1." * 120_000,
+    "30,000 brackets on lines of their own": lambda: "(\n" * 30_000,
+    "one bracket over 50,000 lines": lambda: "x = [" + "\n1," * 50_000 + "]\n",
     "60,000 comments": lambda: "# c\n" * 60_000,
     "100,000 definitions": lambda: "x = 1\n" * 100_000,
     "lines of ever less indentation": lambda: "for v in xs\n" + "".join(f"{' ' * (300 - i)}a\n" for i in range(299)),

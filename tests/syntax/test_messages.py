@@ -110,7 +110,11 @@ def test_unfinished() -> None:
     ("text", "code", "place", "message"),
     [
         ("for v in [1, 2]", "P0104", "for", "this `for` has no statements"),
-        ("for v in [1, 2] print(v)", "P0104", "for", "this `for` has no statements"),
+        ("for v in [1, 2] print(v)", "P0104", "print", "expected `:` before the statement of this `for`"),
+        ("while x > 0: print(x)", "P0117", "while", "Potto has no `while`"),
+        ("function f(x) { return x }", "P0117", "function", "Potto has no `function`"),
+        ("var x = 3", "P0117", "var", "Potto has no `var`"),
+        ("// a comment", "P0117", "//", "a comment starts with `#`, not with `//`"),
         ("else", "P0103", "else", "unexpected `else`"),
         ("import", "P0118", "import", "expected a module after `import`"),
         ("from .m import a", "P0118", ".", "a module's name does not begin with a dot"),
@@ -212,7 +216,7 @@ def test_duplicates() -> None:
         ("x = 1.2.3", "1.2.3", "write `2`, `0.5` or `1e-3`"),
         ("x = 2y", "2y", "to multiply, write `2*y`"),
         ("x = 1e", "1e", "to multiply, write `1*e`"),
-        ("x = 1_000", "1_000", "to multiply, write `1*_000`"),
+        ("x = 1_000", "1_000", "write `1000`"),
         ("x = .5", ".5", "write `0.5`"),
     ],
 )

@@ -1,0 +1,142 @@
+"""What users of other languages and of mathematics write out of habit, and how it is written here.
+
+Owns `habit`, for places where the grammar has no action, and `foreign_statement`, for a chunk that is none of ours. One
+message says all; what follows would only be guessed, so that the rest of the chunk is given up.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from potto.diagnostics import Diagnostic
+from potto.source import Span
+from potto.syntax import kinds
+from potto.syntax.tokens import Token
+
+if TYPE_CHECKING:
+    from potto.syntax.messages import Stop
+
+_STATEMENTS = {
+    "while": "there are no loops but `for` over a list in a script; `sum i in 1..n (…)` adds, recursion repeats",
+    "class": "values are numbers, tuples, lists and functions",
+    "struct": "values are numbers, tuples, lists and functions",
+    "function": "write `def f(x) …`",
+    "func": "write `def f(x) …`",
+    "fn": "write `def f(x) …`",
+    "fun": "write `def f(x) …`",
+    "var": "write `name = e`",
+    "val": "write `name = e`",
+    "const": "write `name = e`",
+    "elif": "write `else if`",
+    "with": "take it out",
+    "assert": "write a comment `#> e` and under it `#= value`, which `potto test` checks",
+    "raise": "an error cannot be raised",
+    "global": "names of the file are known in its definitions",
+}
+
+
+def foreign_statement(tokens: list[Token]) -> Diagnostic | None:
+    """What is said of a chunk with errors that starts with a word of another language before a name."""
+    if len(tokens) < 2 or tokens[0].kind != "NAME" or tokens[1].kind not in ("NAME", "NUMBER"):
+        return None
+    help = _STATEMENTS.get(tokens[0].text)
+    if help is None:
+        return None
+    return kinds.OTHER_LANGUAGE(tokens[0].span, f"Potto has no `{tokens[0].text}`", help=help)
+
+
+def habit(stop: Stop) -> Diagnostic | None:
+    """The message for a stop that shows where its author comes from; None for any other."""
+    for known in (_lambda, _loop, _bounds, _sum):
+        found = known(stop)
+        if found is not None:
+            return found
+    return None
+
+
+def _lambda(stop: Stop) -> Diagnostic | None:
+    if stop.at.kind != "COLON":
+        return None
+    before = stop.tokens[: stop.index]
+    word = next((token for token in reversed(before) if token.text == "lambda" and token.kind == "NAME"), None)
+    if word is None:
+        return None
+    return kinds.OTHER_LANGUAGE(
+        word.span, "Potto has no `lambda`: a function without a name starts with `\\`", help="write `\\x . e`"
+    )
+
+
+def _loop(stop: Stop) -> Diagnostic | None:
+    """A `for` within a definition, over a range, over tuples that it takes apart, or without its colon."""
+    at, first = stop.at, stop.tokens[0]
+    named = stop.after is None or stop.after.kind != "NAME"  # `for = 3`: a reserved word
+    if at.kind == "FOR" and not named and first.kind in ("DEF", "DIFFEODEF"):
+        return kinds.UNEXPECTED(
+            at.span,
+            "a `for` goes through a list in a script, not in a definition",
+            help="add with `sum i in 1..n (…)`, or repeat by recursion",
+        )
+    if first.kind != "FOR":
+        return None
+    if at.kind == "DOTDOT" and "COLON" not in {token.kind for token in stop.tokens[: stop.index]}:
+        return kinds.UNEXPECTED(
+            at.span, "a `for` goes over a list, not over a range", help="write the list: `for i in [1, 2, 3]:`"
+        )
+    if at.kind == "LPAR" and stop.index == 1:
+        return kinds.NOT_A_NAME(
+            at.span, "a `for` has one variable", help="take it apart inside: `for v in list:`, then `(a, b) = v`"
+        )
+    shown = next((token for token in stop.tokens if token.text == "print"), None)
+    if shown is not None and not at.text and "INDENT" in stop.possible:
+        return kinds.UNFINISHED(
+            shown.span, "expected `:` before the statement of this `for`", help="write `for v in list: print(v)`"
+        )
+    return None
+
+
+def _bounds(stop: Stop) -> Diagnostic | None:
+    """`integral (0, 1)`, `integral(0, 1, f, x)`, `integral (x in [0, 1])`."""
+    opened = stop.opened
+    if opened is None or opened.kind not in ("LPAR", "INTEGRAL"):
+        return None
+    outer = [token for token in stop.tokens[: stop.index] if token.kind == "INTEGRAL"]
+    if not outer or stop.tokens[stop.tokens.index(outer[-1]) + 1].kind != "LPAR":
+        return None
+    if stop.at.kind == "IN":
+        return kinds.UNEXPECTED(
+            stop.at.span, "the bounds of an integral stand alone", help="write `integral [lo, hi] body d(x)`"
+        )
+    if stop.before is None or stop.before.kind != "LPAR" or stop.at.kind not in ("NUMBER", "SIGN"):
+        return None
+    return kinds.UNFINISHED(
+        Span(outer[-1].start, stop.at.end),
+        "the bounds of an integral stand in brackets",
+        help="write `integral [lo, hi] body d(x)`",
+    )
+
+
+def _sum(stop: Stop) -> Diagnostic | None:
+    """`sum(i in 1..3) …`."""
+    if stop.at.kind != "LPAR" or stop.before is None or stop.before.kind != "SUM":
+        return None
+    message = "the variable of a `sum` stands without parentheses, its terms stand in them"
+    return kinds.UNEXPECTED(stop.at.span, message, help="write `sum i in 1..n (body)`")
+
+
+def tuple_without_parentheses(stop: Stop) -> Diagnostic | None:
+    """`a, b = pair`: the repair leaves `a = pair`, so that the block goes on."""
+    if stop.at.kind != "COMMA" or (stop.opened is not None and stop.opened.kind not in ("DEF", "DIFFEODEF", "FOR")):
+        return None
+    names = [stop.tokens[stop.index - 1]]
+    rest = stop.tokens[stop.index :]
+    while len(rest) > 2 and rest[0].kind == "COMMA" and rest[1].kind == "NAME":
+        names.append(rest[1])
+        rest = rest[2:]
+    if len(names) < 2 or rest[0].kind != "EQ" or names[0].kind != "NAME":
+        return None
+    shown = ", ".join(name.text for name in names)
+    return kinds.NOT_A_NAME(
+        names[0].span.cover(names[-1].span),
+        "names that take a tuple apart stand in parentheses",
+        help=f"write `({shown}) = …`",
+    )

@@ -1,0 +1,124 @@
+"""What users of other languages and of mathematics write out of habit: one message, which says what to write here."""
+
+from __future__ import annotations
+
+import pytest
+from syntax_help import check_messages, everything, messages
+
+from potto.syntax import split
+
+
+def test_python() -> None:
+    check_messages("""
+        f = lambda x: x + 1
+        #   ^^^^^^ error[P0117]: Potto has no `lambda`
+        def f(x) x // 2
+        #          ^^ error[P0117]: Potto has no `//`
+        def f(x) x += 1
+        #          ^^ error[P0117]: Potto has no `+=`: a name keeps its value
+        def f(x) 1_000*x
+        #        ^^^^^ error[P0111]: `1_000` is not a number
+        def f(n)
+            s = 0
+            for i in range(n):
+        #   ^^^ error[P0103]: a `for` goes through a list in a script, not in a definition
+                s = s + i
+            s
+        for i in 1..3: print(i)
+        #         ^^ error[P0103]: a `for` goes over a list, not over a range
+        for (a, b) in pairs: print(a*b)
+        #   ^ error[P0115]: a `for` has one variable
+        for v in [1, 2] print(v)
+        #               ^^^^^ error[P0104]: expected `:` before the statement of this `for`
+        def f(a)
+            p, q = (a, a)
+        #   ^^^^ error[P0115]: names that take a tuple apart stand in parentheses
+            p + q
+        def integral(x) x
+        #   ^^^^^^^^ error[P0107]: `integral` is a reserved word
+    """)
+
+
+def test_other_languages() -> None:
+    check_messages("""
+        let x = 3
+        #       ^ error[P0104]: expected `in` after the names of `let`
+        g = \\x . let a = 1, b = 2 in a + b
+        #                 ^ error[P0103]: unexpected `,`
+        def f(x)
+            // what follows is kept
+        #   ^^ error[P0117]: a comment starts with `#`
+            y = 3
+            x + y
+    """)
+
+
+def test_mathematics() -> None:
+    check_messages("""
+        def f(t) integral [0, 1] [x < t] dx
+        #        ^^^^^^^^ error[P0105]: this `integral` has no `d(...)`
+        def f(t) integral (0, 1) [x < t] d(x)
+        #        ^^^^^^^^^^^ error[P0104]: the bounds of an integral stand in brackets
+        def f(t) integral(0, 1, [x < t], x)
+        #        ^^^^^^^^^^ error[P0104]: the bounds of an integral stand in brackets
+        #        ^^^^^^^^ error[P0105]: this `integral` has no `d(...)`
+        def f(t) integral (x in [0, 1]) x d(x)
+        #                    ^^ error[P0103]: the bounds of an integral stand alone
+        def f(t) sum(i in 1..3) i*t
+        #           ^ error[P0103]: the variable of a `sum` stands without parentheses
+        def f(x) g'(x)
+        #         ^ error[P0112]: Potto does not know the character `'`
+        def f(x) x – 1
+        #          ^ error[P0112]: Potto does not know the character `–`
+    """)
+
+
+def test_a_line_that_is_indented_more_goes_on() -> None:
+    check_messages("""
+        def f(x)
+            a = x
+              b = 2
+        #     ^ error[P0113]: this line is indented more than the one above
+            a + b
+        def g(x)
+            if x = 1 then 2 else 3
+        #        ^ error[P0108]: `=` names a value; it does not compare
+    """)
+
+
+@pytest.mark.parametrize(
+    ("text", "help"),
+    [
+        ("def f(t) integral [0, 1] t dx", "write `d(x)`"),
+        ("def f(t) integral [0, 1] t d θ", "write `d(θ)`"),
+        ("f x = x", "write `def f(x) …`"),
+        ("f(x, y)(c) = x", "write `def f(x, y)(c) …`"),
+        ("x = 0x10", "write `16`"),
+        ("x = 1_000", "write `1000`"),
+        ("x = 2y", "to multiply, write `2*y`"),
+        ("def f(a)\n    (p, q), r = a\n    p", "to make a tuple, write parentheses around it"),
+        ("def f(a)\n    p, q = a\n    p", "write `(p, q) = …`"),
+    ],
+)
+def test_the_hint_is_what_to_write(text: str, help: str) -> None:
+    assert messages(text)[0][0].help == help
+
+
+@pytest.mark.parametrize("text", ["while(x)", "val = 3", "class (3)", "def function(x) x", "fun 1", "with x"])
+def test_words_of_other_languages_are_names_where_that_is_right(text: str) -> None:
+    assert messages(text) == []
+
+
+def test_lines_within_brackets_may_start_in_the_first_column() -> None:
+    text = "xs = [\n1,\n# one\n2,\n3\n]\nprint(f(1,\n2))\ndef g(x) (x\n+ 2)\n"
+    assert messages(text) == []
+    assert [chunk.text.count("\n") for chunk in split(text)] == [5, 1, 1]
+
+
+@pytest.mark.parametrize(
+    "next", ["def g(x) (x)", "y = (1)", "print((1))", "from m import (a)", "for v in (xs): (v)", "diffeo d(x) = (x)"]
+)
+def test_an_open_bracket_swallows_no_definition(next: str) -> None:
+    text = f"def f(a) (a + 1\n{next}\n)"
+    assert [chunk.text.partition("\n")[0] for chunk in split(text)] == ["def f(a) (a + 1", next]
+    assert len([d for _, parsed in everything(f"def f(a) (a + 1\n{next}") for d in parsed.diagnostics]) == 1
