@@ -24,8 +24,10 @@ BLOCK, MOST_OF_BLOCK = 12, 32  # definitions in the mean, and at most
 _ORDER = {"error": 0, "warning": 1, "info": 2, "hint": 3}
 
 
+@query(travels=True)
 def diagnostics(db: Database, file: str) -> tuple[Located, ...]:
-    """Everything about a file, in the order of its text."""
+    """Everything about a file, in the order of its text. As one memo, so that a file that an edit does not reach costs
+    nothing."""
     found = [*syntax_diagnostics(db, file), *module_diagnostics(db, file)]
     for block in _blocks(names(db, file)):
         for name, said in block_diagnostics(db, file, block):
@@ -47,7 +49,7 @@ def _blocks(names: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
         yield names[start:]
 
 
-@query(keep=2048)
+@query(keep=2048, travels=True)
 def block_diagnostics(
     db: Database, file: str, block: tuple[str, ...]
 ) -> tuple[tuple[str, tuple[Diagnostic, ...]], ...]:
@@ -60,7 +62,7 @@ def block_diagnostics(
     return tuple((name, said) for name, said in found if said)
 
 
-@query
+@query(travels=True)
 def definition_diagnostics(db: Database, file: str, name: str) -> tuple[Diagnostic, ...]:
     """What the checks of one definition say, relative to its chunk. What it means is asked only if its types are right:
     the later checks would repeat in other words what is wrong. Of a text that the parser had to guess at nothing more

@@ -6,9 +6,10 @@ Owns `Library`. Everything may be called from several threads.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from potto.check import diagnostics, errors_of
+from potto.crew import Crew, helpers_for
 from potto.diagnostics import declare
 from potto.modules import Unreadable, module_diagnostics, names, open_files, source
 from potto.modules.files import MAX_BYTES, decode
@@ -104,6 +105,15 @@ class Library:
         """Everything there is to say about a file, lints as its project says."""
         found, project = diagnostics(self.db, file), self.project(file)
         return found if project is None or not project.lints else tuple(levelled(found, project.lints))
+
+    def all_diagnostics(self, files: Sequence[str]) -> Iterator[tuple[Located, ...]]:
+        """The same of many files, one after the other, with the help of other processes if they are worth it."""
+        with Crew(self.db, self.files.roots, files, helpers_for(files)) as crew:
+            for file in files:
+                while crew.has_found:
+                    crew.take()
+                crew.leave(file)
+                yield self.diagnostics(file)
 
     def errors(self, file: str) -> tuple[Located, ...]:
         """The errors in a file."""

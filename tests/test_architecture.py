@@ -19,7 +19,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     ),
     ("potto.runtime",),
     ("potto.kernels", "potto.integrate"),
-    ("potto.library", "potto.facts", "potto.check", "potto.spoiled"),
+    ("potto.library", "potto.facts", "potto.check", "potto.spoiled", "potto.crew"),
     ("potto.calculus",),
     ("potto.elaborate",),
     ("potto.types",),

@@ -7,28 +7,23 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from potto.diagnostics import Diagnostic
 from potto.modules import chunk_start, module_diagnostics, names, open_files, source, statements
 from potto.modules.texts import chunks, is_diffeo, parsed, syntax_diagnostics
 from potto.project import Project, Projects, read_project
-from potto.query import Database, query
+from potto.query import Database
 from potto.render import Located
 from potto_lsp.documents import Document
 from potto_lsp.text import Encoding, Text
 from potto_lsp.uris import to_key, to_uri
 from potto_lsp.verdicts import Verdicts
 
+if TYPE_CHECKING:
+    from potto.crew import Crew
+
 logger = logging.getLogger(__name__)
-
-
-@query
-def file_diagnostics(db: Database, file: str) -> tuple[Located, ...]:
-    """All that there is to say about a file. As one memo, so that a file that an edit does not reach costs nothing."""
-    from potto.check import diagnostics  # slow to import, and what is known from earlier is told without it
-
-    return diagnostics(db, file)
 
 
 # What is forgotten of closed files, by what the queries are asked about: a chunk's text, a file, some definitions.
@@ -55,6 +50,8 @@ class Analysis:
         self._checked: set[str] = set()  # files asked for: only the first answer may be from an earlier session
         self._ripe: set[str] = set()  # files that were checked since trees were forgotten
         self.settled = False  # whether all files have been checked
+        self._crew: Crew | None = None
+        self.taken: set[str] = set()  # files that helpers have checked
 
     # What the client has
 
@@ -93,6 +90,7 @@ class Analysis:
         self._documents[key] = document
         self._texts[key] = document.text
         self.files.set_text(key, document.text.text)
+        self._tell_crew()
         return key
 
     def finds_project(self, key: str) -> bool:
@@ -109,6 +107,7 @@ class Analysis:
         self._documents.pop(key, None)
         self._texts.pop(key, None)
         self.files.close(key)
+        self._tell_crew()
         return key
 
     def document(self, key: str) -> Document | None:
@@ -171,18 +170,66 @@ class Analysis:
             known = self._verdicts.of(key)
             if known is not None:
                 return known
-        self._ripe.add(key)
+        from potto import check  # slow to import, and what is known from earlier is told without it
+
+        if key not in self.taken:
+            self._ripe.add(key)
+        if self._crew is not None:
+            self._crew.leave(key)
         try:
-            return file_diagnostics(self.db, key)
+            return check.diagnostics(self.db, key)
         except Exception:
             from potto.check import arranged
 
             return tuple(Located(key, said) for said in arranged(self._guarded(key)))
 
+    # Helpers
+
+    def call_helpers(self) -> None:
+        """Let processes of their own check closed files beside this one, if there are so many that it is worth it."""
+        from potto.crew import Crew, helpers_for
+
+        files = [key for key in self.programs() if key not in self._documents]
+        if self._crew is None and (helpers := helpers_for(files)):
+            self._crew = Crew(self.db, self.files.roots, files, helpers, self._open_texts())
+
+    def _tell_crew(self) -> None:
+        if self._crew is not None:
+            self._crew.texts = self._open_texts()
+
+    def _open_texts(self) -> dict[str, str]:
+        return {key: document.text.text for key, document in self._documents.items()}
+
+    @property
+    def helpers(self) -> tuple[int, ...]:
+        """The ids of the processes that help now."""
+        return () if self._crew is None else self._crew.processes
+
+    @property
+    def helpers_have_found(self) -> bool:
+        """Whether there is something to take over from the helpers."""
+        return self._crew is not None and self._crew.has_found
+
+    def take_over(self) -> None:
+        """Take over what a helper has found out about one file."""
+        file = None if self._crew is None else self._crew.take()
+        if file is not None:
+            self.taken.add(file)
+
+    def dismiss_helpers(self) -> None:
+        """There is nothing left to do for helpers."""
+        if self._crew is not None:
+            self._crew.close()
+        self._crew = None
+
+    # Later sessions
+
     def keep(self, key: str) -> None:
         """Keep for later sessions what was found out about a file."""
+        from potto.check import diagnostics
+
         try:
-            self._verdicts.keep(key, file_diagnostics(self.db, key), file_diagnostics.__name__)
+            self._verdicts.keep(key, diagnostics(self.db, key), diagnostics.__name__)
         except Exception as error:
             self.failed(key, "verdict", error)
 

@@ -111,8 +111,12 @@ class Session:
         steps = list(self.publisher.steps())
         for number, step in enumerate(steps):
             if number == len(self.analysis.documents):  # what is open is told; the next thing is to be asked about it
+                if len(steps) > number + 1:
+                    yield self.analysis.call_helpers
                 yield self._load_features
                 yield from steps[:number]  # what was known from an earlier session is found anew, for the edits to come
+            while self.analysis.helpers_have_found:
+                yield self.analysis.take_over
             yield step
             self._progress.report(number + 1, len(steps))
             if number % TREES == TREES - 1:
@@ -134,6 +138,7 @@ class Session:
                 feature.load()
 
     def _all_checked(self) -> None:
+        self.analysis.dismiss_helpers()
         self.checked = self.analysis.settled = True
         self._progress.end()
         memory.settle()
@@ -143,6 +148,7 @@ class Session:
         evaluator = getattr(self, "evaluator", None)
         if evaluator is not None:
             evaluator.close()
+            self.analysis.dismiss_helpers()
         self.presenter.close()
 
     def diagnostics_changed(self) -> None:

@@ -122,7 +122,7 @@ def _exported_in_cycle(db: Database, file: str, name: str) -> Term | None:
     return skeleton(core_term(db, file, name))
 
 
-@query(cycle=_exported_in_cycle)
+@query(cycle=_exported_in_cycle, travels=True)
 def exported(db: Database, file: str, name: str) -> Term | None:
     """The conditions and calls of a definition over its parameters: what a caller's check reads.
 
@@ -133,7 +133,7 @@ def exported(db: Database, file: str, name: str) -> Term | None:
     return skeleton(core_term(db, file, name), lambda g: has_conditions(exported(db, g.module, g.name)))
 
 
-@query
+@query(travels=True)
 def is_sound(db: Database, file: str, name: str) -> bool:
     """Whether a definition could be read and has a type."""
     wrong = any(said.severity == "error" for said in check_definition(db, file, name))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import gc
 import time
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 
 SUMMARY = "say what is wrong with programs, where, and what to do"
 EXAMPLE = "  potto check examples/ --watch"
+THRESHOLDS = (100_000, 50, 1_000)  # of collections: nearly all that checks make stays, to look through it takes long
 PAUSE = 0.2  # seconds between two looks at the files
 
 
@@ -25,6 +27,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     from potto.library import Library
 
+    gc.set_threshold(*THRESHOLDS)
     world = Library(["."])
     status = _look(world, options, console)
     while options.watch:
@@ -56,11 +59,16 @@ def gather(world: Library, paths: list[str]) -> tuple[list[Located], int]:
     from potto.render import ProgramError
 
     files, found = expand(paths)
+    parts: dict[str, list[Located]] = {}
+    keys = dict[str, str]()
     for path in files:
         try:
-            found += world.diagnostics(opened(world, path))
+            keys[path] = opened(world, path)
         except ProgramError as error:
-            found += error.located
+            parts[path] = list(error.located)
+    for path, said in zip(keys, world.all_diagnostics(list(keys.values()))):
+        parts[path] = list(said)
+    found += (located for path in files for located in parts[path])
     return list(dict.fromkeys(found)), len(files)
 
 

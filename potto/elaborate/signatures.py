@@ -26,7 +26,7 @@ class Signature:
     dims: int | None = None
 
 
-@query
+@query(travels=True)
 def signature(db: Database, file: str, name: str) -> Signature | None:
     """The signature of a definition, through aliases, imports, `deriv` and partial application; None if there is none.
 

@@ -7,6 +7,7 @@ other, so the groups of all definitions are found once for a group of files, and
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from typing import TypeVar
 
@@ -16,9 +17,10 @@ from potto.modules.texts import chunk_references, chunk_text, imports, is_diffeo
 from potto.query import Database, query
 
 N = TypeVar("N", bound=Hashable)
+_WORD = re.compile(r"[^\W\d]\w*")
 
 
-@query
+@query(travels=True)
 def imported_files(db: Database, file: str) -> tuple[str, ...]:
     """The files that a file imports, in order, each once."""
     found: dict[str, None] = {}
@@ -33,7 +35,7 @@ def imported_files(db: Database, file: str) -> tuple[str, ...]:
     return tuple(found)
 
 
-@query
+@query(travels=True)
 def import_group(db: Database, file: str) -> tuple[str, ...]:
     """The files that import each other, this one included, sorted; alone if it is in no cycle."""
     for group in components((file,), lambda f: imported_files(db, f)):
@@ -61,14 +63,14 @@ def import_cycle(db: Database, file: str) -> tuple[str, ...]:
     return ()
 
 
-@query
+@query(travels=True)
 def references(db: Database, file: str, name: str) -> tuple[Reference, ...]:
     """The names `(None, name)` and members `(path, name)` that a definition refers to, in order, each once."""
     text = chunk_text(db, file, name)
     return () if text is None else chunk_references(db, text, is_diffeo(file))
 
 
-@query
+@query(travels=True)
 def dependencies(db: Database, file: str, name: str) -> tuple[DefinitionTarget, ...]:
     """The definitions that a definition refers to directly, in the order of the text."""
     found = (refer(db, file, path, used) for path, used in references(db, file, name))
@@ -80,7 +82,7 @@ def refer(db: Database, file: str, path: str | None, name: str) -> Target | None
     return resolve(db, file, name) if path is None else resolve_member(db, file, path, name)
 
 
-@query
+@query(travels=True)
 def strongly_connected(db: Database, file: str, name: str) -> tuple[DefinitionTarget, ...]:
     """The definitions that need each other with this one, itself included; itself alone if there are no others."""
     target = DefinitionTarget(file, name)
@@ -93,22 +95,43 @@ def is_recursive(db: Database, file: str, name: str) -> bool:
     return len(strongly_connected(db, file, name)) > 1 or DefinitionTarget(file, name) in dependencies(db, file, name)
 
 
-@query
+@query(travels=True)
 def _definition_groups(db: Database, files: tuple[str, ...]) -> Mapping[DefinitionTarget, tuple[DefinitionTarget, ...]]:
-    """The groups of two or more definitions of `files` that need each other, under each of their members."""
-    inside = set(files)
+    """The groups of two or more definitions of `files` that need each other, under each of their members.
 
-    def needs(target: DefinitionTarget) -> Iterable[DefinitionTarget]:
-        return (needed for needed in dependencies(db, target.file, target.name) if needed.file in inside)
-
+    In a file that imports none of them each goes by its own name. So they are looked for by words first: most cannot
+    need each other by what is written, and of those no tree is made.
+    """
     definitions = [DefinitionTarget(file, name) for file in files for name in names(db, file)]
     place = {target: index for index, target in enumerate(definitions)}
+
+    def may_need(target: DefinitionTarget) -> Iterable[DefinitionTarget]:
+        return (DefinitionTarget(target.file, name) for name in _mentioned(db, target.file, target.name))
+
+    def needs(target: DefinitionTarget) -> Iterable[DefinitionTarget]:
+        return (needed for needed in dependencies(db, target.file, target.name) if needed in place)
+
     table: dict[DefinitionTarget, tuple[DefinitionTarget, ...]] = {}
-    for group in components(definitions, needs):
+    suspects = definitions
+    if len(files) == 1 and files[0] not in imported_files(db, files[0]):
+        suspects = [target for group in components(definitions, may_need) if len(group) > 1 for target in group]
+    for group in components(suspects, needs):
         if len(group) > 1:
             ordered = tuple(sorted(group, key=place.__getitem__))
             table.update(dict.fromkeys(group, ordered))
     return table
+
+
+@query(travels=True)
+def _mentioned(db: Database, file: str, name: str) -> tuple[str, ...]:
+    """The other definitions of a file whose names occur as words in the text of one."""
+    text = chunk_text(db, file, name)
+    return () if text is None else tuple(sorted(_names_in(db, file).intersection(_WORD.findall(text)) - {name}))
+
+
+@query(travels=True)
+def _names_in(db: Database, file: str) -> frozenset[str]:
+    return frozenset(names(db, file))
 
 
 def components(starts: Iterable[N], needs: Callable[[N], Iterable[N]]) -> list[list[N]]:

@@ -43,7 +43,7 @@ from potto.syntax import nodes
 Said = tuple[int, Diagnostic]  # the number of the import, and what is said about it
 
 
-@query
+@query(travels=True)
 def import_diagnostics(db: Database, file: str) -> tuple[Said, ...]:
     """Everything about the imports of a file, by the number of the import."""
     items = imports(db, file)

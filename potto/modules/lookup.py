@@ -80,14 +80,14 @@ def locate(db: Database, file: str, dotted: str) -> Found | None:
     return itself
 
 
-@query
+@query(travels=True)
 def find_module(db: Database, file: str, dotted: str) -> str | None:
     """The key of the file that the module `dotted` means in `file`."""
     found = locate(db, file, dotted)
     return None if found is None else found.file
 
 
-@query
+@query(travels=True)
 def scope(db: Database, file: str) -> Mapping[str, Imported | Defined]:
     """What each name (or dotted module) is bound to at the top of a file; a table, to be read by entry.
 
@@ -186,7 +186,7 @@ def trail(db: Database, file: str, name: str) -> Trail:
         file, name = target, original
 
 
-@query
+@query(travels=True)
 def resolve(db: Database, file: str, name: str) -> Target | None:
     """What a name means at the top of a file: a definition, here or where it was imported from, or a module."""
     bound = meaning(db, file, name)
@@ -197,7 +197,7 @@ def resolve(db: Database, file: str, name: str) -> Target | None:
     return trail(db, file, name).target
 
 
-@query
+@query(travels=True)
 def resolve_member(db: Database, file: str, path: str, name: str) -> DefinitionTarget | None:
     """The definition that `path.name` means in a file that imports the module `path` (or has it under that name)."""
     module = resolve_module(db, file, path)
@@ -205,7 +205,7 @@ def resolve_member(db: Database, file: str, path: str, name: str) -> DefinitionT
     return target if isinstance(target, DefinitionTarget) else None
 
 
-@query
+@query(travels=True)
 def resolve_module(db: Database, file: str, path: str) -> str | None:
     """The file of the module that `path` (`k`, `pkg.m`, or `b.a` where b imports a) means in a file."""
     parts = path.split(".")

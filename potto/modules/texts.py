@@ -80,14 +80,14 @@ def source(db: Database, file: str) -> SourceText | None:
     return SourceText(file, text) if isinstance(text, str) else None
 
 
-@query
+@query(travels=True)
 def problem(db: Database, file: str) -> Unreadable | None:
     """Why a file that is there has no text. Stands still while the text is edited."""
     text = content(db, file)
     return text if isinstance(text, Unreadable) else None
 
 
-@query
+@query(travels=True)
 def exists(db: Database, file: str) -> bool:
     """Whether there is such a file that an import could mean."""
     text = content(db, file)
@@ -179,7 +179,7 @@ def layout(db: Database, file: str) -> Layout:
     return Layout(texts, starts, places, tuple(imports), tuple(statements), nameless)
 
 
-@query
+@query(travels=True)
 def texts(db: Database, file: str) -> Mapping[str, str]:
     """The chunk that defines each name; a table, to be read by entry."""
     return layout(db, file).texts
@@ -191,14 +191,14 @@ def starts(db: Database, file: str) -> Mapping[str, int]:
     return layout(db, file).starts
 
 
-@query
+@query(travels=True)
 def outline(db: Database, file: str) -> Outline:
     """What a file defines and imports, without places."""
     found = layout(db, file)
     return Outline(tuple(found.texts), tuple(chunk.text for chunk in found.imports), found.nameless)
 
 
-@query
+@query(travels=True)
 def names(db: Database, file: str) -> tuple[str, ...]:
     """What the file defines, in order, also where the definition is broken."""
     return outline(db, file).names
@@ -248,7 +248,7 @@ def import_starts(db: Database, file: str) -> tuple[int, ...]:
     return tuple(chunk.start for chunk in layout(db, file).imports)
 
 
-@query
+@query(travels=True)
 def syntax_diagnostics(db: Database, file: str) -> tuple[Diagnostic, ...]:
     """What the parser has to say about a file, with absolute spans."""
     diffeo = is_diffeo(file)

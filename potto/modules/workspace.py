@@ -28,7 +28,7 @@ def files(db: Database) -> tuple[str, ...]:
     return found
 
 
-@query
+@query(travels=True)
 def mentions(db: Database, file: str, name: str) -> bool:
     """Whether a name occurs as a word in a file's text."""
     text = content(db, file)
@@ -40,13 +40,13 @@ def definers(db: Database, name: str) -> Iterator[str]:
     return (file for file in db.entry(_by_definition, (), name) or () if name in names(db, file))
 
 
-@query
+@query(travels=True)
 def _by_definition(db: Database) -> dict[str, list[str]]:
     """The files that may define each name; a table, to be read by entry."""
     return _table(db, lambda file: _words_at(db, file).defined)
 
 
-@query
+@query(travels=True)
 def _by_import(db: Database) -> dict[str, list[str]]:
     """The files in whose imports each name occurs, as a module or as what is taken from one; to be read by entry."""
     return _table(db, lambda file: _words_at(db, file).imported)
@@ -68,7 +68,7 @@ class _Words:
     imported: frozenset[str]
 
 
-@query
+@query(travels=True)
 def _words_at(db: Database, file: str) -> _Words:
     """What a file may define and import, from its text alone. Stands still while the body of a definition is edited."""
     text = content(db, file)
@@ -95,7 +95,7 @@ def module_name(db: Database, file: str, target: str) -> str | None:
     return None
 
 
-@query
+@query(travels=True)
 def is_reexported(db: Database, file: str, name: str) -> bool:
     """Whether another file of the workspace takes the name `name` from this one, which may itself import it."""
     module = os.path.splitext(os.path.basename(file))[0]
@@ -115,7 +115,7 @@ def _takes(db: Database, other: str, file: str, name: str) -> bool:
     return False
 
 
-@query
+@query(travels=True)
 def _members(db: Database, file: str) -> frozenset[tuple[str, str]]:
     """The members of modules that a file uses."""
     diffeo = is_diffeo(file)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Hashable, Iterator, Mapping
+from collections.abc import Callable, Container, Hashable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from threading import get_ident
 from typing import Any, TypeVar, cast
 
 from potto.query.engine import Engine, drop
-from potto.query.nodes import FOREVER, MISSING, Entry, Event, Input, Memo, Query, same
+from potto.query.nodes import FOREVER, MISSING, Event, Input, Memo, Node, Query, entry_of, same
 
 K = TypeVar("K")
 V = TypeVar("V")
@@ -82,6 +82,47 @@ class Database(Engine):
         with self.evaluating():
             return tuple(self._inputs)
 
+    def inputs(self) -> tuple[tuple[Hashable, Input], ...]:
+        """All inputs that were set or read, under their keys."""
+        with self.evaluating():
+            return tuple((key, node) for key, node in self._inputs.items())
+
+    # What is found elsewhere, see `travel`
+
+    def input(self, key: Hashable) -> Input:
+        """An input, loaded if it was never read."""
+        with self.evaluating():
+            return self._inputs.get(key) or self._load(key)
+
+    def memo(self, table: Callable[..., Any], args: tuple[Hashable, ...]) -> Memo:
+        """The memo of a query, up to date."""
+        query: Query = table.query  # type: ignore[attr-defined]
+        with self.evaluating():
+            return self._demand_unread(query, args)
+
+    def is_current(self, node: Node) -> bool:
+        """Whether a node is what is read now, brought up to date if it has to be."""
+        source = node.source
+        if source is not None and source.verified_at < self.revision:
+            self._demand_unread(source.query, source.args)
+            return source.verified_at >= self.revision
+        return True
+
+    def adopt(self, table: Callable[..., Any], args: tuple[Hashable, ...], value: Any, deps: Iterable[Node]) -> Memo:
+        """Take an answer that was found elsewhere from what `deps` are here now. One that is known here stays."""
+        self._forbid_in_queries("adopt")
+        query: Query = table.query  # type: ignore[attr-defined]
+        memos = self._memos[query]
+        memo = memos.get(args)
+        if memo is None:
+            args = self._arguments.setdefault(args, args)
+            memo = memos[args] = Memo(query, args)
+        elif memo.verified_at >= self.revision:
+            return memo
+        memo.put(value, self.revision)
+        self._depend(memo, dict.fromkeys(deps))
+        return memo
+
     # Reading
 
     def entry(self, table: Callable[..., Mapping[K, V]], args: tuple[Hashable, ...], key: K) -> V | None:
@@ -93,11 +134,7 @@ class Database(Engine):
         memo = self._memos[query].get(args)
         if memo is None or memo.verified_at < self.revision or self._cancelled == self._evaluation:
             memo = self._demand_unread(query, args)
-        if memo.entries is None:
-            memo.entries = {}
-        node = memo.entries.get(key)
-        if node is None:
-            node = memo.entries[key] = Entry(memo, memo.value.get(key))
+        node = entry_of(memo, key)
         if self._frame is not None:
             self._frame[node] = None
         return cast("V | None", node.value)

@@ -18,19 +18,25 @@ R = TypeVar("R")
 def query(function: Callable[Concatenate[Database, P], R], /) -> Callable[Concatenate[Database, P], R]: ...
 @overload
 def query(
-    *, cycle: Callable[..., Any] | None = None, keep: int = 0
+    *, cycle: Callable[..., Any] | None = None, keep: int = 0, travels: bool = False
 ) -> Callable[[Callable[Concatenate[Database, P], R]], Callable[Concatenate[Database, P], R]]: ...
 def query(
-    function: Callable[..., Any] | None = None, /, *, cycle: Callable[..., Any] | None = None, keep: int = 0
+    function: Callable[..., Any] | None = None,
+    /,
+    *,
+    cycle: Callable[..., Any] | None = None,
+    keep: int = 0,
+    travels: bool = False,
 ) -> Any:
     """Declare a query `f(db, *hashable_args)`, called with positional arguments.
 
     `cycle(db, *args)` gives its value when it is found in a cycle. `keep`: about how many memos are kept, for a query
     whose arguments go out of use (texts); the longest unused go first, those of the present revision never.
+    `travels`: its answers can be pickled and are worth it, see `travel`.
     """
     if function is None:
-        return lambda f: _declare(Query(f, cycle, keep))
-    return _declare(Query(function, cycle, keep))
+        return lambda f: _declare(Query(f, cycle, keep, travels))
+    return _declare(Query(function, cycle, keep, travels))
 
 
 def _declare(declared: Query) -> Callable[..., Any]:

@@ -31,12 +31,16 @@ class Event:
 
 
 class Query:
-    """A declared query: its function, name, fallback in a cycle, and how many memos to keep (0: all)."""
+    """A declared query: its function, name, fallback in a cycle, how many memos to keep (0: all), and whether its
+    answers travel to other databases (see `travel`)."""
 
-    __slots__ = ("fallback", "function", "keep", "name")
+    __slots__ = ("fallback", "function", "keep", "name", "travels")
 
-    def __init__(self, function: Callable[..., Any], fallback: Callable[..., Any] | None, keep: int) -> None:
+    def __init__(
+        self, function: Callable[..., Any], fallback: Callable[..., Any] | None, keep: int, travels: bool
+    ) -> None:
         self.function, self.fallback, self.keep, self.name = function, fallback, keep, function.__name__
+        self.travels = travels
 
 
 class Input:
@@ -111,14 +115,24 @@ class Memo:
 class Entry:
     """One key of a query whose value is a mapping: changes only when the value under that key does."""
 
-    __slots__ = ("changed_at", "source", "value")
+    __slots__ = ("changed_at", "key", "source", "value")
 
-    def __init__(self, source: Memo, value: Any) -> None:
-        self.source, self.value, self.changed_at = source, value, source.changed_at
+    def __init__(self, source: Memo, key: Any) -> None:
+        self.source, self.key, self.value, self.changed_at = source, key, source.value.get(key), source.changed_at
 
     @property
     def durability(self) -> int:
         return self.source.durability
+
+
+def entry_of(memo: Memo, key: Any) -> Entry:
+    """One key of a memo whose value is a mapping."""
+    if memo.entries is None:
+        memo.entries = {}
+    node = memo.entries.get(key)
+    if node is None:
+        node = memo.entries[key] = Entry(memo, key)
+    return node
 
 
 Node = Input | Memo | Entry

@@ -7,9 +7,11 @@ question of its own (`queries.plain_reasons`), asked only when a message is buil
 
 from __future__ import annotations
 
+import copyreg
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
+from typing import Any
 
 from potto.modules.lookup import DefinitionTarget
 from potto.types.algebra import flat, inputs_of, inputs_of_ports, join, ports_in
@@ -26,6 +28,7 @@ from potto.types.types import (
     result_of,
 )
 from potto.types.values import (
+    HAZE,
     HAZY,
     NONE,
     Abstract,
@@ -111,6 +114,37 @@ def _closed(
 
 
 VARYING = Source("variable", "", number=-2)
+_NAMED = {"HAZE": HAZE, "VARYING": VARYING}
+
+
+def _symbol(kind: type, *made_of: Any) -> Any:
+    """The one symbol of an interface that there is in this process, from what is told of it to another one."""
+    if kind is str:
+        return _NAMED[made_of[0]]
+    return {Source: _source, Port: _port, Sink: _sink}[kind](*made_of)
+
+
+def _told(symbol: Any) -> tuple[Any, ...]:
+    """How a symbol is pickled. Those of interfaces are told by their numbers, for they are compared by identity."""
+    for name, named in _NAMED.items():
+        if symbol is named:
+            return _symbol, (str, name)
+    if isinstance(symbol, Sink):
+        if symbol is _sink(symbol.kind, symbol.number):
+            return _symbol, (Sink, symbol.kind, symbol.number)
+        return Sink, (symbol.kind, symbol.span, symbol.number, symbol.origin, symbol.node)
+    if isinstance(symbol, Source):
+        if symbol is _source(symbol.number):
+            return _symbol, (Source, symbol.number)
+        return Source, (symbol.kind, symbol.name, symbol.span, symbol.number, symbol.origin)
+    assert isinstance(symbol, Port)
+    if symbol is _port(symbol.number):
+        return _symbol, (Port, symbol.number)
+    return Port, (symbol.name, symbol.number, symbol.origin)
+
+
+for _kind in (Source, Port, Sink):
+    copyreg.pickle(_kind, _told)
 
 
 def chain_of(value: Value) -> list[Closure]:

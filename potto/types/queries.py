@@ -41,7 +41,7 @@ class Inferred:
     diagnostics: tuple[Diagnostic, ...]
 
 
-@query
+@query(travels=True)
 def interface(db: Database, file: str, name: str) -> Interface:
     """What others may know of a definition: its type, and what flows where. Broken ones have one too."""
     found = _analysis(db, file, name)

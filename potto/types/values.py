@@ -169,4 +169,5 @@ Value = Scalar | TupleValue | ListValue | Closure | Abstract | Choice
 
 NONE: Sources = {}
 STILL = Scalar(NONE)
-HAZY = Scalar({Source("other", "?"): None})  # what is wrong: varies with it knows what, and breaks no rule
+HAZE = Source("other", "?")
+HAZY = Scalar({HAZE: None})  # what is wrong: varies with it knows what, and breaks no rule

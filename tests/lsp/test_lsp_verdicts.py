@@ -71,7 +71,7 @@ def test_what_was_found_is_known_to_the_next_session(cache: Path, folder: Path) 
     key = str(folder / "main.po")
     with made.db.recording() as events:
         assert made.diagnostics(key) == found
-    assert not any(event.query in ("_analyses", "parsed", "file_diagnostics") for event in events)
+    assert not any(event.query in ("_analyses", "parsed", "diagnostics") for event in events)
     with made.db.recording() as events:
         assert made.diagnostics(key) == found, "the second time it is found anew"
     assert any(event.query == "_analyses" for event in events)

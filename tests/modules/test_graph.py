@@ -58,6 +58,29 @@ def test_groups_in_one_file() -> None:
     assert recursive == ["fact", "even", "odd"]
 
 
+def test_words_alone_make_no_group() -> None:
+    db = world("""
+        # even and odd are but words here
+        def even(odd) if odd > 0 then odd - 1 else 1
+        # as even is
+        def odd(n) sin(n) + even(n)
+    """)
+    assert group(db, "even") == ["main.po:even"]
+    assert group(db, "odd") == ["main.po:odd"]
+
+
+def test_groups_under_other_names() -> None:
+    db = world("""
+        # file: main.po
+        from b import odd as other
+        def even(n) if n > 0 then other(n - 1) else 1
+        # file: b.po
+        from main import even as one
+        def odd(n) if n > 0 then one(n - 1) else 0
+    """)
+    assert group(db, "even") == group(db, "odd", key("b.po")) == ["b.po:odd", "main.po:even"]
+
+
 def test_groups_across_files() -> None:
     db = world("""
         # file: main.po

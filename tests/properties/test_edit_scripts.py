@@ -75,7 +75,7 @@ BODY_EDITS = [
 ]
 OF_FILES = {
     "content", "source", "chunks", "layout", "outline", "texts", "starts", "syntax_diagnostics", "module_diagnostics",
-    "statements", "used_imports", "unused_imports", "_words_at", "exists", "problem",
+    "statements", "used_imports", "unused_imports", "_words_at", "exists", "problem", "diagnostics",
 }  # fmt: skip
 
 

@@ -1,0 +1,179 @@
+"""Helper processes for one database: started, given files, listened to, ended."""
+
+from __future__ import annotations
+
+import logging
+import os
+import subprocess
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from threading import Lock, Thread
+from types import TracebackType
+
+import potto
+from potto.crew.pipes import Found, Task, packed, unpacked
+from potto.query import Database
+from potto.query.travel import Receiver
+
+logger = logging.getLogger(__name__)
+ENOUGH = 200_000  # bytes of programs for each helper: about twice what is checked in the time that it takes to start
+MOST = 8
+AHEAD = 4  # files that a helper is given before it has told about the first
+
+
+def helpers_for(files: Iterable[str], processors: int | None = None) -> int:
+    """How many helpers are worth their start for so many files: one processor is left to who asks for them."""
+    sizes = 0
+    for file in files:
+        try:
+            sizes += os.stat(file).st_size
+        except (OSError, ValueError):
+            continue
+    free = (usable_processors() if processors is None else processors) - 1
+    return max(0, min(free, MOST, sizes // ENOUGH))
+
+
+def usable_processors() -> int:
+    """How many processors this process may use."""
+    if sys.platform == "linux":
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+class Crew:
+    """Helpers that check files from the last one on. All but what the listeners do is for one thread at a time."""
+
+    def __init__(
+        self,
+        db: Database,
+        roots: Sequence[str],
+        files: Iterable[str],
+        helpers: int,
+        texts: Mapping[str, str] | None = None,
+    ) -> None:
+        self._db, self._roots = db, tuple(roots)
+        self._left = dict.fromkeys(files)  # what nobody has begun
+        self._lock = Lock()
+        self._found: SimpleQueue[tuple[_Helper, Found]] = SimpleQueue()
+        self._receivers: dict[tuple[_Helper, int], Receiver] = {}
+        self._helpers: list[_Helper] = []
+        self.texts = texts or {}  # of open files, to be replaced when they change
+        for _ in range(helpers if self._left else 0):
+            self._start()
+
+    def __enter__(self) -> Crew:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    @property
+    def processes(self) -> tuple[int, ...]:
+        """The ids of the processes that run."""
+        return tuple(helper.process.pid for helper in self._helpers if helper.process.poll() is None)
+
+    @property
+    def expects(self) -> bool:
+        """Whether a helper still has something to say."""
+        return any(helper.expected for helper in self._helpers)
+
+    @property
+    def has_found(self) -> bool:
+        """Whether there is something to `take`."""
+        return not self._found.empty()
+
+    def take(self) -> str | None:
+        """Take over what was found out about one file, and say which; None if there is nothing now, or nothing that
+        holds."""
+        try:
+            helper, found = self._found.get_nowait()
+        except Empty:
+            return None
+        if found.parcel is None:
+            return None
+        key = helper, found.round
+        if key not in self._receivers:
+            self._receivers[key] = Receiver(self._db)
+        return found.file if self._receivers[key].take(found.parcel) else None
+
+    def leave(self, file: str) -> None:
+        """A file that is checked here needs no helper."""
+        with self._lock:
+            self._left.pop(file, None)
+
+    def close(self) -> None:
+        """End all helpers."""
+        with self._lock:
+            self._left.clear()
+        for helper in self._helpers:
+            helper.end()
+
+    # Helpers
+
+    def _start(self) -> None:
+        try:
+            helper = _Helper()
+        except OSError:
+            logger.warning("a helper process does not start", exc_info=True)
+            return
+        self._helpers.append(helper)
+        Thread(target=self._listen, args=(helper,), name="potto-crew", daemon=True).start()
+
+    def _listen(self, helper: _Helper) -> None:
+        """Give a helper files and hear what it says, on a thread of its own."""
+        self._give(helper, AHEAD)
+        helper.expected -= 1
+        try:
+            while (found := unpacked(helper.answers)) is not None:
+                self._found.put((helper, found))
+                self._give(helper, 1)
+                helper.expected -= 1
+        except Exception:
+            logger.warning("what a helper process says is not understood", exc_info=True)
+            helper.end()
+        helper.answers.close()
+        helper.expected = 0
+
+    def _give(self, helper: _Helper, count: int) -> None:
+        with self._lock:
+            files = tuple(self._left.popitem()[0] for _ in range(min(count, len(self._left))))
+        if files:
+            helper.put(files, self._roots, self.texts)
+
+
+class _Helper:
+    """One process and the texts that it has."""
+
+    def __init__(self) -> None:
+        pipe = subprocess.PIPE
+        command = [sys.executable, "-m", "potto.crew.helper"]
+        home = Path(potto.__file__).parent.parent  # not where the user is: there may be modules of any name
+        self.process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, cwd=home)
+        assert self.process.stdin is not None and self.process.stdout is not None
+        self._tasks, self.answers = self.process.stdin, self.process.stdout
+        self._texts: Mapping[str, str] = {}
+        self.expected = 1  # answers; one more until it has been given files
+
+    def put(self, files: tuple[str, ...], roots: tuple[str, ...], texts: Mapping[str, str]) -> None:
+        """Give it files, and the texts that are not as it has them. One that is dead does not hear it."""
+        changed = [(key, text) for key, text in texts.items() if self._texts.get(key) != text]
+        closed = [(key, None) for key in self._texts if key not in texts]
+        self._texts = texts
+        self.expected += len(files)
+        try:
+            self._tasks.write(packed(Task(files, roots, (*changed, *closed))))
+            self._tasks.flush()
+        except (OSError, ValueError):
+            logger.info("a helper process has ended")
+
+    def end(self) -> None:
+        """End it at once."""
+        self.process.kill()
+        self.process.wait()
+        with suppress(OSError, ValueError):
+            self._tasks.close()

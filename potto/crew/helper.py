@@ -1,0 +1,84 @@
+"""What a helper process does: it checks files that it is told, in a database of its own, until its input ends."""
+
+from __future__ import annotations
+
+import gc
+import os
+import signal
+from queue import SimpleQueue
+from threading import Thread
+from typing import BinaryIO
+
+from potto.check import diagnostics
+from potto.crew.pipes import Found, Task, packed, unpacked
+from potto.modules import open_files
+from potto.query import Database
+from potto.query.travel import Sender
+
+
+def serve(reader: BinaryIO, writer: BinaryIO) -> None:
+    """Check the files of each task and tell about one after the other."""
+    tasks: SimpleQueue[Task] = SimpleQueue()
+    Thread(target=_read, args=(reader, tasks), name="potto-tasks", daemon=True).start()
+    helper = Helper()
+    while True:
+        task = tasks.get()
+        helper.prepare(task)
+        for file in task.files:
+            writer.write(helper.checked(file))
+            writer.flush()
+
+
+def _read(reader: BinaryIO, tasks: SimpleQueue[Task]) -> None:
+    """Read tasks as they come, so that whoever gives them never waits. At the end there is nobody to tell anything."""
+    while (task := unpacked(reader)) is not None:
+        tasks.put(task)
+    os._exit(0)
+
+
+class Helper:
+    """A database, and what of it has been sent."""
+
+    def __init__(self) -> None:
+        self._db = Database()
+        self._files = open_files(self._db)
+        self._sender, self._round = Sender(self._db), 0
+
+    def prepare(self, task: Task) -> None:
+        """Bring roots and texts up to date."""
+        before = self._db.revision
+        self._files.set_roots(task.roots)
+        for key, text in task.texts:
+            if text is None:
+                self._files.close(key)
+            else:
+                self._files.set_text(key, text)
+        if self._db.revision != before:
+            self._begin_anew()
+
+    def _begin_anew(self) -> None:
+        self._sender, self._round = Sender(self._db), self._round + 1
+
+    def checked(self, file: str) -> bytes:
+        """What there is to say about a file, as a message."""
+        try:
+            return packed(Found(file, self._round, self._sender.pack(diagnostics, file)))
+        except Exception:  # whoever asked checks the file and meets it there
+            self._begin_anew()
+            return packed(Found(file, self._round, None))
+
+
+def main() -> None:
+    """Serve the process that has started this one, over standard input and output."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends it to everybody; the input ends all the same
+    gc.disable()  # it lives for seconds, and nearly all that it makes stays
+    reader, writer = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what anything prints must not get between the messages
+    try:
+        serve(reader, writer)
+    except BrokenPipeError:
+        os._exit(0)
+
+
+if __name__ == "__main__":
+    main()

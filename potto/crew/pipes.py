@@ -1,0 +1,45 @@
+"""Messages between a crew and its helpers: pickled objects with their length in front, over pipes that are theirs."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import dataclass
+from typing import IO, Any
+
+from potto.query.travel import Parcel
+
+LENGTH = 4  # bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """Files to check, and what has changed since the last task: roots, and texts of open files (None: closed)."""
+
+    files: tuple[str, ...]
+    roots: tuple[str, ...]
+    texts: tuple[tuple[str, str | None], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What was found out about a file; no parcel if that failed. `round`: after an edit both ends begin anew."""
+
+    file: str
+    round: int
+    parcel: Parcel | None
+
+
+def packed(message: Task | Found) -> bytes:
+    """A message as bytes. Raises what pickling raises, for what is nested too deeply."""
+    body = pickle.dumps(message, pickle.HIGHEST_PROTOCOL)
+    return len(body).to_bytes(LENGTH, "little") + body
+
+
+def unpacked(stream: IO[bytes]) -> Any:
+    """The next message; None at the end of the stream, also in the middle of a message."""
+    head = stream.read(LENGTH)
+    if len(head) < LENGTH:
+        return None
+    length = int.from_bytes(head, "little")
+    body = stream.read(length)
+    return pickle.loads(body) if len(body) == length else None

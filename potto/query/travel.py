@@ -1,0 +1,196 @@
+"""Answers that travel: what one database has found out, taken over by another one that has the same inputs.
+
+Owns `Sender` and `Receiver`, the two ends of one way between two processes, and `Parcel`, what goes over it: an answer
+with all that it rests on and that was not sent before. A query says whether its answers travel
+(`@query(travels=True)`); where they don't, what it has read stands for it. That is always sound; the answers of queries
+that cut edits off should travel, so that they do so on the other side too.
+
+With each input goes a digest of its value. The receiver takes an answer over only if every input below it is the same
+here, so nothing is ever taken over that would not have been found here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+from hashlib import blake2b
+from importlib import import_module
+from typing import Any
+
+from potto.query.database import Database
+from potto.query.nodes import Entry, Input, Memo, Node, Query, entry_of
+
+Args = tuple[Hashable, ...]
+# Everything is called by its number in the order of sending. What was read: an input and the digest of its value; an
+# answer: its query, arguments and value by number, and what it has read; or a key of an answer that is a table.
+InputSent = tuple[Hashable, str]
+AnswerSent = tuple[int, Args, int, tuple[int, ...]]
+EntrySent = tuple[int, Hashable, None]
+Sent = InputSent | AnswerSent | EntrySent
+
+
+@dataclass(frozen=True, slots=True)
+class Parcel:
+    """The answer of number `root`, with the values and the nodes that were not sent before."""
+
+    root: int
+    values: tuple[Any, ...]
+    nodes: tuple[Sent, ...]
+
+
+def digest(value: object) -> str:
+    """A digest of an input's value."""
+    return blake2b(repr(value).encode("utf-8", "surrogatepass"), digest_size=16).hexdigest()
+
+
+def address(query: Query) -> tuple[str, str]:
+    """Where a query is found: its module, and its name there."""
+    return query.function.__module__, query.function.__name__
+
+
+class Sender:
+    """Packs answers of a database. It holds for one revision: after an edit both ends begin anew."""
+
+    def __init__(self, db: Database) -> None:
+        self._db = db
+        self._numbers: dict[Node, int] = {}
+        self._values: dict[Any, int] = {}
+        self._views: dict[Memo, tuple[int, ...]] = {}  # what stands for a memo: itself, or what it has read
+        self._keys: dict[Input, Hashable] = {}
+        self._new_values: list[Any] = []
+        self._new: list[Sent] = []
+
+    def pack(self, query: Callable[..., Any], *args: Hashable) -> Parcel:
+        """The parcel of an answer; the query must travel. Raises what the query raises."""
+        with self._db.evaluating():
+            root = self._db.memo(query, args)
+            self._new_values, self._new = [], []
+            self._look_at(root)
+            return Parcel(self._views[root][0], tuple(self._new_values), tuple(self._new))
+
+    def _look_at(self, root: Memo) -> None:
+        """See all that a memo rests on, what is below first; without recursion."""
+        stack, begun = [root], set[Memo]()
+        while stack:
+            memo = stack[-1]
+            if memo in self._views:
+                stack.pop()
+            elif memo in begun:
+                stack.pop()
+                self._views[memo] = self._view(memo)
+            else:
+                begun.add(memo)
+                below = (dep.source for dep in memo.deps)
+                stack += [source for source in below if source is not None and source not in self._views]
+
+    def _view(self, memo: Memo) -> tuple[int, ...]:
+        below: dict[int, None] = {}
+        for dep in memo.deps:
+            if isinstance(dep, Input):
+                below[self._input(dep)] = None
+            elif isinstance(dep, Entry) and dep.source.query.travels:
+                below[self._entry(dep, self._views[dep.source][0])] = None
+            else:
+                below.update(dict.fromkeys(self._views[dep.source]))
+        if not memo.query.travels:
+            return tuple(below)
+        query, value = self._value(address(memo.query)), self._value(memo.value)
+        return (self._number(memo, (query, memo.args, value, tuple(below))),)
+
+    def _number(self, node: Node, sent: Sent) -> int:
+        number = self._numbers[node] = len(self._numbers)
+        self._new.append(sent)
+        return number
+
+    def _input(self, node: Input) -> int:
+        number = self._numbers.get(node)
+        if number is None:
+            if node not in self._keys:
+                self._keys = {node: key for key, node in self._db.inputs()}
+            number = self._number(node, (self._keys[node], digest(node.value)))
+        return number
+
+    def _entry(self, node: Entry, table: int) -> int:
+        number = self._numbers.get(node)
+        return self._number(node, (table, node.key, None)) if number is None else number
+
+    def _value(self, value: Any) -> int:
+        """The number of a value; equal ones are sent once, so that they are one object on the other side."""
+        key: Any = (type(value), value)
+        try:
+            number = self._values.get(key)
+        except TypeError:  # a table
+            key, number = object(), None
+        if number is None:
+            number = self._values[key] = len(self._values)
+            self._new_values.append(value)
+        return number
+
+
+class Receiver:
+    """Takes the parcels of one sender, in the order in which they were sent."""
+
+    def __init__(self, db: Database) -> None:
+        self._db = db
+        self._values: list[Any] = []
+        self._nodes: list[Node | None] = []  # None: not taken over
+        self._reads: list[int] = []  # the inputs below each node, a bit for each
+        self._inputs: list[InputSent] = []
+        self._digests: dict[Hashable, tuple[int, str]] = {}
+        self._same, self._other, self._revision = 0, 0, -1  # which inputs are the same here, in which revision
+
+    def take(self, parcel: Parcel) -> bool:
+        """Take over what rests on nothing that is different here; whether that goes for the answer itself."""
+        with self._db.evaluating():
+            self._values += parcel.values
+            end = len(self._nodes) + len(parcel.nodes)
+            try:
+                for sent in parcel.nodes:
+                    node, reads = self._taken(sent)
+                    self._reads.append(reads)
+                    self._nodes.append(node)
+            finally:  # cancelled, or a query fails
+                self._reads += [0] * (end - len(self._reads))
+                self._nodes += [None] * (end - len(self._nodes))
+            return self._nodes[parcel.root] is not None
+
+    def _taken(self, sent: Sent) -> tuple[Node | None, int]:
+        if len(sent) == 2:
+            self._inputs.append(sent)
+            return self._db.input(sent[0]), 1 << (len(self._inputs) - 1)
+        if len(sent) == 3:
+            table = self._nodes[sent[0]]
+            return (entry_of(table, sent[1]) if isinstance(table, Memo) else None), self._reads[sent[0]]
+        below, reads = [], 0
+        for number in sent[3]:
+            node = self._nodes[number]
+            if node is None:
+                return None, 0
+            below.append(node)
+            reads |= self._reads[number]
+        if not self._holds(reads) or not all(map(self._db.is_current, below)):
+            return None, 0
+        module, name = self._values[sent[0]]
+        return self._db.adopt(getattr(import_module(module), name), sent[1], self._values[sent[2]], below), reads
+
+    def _holds(self, reads: int) -> bool:
+        """Whether inputs are the same here."""
+        if self._revision != self._db.revision:
+            self._same, self._other, self._revision = 0, 0, self._db.revision
+        open_ = reads & ~self._same
+        while open_ and not reads & self._other:
+            bit = open_ & -open_
+            open_ ^= bit
+            key, claimed = self._inputs[bit.bit_length() - 1]
+            if self._digest(key) == claimed:
+                self._same |= bit
+            else:
+                self._other |= bit
+        return not reads & self._other
+
+    def _digest(self, key: Hashable) -> str:
+        node = self._db.input(key)
+        known = self._digests.get(key)
+        if known is None or known[0] != node.changed_at:
+            known = self._digests[key] = (node.changed_at, digest(node.value))
+        return known[1]
