@@ -102,7 +102,7 @@ def check_conditions(db: Database, file: str, name: str) -> tuple[Diagnostic, ..
     if isinstance(item, nodes.DiffeoDefinition):
         return _studied(db, file, name).diagnostics
     elaborated = core(db, file, name)
-    found = conditions_of(elaborated.term, lambda g: exported(db, g.module, g.name), lambda g: _whole(db, g))
+    found = conditions_of(elaborated.term, lambda g: exported(db, g.module, g.name), lambda g: _faultless(db, g))
     spans = dict(elaborated.origins)
     fallback = Span(0, 0) if item is None else item.name_span
     products = _products(db, elaborated.term, found, spans, fallback)
@@ -144,6 +144,16 @@ def _whole(db: Database, target: Global) -> Term | None:
     return core_term(db, target.module, target.name) if is_sound(db, target.module, target.name) else None
 
 
+def _faultless(db: Database, target: Global) -> Term | None:
+    """As `_whole`, but None of a diffeomorphism that is none: that is said where it is defined, and not at each use."""
+    item = definition(db, target.module, target.name)
+    if isinstance(item, nodes.DiffeoDefinition) and _whole(db, target) is not None:
+        studied = _studied(db, target.module, target.name)
+        if any(said.severity == "error" for said in studied.diagnostics):
+            return None
+    return _whole(db, target)
+
+
 # Conditions under integrals
 
 
@@ -183,7 +193,7 @@ def _products(
         if not anchors:
             continue
         try:
-            whole = Differentiator(lambda g: _whole(db, g)).carried_out(node)
+            whole = Differentiator(lambda g: _faultless(db, g)).carried_out(node)
             if isinstance(whole, Integral):
                 without_deltas(whole)
         except PottoError as error:

@@ -38,8 +38,9 @@ from potto.types.types import (
     dual_of_tuple,
     resolve,
 )
-from potto.types.unify import settle, unify
+from potto.types.unify import MAX_LEAVES, leaves, occurs, settle, unify
 
+MOST_DUALS = 50  # that lead to each other: more than levels of functions of functions
 STACK = 8000  # frames: two per node, for 200 levels of nesting and what is written between them
 
 Condition = Literal["plain", "bracket", "diffeo"]
@@ -77,6 +78,26 @@ class Plan:
     spread: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class _Pending:
+    """A type that is not known yet, and what is to be its dual; `node` is what is derived.
+
+    `generation`: how many duals led here, each through what was not known of the one before.
+    """
+
+    primal: Meta
+    derived: Meta
+    node: nodes.Expr
+    generation: int
+
+    @property
+    def is_endless(self) -> bool:
+        """Whether the dual would be part of itself, as that of an `h` which is given its own derivative."""
+        if self.generation > MOST_DUALS or leaves(self.primal) >= MAX_LEAVES:
+            return True
+        return occurs(self.derived, self.primal)
+
+
 class Inference:
     """Infers the types in one definition (or statement, or expression)."""
 
@@ -96,7 +117,8 @@ class Inference:
         self.mixed: set[int] = set()  # the `and`, `or`, `not` of conditions, where brackets may stand
         self.integrals = 0  # how many integrals are around the place that is looked at
         self._late: list[Callable[[], None]] = []
-        self._duals: list[tuple[Meta, Meta, nodes.Expr]] = []
+        self._duals: list[_Pending] = []
+        self._generation = 0  # of the dual that is being derived
 
     # Expressions
 
@@ -210,7 +232,7 @@ class Inference:
                 return UNKNOWN if dims is None else dual_of_tuple((TupleOf((REAL, REAL), dual=True),) * dims)
             case Meta():
                 derived = Meta(type.level)
-                self._duals.append((type, derived, node))
+                self._duals.append(_Pending(type, derived, node, self._generation + 1))
                 return derived
             case _:
                 return UNKNOWN
@@ -218,26 +240,28 @@ class Inference:
     def settle_duals(self, force: bool = False) -> None:
         """Derive the types that are known by now; `force`: what is not known at the end is a number."""
         pending, self._duals = self._duals, []
-        waiting: list[tuple[Meta, Meta, nodes.Expr]] = []
+        waiting: list[_Pending] = []
         while pending:
-            primal, derived, node = pending.pop()
-            if isinstance(resolve(primal), Meta):
+            item = pending.pop()
+            if isinstance(resolve(item.primal), Meta):
                 if not force:
-                    waiting.append((primal, derived, node))
+                    waiting.append(item)
                     continue
-                unify(primal, REAL)
-            if not unify(derived, self.dual(primal, node)):
-                self.report(_misused_derivative(node))
+                unify(item.primal, REAL)
+            self._generation = item.generation
+            if item.is_endless or not unify(item.derived, self.dual(item.primal, item.node)):
+                unify(item.derived, UNKNOWN)
+                self.report(_misused_derivative(item.node))
             pending += self._duals
             self._duals = []
-        self._duals = waiting
+        self._duals, self._generation = waiting, 0
 
     def primal_of(self, derived: Type) -> Type | None:
         """The type whose dual `derived` is to be, if that is known no better yet."""
         derived = resolve(derived)
-        for primal, dual, _ in self._duals:
-            if resolve(dual) is derived:
-                return resolve(primal)
+        for pending in self._duals:
+            if resolve(pending.derived) is derived:
+                return resolve(pending.primal)
         return None
 
     # The end

@@ -99,6 +99,19 @@ def _bind(meta: Meta, type: Type) -> bool:
     return True
 
 
+def occurs(meta: Meta, type: Type) -> bool:
+    """Whether a type is made of what `meta` stands for."""
+    meta_itself, stack, seen = resolve(meta), [type], set[int]()
+    while stack:
+        part = resolve(stack.pop())
+        if part is meta_itself:
+            return True
+        if id(part) not in seen:
+            seen.add(id(part))
+            stack.extend(parts(part))
+    return False
+
+
 def parts(type: Type) -> tuple[Type, ...]:
     """The types that a type is made of."""
     if isinstance(type, TupleOf):

@@ -345,6 +345,20 @@ def test_a_condition_that_a_passed_function_brings_is_the_callers() -> None:
     assert check(area + "def f(t)\n    area(\\x . [x < t])\n") == []
 
 
+def test_a_diffeomorphism_that_is_none_is_reported_where_it_is_defined_and_not_where_it_is_used() -> None:
+    program = """
+        diffeo half(x, y; c) = (COMPONENTS)
+
+        def shader(x, y)(c) (half(x, y; c) ? x : y)
+
+        def render(c)
+            integral ([0, 1], [0, 1]) shader(x, y)(c) + (half(x, y; c) ? 1 : 2) d(x, y)
+    """
+    assert codes(program.replace("COMPONENTS", "x + y + c, x - y")) == []
+    (said,) = check(program.replace("COMPONENTS", "x - y + c, x - y"))
+    assert said.code == "P0401" and "whose determinant is 0" in str(said.notes)
+
+
 # Calls carried out
 
 

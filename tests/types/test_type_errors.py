@@ -246,6 +246,10 @@ def test_duals() -> None:
         #                 ^ error[P0306]: the derivative of this function takes and gives pairs
         i = deriv(sin, cos)
         #   ^^^^^^^^^^^^^^^ error[P0308]: `deriv` takes one function
+        def l(s, t) s(deriv(s))
+        #                   ^ error[P0306]: the derivative of this function takes and gives pairs
+        def m(s) s(\x . deriv(s))
+        #                     ^ error[P0306]: the derivative of this function takes and gives pairs
     """)
     assert "deriv(" in only("def f(s) s(1)\na = deriv(f)(sin)").help
 
