@@ -1,9 +1,8 @@
-"""What the README and the examples say is so."""
+"""What the README and the examples say is so; programs and commands of all pages are in `test_pages`."""
 
 from __future__ import annotations
 
 import re
-import shlex
 from pathlib import Path
 
 import pytest
@@ -21,13 +20,6 @@ def blocks(text: str, language: str) -> list[str]:
     return re.findall(rf"(?m)^```{language}\n(.*?)^```", text, re.DOTALL)
 
 
-@pytest.mark.parametrize("number", range(len(blocks(README, "potto"))))
-def test_the_programs_of_the_readme_hold(number: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file = tmp_path / "readme.po"
-    file.write_text(blocks(README, "potto")[number], encoding="utf-8")
-    assert main(["test", str(file)]) == 0, capsys.readouterr().err
-
-
 PYTHON = [(page.name, block) for page in PAGES for block in blocks(page.read_text(encoding="utf-8"), "python")]
 
 
@@ -35,23 +27,6 @@ PYTHON = [(page.name, block) for page in PAGES for block in blocks(page.read_tex
 def test_the_python_of_the_pages_runs(page: str, block: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
     exec(compile(block, page, "exec"), {})
-
-
-def commands() -> list[str]:
-    lines = "\n".join(blocks(README, "sh")).splitlines()
-    return [line.partition(" #")[0] for line in lines if line.startswith("potto ") and "FILE" not in line]
-
-
-@pytest.mark.parametrize("command", commands())
-def test_the_commands_of_the_readme_run(
-    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "examples").symlink_to(ROOT / "examples")  # some of them write files
-    monkeypatch.chdir(tmp_path)
-    status = main(shlex.split(command)[1:])
-    said = capsys.readouterr()
-    # `fmt --diff` ends with 1 where the paper's own layout is not ours
-    assert status == 0 or (command.startswith("potto fmt") and said.out), said.err
 
 
 def test_the_paper_is_quoted_to_the_letter() -> None:
