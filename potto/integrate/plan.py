@@ -38,6 +38,7 @@ from potto.core.terms import (
     tuple_,
 )  # fmt: skip
 from potto.integrate.boxes import Box, box_of
+from potto.integrate.straight import Straight, straight
 from potto.kernels.cells import Mask, Trace, Value
 
 
@@ -88,6 +89,7 @@ class Plan:
     reaches: whether every jump can be forced; if not, boundary terms may be missing.
     box: how members of a batch are recognized that no surface cuts, where that can be told.
     doublings: how often its surfaces double what quadrature takes, about: up to three times each.
+    straight: its terms where it can be integrated by rules that are proved to do, if the parameters let it.
     """
 
     term: Integral
@@ -99,6 +101,7 @@ class Plan:
     reaches: bool = True
     box: Box | None = None
     doublings: int = 0
+    straight: Straight | None = None
 
     def environment(self, env: dict[str, Value], everything: dict[str, Value]) -> dict[str, Value]:
         """What the plan is evaluated in: also what functions have captured, if calls of them were carried out."""
@@ -174,7 +177,8 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve) -> P
     box = box_of(term, found, body) if reaches else None
     surfaces = {f.surface for f in found if f.kind != "center"}
     doublings = sum(min(3, len(surface.free.intersection(term.variables))) for surface in surfaces)
-    return Plan(term, tuple(levels), tuple(groups), body, vanishing, kept, reaches, box, doublings)
+    plain = straight(term, levels, inline) if reaches else None
+    return Plan(term, tuple(levels), tuple(groups), body, vanishing, kept, reaches, box, doublings, plain)
 
 
 def level_plan(level: Level, decided: tuple[int, ...], groups: Sequence[Group]) -> LevelPlan:

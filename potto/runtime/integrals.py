@@ -23,6 +23,7 @@ from potto.integrate.boxes import uncut
 from potto.integrate.levels import Iteration
 from potto.integrate.pieces import Sums
 from potto.integrate.plan import Plan
+from potto.integrate.straight import certain
 from potto.kernels import errors
 from potto.kernels.cells import Array, Cell, Number, Value, all_arrays, map_arrays
 from potto.runtime.plans import Linked, link, plan_for, split_by_decisions
@@ -116,6 +117,10 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
     for order in preferred(machine, term, linked):
         machine.books.degenerate.clear()
         plan = plan_for(machine, order, linked)
+        if batch == 1 and plan.straight is not None:
+            plain = certain(plan.straight, machine, linked.env)
+            if plain is not None:
+                return plain
         sums = counted(in_parts(plan, machine, plan.environment(env, linked.env), batch), plan, machine)
         if not machine.books.degenerate:
             if outermost and machine.books.sided and not machine.side:

@@ -9,7 +9,9 @@ import potto
 
 M = potto.compile("""
 def step(t, a) integral [0, 1] a*[x < t] d(x)
+def bent(t, a) integral [0, 1] a*abs(x - 2)*[x < t] d(x)
 def scene(c, s, a) integral ([0, 1], [0, 1]) a*x*[x + y + c >= 0]*[x < s]*[y < 5*a] d(x, y)
+def rough(c, s, a) integral ([0, 1], [0, 1]) a*abs(x - 2)*[x + y + c >= 0]*[x < s]*[y < 5*a] d(x, y)
 def still(a) integral ([0, 1], [0, 1]) a*x*[x + y >= 1] d(x, y)
 def four(t, a) integral ([0, 1], [0, 1], [0, 1], [0, 1]) a*[x + y + z + w < t]*[x < 1/2] d(x, y, z, w)
 def walled(c, a) integral ([0, 1], [0, 1]) a*[x < 1/2]*[x + y + c >= 0] d(x, y)
@@ -39,9 +41,17 @@ def test_the_parts_are_the_whole():
 
 def test_a_line_costs_eleven_nodes_and_its_two_ends():
     """One stretch with the first rule; its end at t is the boundary, its end at 0 a check; [t, 1] is left out."""
-    found = costs(lambda: potto.grad(M.step, "t")(0.3, 2.0))
+    found = costs(lambda: potto.grad(M.bent, "t")(0.3, 2.0))
     assert (found[INTERIOR], found[BOUNDARY], found[CHECKS]) == (11, 1, 1)
     assert (found["cells"], found["empty cells left out"]) == (1, 1)
+
+
+def test_a_polynomial_costs_the_nodes_that_make_a_rule_exact():
+    """Two of them; they move with the end at t, so that nothing is evaluated on it."""
+    found = costs(lambda: potto.grad(M.step, "t")(0.3, 2.0))
+    assert (found[INTERIOR], found[BOUNDARY], found[CHECKS]) == (2, 0, 0)
+    assert (found["cells"], found["empty cells left out"]) == (1, 1)
+    assert fates(found) == {"t - x = 0": (True, "it moves: it has a boundary term")}
 
 
 def test_a_surface_that_nothing_moves_costs_no_boundary_work():
@@ -61,14 +71,16 @@ def test_nor_when_it_is_sampled(method):
     assert alone[INTERIOR] == still[INTERIOR]
 
 
-def test_parameters_that_are_not_perturbed_cost_nothing():
+@pytest.mark.parametrize(("f", "boundary"), [(M.scene, False), (M.rough, True)], ids=["proved", "refined"])
+def test_parameters_that_are_not_perturbed_cost_nothing(f, boundary):
     """Differentiating by `c` alone, by a dual with tangent 0 for the rest, or by all: the same cells and nodes."""
-    one = costs(lambda: potto.grad(M.scene, "c")(-0.7, 0.5, 1.0))
-    zero = costs(lambda: potto.deriv(M.scene)((-0.7, 1.0), (0.5, 0.0), (1.0, 0.0)))
-    every = costs(lambda: potto.grad(M.scene, ["c", "s", "a"])(-0.7, 0.5, 1.0))
-    value = costs(lambda: M.scene(-0.7, 0.5, 1.0))
+    one = costs(lambda: potto.grad(f, "c")(-0.7, 0.5, 1.0))
+    zero = costs(lambda: potto.deriv(f)((-0.7, 1.0), (0.5, 0.0), (1.0, 0.0)))
+    every = costs(lambda: potto.grad(f, ["c", "s", "a"])(-0.7, 0.5, 1.0))
+    value = costs(lambda: f(-0.7, 0.5, 1.0))
     assert one[INTERIOR] == zero[INTERIOR] == value[INTERIOR]
-    assert one[BOUNDARY] == zero[BOUNDARY] < every[BOUNDARY] and value[BOUNDARY] == 0
+    assert one[BOUNDARY] == zero[BOUNDARY] and value[BOUNDARY] == 0
+    assert one[BOUNDARY] < every[BOUNDARY] if boundary else every[BOUNDARY] == 0
 
 
 def test_every_surface_says_what_became_of_it():

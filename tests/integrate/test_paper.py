@@ -16,7 +16,8 @@ import pytest
 import potto
 
 PAPER = Path(__file__).parents[2] / "examples" / "paper"
-PLACES = [-2.5, -2.0, -1.999, -1.9, -1.7, -1.3, -1.1, -1.0001, -1.0, -0.999, -0.7, -0.5, -0.1, -0.01, 0.0, 0.3, 2.0]
+PLACES = [-2.5, -2.0, -1.999, -1.9, -1.7, -1.3, -1.1, -1.0001, -1.0, -0.999, -0.9, -0.7, -0.5, -0.3, -0.1, -0.01,
+          0.0, 0.3, 1.1, 2.0]  # fmt: skip
 
 
 def antiderivatives(shader: str) -> tuple[Callable[[Any], Any], Callable[[Any], Any]]:
@@ -44,6 +45,6 @@ def test_value_and_derivative(shader: str, c: float) -> None:
         for got, exact, error in ((r.value, value, r.error), (r.tangent, tangent, r.tangent_error)):
             off = float(abs(mp.mpf(got) - exact))
             # 1e-12 relative is what is promised; the second term is one rounding of the answer itself
-            assert off <= 1e-12 * abs(exact)
+            assert off <= 1e-12 * abs(exact) and off <= 1e-13
             assert off <= error + 2.0**-52 * abs(exact)
-    assert r.evals <= 400 and r.converged
+    assert r.evals <= 200 and r.converged

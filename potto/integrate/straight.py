@@ -1,0 +1,276 @@
+"""One integral between known cuts, straight through: no pieces, no refinement, as many nodes as were proved enough.
+
+Owns `Straight` and `straight`. Where all cuts are closed forms and on every cell between them the integrand is one
+analytic formula, `proofs` says beforehand how many nodes do. What is left is a short program: bounds and cuts as
+formulas of the variables further out, the nodes between them, the formula at the nodes, weighted sums. Its derivative
+is that of the program, whose nodes move with the parameters (Reynolds' transport theorem: a surface that moves takes
+its nodes along, so that no boundary term is left). Its rounding is kept track of as everywhere outside of integrals, by
+a running error analysis from the bounds to the sums. Whatever is not plain here is left to `levels`.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from potto.calculus.expand import expanded
+from potto.calculus.surfaces import Resolve
+from potto.core.terms import (
+    Branch,
+    Const,
+    Integral,
+    Lam,
+    Term,
+    Var,
+    children,
+    postorder,
+    rebuild,
+    substitute,
+    tuple_,
+)
+from potto.integrate.enclosures import enclosable
+from potto.integrate.pieces import Evaluator, Sums
+from potto.integrate.proofs import Cell as Stretch
+from potto.integrate.proofs import Region, proved
+from potto.integrate.weighted import Totals, evaluated, function_of, summed
+from potto.kernels.cells import Cell, Value
+
+if TYPE_CHECKING:
+    from potto.integrate.plan import LevelPlan
+
+MOST_VARIABLES, MOST_CUTS, MOST_CELLS, MOST_NODES, MOST_TERMS = 3, 8, 24, 60_000, 300
+# The truncation error that is proved for the value, as a part of the accuracy that is asked for; nobody gains by less
+# than LOOSEST.
+MARGIN = 1e-3
+LOOSEST = 1e-8
+# How many times its rounding a surface must be away from 0, and cuts from each other.
+CLEAR = 64.0
+# A region of parameters: this part of the power of two below a parameter's size, or below the first variable's range.
+REGION = 2.0**-5
+TINY = 1e-280
+# How far off a rule may be for a sum that cancels, as a part of what it is when nothing does.
+NOISE = 1e-12
+MOST_REGIONS = 512
+
+Path = tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True)
+class Straight:
+    """The terms of an integral for this way: frames per variable (bounds, then cuts), the integrand without calls.
+
+    jumps: per variable the surfaces that it crosses, with the rows of the frame that are their places. surfaces: what
+    the integrand's branches depend on, as one function to a tuple. names: parameters.
+    """
+
+    variables: tuple[str, ...]
+    frames: tuple[Lam, ...]
+    jumps: tuple[tuple[tuple[Term, tuple[int, ...]], ...], ...]
+    body: Term
+    surfaces: Lam
+    names: tuple[str, ...]
+    faces: dict[tuple[bool, ...], Term] = field(default_factory=dict, compare=False)
+    regions: dict[Any, Region | None] = field(default_factory=dict, compare=False)
+
+    @property
+    def items(self) -> tuple[tuple[Term, ...], ...]:
+        return tuple(children(frame.body) for frame in self.frames)
+
+    def face(self, sides: tuple[bool, ...]) -> Term:
+        """The integrand on one side of each of its surfaces."""
+        found = self.faces.get(sides)
+        if found is None:
+            side = dict(zip(children(self.surfaces.body), sides, strict=True))
+            found = self.faces[sides] = _on_sides(self.body, side)
+        return found
+
+
+def straight(term: Integral, levels: Sequence[LevelPlan], inline: Resolve) -> Straight | None:
+    """The terms for this way; None if a cut has no closed form, or the integrand no formula that can be bounded."""
+    if len(levels) > MOST_VARIABLES or any(_not_plain(level) for level in levels):
+        return None
+    passed = {n.name: f for n in postorder(term.body) if isinstance(n, Var) and (f := inline(n)) is not None}
+    body = expanded(substitute(term.body, passed), inline)
+    nodes = postorder(body)
+    if len(nodes) > MOST_TERMS:
+        return None
+    surfaces = tuple(dict.fromkeys(node.surface for node in nodes if isinstance(node, Branch)))
+    without = _on_sides(body, dict.fromkeys(surfaces, True)), _on_sides(body, dict.fromkeys(surfaces, False))
+    cuts = (cut for level in levels for cut in children(level.frame.body))
+    if not all(map(enclosable, (*surfaces, *without, *cuts))):
+        return None
+    frames = tuple(level.frame for level in levels)
+    free = body.free.union(*(frame.body.free for frame in frames)) - set(term.variables)
+    jumps = tuple(
+        tuple(
+            (cut.surface, tuple(row for row, (at, _) in enumerate(level.rows, 2) if at == number))
+            for number, cut in enumerate(level.level.cuts)
+            if cut.jumps
+        )
+        for level in levels
+    )
+    return Straight(term.variables, frames, jumps, body, function_of(tuple_(surfaces)), tuple(sorted(free)))
+
+
+def _not_plain(level: LevelPlan) -> bool:
+    turning = any(turning for _, turning in level.rows) or any(cut.turning for cut in level.level.cuts)
+    return bool(level.searched or level.families or turning or any(level.turned)) or len(level.rows) > MOST_CUTS
+
+
+def _on_sides(body: Term, sides: Mapping[Term, bool]) -> Term:
+    memo: dict[Term, Term] = {}
+    for node in postorder(body):
+        if isinstance(node, Branch):
+            memo[node] = memo[node.then if sides[node.surface] else node.orelse]
+        else:
+            memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
+    return memo[body]
+
+
+# Where the cells are
+
+
+class _NotPlain(Exception):
+    """Something that this way does not provide for: a cut on a bound, a surface that is 0 in a cell's middle."""
+
+
+def _cells(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Iterator[Stretch]:
+    """The cells between the cuts, with the integrand on each; those on which it is 0 left out."""
+    tracked = machine.with_directions(machine.directions if machine.costs is not None else 0).tracking()
+
+    def over(i: int, here: dict[str, Value], path: Path) -> Iterator[Stretch]:
+        if i == len(plan.variables):
+            face = plan.face(_sides(plan, tracked, here))
+            dark = isinstance(face, Const) and face.value == 0
+            if machine.costs is not None:
+                machine.costs.stretches(1, 0 if dark else 1)
+            if not dark:
+                yield Stretch(path, face)
+            return
+        for low, high, middle in _stretches(plan, i, tracked, here):
+            yield from over(i + 1, {**here, plan.variables[i]: Cell(middle)}, (*path, (low, high)))
+
+    return over(0, env, ())
+
+
+def _stretches(plan: Straight, i: int, machine: Evaluator, env: dict[str, Value]) -> list[tuple[int, int, float]]:
+    """Between which rows of the frame one variable runs, and the middles."""
+    values = evaluated(plan.frames[i], machine, env)
+    if machine.costs is not None:
+        for surface, rows in plan.jumps[i]:
+            roots = [(values[row].v, values[row].t) for row in rows]
+            machine.costs.saw(surface, roots, values[0].v, values[1].v, machine.directions > 0)
+    places = []
+    for row, cell in enumerate(values):
+        x, e = float(cell.v), float(cell.e or 0.0)
+        if not math.isfinite(x) or not math.isfinite(e):
+            raise _NotPlain
+        places.append((x, CLEAR * e, row))
+    lo, hi, rest = places[0], places[1], places[2:]
+    kept = [lo]
+    for place in sorted(rest):
+        if place[0] >= lo[0] - lo[1] - place[1] and place[0] <= hi[0] + hi[1] + place[1]:
+            kept.append(place)
+    kept.append(hi)
+    if any(b[0] - a[0] <= a[1] + b[1] for a, b in itertools.pairwise(kept)):
+        raise _NotPlain
+    return [(a[2], b[2], 0.5 * (a[0] + b[0])) for a, b in itertools.pairwise(kept)]
+
+
+def _sides(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> tuple[bool, ...]:
+    if not children(plan.surfaces.body):
+        return ()
+    values = machine.evaluate(plan.surfaces, {n: env[n] for n in plan.surfaces.params}, None)
+    assert isinstance(values, tuple)
+    sides = []
+    for cell in values:
+        assert isinstance(cell, Cell)
+        x = float(cell.v)
+        if not abs(x) > CLEAR * float(cell.e or 0.0):
+            raise _NotPlain
+        sides.append(x > 0)
+    return tuple(sides)
+
+
+# What is proved
+
+
+def _region(plan: Straight, cells: tuple[Stretch, ...], values: Mapping[str, float], reach: float, rtol: float) -> Any:
+    """What is known of the rules for these cells, in the region in which the parameters lie; proved once.
+
+    Regions are as large as the parameters, or as the domain where that is larger; if nothing can be proved of those,
+    as the parameters alone.
+    """
+    rtol = min(rtol, LOOSEST)
+    for least in (reach, 0.0):
+        places = []
+        for name, value in values.items():
+            step = 2.0 ** math.floor(math.log2(max(abs(value), least) or reach)) * REGION
+            if step < TINY:
+                return None
+            places.append((name, round(value / (2 * step)) * 2 * step, step))
+        key = (cells, tuple(places), rtol)
+        if key not in plan.regions:
+            if len(plan.regions) >= MOST_REGIONS:
+                plan.regions.clear()
+            middle, radius = {n: m for n, m, _ in places}, {n: r for n, _, r in places}
+            plan.regions[key] = proved(plan.variables, plan.items, cells, middle, radius, MARGIN * rtol)
+        if plan.regions[key] is not None or all(abs(v) >= reach / 8 for v in values.values()):
+            return plan.regions[key]
+    return None
+
+
+# The integral
+
+
+def certain(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Sums | None:
+    """The integral for one set of parameters; None where something about it is not plain."""
+    if machine.frozen or machine.side:
+        return None
+    values: dict[str, float] = {}
+    for name in plan.names:
+        cell = env.get(name)
+        if not isinstance(cell, Cell) or not isinstance(cell.v, float) or not math.isfinite(cell.v):
+            return None
+        values[name] = cell.v
+    try:
+        cells = tuple(_cells(plan, machine, env))
+    except _NotPlain:
+        return None
+    k = machine.directions
+    if not cells:
+        return Sums(np.zeros((1, 1)), np.zeros((1, 1)), np.zeros((1, k, 1)), np.zeros((1, k, 1)))
+    frame = evaluated(plan.frames[0], machine.tracking(), env)
+    region = None
+    if len(cells) <= MOST_CELLS:
+        region = _region(plan, cells, values, float(frame[1].v - frame[0].v), machine.rtol)
+    if region is None or sum(region.outer) * math.prod(region.inner) > MOST_NODES:
+        return None
+    sums = summed(plan.variables, plan.frames, cells, region, machine, env, frame)
+    return None if sums is None else _accurate(sums, region, machine, [env[name] for name in plan.names])
+
+
+def _accurate(found: Totals, region: Region, machine: Evaluator, parameters: Sequence[Value]) -> Sums | None:
+    """The answer, if it is as accurate as was asked for, or as its rounding allows."""
+    k = machine.directions
+    truncation = [region.error]
+    for d in range(k):
+        speeds = {}
+        for name, cell in zip(region.radius, parameters, strict=True):
+            assert isinstance(cell, Cell)
+            t = cell.t[d] if d < len(cell.t) else None
+            speeds[name] = 0.0 if t is None else float(t)
+        truncation.append(region.rate(speeds))
+    errors = []
+    for x, rounding, gross, beyond in zip(found.number, found.rounding, found.gross, truncation, strict=True):
+        asked = 0.5 * max(machine.atol, machine.rtol * abs(x))
+        if not (rounding <= asked and beyond <= max(asked, NOISE * gross)):
+            return None
+        errors.append(rounding + beyond)
+    v, t = np.array(found.number[:1]), np.array(found.number[1:])
+    return Sums(v[None], np.array([errors[:1]]), t[None, :, None], np.array(errors[1:])[None, :, None])
