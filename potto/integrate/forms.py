@@ -50,7 +50,7 @@ def totals(work: Work, p: Pieces, ends: Ends | None) -> Totals:
     integral, error, size = added(work, np.concatenate((p.integral, p.error + p.floor, p.size)), p, 3)
     error = np.where(np.isnan(integral) | np.isnan(error), np.inf, error)
     moving = integral[:, 1 : 1 + k], error[:, 1 : 1 + k]
-    if not work.moving:
+    if not work.both:
         return Totals(integral, error, size, moving, None, None)
     value, bound = integral[:, 1 + k :], error[:, 1 + k :]
     if ends is not None:

@@ -41,7 +41,7 @@ def too_coarse(work: Work, p: Pieces, ends: Any, tally: Tally) -> Any:
     rows, m = p.integral.shape[0] // work.width, work.width
     error, floor = p.error.reshape(m, rows, -1), p.floor.reshape(m, rows, -1)
     k = work.k
-    if work.moving:  # per direction the better of the two forms
+    if work.both:  # per direction the better of the two forms
         better = np.minimum(error[:, 1 : 1 + k], error[:, 1 + k :])
         error = np.concatenate((error[:, :1], better), axis=1)
         floor = floor[:, : 1 + k]

@@ -55,7 +55,11 @@ class Iteration:
         work = Work(self, number, level, env, seg, sides, machine, cuts.moving and k > 0, batch, root, cuts.conflict)
         sums = work.integrate()
         if k and (cuts.meetings or cuts.edges):
-            count_places(self, number, level, cuts, env, outer, sums, machine)
+            if self.plan.hides:
+                machine.note_unfinished("surfaces meet, or lie on a bound, that an inner integral jumps at")
+                sums.et = np.full_like(sums.et, np.inf)
+            else:
+                count_places(self, number, level, cuts, env, outer, sums, machine)
         sums.v *= cuts.sign
         sums.t *= cuts.sign
         if cuts.bound_nan is not None:

@@ -86,7 +86,8 @@ class Plan:
     """An integral, ready to be evaluated for any parameters.
 
     decisions: plain terms and the values that they had when the plan was made; it holds where they are the same.
-    reaches: whether every jump can be forced; if not, boundary terms may be missing.
+    reaches: whether every jump is known of; if not, boundary terms may be missing.
+    hides: whether there are jumps whose side can't be forced, though it is known where they are.
     box: how members of a batch are recognized that no surface cuts, where that can be told.
     doublings: how often its surfaces double what quadrature takes, about: up to three times each.
     straight: its terms where it can be integrated by rules that are proved to do, if the parameters let it.
@@ -99,6 +100,7 @@ class Plan:
     vanishing: Any
     decisions: tuple[tuple[Term, float | None], ...]
     reaches: bool = True
+    hides: bool = False
     box: Box | None = None
     doublings: int = 0
     straight: Straight | None = None
@@ -154,12 +156,13 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve) -> P
 
     term = cased(term)
     found = findings(term.body, known, remember)
-    reaches = not (unknown or hidden(term, found, resolve))
-    if not reaches:
+    hides = hidden(term, found, resolve)
+    if unknown or hides:
         unknown.clear()
         term = hoisted(term, inline)
         found = findings(term.body, known, remember)
-        reaches = not (unknown or hidden(term, found, resolve))
+        hides = hidden(term, found, resolve)
+    reaches = not unknown
     swept = sweep(term, found, resolve, remember)
     groups: list[Group] = []
     levels: list[LevelPlan] = []
@@ -174,11 +177,11 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve) -> P
     vanishing = _vanishing(term.body, numbers)
     kept = tuple((t, v) for t, v in decisions.items() if not isinstance(t, Const))
     body = function_of(term.body)
-    box = box_of(term, found, body) if reaches else None
+    box = box_of(term, found, body) if reaches and not hides else None
     surfaces = {f.surface for f in found if f.kind != "center"}
     doublings = sum(min(3, len(surface.free.intersection(term.variables))) for surface in surfaces)
-    plain = straight(term, levels, inline) if reaches else None
-    return Plan(term, tuple(levels), tuple(groups), body, vanishing, kept, reaches, box, doublings, plain)
+    plain = straight(term, levels, inline) if reaches and not hides else None
+    return Plan(term, tuple(levels), tuple(groups), body, vanishing, kept, reaches, hides, box, doublings, plain)
 
 
 def level_plan(level: Level, decided: tuple[int, ...], groups: Sequence[Group]) -> LevelPlan:

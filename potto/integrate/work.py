@@ -69,9 +69,11 @@ class Work:
     def __post_init__(self) -> None:
         self.k = self.machine.directions
         self.last = self.number + 1 == len(self.parent.plan.levels)
+        # Without forced sides there are no values on a surface: only the moving form does without them.
+        self.both = self.moving and not self.parent.plan.hides
         self.inner = self.machine.with_directions(self.k + 1) if self.moving else self.machine
 
-    # Channels: per component the value, then per direction the moving form, then (if moving) the fixed form
+    # Channels: per component the value, then per direction the moving form, then (if both) the fixed form
 
     def integrate(self) -> Sums:
         count = self.seg.a.size
@@ -275,14 +277,15 @@ class Work:
         """The channels at the nodes, times the weight: (C, P, n), and the errors that came with them."""
         f, fx, ft, e, et = self.integrand(index, x)
         m, k = f.shape[0], self.k
-        rows = 1 + k + (k if self.moving else 0)
+        rows = 1 + k + (k if self.both else 0)
         h = np.empty((m, rows, *x.shape))
         h[:, 0] = f
         if self.moving:
             for d in range(k):
                 v, dv = maps.velocity(seg, label, d)
                 h[:, 1 + d] = ft[:, d] + fx * v + f * dv
-                h[:, 1 + k + d] = ft[:, d]
+                if self.both:
+                    h[:, 1 + k + d] = ft[:, d]
         elif k:
             h[:, 1:] = ft
         h *= weight
@@ -297,7 +300,8 @@ class Work:
                     for d in range(k):
                         v, dv = maps.velocity(seg, label, d)
                         bound[:, 1 + d] += np.abs(v) * et[:, k] + np.abs(dv) * e
-                    bound[:, 1 + k :] = et[:, :k]
+                    if self.both:
+                        bound[:, 1 + k :] = et[:, :k]
             bound = (bound * np.abs(weight)).reshape(m * rows, *x.shape)
         return h.reshape(m * rows, *x.shape), bound
 
@@ -339,11 +343,11 @@ class Work:
         hinted = any(level.level.hints for level in self.parent.plan.levels[self.number :])
         if not self.last and not hinted and not (self.moving and self.sweeps()):
             return None
-        seg, frozen = self.seg, self.machine.with_directions(0)
-        names = self.parent.plan.body.params if self.last else self.env
+        seg, frozen, plan = self.seg, self.machine.with_directions(0), self.parent.plan
+        names = plan.body.params if self.last else self.env
         both = np.concatenate((seg.owner, seg.owner))
         here = gather({n: still(v) for n, v in self.env.items() if n in names}, both)
-        here[self.level.variable] = Cell(np.concatenate((seg.a, seg.b)))
+        here[self.level.variable] = Cell(np.concatenate(self.just_inside() if plan.hides else (seg.a, seg.b)))
         sides = {g: np.concatenate((m, m)) if isinstance(m, np.ndarray) else m for g, m in self.sides.items()}
         costs = self.machine.costs
         with nullcontext() if costs is None else costs.ends(seg.ta, seg.tb, self.parent.machine.directions):
@@ -351,6 +355,12 @@ class Work:
         count = seg.a.size
         e = np.where(np.isfinite(e), e, 0.0)  # where F is infinite
         return Ends(f[:, :count], f[:, count:], e[:, :count], e[:, count:])
+
+    def just_inside(self) -> tuple[Array, Array]:
+        """Points next to the ends of segments, on the side of the cut that the segment is on."""
+        seg = self.seg
+        width = np.where(np.isfinite(seg.b - seg.a), seg.b - seg.a, 0.0)
+        return seg.a + BESIDE * width, seg.b - BESIDE * width
 
     def sweeps(self) -> bool:
         """Whether an end moves at which the integrand may jump: not where only something further in changes."""

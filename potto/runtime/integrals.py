@@ -70,6 +70,8 @@ def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermos
     flat = {n: map_arrays(v, lambda a: np.ascontiguousarray(np.broadcast_to(a, shape)).reshape(-1))
             for n, v in env.items()}  # fmt: skip
     machine.books.integrals += 1
+    if machine.overdrawn() and not outermost:
+        return given_up(machine, shape)
     linked = link(flat)
     groups = split_by_decisions(machine, term, linked, batch)
     if groups is None:
@@ -86,6 +88,13 @@ def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermos
         result.t[:, :, index], result.et[:, :, index] = part.t, part.et
     assert result is not None
     return _shaped(poisoned(result, linked.env), shape)
+
+
+def given_up(machine: Machine, shape: tuple[int, ...]) -> Value:
+    """No number, where finding one would take far more than the budget."""
+    machine.note_unfinished("the budget of evaluations is spent")
+    nan, k = np.full(shape, np.nan), machine.directions
+    return Cell(nan, np.full(shape, np.inf), (nan,) * k, (np.full(shape, np.inf),) * k)
 
 
 def poisoned(sums: Sums, env: dict[str, Value]) -> Sums:
@@ -110,7 +119,8 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
         from potto.integrate.sampling import sample
 
         plan = plan_for(machine, term, linked)
-        sums = counted(sample(plan, machine, plan.environment(env, linked.env), batch, method), plan, machine)
+        known = plan.reaches and not plan.hides
+        sums = counted(sample(plan, machine, plan.environment(env, linked.env), batch, method), known, machine)
         machine.books.methods.add("mc" if method == "mc" else "qmc")
         return sums
     machine.books.methods.add("quadrature")
@@ -121,7 +131,7 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
             plain = certain(plan.straight, machine, linked.env)
             if plain is not None:
                 return plain
-        sums = counted(in_parts(plan, machine, plan.environment(env, linked.env), batch), plan, machine)
+        sums = counted(in_parts(plan, machine, plan.environment(env, linked.env), batch), plan.reaches, machine)
         if not machine.books.degenerate:
             if outermost and machine.books.sided and not machine.side:
                 from_both_sides(machine, plan, plan.environment(env, linked.env), batch, sums)
@@ -180,9 +190,9 @@ def too_many(machine: Machine, term: Integral, linked: Linked) -> bool:
     return machine.settings.rtol >= LOOSE or PER_LEVEL**count * 2**doublings > AFFORDABLE
 
 
-def counted(sums: Sums, plan: Plan, machine: Machine) -> Sums:
-    """The sums, with derivatives that no one vouches for where a jump could not be taken account of."""
-    if machine.directions and not plan.reaches:
+def counted(sums: Sums, known: bool, machine: Machine) -> Sums:
+    """The sums, with derivatives that no one vouches for where not all jumps could be taken account of."""
+    if machine.directions and not known:
         machine.note_unfinished("a condition jumps inside an inner integral where its boundary term is not counted")
         sums.et = np.full_like(sums.et, np.inf)
     return sums

@@ -42,6 +42,7 @@ from potto.settings import Settings
 
 DEEPEST_CALLS = 3000
 MOST_TERMS = 10_000_000
+OVERDRAFT = 3
 
 
 class Linker:
@@ -174,6 +175,10 @@ class Machine:
 
     def exhausted(self) -> bool:
         return self.books.evaluations > self.settings.max_evals * self.books.members
+
+    def overdrawn(self) -> bool:
+        """Whether integrals inside of integrals have spent far more than the budget: what is left is given up."""
+        return self.books.evaluations > OVERDRAFT * self.settings.max_evals * self.books.members
 
     def note_edge(self, what: Sided, backward: Array, forward: Array) -> None:
         self.books.edges.append((what, backward, forward))
