@@ -1,41 +1,24 @@
 """What is known of a function by symbols alone: its surfaces, and its derivative as interior and boundary.
 
-Owns `surfaces` and `derivative_facts`, the answers of `potto deriv` and of `Function.surfaces`. The formulas are
-those of the calculus; here they are put together and printed. No numbers are computed.
+Owns `surfaces` and `derivative_facts`, the answers of `potto deriv` and of `Function.surfaces`. The derivative is that
+of `calculus.explain`, of a definition with its calls carried out, each part written as a formula of its own; the
+editor and the prompt lay the same out in a definition's own words. No numbers are computed.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from potto.calculus.boundary import NoClosedForm, at_bounds, jumps
 from potto.calculus.branch_cuts import opened
 from potto.calculus.conditions import conditions_of
 from potto.calculus.diffeo import exported
-from potto.calculus.dual import dual
 from potto.calculus.expand import expanded
+from potto.calculus.explain import DerivativeText, IntegralText, describe
 from potto.calculus.guards import unguarded
 from potto.core.printer import format_term
 from potto.core.simplify import simplify
-from potto.core.terms import (
-    ZERO,
-    App,
-    Branch,
-    Delta,
-    Deriv,
-    Global,
-    Integral,
-    Lam,
-    Term,
-    Var,
-    deriv,
-    integral,
-    postorder,
-    var,
-)
-from potto.diagnostics import PottoError
+from potto.core.terms import App, Branch, Delta, Deriv, Global, Lam, Term, postorder
 from potto.elaborate import core, elaborate_expression
 from potto.modules import is_recursive
 from potto.query import Database
@@ -71,6 +54,7 @@ class DerivativeFacts:
     surfaces: tuple[str, ...]
     integrals: tuple[PartFacts, ...]
     body: PartFacts | None
+    derivative: str = ""  # the whole of it, deltas integrated out
     where: tuple[str, ...] = ()  # what the parameters of measures must be
 
     @property
@@ -81,6 +65,9 @@ class DerivativeFacts:
             lines += _lines(item)
         if self.body is not None:
             lines += ["", "body" if self.integrals else "function", *_lines(self.body)]
+        said = [part.interior for part in (*self.integrals, self.body) if part is not None and not part.boundary]
+        if self.derivative and said != [self.derivative]:
+            lines += ["", *_part("whole", (self.derivative,))]
         lines += ["", *_part("surfaces", self.surfaces or ("none",)), *_part("where", self.where)]
         return "\n".join(lines)
 
@@ -91,7 +78,7 @@ def _lines(item: PartFacts) -> list[str]:
     return [
         *_part("value", (item.value,)),
         *_part("interior", (item.interior,) if item.interior else ()),
-        *_part("boundary", boundary),
+        *_part("boundary", boundary if item.interior or item.boundary else ()),
         *_part("bounds", item.bounds),
         *_part("note", note),
     ]
@@ -120,29 +107,26 @@ def _surfaces(db: Database, term: Term) -> dict[str, None]:
 
 def derivative_facts(db: Database, file: str, name: str) -> DerivativeFacts | None:
     """The derivative of a definition in symbols; None for one that is no function."""
-    term = core(db, file, name).term
+    whole = core(db, file, name).term
+    term = whole
     while isinstance(term, Deriv | Global):
         term = term.function if isinstance(term, Deriv) else core(db, term.module, term.name).term
     if not isinstance(term, Lam):
         return None
-    body, parameters = term.body, [*term.params]
-    while isinstance(body, Lam):
-        parameters += body.params
-        body = body.body
     if not is_recursive(db, file, name):
-        body = expanded(body, lambda g: _unless_recursive(db, g))
-    body, conditions = unguarded(body)
-    tangents = _tangents(parameters, body)
-    found = tuple(_integral_facts(node, tangents) for node in _outermost(body))
+        term = expanded(term, lambda g: _unless_recursive(db, g))
     type = interface(db, file, name).type
+    derived = format_type(derivative_type(type))
+    found = describe(term, name, derived, lambda g: core(db, g.module, g.name).term)
     return DerivativeFacts(
         name,
         format_type(type),
-        format_type(derivative_type(type)),
-        tuple(_surfaces(db, core(db, file, name).term)),
-        found,
-        None if isinstance(body, Integral) else _body_facts(body, tangents),
-        conditions,
+        derived,
+        tuple(_surfaces(db, whole)),
+        tuple(map(_integral_facts, found.integrals)),
+        None if found.alone else _body_facts(term, found),
+        found.tangent,
+        found.conditions,
     )
 
 
@@ -150,57 +134,18 @@ def _unless_recursive(db: Database, target: Global) -> Term | None:
     return None if is_recursive(db, target.module, target.name) else core(db, target.module, target.name).term
 
 
-def _tangents(parameters: list[str], body: Term) -> Mapping[str, Term]:
-    """For each parameter the name of its tangent; a function's is its derivative."""
-    heads = {node.function.name for node in postorder(body) if isinstance(node, App) and isinstance(node.function, Var)}
-    return {p: deriv(var(p)) if p in heads else var(f"d{p}") for p in parameters}
+def _integral_facts(found: IntegralText) -> PartFacts:
+    def over(body: str) -> str:
+        return f"{found.head} {body} d({found.variables})"
+
+    interior = over(found.interior) if found.interior not in ("", "0") else found.interior
+    reason = f"the boundary is found by numbers: {found.reason}" if found.reason else ""
+    return PartFacts(over(found.integrand), interior, tuple(map(over, found.deltas)), found.bounds, reason)
 
 
-def _outermost(body: Term) -> Iterator[Integral]:
-    """The integrals that stand in no other one."""
-    inside = {inner for node in postorder(body) if isinstance(node, Integral) for inner in postorder(node.body)}
-    return (node for node in postorder(body) if isinstance(node, Integral) and node not in inside)
-
-
-def _integral_facts(node: Integral, tangents: Mapping[str, Term]) -> PartFacts:
-    def over(body: Term) -> str:
-        return format_term(simplify(integral(node.variables, node.bounds, simplify(body), node.hints)))
-
-    def rate(term: Term) -> Term:
-        return dual(term, tangents)[1]
-
-    interior, reason = "", ""
-    boundary: tuple[str, ...] = ()
-    bounds: tuple[str, ...] = ()
-    try:
-        slope = rate(node.body)
-        interior = "0" if slope is ZERO else over(slope)
-        boundary = tuple(
-            over(jump.contribution)
-            for jump in jumps(opened(node.body), node.variables, rate)
-            if jump.rate is not ZERO
-        )
-        bounds = tuple(format_term(simplify(term)) for term in at_bounds(node, rate))
-    except (PottoError, NoClosedForm) as error:
-        reason = f"no symbolic form: {_why(error)}"
-    return PartFacts(format_term(node), interior, boundary, bounds, reason)
-
-
-def _body_facts(body: Term, tangents: Mapping[str, Term]) -> PartFacts:
-    """A body that is no integral by itself. Where a parameter crosses a surface, the derivative has a delta of it."""
-    interior, reason = "", ""
-    boundary: tuple[str, ...] = ()
-    try:
-        interior = format_term(simplify(dual(body, tangents)[1]))
-        boundary = tuple(
-            format_term(simplify(jump.contribution))
-            for jump in jumps(opened(body), body.free, lambda term: dual(term, tangents)[1])
-            if jump.rate is not ZERO
-        )
-    except (PottoError, NoClosedForm) as error:
-        reason = f"no symbolic form: {_why(error)}"
-    return PartFacts(format_term(body), interior, boundary, (), reason)
-
-
-def _why(error: PottoError | NoClosedForm) -> str:
-    return error.diagnostics[0].message if isinstance(error, PottoError) else str(error)
+def _body_facts(term: Term, found: DerivativeText) -> PartFacts:
+    """A body that is no integral by itself; what it is around its integrals is seen in the whole derivative."""
+    while isinstance(term, Lam):
+        term = term.body
+    interior = "" if found.integrals else found.smooth
+    return PartFacts(format_term(unguarded(term)[0]), interior, found.deltas, (), "; ".join(found.problems))

@@ -89,7 +89,9 @@ class DerivativeText:
     """The derivative of a definition in symbols. `text` is all of it; the fields are for those who lay it out anew.
 
     tangent: the whole of it, deltas integrated out. alone: the definition is its one integral and nothing else.
-    surfaces: where it jumps as a function of its parameters, if there is no integral.
+    surfaces: where it jumps as a function of its parameters, if there is no integral; deltas: its derivative there,
+    which `tangent` ends with; smooth: what it is before.
+    conditions: where it has a value. problems: why there is no whole in symbols.
     by: the name of a definition that is this derivative, if it was asked about that.
     """
 
@@ -98,9 +100,16 @@ class DerivativeText:
     tangent: str
     alone: bool
     integrals: tuple[IntegralText, ...]
-    notes: tuple[str, ...] = ()
+    conditions: tuple[str, ...] = ()
+    problems: tuple[str, ...] = ()
     surfaces: tuple[SurfaceText, ...] = ()
     by: str = ""
+    smooth: str = ""
+    deltas: tuple[str, ...] = ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return (*(f"has a value where {condition}" for condition in self.conditions), *self.problems)
 
     @property
     def text(self) -> str:
@@ -167,24 +176,25 @@ def describe(term: Term, name: str, type_text: str, resolve: Resolve) -> Derivat
     functions = {p: f"d{p}" for p in params if p in heads_of(term)}
     tangents: dict[str, Term] = {p: var(f"d{p}") for p in params}
     work = Differentiator(resolve)
-    notes = [f"has a value where {condition}" for condition in conditions]
-    guards, tangent = len(notes), ""
+    problems: list[str] = []
+    tangent = ""
     try:
         tangent = _text(work.dual(opened(body), tangents)[1], functions)
     except NoClosedForm as problem:
-        notes.append(f"a boundary is found by numbers: {problem}")
+        problems.append(f"a boundary is found by numbers: {problem}")
     except NotSmooth as problem:
-        notes.append(f"the derivative has no closed form: {problem}")
+        problems.append(f"the derivative has no closed form: {problem}")
     except PottoError as problem:
-        notes.extend(d.message for d in problem.diagnostics)
+        problems.extend(d.message for d in problem.diagnostics)
     known = [work.carried_out(i) for i in _outermost(body)]
     integrals = tuple(_integral(i, work, tangents, functions) for i in known if isinstance(i, Integral))
-    surfaces: tuple[SurfaceText, ...] = ()
-    if not integrals and len(notes) == guards:
+    found = DerivativeText(name, type_text, tangent, isinstance(body, Integral), integrals, conditions)
+    found = replace(found, problems=tuple(problems), smooth=tangent)
+    if not integrals and not problems:
         plain = work.carried_out(body)
-        tangent = _with_deltas(plain, work, tangents, functions, tangent)
-        surfaces = _own_surfaces(plain, tangents)
-    return DerivativeText(name, type_text, tangent, isinstance(body, Integral), integrals, tuple(notes), surfaces)
+        found = replace(found, surfaces=_own_surfaces(plain, tangents))
+        return _with_deltas(found, plain, work, tangents, functions)
+    return found
 
 
 def _outermost(term: Term) -> list[Integral]:
@@ -200,16 +210,21 @@ def _outermost(term: Term) -> list[Integral]:
 
 
 def _with_deltas(
-    plain: Term, work: Differentiator, tangents: Mapping[str, Term], functions: Mapping[str, str], tangent: str
-) -> str:
+    found: DerivativeText,
+    plain: Term,
+    work: Differentiator,
+    tangents: Mapping[str, Term],
+    functions: Mapping[str, str],
+) -> DerivativeText:
     """A function that jumps over its parameters: its derivative is a distribution over what they are filled with."""
-    found = jumps(opened(plain), tangents, lambda t: work.dual(t, tangents)[1])
-    if not found:
-        return tangent
+    over = jumps(opened(plain), tangents, lambda t: work.dual(t, tangents)[1])
+    if not over:
+        return found
     smooth = _text(work.dual(plain, tangents)[1], functions)  # calls carried out here too: else they count twice
-    parts = [] if smooth == "0" else [smooth]
-    parts += [_text(item.contribution, functions) for item in found]
-    return " + ".join(parts)
+    deltas = tuple(_text(item.contribution, functions) for item in over if item.rate is not ZERO)
+    first = f"({smooth})" if smooth.startswith("if ") else smooth  # an `else` would take in what is added
+    parts = deltas if smooth == "0" and deltas else (first, *deltas)
+    return replace(found, tangent=" + ".join(parts), smooth=smooth, deltas=deltas)
 
 
 def _integral(

@@ -223,7 +223,8 @@ def _missing_expression(stop: Stop) -> Diagnostic:
             at.span, "expected what is integrated before `d(...)`", help="write `integral [lo, hi] body d(x)`"
         )
     if before is None:
-        return kinds.MISSING_EXPRESSION(stop.place, f"expected an expression before `{_shown(at)}`")
+        what = f"expected an expression before `{_shown(at)}`" if at.text else "there is no expression here"
+        return kinds.MISSING_EXPRESSION(stop.place, what)
     if at.text and at.text in RESERVED and at.kind not in ("BINOP", "NOT"):
         return kinds.MISSING_EXPRESSION(
             before.span, f"expected an expression after `{_shown(before)}`, before `{at.text}`"

@@ -270,6 +270,28 @@ def test_deriv_keeps_bounds_that_move_apart(potto: Potto) -> None:
     assert "dt" in part["bounds"][0] and "[" in part["bounds"][0]
 
 
+def test_deriv_of_a_delta_is_no_zero(potto: Potto) -> None:
+    # the integral of delta(x - t)*x^2 is t^2 within [0, 1], so its derivative is 2*t
+    answer = potto("deriv", "--json", "main.po", "f", main="def f(t) integral [0, 1] delta(x - t)*x^2 d(x)\n").json
+    assert answer["integrals"][0]["boundary"] == ["integral [0, 1] -x^2*dt*delta'(x - t) d(x)"]
+    assert answer["derivative"] == "2*t*dt*[t < 1]*[t > 0]"
+
+
+def test_deriv_of_a_definition_around_integrals_of_others(potto: Potto) -> None:
+    program = f"{HALF}def g(t) 3*f(t)^2\n"
+    answer = potto("deriv", "--json", "main.po", "g", main=program).json
+    assert answer["integrals"][0]["boundary"] == ["integral [0, 1] delta(t - x)*dt d(x)"]
+    assert answer["body"]["value"] == "3*(integral [0, 1] [x < t] d(x))^2"
+    # D of 3*t^2 within [0, 1], by what the printed formula gives at t = 0.3, dt = 1
+    formula = f"let t = 0.3 in let dt = 1 in {answer['derivative']}"
+    assert math.isclose(potto("eval", "main.po", formula, "--json").json["value"], 1.8, rel_tol=1e-12)
+
+
+def test_the_whole_of_a_choice_and_its_delta_can_be_read(potto: Potto) -> None:
+    out = potto("deriv", "main.po", "f", main="def f(y, a) if [y > a] then a*y else 2*y\n").out
+    assert "whole     (if [a < y] then " in out and ") + (a*y - 2*y)*delta(" in out
+
+
 @pytest.mark.parametrize(
     ("kind", "part"),
     [
