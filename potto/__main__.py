@@ -20,6 +20,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if arguments in (["--version"], ["-V"]):
         print(f"potto {__version__}")
         return FINE
+    _open_streams()
     try:
         return _guarded(arguments)
     except KeyboardInterrupt:
@@ -28,8 +29,15 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _guarded(arguments: list[str]) -> int:
+    import os
+
     from potto.cli.command_line import dispatch
 
+    try:
+        os.getcwd()
+    except OSError:
+        sys.stderr.write("potto: the folder that this is run in is gone: change to another one\n")
+        return FAILED
     try:
         status = dispatch(arguments)
         sys.stdout.flush()
@@ -38,11 +46,32 @@ def _guarded(arguments: list[str]) -> int:
         return leaving.code if isinstance(leaving.code, int) else WRONG_USE
     except BrokenPipeError:
         return _closed_pipe()
-    except Exception as error:
-        from potto.cli.crash import report
+    except OSError as error:
+        import errno
 
-        sys.stderr.write(report(arguments, error) + "\n")
-        return CRASHED
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+            return _crashed(arguments, error)
+        _closed_pipe()
+        sys.stderr.write(f"potto: what is said cannot be written: {(error.strerror or str(error)).lower()}\n")
+        return FAILED
+    except Exception as error:
+        return _crashed(arguments, error)
+
+
+def _crashed(arguments: list[str], error: Exception) -> int:
+    from potto.cli.crash import report
+
+    sys.stderr.write(report(arguments, error) + "\n")
+    return CRASHED
+
+
+def _open_streams() -> None:
+    """Let what is said go nowhere where somebody has closed the streams (`>&-`)."""
+    import os
+
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode))  # noqa: SIM115  (until the end)
 
 
 def _closed_pipe() -> int:

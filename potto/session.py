@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from potto.check import absolute
 from potto.modules import DefinitionTarget, chunk_start, definition, imports, names, resolve, statements
 from potto.modules.builtins import is_builtin
+from potto.modules.kinds import HIDES_BUILTIN
 from potto.modules.lookup import bindings, preludes, scope
 from potto.modules.texts import import_starts
 from potto.render import Located, ProgramError
@@ -27,6 +28,7 @@ from potto.types import Inferred, format_type, infer_expression, interface
 from potto.world import Answer, World
 
 PROMPT = "<prompt>"
+_ANSWER = re.compile("_[0-9]*")
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +105,7 @@ class Session:
         self._put(entry, text, self.prelude)
         if self.number == 1:
             yield from map(Said, self.world.project_problems(entry))
-        said = [Said(located) for located in self.world.diagnostics(entry) if not _is_idle(located)]
+        said = [Said(located) for located in self.world.diagnostics(entry) if not _goes_without_saying(located)]
         yield from said
         if any(item.is_error for item in said):
             return
@@ -125,7 +127,9 @@ class Session:
     def _defined(self, entry: str, name: str) -> Defined:
         before = resolve(self.db, PROMPT, name)
         shadows = None
-        if isinstance(before, DefinitionTarget):
+        if isinstance(before, DefinitionTarget) and _ANSWER.fullmatch(before.name):
+            shadows = f"the answer `{name}`" if name != "_" else "the last answer, until there is another"
+        elif isinstance(before, DefinitionTarget):
             shadows = f"`{name}` of {before.file if before.file.startswith('<') else os.path.basename(before.file)}"
         elif before is not None:
             shadows = f"the module `{name}`"
@@ -192,7 +196,7 @@ class Session:
         found: dict[str, DefinitionTarget | None] = {}
         for file in preludes(self.db, PROMPT):
             for name in scope(self.db, file):
-                if name not in found and not re.fullmatch(r"_[0-9]*", name):
+                if name not in found and not _ANSWER.fullmatch(name):
                     target = resolve(self.db, file, name)
                     found[name] = target if isinstance(target, DefinitionTarget) else None
         return found
@@ -251,6 +255,6 @@ class Session:
         self._see(())
 
 
-def _is_idle(located: Located) -> bool:
-    """Whether a message is about something unused: at a prompt it may be used by what comes next."""
-    return "unnecessary" in located.diagnostic.tags
+def _goes_without_saying(located: Located) -> bool:
+    """Whether a message is about what is unused, for what comes next may use it, or hidden: `Defined` says it."""
+    return "unnecessary" in located.diagnostic.tags or located.diagnostic.code == HIDES_BUILTIN.code

@@ -29,7 +29,7 @@ def report(arguments: Sequence[str], error: BaseException) -> str:
 
 def _write(command: str, error: BaseException) -> str:
     details = "".join(traceback.format_exception(error, limit=-60))
-    text = f"potto {__version__}, Python {sys.version}, {platform.platform()}\n{command}\n{os.getcwd()}\n\n{details}"
+    text = f"potto {__version__}, Python {sys.version}, {platform.platform()}\n{command}\n{_folder()}\n\n{details}"
     try:
         handle, path = tempfile.mkstemp(prefix="potto-crash-", suffix=".txt", text=True)
         with os.fdopen(handle, "w", encoding="utf-8", errors="backslashreplace") as file:
@@ -37,3 +37,10 @@ def _write(command: str, error: BaseException) -> str:
     except OSError as problem:
         return f"(could not be written: {problem})"
     return path
+
+
+def _folder() -> str:
+    try:
+        return os.getcwd()
+    except OSError as problem:  # it was removed
+        return f"({problem})"

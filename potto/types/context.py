@@ -158,7 +158,7 @@ class Inference:
     def bind(self, node: object, local: Local) -> Local:
         """Bring a name into scope."""
         before = self.scope.find(local.name)
-        if before is not None and not local.name.startswith("_"):
+        if before is not None and local.name and not local.name.startswith("_"):
             self.report(_shadowing(local, before))
         self.scope.bind(local)
         self.binders[id(node)] = local

@@ -35,9 +35,11 @@ LONG = 100  # characters of a formula that an answer still shows
 def entry_parts(session: Conversation, text: str) -> Iterator[Part]:
     """Run an entry and say step by step what came of it."""
     missing: list[str] = []
+    otherwise = False  # whether something else is wrong, or the message says itself what to do
     for outcome in session.enter(text):
         if isinstance(outcome, Said):
             found = outcome.located.diagnostic
+            otherwise |= outcome.is_error and (found.code != NOT_DEFINED or "defines it" in found.help)
             session.last_code = found.code
             if found.code == NOT_DEFINED and outcome.located.file == f"<In {session.number}>":
                 name = plain_names(session.entries[-1].text)[found.span.start : found.span.end]
@@ -46,7 +48,7 @@ def entry_parts(session: Conversation, text: str) -> Iterator[Part]:
                 else:
                     missing.append(name)
         yield from outcome_parts(session, outcome)
-    advice = _advice(session, list(dict.fromkeys(missing)))
+    advice = "" if otherwise else _advice(session, list(dict.fromkeys(missing)))
     if advice:
         yield Part("help", advice)
 

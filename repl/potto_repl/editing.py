@@ -1,6 +1,6 @@
 """What typing means: when an entry is over, how a new line is indented, what a paste says.
 
-Owns `is_over`, `indentation` and `unprompted`. Texts in, texts out: the parser decides, the keys obey.
+Owns `is_over`, `indentation`, `unprompted` and `untabbed`. Texts in, texts out: the parser decides, the keys obey.
 """
 
 from __future__ import annotations
@@ -78,3 +78,13 @@ def unprompted(text: str) -> str:
         elif _CONTINUED.match(line):
             kept.append(_CONTINUED.sub("", line))
     return "\n".join(kept)
+
+
+def untabbed(text: str) -> str:
+    """A text whose lines are indented by blanks alone: a screen shows no tabs, and they may not be mixed."""
+    return "\n".join(_indented(line) for line in text.split("\n"))
+
+
+def _indented(line: str) -> str:
+    rest = line.lstrip(" \t")
+    return line[: len(line) - len(rest)].expandtabs(INDENT) + rest.replace("\t", " ")

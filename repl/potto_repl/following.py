@@ -56,10 +56,13 @@ def refreshed(session: Conversation, quiet: bool = False) -> list[Part]:
     """Read again what changed on disk, keep old definitions where the new text is wrong, and say what was done."""
     start = time.perf_counter()
     before = _State.of(session)
+    changed = session.world.refresh()
+    if quiet and not changed and all(_stamp(file) == stamp for file, stamp in session.broken.items()):
+        return []  # what is broken was said when it broke
     for file in session.broken:
         session.world.files.close(file)
-    waiting, session.broken = session.broken, set()
-    if not session.world.refresh() and not waiting:
+    waiting, session.broken = session.broken, {}
+    if not session.world.refresh() and not waiting and not changed:
         return [] if quiet else [Part("answer", "nothing has changed", {"reloaded": []})]
     parts: list[Part] = []
     with session.db.recording() as events:
@@ -72,6 +75,15 @@ def refreshed(session: Conversation, quiet: bool = False) -> list[Part]:
     if len(why) > MOST_REASONS:
         lines.append(f"  and {len(why) - MOST_REASONS} more")
     return [*parts, Part("answer", "\n".join(lines), {"recompiled": len(again), "definitions": total, "why": why})]
+
+
+def _stamp(file: str) -> tuple[int, ...] | None:
+    """What changes when a file does; None where there is none."""
+    try:
+        found = os.stat(file)
+    except OSError:
+        return None
+    return (found.st_mtime_ns, found.st_size, found.st_ino, found.st_mode)
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +143,7 @@ def _check_all(session: Conversation, before: dict[str, str], parts: list[Part])
         parts += [diagnostic(located, session.source) for located in said]
         if any(located.diagnostic.severity == "error" for located in said) and file in before:
             parts.append(note(f"{display_name(file)}: the definitions of before are kept"))
-            session.broken.add(file)
+            session.broken[file] = _stamp(file)
     for file in session.broken:
         session.world.files.set_text(file, before[file])
     return _elaborated(session)

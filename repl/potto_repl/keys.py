@@ -13,7 +13,7 @@ from prompt_toolkit.filters import Condition, Filter, emacs_mode, has_focus, is_
 from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
 from prompt_toolkit.keys import Keys
 
-from potto_repl.editing import INDENT, indentation, is_over, unprompted
+from potto_repl.editing import INDENT, indentation, is_over, unprompted, untabbed
 from potto_repl.symbols import expanded, typed
 
 
@@ -45,7 +45,7 @@ def _lines(keys: KeyBindings, typing: Filter) -> None:
 
     @keys.add(Keys.BracketedPaste, filter=typing)
     def _paste(event: KeyPressEvent) -> None:
-        text = unprompted(event.data).rstrip("\n")
+        text = untabbed(unprompted(event.data)).rstrip("\n")
         event.current_buffer.insert_text(text)
         pasted[0] = event.current_buffer.text
 

@@ -32,17 +32,26 @@ def stream(session: Conversation, text: str) -> Iterator[Part]:
         for part in _guarded(session, text):
             said.append(part)
             yield part
-    finally:
-        if recording is not None and recording == session.record:
-            _write_down(recording, text, said)
+    except BaseException:
+        _write_down(session, recording, text, said)
+        raise
+    yield from _write_down(session, recording, text, said)
 
 
-def _write_down(path: str, text: str, said: list[Part]) -> None:
-    """An entry and its answer at the end of a transcript."""
+def _write_down(session: Conversation, path: str | None, text: str, said: list[Part]) -> tuple[Part, ...]:
+    """An entry and its answer at the end of a transcript; what to say where that cannot be written any more."""
     from potto_repl.replay import prompted
 
-    with open(path, "a", encoding="utf-8") as file:
-        file.write("\n".join([prompted(text), *(part.plain() for part in said)]) + "\n\n")
+    if path is None or path != session.record:
+        return ()
+    try:
+        with open(path, "a", encoding="utf-8") as file:
+            file.write("\n".join([prompted(text), *(part.plain() for part in said)]) + "\n\n")
+    except OSError as error:
+        session.record = None
+        why = (error.strerror or str(error)).lower()
+        return Refusal(f"`{path}` cannot be written any more: {why}", "recording has ended; all else goes on").parts
+    return ()
 
 
 def _guarded(session: Conversation, text: str) -> Iterator[Part]:
@@ -60,6 +69,9 @@ def _guarded(session: Conversation, text: str) -> Iterator[Part]:
         for found in error.diagnostics:
             session.last_code = found.code
             yield diagnostic(Located(None, found), session.source)
+    except OSError as error:  # of the system, not of ours: a folder that is gone, a disc that is full
+        where = f": {error.filename}" if error.filename is not None else ""
+        yield Part("error", f"the system says: {(error.strerror or str(error)).lower()}{where}")
     except Exception as error:
         yield from _crashed(text, error)
 

@@ -54,7 +54,7 @@ class Conversation(Session):
         self.entries: list[Entry] = []
         self.undoing: list[Before] = []
         self.written: dict[str, SourceText] = {}  # entries as they were typed, where that differs from what was run
-        self.broken: set[str] = set()  # loaded files that mean what they meant before
+        self.broken: dict[str, object] = {}  # loaded files that mean what they meant before, by how they were then
         self.parts: dict[tuple[str, str], Parts | None] = {}  # of derivatives that were answered, by their definition
         self.last_code: str | None = None
         self.last_picture: Any = None

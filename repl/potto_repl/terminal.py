@@ -12,6 +12,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,7 @@ from prompt_toolkit.history import FileHistory, History, InMemoryHistory
 from prompt_toolkit.output import ColorDepth
 from prompt_toolkit.styles import DynamicStyle
 
-from potto_repl.beside import Checker, Progress
+from potto_repl.beside import PLAIN, Checker, Progress
 from potto_repl.highlight import PottoCompleter, PottoLexer, style
 from potto_repl.keyboard import kept_interrupts, loud_keys, quiet_keys
 from potto_repl.keys import bindings
@@ -48,13 +49,32 @@ def history_path() -> Path:
 def open_history() -> History:
     """The history of all sessions; of this one alone where it cannot be kept."""
     path = history_path()
+    if path.exists() and not path.is_file():
+        return InMemoryHistory()
+    home = os.path.expanduser("~")
+    if str(path).startswith(home) and not os.path.isdir(home):
+        return InMemoryHistory()  # nobody's home is made here
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("a", encoding="utf-8"):
             pass
     except OSError:
         return InMemoryHistory()
-    return FileHistory(str(path))
+    return KeptHistory(str(path))
+
+
+class KeptHistory(FileHistory):
+    """A history in a file; where that cannot be read or written any more, of this session alone."""
+
+    def load_history_strings(self) -> list[str]:
+        try:
+            return list(super().load_history_strings())
+        except OSError:
+            return []
+
+    def store_string(self, string: str) -> None:
+        with suppress(OSError):
+            super().store_string(string)
 
 
 class Terminal:
@@ -133,7 +153,10 @@ class Terminal:
         self.checker.stop()
         try:
             with self.progress:
+                if not self.loader.ready:
+                    self.progress.note("starting")
                 self._attach()
+                self.progress.note(PLAIN)
                 from potto.runtime.books import Gauge, watching
                 from potto_repl.respond import stream
                 from potto_repl.symbols import readable

@@ -116,6 +116,8 @@ def save(session: Conversation, text: str) -> list[Part]:
         raise Refusal(f"`{path}` is neither a program nor a picture", "end it with .po, .svg or .png")
     from potto_repl.transcript import program
 
+    if session.world.key(path) in session.loaded:
+        raise Refusal(f"`{path}` is loaded here: it would be overwritten", "choose another name")
     body, notes = program(session, os.path.dirname(os.path.abspath(path)))
     _write(path, body.encode())
     live = body.count("\n#> ") + body.startswith("#> ")
@@ -133,11 +135,33 @@ def _save_picture(session: Conversation, path: str, suffix: str) -> list[Part]:
 
 
 def _write(path: str, data: bytes) -> None:
+    """Write a file whole or not at all: on a disc that is full the old one stays."""
+    import tempfile
+
     try:
-        with open(path, "wb") as file:
-            file.write(data)
+        folder = os.path.dirname(path) or "."
+        special = os.path.exists(path) and (os.path.islink(path) or not os.path.isfile(path))
+        if special or not os.access(folder, os.W_OK):
+            with open(path, "wb") as file:
+                file.write(data)
+            return
+        handle, fresh = tempfile.mkstemp(dir=folder, prefix=f".{os.path.basename(path)}-")
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(data)
+            os.chmod(fresh, os.stat(path).st_mode if os.path.exists(path) else 0o666 & ~_umask())
+            os.replace(fresh, path)
+        except BaseException:
+            os.unlink(fresh)
+            raise
     except OSError as error:
         raise Refusal(f"`{path}` cannot be written: {(error.strerror or str(error)).lower()}") from None
+
+
+def _umask() -> int:
+    mask = os.umask(0o022)
+    os.umask(mask)
+    return mask
 
 
 @command("record", argument="[FILE | off]", completes="file")
