@@ -24,6 +24,7 @@ from potto.modules import DefinitionTarget, ModuleTarget, find_module, names, re
 from potto.modules.kinds import NO_MODULE
 from potto.render import ProgramError, display_name
 from potto.runtime.estimate import Estimate
+from potto.runtime.functions import Closure
 from potto.source import Span
 from potto.syntax import nodes, print_expression
 from potto.types import derivative_type, format_type, infer_expression
@@ -200,6 +201,7 @@ class Function:
         self._type = type
         self._given = given
         self._calls: dict[Form, Call] = {}
+        self._known: tuple[int, Value] | None = None
         self._groups: tuple[int, tuple[tuple[Parameter, ...], ...]] | None = None
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
@@ -235,8 +237,14 @@ class Function:
 
     def _value(self) -> Value:
         """The function as a value. Raises PottoError."""
+        revision = self._world.db.revision
+        if self._known is not None and self._known[0] == revision:
+            return self._known[1]
         arguments, _ = self._arguments(self._given)
-        return self._call(self._given).value([value for _, value in arguments])
+        value = self._call(self._given).value([value for _, value in arguments])
+        if isinstance(value, Closure) and not value.captured:  # nothing in it was computed, under settings of its own
+            self._known = revision, value
+        return value
 
     @property
     def _whole(self) -> Type:

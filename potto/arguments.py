@@ -41,6 +41,11 @@ class Batch:
 
     def shaped(self, estimate: Estimate) -> Estimate:
         """The estimate with every number as an array of the batch's shape; as a float if there were no arrays."""
+        if self.shape is None and all(
+            part is None or part.__class__ is float
+            for part in (estimate.value, estimate.error, estimate.tangent, estimate.tangent_error)
+        ):
+            return estimate
         parts = (estimate.value, estimate.error, estimate.tangent, estimate.tangent_error)
         value, error, tangent, tangent_error = map(self._restored, parts)
         return replace(estimate, value=value, error=error, tangent=tangent, tangent_error=tangent_error)

@@ -46,14 +46,16 @@ class Cell:
     body: Term
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Region:
     """What was proved for all parameters near those given.
 
-    outer: nodes for the outermost variable, per cell; inner: for each of the others. error: a bound of the integral's
-    error. radius: per parameter that of the disc about it on whose every point the bound holds.
+    cells: what it was proved of. outer: nodes for the outermost variable, per cell; inner: for each of the others.
+    error: a bound of the integral's error. radius: per parameter that of the disc about it on whose every point the
+    bound holds.
     """
 
+    cells: tuple[Cell, ...]
     outer: tuple[int, ...]
     inner: tuple[int, ...]
     error: float
@@ -113,7 +115,7 @@ def proved(
         return None
     outer, inner = (errors[:, 0] <= share).argmax(axis=1), enough[1:].argmax(axis=1)
     bound = sum(float(e[0, o] + e[np.arange(1, count), inner].sum()) for e, o in zip(errors, outer, strict=True))
-    return Region(tuple(int(o) + 2 for o in outer), tuple(int(i) + 2 for i in inner), bound, dict(radius))
+    return Region(tuple(cells), tuple(int(o) + 2 for o in outer), tuple(int(i) + 2 for i in inner), bound, dict(radius))
 
 
 def _on_cell(

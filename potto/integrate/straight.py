@@ -37,6 +37,7 @@ from potto.integrate.enclosures import enclosable
 from potto.integrate.pieces import Evaluator, Sums
 from potto.integrate.proofs import Cell as Stretch
 from potto.integrate.proofs import Region, proved
+from potto.integrate.rules import EPS
 from potto.integrate.weighted import Totals, evaluated, function_of, summed
 from potto.kernels.cells import Cell, Value
 
@@ -139,8 +140,13 @@ class _NotPlain(Exception):
     """Something that this way does not provide for: a cut on a bound, a surface that is 0 in a cell's middle."""
 
 
-def _cells(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Iterator[Stretch]:
-    """The cells between the cuts, with the integrand on each; those on which it is 0 left out."""
+def _cells(
+    plan: Straight, machine: Evaluator, env: dict[str, Value], frame: tuple[Cell, ...]
+) -> Iterator[Stretch]:
+    """The cells between the cuts, with the integrand on each; those on which it is 0 left out.
+
+    frame: the bounds and cuts of the outermost variable.
+    """
     tracked = machine.with_directions(machine.directions if machine.costs is not None else 0).tracking()
 
     def over(i: int, here: dict[str, Value], path: Path) -> Iterator[Stretch]:
@@ -152,15 +158,17 @@ def _cells(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Iterato
             if not dark:
                 yield Stretch(path, face)
             return
-        for low, high, middle in _stretches(plan, i, tracked, here):
+        values = evaluated(plan.frames[i], tracked, here) if i else frame
+        for low, high, middle in _stretches(plan, i, tracked, values):
             yield from over(i + 1, {**here, plan.variables[i]: Cell(middle)}, (*path, (low, high)))
 
     return over(0, env, ())
 
 
-def _stretches(plan: Straight, i: int, machine: Evaluator, env: dict[str, Value]) -> list[tuple[int, int, float]]:
+def _stretches(
+    plan: Straight, i: int, machine: Evaluator, values: tuple[Cell, ...]
+) -> list[tuple[int, int, float]]:
     """Between which rows of the frame one variable runs, and the middles."""
-    values = evaluated(plan.frames[i], machine, env)
     if machine.costs is not None:
         for surface, rows in plan.jumps[i]:
             roots = [(values[row].v, values[row].t) for row in rows]
@@ -185,11 +193,8 @@ def _stretches(plan: Straight, i: int, machine: Evaluator, env: dict[str, Value]
 def _sides(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> tuple[bool, ...]:
     if not children(plan.surfaces.body):
         return ()
-    values = machine.evaluate(plan.surfaces, {n: env[n] for n in plan.surfaces.params}, None)
-    assert isinstance(values, tuple)
     sides = []
-    for cell in values:
-        assert isinstance(cell, Cell)
+    for cell in evaluated(plan.surfaces, machine, env):
         x = float(cell.v)
         if not abs(x) > CLEAR * float(cell.e or 0.0):
             raise _NotPlain
@@ -238,20 +243,20 @@ def certain(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Sums |
         if not isinstance(cell, Cell) or not isinstance(cell.v, float) or not math.isfinite(cell.v):
             return None
         values[name] = cell.v
+    frame = evaluated(plan.frames[0], machine.tracking(), env)
     try:
-        cells = tuple(_cells(plan, machine, env))
+        cells = tuple(_cells(plan, machine, env, frame))
     except _NotPlain:
         return None
     k = machine.directions
     if not cells:
         return Sums(np.zeros((1, 1)), np.zeros((1, 1)), np.zeros((1, k, 1)), np.zeros((1, k, 1)))
-    frame = evaluated(plan.frames[0], machine.tracking(), env)
     region = None
     if len(cells) <= MOST_CELLS:
         region = _region(plan, cells, values, float(frame[1].v - frame[0].v), machine.rtol)
     if region is None or sum(region.outer) * math.prod(region.inner) > MOST_NODES:
         return None
-    sums = summed(plan.variables, plan.frames, cells, region, machine, env, frame)
+    sums = summed(plan.variables, plan.frames, region, machine, env, frame)
     return None if sums is None else _accurate(sums, region, machine, [env[name] for name in plan.names])
 
 
@@ -266,10 +271,10 @@ def _accurate(found: Totals, region: Region, machine: Evaluator, parameters: Seq
             t = cell.t[d] if d < len(cell.t) else None
             speeds[name] = 0.0 if t is None else float(t)
         truncation.append(region.rate(speeds))
-    errors = []
+    errors, unit = [], EPS * max(found.gross)
     for x, rounding, gross, beyond in zip(found.number, found.rounding, found.gross, truncation, strict=True):
         asked = 0.5 * max(machine.atol, machine.rtol * abs(x))
-        if not (rounding <= asked and beyond <= max(asked, NOISE * gross)):
+        if not (rounding <= asked and beyond <= max(asked, NOISE * gross, unit)):
             return None
         errors.append(rounding + beyond)
     v, t = np.array(found.number[:1]), np.array(found.number[1:])

@@ -34,7 +34,7 @@ def function_of(term: Term) -> Lam:
 
 def evaluated(function: Lam, machine: Evaluator, env: dict[str, Value]) -> tuple[Cell, ...]:
     """The numbers of a function to a tuple of them, whose parameters have the values of `env`."""
-    values = machine.evaluate(function, {n: env[n] for n in function.params}, None)
+    values = machine.evaluate(function, env, None)
     assert isinstance(values, tuple)
     return values  # type: ignore[return-value]
 
@@ -57,8 +57,8 @@ class Totals:
 
 
 def summed(
-    variables: Sequence[str], frames: Sequence[Lam], cells: tuple[Stretch, ...], region: Region, machine: Evaluator,
-    env: dict[str, Value], frame: tuple[Cell, ...],
+    variables: Sequence[str], frames: Sequence[Lam], region: Region, machine: Evaluator, env: dict[str, Value],
+    frame: tuple[Cell, ...],
 ) -> Totals | None:  # fmt: skip
     """Weighted sums over the nodes of all cells: value and tangents, with their rounding. None where cuts cross.
 
@@ -66,13 +66,13 @@ def summed(
     """
     tracked, here = machine.tracking(), dict(env)
     owner, nodes, weights = _outer(region.outer)
+    rows = _rows(region)
     shape, length, rounded = (1,), None, None
     for i, variable in enumerate(variables):
         if i:
             frame = evaluated(frames[i], tracked, here)
             nodes = gauss(region.inner[i - 1]).nodes
-        low, high = (np.array([cell.rows[i][side] for cell in cells])[owner] for side in (0, 1))
-        found = _between(_block(frame, machine.directions, shape), low, high, i > 0)
+        found = _between(_block(frame, machine.directions, shape), *rows[i], i > 0)
         if found is None:
             return None
         lo, width, off = found
@@ -83,11 +83,20 @@ def summed(
         here[variable] = _placed(lo, width, off, nodes, i > 0)
         length, rounded = _times(length, rounded, width, off, i > 1)
         shape = here[variable].v.shape  # type: ignore[union-attr]
-    values = _integrand(cells, owner, tracked, here, shape)
+    values = _integrand(region.cells, owner, tracked, here, shape)
     if len(variables) > 1:
         values = values @ gauss(region.inner[-1]).weights
     machine.count(math.prod(shape))
     return _added(values, length * weights, rounded * weights)  # type: ignore[operator]
+
+
+@lru_cache(maxsize=256)
+def _rows(region: Region) -> tuple[tuple[Ints, Ints], ...]:
+    """Per variable, for every node of the outermost one, which rows of the frame are the ends of its cell."""
+    owner, _, _ = _outer(region.outer)
+    count = len(region.cells[0].rows)
+    ends = np.array([cell.rows for cell in region.cells])[owner]
+    return tuple((ends[:, i, 0].copy(), ends[:, i, 1].copy()) for i in range(count))
 
 
 def _deeper(array: Array) -> Array:

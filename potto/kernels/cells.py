@@ -84,10 +84,9 @@ def pattern(value: Value, directions: int) -> Pattern:
     A cell gives (has an error, per direction 0 none, 1 one, 2 any other tangent); structure is mirrored.
     """
     if isinstance(value, Cell):
-        tangents = tuple(
-            0 if x is None else (1 if x.__class__ is float and x == 1.0 else 2) for x in value.t
-        ) or (0,) * directions  # fmt: skip
-        return (value.e is not None or any(x is not None for x in value.et), tangents)
+        tangents = [0 if x is None else 1 if x.__class__ is float and x == 1.0 else 2 for x in value.t]
+        inexact = value.e is not None or (value.et.count(None) != len(value.et))
+        return (inexact, tuple(tangents) or (0,) * directions)
     if isinstance(value, tuple):
         return ("tuple", *(pattern(item, directions) for item in value))
     if isinstance(value, list):
