@@ -26,7 +26,7 @@ from potto.kernels.cells import Array, Cell, Ints, Value
 SUMMED = 4 * EPS
 
 
-@lru_cache(maxsize=1024)
+@lru_cache(maxsize=16384)
 def function_of(term: Term) -> Lam:
     """A term as a function of its free variables, in sorted order."""
     return lam(tuple(sorted(term.free)), term)
@@ -39,7 +39,7 @@ def evaluated(function: Lam, machine: Evaluator, env: dict[str, Value]) -> tuple
     return values  # type: ignore[return-value]
 
 
-@lru_cache(maxsize=512)
+@lru_cache(maxsize=4096)
 def _outer(orders: tuple[int, ...]) -> tuple[Ints, Array, Array]:
     """For the nodes of the outermost variable, cell after cell: the cell, the node in [0, 1], the weight."""
     rules = [gauss(n) for n in orders]
@@ -90,7 +90,7 @@ def summed(
     return _added(values, length * weights, rounded * weights)  # type: ignore[operator]
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=4096)
 def _rows(region: Region) -> tuple[tuple[Ints, Ints], ...]:
     """Per variable, for every node of the outermost one, which rows of the frame are the ends of its cell."""
     owner, _, _ = _outer(region.outer)
