@@ -12,7 +12,6 @@ from zlib import crc32
 
 from potto.calculus.diffeo import check_conditions
 from potto.diagnostics import Diagnostic, Related
-from potto.elaborate import core
 from potto.modules import chunk_start, module_diagnostics, names, statements
 from potto.modules.texts import syntax_diagnostics
 from potto.query import Database, query
@@ -70,10 +69,7 @@ def definition_diagnostics(db: Database, file: str, name: str) -> tuple[Diagnost
     found = check_definition(db, file, name)
     if has_errors(found) or interface(db, file, name).broken:
         return found
-    elaborated = core(db, file, name).diagnostics
-    if has_errors(elaborated):
-        return (*found, *elaborated)
-    return (*found, *elaborated, *check_conditions(db, file, name))
+    return (*found, *check_conditions(db, file, name))
 
 
 def has_errors(found: Iterable[Diagnostic]) -> bool:

@@ -20,6 +20,7 @@ from potto.calculus.invert import Failure, Inverse, invert
 from potto.calculus.isolate import Guard
 from potto.calculus.linear import affine
 from potto.calculus.pivots import NoClosedForm
+from potto.calculus.relevance import may_integrate
 from potto.calculus.sides import unguarded
 from potto.calculus.trace import spine
 from potto.calculus.verdict import (
@@ -101,6 +102,8 @@ def check_conditions(db: Database, file: str, name: str) -> tuple[Diagnostic, ..
     item = definition(db, file, name)
     if isinstance(item, nodes.DiffeoDefinition):
         return _studied(db, file, name).diagnostics
+    if not may_integrate(db, file, name):
+        return ()
     elaborated = core(db, file, name)
     found = conditions_of(elaborated.term, lambda g: exported(db, g.module, g.name), lambda g: _faultless(db, g))
     spans = dict(elaborated.origins)
