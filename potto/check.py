@@ -48,7 +48,7 @@ def _blocks(names: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
         yield names[start:]
 
 
-@query(keep=2048, travels=True)
+@query(keep=2048)
 def block_diagnostics(
     db: Database, file: str, block: tuple[str, ...]
 ) -> tuple[tuple[str, tuple[Diagnostic, ...]], ...]:

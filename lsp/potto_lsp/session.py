@@ -108,11 +108,11 @@ class Session:
 
     def _first_check(self) -> Iterator[Callable[[], None]]:
         """The first check of the whole workspace, which may take a while: with progress."""
+        if self.publisher.whole_workspace:
+            yield self.analysis.call_helpers  # they start while what is open is checked here
         steps = list(self.publisher.steps())
         for number, step in enumerate(steps):
             if number == len(self.analysis.documents):  # what is open is told; the next thing is to be asked about it
-                if len(steps) > number + 1:
-                    yield self.analysis.call_helpers
                 yield self._load_features
                 yield from steps[:number]  # what was known from an earlier session is found anew, for the edits to come
             while self.analysis.helpers_have_found:

@@ -18,7 +18,7 @@ from potto.query import Database, query
 from potto.source import Span
 
 
-@query(travels=True)
+@query
 def module_diagnostics(db: Database, file: str) -> tuple[Diagnostic, ...]:
     """Everything about a file that concerns more than one of its definitions; all spans are absolute."""
     text = content(db, file)

@@ -63,14 +63,14 @@ def import_cycle(db: Database, file: str) -> tuple[str, ...]:
     return ()
 
 
-@query(travels=True)
+@query
 def references(db: Database, file: str, name: str) -> tuple[Reference, ...]:
     """The names `(None, name)` and members `(path, name)` that a definition refers to, in order, each once."""
     text = chunk_text(db, file, name)
     return () if text is None else chunk_references(db, text, is_diffeo(file))
 
 
-@query(travels=True)
+@query
 def dependencies(db: Database, file: str, name: str) -> tuple[DefinitionTarget, ...]:
     """The definitions that a definition refers to directly, in the order of the text."""
     found = (refer(db, file, path, used) for path, used in references(db, file, name))
@@ -82,7 +82,7 @@ def refer(db: Database, file: str, path: str | None, name: str) -> Target | None
     return resolve(db, file, name) if path is None else resolve_member(db, file, path, name)
 
 
-@query(travels=True)
+@query
 def strongly_connected(db: Database, file: str, name: str) -> tuple[DefinitionTarget, ...]:
     """The definitions that need each other with this one, itself included; itself alone if there are no others."""
     target = DefinitionTarget(file, name)
@@ -122,14 +122,14 @@ def _definition_groups(db: Database, files: tuple[str, ...]) -> Mapping[Definiti
     return table
 
 
-@query(travels=True)
+@query
 def _mentioned(db: Database, file: str, name: str) -> tuple[str, ...]:
     """The other definitions of a file whose names occur as words in the text of one."""
     text = chunk_text(db, file, name)
     return () if text is None else tuple(sorted(_names_in(db, file).intersection(_WORD.findall(text)) - {name}))
 
 
-@query(travels=True)
+@query
 def _names_in(db: Database, file: str) -> frozenset[str]:
     return frozenset(names(db, file))
 

@@ -186,7 +186,7 @@ def trail(db: Database, file: str, name: str) -> Trail:
         file, name = target, original
 
 
-@query(travels=True)
+@query
 def resolve(db: Database, file: str, name: str) -> Target | None:
     """What a name means at the top of a file: a definition, here or where it was imported from, or a module."""
     bound = meaning(db, file, name)
@@ -197,7 +197,7 @@ def resolve(db: Database, file: str, name: str) -> Target | None:
     return trail(db, file, name).target
 
 
-@query(travels=True)
+@query
 def resolve_member(db: Database, file: str, path: str, name: str) -> DefinitionTarget | None:
     """The definition that `path.name` means in a file that imports the module `path` (or has it under that name)."""
     module = resolve_module(db, file, path)
@@ -205,7 +205,7 @@ def resolve_member(db: Database, file: str, path: str, name: str) -> DefinitionT
     return target if isinstance(target, DefinitionTarget) else None
 
 
-@query(travels=True)
+@query
 def resolve_module(db: Database, file: str, path: str) -> str | None:
     """The file of the module that `path` (`k`, `pkg.m`, or `b.a` where b imports a) means in a file."""
     parts = path.split(".")
