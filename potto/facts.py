@@ -14,7 +14,8 @@ from potto.calculus.branch_cuts import opened
 from potto.calculus.conditions import conditions_of
 from potto.calculus.diffeo import exported
 from potto.calculus.expand import expanded
-from potto.calculus.explain import DerivativeText, IntegralText, describe
+from potto.calculus.explain import describe
+from potto.calculus.explained import DerivativeText, IntegralText
 from potto.calculus.guards import unguarded
 from potto.core.printer import format_term
 from potto.core.simplify import simplify

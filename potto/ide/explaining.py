@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 from potto.calculus.conditions import conditions_of
 from potto.calculus.diffeo import DiffeoInfo, diffeo_info, exported
-from potto.calculus.explain import DerivativeText, IntegralText, equation, explain_derivative
+from potto.calculus.explain import equation, explain_derivative
+from potto.calculus.explained import DerivativeText, IntegralText
 from potto.calculus.invert import Inverse, invert
 from potto.calculus.verdict import Problem, Verdict, judge
 from potto.check import has_errors

@@ -7,7 +7,8 @@ import os
 
 from potto import pages
 from potto.calculus.again import NoText, first_derivative
-from potto.calculus.explain import DerivativeText, describe, explain_derivative
+from potto.calculus.explain import describe, explain_derivative
+from potto.calculus.explained import DerivativeText
 from potto.core.terms import Deriv, Global, Term
 from potto.elaborate import core_term, elaborate_expression
 from potto.facts import surfaces
