@@ -15,17 +15,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-from potto.core.terms import ZERO, Const, Prim, Term, add, const, div, mul, neg, postorder, pow_, prim
-
-Monomial = tuple[tuple[Term, int], ...]
-Polynomial = Mapping[Monomial, Fraction]
+from potto.core.polynomials import ONE, Monomial, Polynomial, TooLarge, monomial_term, number, total
+from potto.core.terms import ZERO, Const, Prim, Term, add, div, mul, neg, postorder, prim
 
 _LARGEST = 400
-_BITS = 4096
-
-
-class _TooLarge(Exception):
-    """Internal: the normal form is given up."""
 
 
 @dataclass(frozen=True)
@@ -37,10 +30,9 @@ class Rational:
 
     @property
     def whole(self) -> bool:
-        return self.below == _ONE
+        return self.below == ONE
 
 
-_ONE: Polynomial = {(): Fraction(1)}
 
 
 def normal(term: Term) -> Rational | None:
@@ -49,7 +41,7 @@ def normal(term: Term) -> Rational | None:
     try:
         for node in postorder(term):
             memo[node] = _node(node, memo)
-    except _TooLarge:
+    except TooLarge:
         return None
     return memo[term]
 
@@ -101,14 +93,10 @@ def as_term(polynomial: Polynomial) -> Term | None:
     """A polynomial as a term; None if a coefficient is no double."""
     terms: list[Term] = []
     for monomial, coefficient in polynomial.items():
-        factors = [atom if n == 1 else pow_(atom, const(n)) for atom, n in monomial]
-        size = abs(coefficient)
-        if Fraction(float(size)) == size:
-            term = mul(const(float(size)), *factors)
-        elif max(size.numerator, size.denominator) < 1 << 53:
-            term = div(mul(const(size.numerator), *factors), const(size.denominator))
-        else:
+        scale = number(abs(coefficient))
+        if scale is None:
             return None
+        term = monomial_term(scale, monomial)
         terms.append(neg(term) if coefficient < 0 else term)
     terms.sort(key=lambda t: isinstance(t, Prim) and t.op == "neg")
     return add(*terms) if terms else ZERO
@@ -120,8 +108,8 @@ def as_term(polynomial: Polynomial) -> Term | None:
 def _node(node: Term, memo: Mapping[Term, Rational]) -> Rational:
     if isinstance(node, Const) and node.name is None:
         if not abs(node.value) < float("inf"):
-            raise _TooLarge
-        return Rational({(): Fraction(node.value)} if node.value else {}, _ONE)
+            raise TooLarge
+        return Rational({(): Fraction(node.value)} if node.value else {}, ONE)
     if not isinstance(node, Prim):
         return _atom(node)
     args = [memo[a] for a in node.args if a in memo]
@@ -151,13 +139,13 @@ def _node(node: Term, memo: Mapping[Term, Rational]) -> Rational:
 
 
 def _atom(term: Term) -> Rational:
-    return Rational({((term, 1),): Fraction(1)}, _ONE)
+    return Rational({((term, 1),): Fraction(1)}, ONE)
 
 
 def _plus(a: Rational, b: Rational) -> Rational:
     if a.below == b.below:
-        return _reduced(_sum(a.top, b.top), a.below)
-    return _reduced(_sum(_times(a.top, b.below), _times(b.top, a.below)), _times(a.below, b.below))
+        return _reduced(total((a.top, b.top), _LARGEST), a.below)
+    return _reduced(total((_times(a.top, b.below), _times(b.top, a.below)), _LARGEST), _times(a.below, b.below))
 
 
 def _product(a: Rational, b: Rational) -> Rational:
@@ -170,15 +158,15 @@ def _product(a: Rational, b: Rational) -> Rational:
 
 def _flip(a: Rational) -> Rational:
     if not a.top:
-        raise _TooLarge
+        raise TooLarge
     return Rational(a.below, a.top)
 
 
 def _power(a: Rational, n: int) -> Rational:
     if abs(n) > 24:
-        raise _TooLarge
+        raise TooLarge
     base = _flip(a) if n < 0 else a
-    result = Rational(_ONE, _ONE)
+    result = Rational(ONE, ONE)
     for _ in range(abs(n)):
         result = _product(result, base)
     return result
@@ -187,17 +175,17 @@ def _power(a: Rational, n: int) -> Rational:
 def _reduced(top: Polynomial, below: Polynomial) -> Rational:
     """Common monomials cancelled, and a denominator of one monomial kept monic."""
     if not top:
-        return Rational(top, _ONE)
+        return Rational(top, ONE)
     if top == below:
-        return Rational(_ONE, _ONE)
+        return Rational(ONE, ONE)
     if len(below) > 1 or len(top) > 1:
         exact = _divided(top, below)
         if exact is not None:
-            return Rational(exact, _ONE)
+            return Rational(exact, ONE)
         exact = _divided(below, top)
         if exact is not None:
-            return _reduced(_ONE, exact)
-    if below != _ONE:
+            return _reduced(ONE, exact)
+    if below != ONE:
         shared = _shared([*top, *below])
         if shared:
             top = {_without(m, shared): c for m, c in top.items()}
@@ -258,35 +246,14 @@ def _without(monomial: Monomial, shared: Mapping[Term, int]) -> Monomial:
     return tuple((a, n - shared.get(a, 0)) for a, n in monomial if n > shared.get(a, 0))
 
 
-def _sum(a: Polynomial, b: Polynomial) -> Polynomial:
-    result = dict(a)
-    for monomial, coefficient in b.items():
-        total = result.get(monomial, Fraction(0)) + coefficient
-        if total:
-            result[monomial] = total
-        else:
-            result.pop(monomial, None)
-    return _checked(result)
-
-
-def _checked(result: Polynomial) -> Polynomial:
-    if len(result) > _LARGEST or any(c.numerator.bit_length() > _BITS for c in result.values()):
-        raise _TooLarge
-    return result
-
-
 def _times(a: Polynomial, b: Polynomial) -> Polynomial:
-    if a == _ONE:
+    if a == ONE:
         return b
-    if b == _ONE:
+    if b == ONE:
         return a
     if len(a) * len(b) > 4 * _LARGEST:
-        raise _TooLarge
-    result: Polynomial = {}
-    for m, c in a.items():
-        for n, d in b.items():
-            result = _sum(result, _joined(m, n, c * d))
-    return result
+        raise TooLarge
+    return total(tuple(_joined(m, n, c * d) for m, c in a.items() for n, d in b.items()), _LARGEST)
 
 
 def _joined(first: Monomial, second: Monomial, coefficient: Fraction) -> Polynomial:

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from potto.core.normal_form import number
+from potto.core.polynomials import number
 from potto.core.terms import ONE, ZERO, Const, Prim, Term, add, const, div, mul, neg, pow_, prim
 
 _HALF = Fraction(1, 2)

@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from fractions import Fraction
-from functools import lru_cache
 
+from potto.core.polynomials import Monomial, Polynomial, TooLarge, bounded, monomial_term, number, total
 from potto.core.terms import (
     ZERO,
     Const,
@@ -21,32 +21,18 @@ from potto.core.terms import (
     Var,
     add,
     children,
-    const,
-    div,
-    mul,
     neg,
     postorder,
-    pow_,
     prim,
     rebuild,
 )
 
-Monomial = tuple[tuple[Term, int], ...]
-Polynomial = Mapping[Monomial, Fraction]
-
 _LARGEST = 64  # monomials; an expansion larger than that becomes an atom
 _HIGHEST = 16  # powers of sums that are expanded
-_BITS = 4096  # of a coefficient
-_WHOLE = 2.0**53
 _ODD = frozenset(("sin", "tan", "asin", "atan", "sinh", "tanh", "asinh", "atanh", "erf", "erfinv", "sign"))
 _EVEN = frozenset(("cos", "cosh", "abs"))
 
 
-class _TooLarge(Exception):
-    """Internal: the node is not expanded but kept as an atom."""
-
-
-@lru_cache(maxsize=4096)
 def normal_form(term: Term) -> Polynomial:
     """The polynomial that a term is; empty where it is 0."""
     forms: dict[Term, Polynomial] = {}
@@ -68,37 +54,9 @@ def as_term(polynomial: Polynomial) -> Term | None:
     return add(*terms) if terms else ZERO
 
 
-def number(value: Fraction) -> Term | None:
-    """A fraction as an exact term: a double, or a quotient of whole doubles."""
-    try:
-        nearest = float(value)
-    except OverflowError:
-        return None
-    if Fraction(nearest) == value:
-        return const(nearest)
-    if abs(value.numerator) < _WHOLE and value.denominator < _WHOLE:
-        return div(const(value.numerator), const(value.denominator))
-    return None
-
-
-def monomial_term(scale: Term, monomial: Monomial) -> Term:
-    """scale * product of atom^exponent, what has negative exponents below the line."""
-    above = [_power_term(atom, n) for atom, n in monomial if n > 0]
-    below = [_power_term(atom, -n) for atom, n in monomial if n < 0]
-    if isinstance(scale, Prim):  # a quotient of whole numbers
-        above, below = [scale.args[0], *above], [scale.args[1], *below]
-    else:
-        above = [scale, *above]
-    return div(mul(*above), mul(*below))
-
-
 def leading(polynomial: Polynomial) -> Monomial:
     """The first monomial in order."""
     return min(polynomial, key=_monomial_order)
-
-
-def _power_term(atom: Term, n: int) -> Term:
-    return atom if n == 1 else pow_(atom, const(n))
 
 
 def _atom_order(atom: Term) -> tuple[int, str]:
@@ -125,7 +83,7 @@ def _node(node: Term, forms: Mapping[Term, Polynomial]) -> Polynomial:
         case Prim(op=op, args=args) if op in _RULES:
             try:
                 return _RULES[op](*(forms[a] for a in args))
-            except _TooLarge:
+            except TooLarge:
                 return _opaque(node, forms)
         case Prim(op=op, args=(inner,)) if op in _ODD or op in _EVEN:
             return _symmetric(op, inner, forms)
@@ -162,29 +120,29 @@ def _symmetric(op: str, inner: Term, forms: Mapping[Term, Polynomial]) -> Polyno
 # Arithmetic
 
 
-def _scaled(a: Polynomial, factor: Fraction) -> Polynomial:
-    return _checked({m: c * factor for m, c in a.items()})
+def _bounded(result: Polynomial) -> Polynomial:
+    return bounded(result, _LARGEST)
 
 
 def _sum(*parts: Polynomial) -> Polynomial:
-    result: dict[Monomial, Fraction] = {}
-    for part in parts:
-        for monomial, coefficient in part.items():
-            result[monomial] = result.get(monomial, Fraction(0)) + coefficient
-    return _checked({m: c for m, c in result.items() if c})
+    return total(parts, _LARGEST)
+
+
+def _scaled(a: Polynomial, factor: Fraction) -> Polynomial:
+    return _bounded({m: c * factor for m, c in a.items()})
 
 
 def _product(*parts: Polynomial) -> Polynomial:
     result: Polynomial = {(): Fraction(1)}
     for part in parts:
         if len(result) * len(part) > 4 * _LARGEST:
-            raise _TooLarge
+            raise TooLarge
         grown: dict[Monomial, Fraction] = {}
         for m, c in result.items():
             for n, d in part.items():
                 key = _join(m, n)
                 grown[key] = grown.get(key, Fraction(0)) + c * d
-        result = _checked({m: c for m, c in grown.items() if c})
+        result = _bounded({m: c for m, c in grown.items() if c})
     return result
 
 
@@ -195,14 +153,6 @@ def _join(first: Monomial, second: Monomial) -> Monomial:
     for atom, n in second:
         exponents[atom] = exponents.get(atom, 0) + n
     return tuple(sorted(((a, n) for a, n in exponents.items() if n), key=lambda pair: _atom_order(pair[0])))
-
-
-def _checked(result: Polynomial) -> Polynomial:
-    if len(result) > _LARGEST or any(
-        c.numerator.bit_length() + c.denominator.bit_length() > _BITS for c in result.values()
-    ):
-        raise _TooLarge
-    return result
 
 
 def _negative(a: Polynomial) -> Polynomial:
@@ -216,24 +166,24 @@ def _quotient(a: Polynomial, b: Polynomial) -> Polynomial:
 def _inverse(a: Polynomial) -> Polynomial:
     """1/a: exact for a monomial, else an atom (the sum with leading coefficient 1) to the power -1."""
     if not a:
-        raise _TooLarge
+        raise TooLarge
     first = leading(a)
     scale = 1 / a[first]
     if len(a) == 1:
         return {tuple((atom, -n) for atom, n in first): scale}
     monic = as_term(_scaled(a, scale))
     if monic is None:
-        raise _TooLarge
+        raise TooLarge
     return {((monic, -1),): scale}
 
 
 def _power(base: Polynomial, exponent: Polynomial) -> Polynomial:
     n = exponent.get((), Fraction(0))
     if (exponent and list(exponent) != [()]) or n.denominator != 1 or abs(n) > _HIGHEST:
-        raise _TooLarge
+        raise TooLarge
     if len(base) == 1:
         ((monomial, coefficient),) = base.items()
-        return _checked({tuple((a, k * int(n)) for a, k in monomial if n): coefficient ** int(n)})
+        return _bounded({tuple((a, k * int(n)) for a, k in monomial if n): coefficient ** int(n)})
     if n < 0:
         return _power(_inverse(base), {(): -n})
     return _product(*(base,) * int(n))
@@ -243,10 +193,10 @@ def _root(a: Polynomial) -> Polynomial:
     """The square root of the square of a number; others are atoms."""
     value = a.get((), Fraction(0))
     if len(a) > 1 or (a and list(a) != [()]) or value < 0:
-        raise _TooLarge
+        raise TooLarge
     exact = Fraction(math.isqrt(value.numerator), math.isqrt(value.denominator))
     if exact * exact != value:
-        raise _TooLarge
+        raise TooLarge
     return {(): exact} if exact else {}
 
 

@@ -11,7 +11,8 @@ import math
 from fractions import Fraction
 from functools import lru_cache
 
-from potto.core.normal_form import as_term, leading, normal_form, number
+from potto.core.normal_form import as_term, leading, normal_form
+from potto.core.polynomials import number
 from potto.core.rewrite import Rewriter
 from potto.core.sampling import vanishes
 from potto.core.terms import ONE, ZERO, Const, Prim, Term, Var, add, const, div, mul, neg, postorder, pow_

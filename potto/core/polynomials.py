@@ -1,0 +1,71 @@
+"""Polynomials over terms as atoms, with exact coefficients: what both normal forms compute with.
+
+Owns `Polynomial`, sums, the bound on sizes, and how coefficients and monomials are written as terms. `normal_form` puts
+terms in order and must keep their values everywhere; `calculus.normal` recognizes zero and may use identities between
+atoms, so that their products differ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+
+from potto.core.terms import Prim, Term, const, div, mul, pow_
+
+Monomial = tuple[tuple[Term, int], ...]
+"""Atoms with their exponents, in an order that their owner keeps."""
+Polynomial = Mapping[Monomial, Fraction]
+
+ONE: Polynomial = {(): Fraction(1)}
+_BITS = 4096  # of a coefficient
+_WHOLE = 2.0**53
+
+
+class TooLarge(Exception):
+    """Internal: the normal form is given up."""
+
+
+def total(parts: tuple[Polynomial, ...], largest: int) -> Polynomial:
+    """The sum. Raises TooLarge beyond `largest` monomials."""
+    result: dict[Monomial, Fraction] = {}
+    for part in parts:
+        for monomial, coefficient in part.items():
+            result[monomial] = result.get(monomial, Fraction(0)) + coefficient
+    return bounded({m: c for m, c in result.items() if c}, largest)
+
+
+def bounded(result: Polynomial, largest: int) -> Polynomial:
+    """The same. Raises TooLarge for more monomials than `largest`, or for coefficients of too many digits."""
+    if len(result) > largest or any(
+        c.numerator.bit_length() + c.denominator.bit_length() > _BITS for c in result.values()
+    ):
+        raise TooLarge
+    return result
+
+
+def number(value: Fraction) -> Term | None:
+    """A fraction as an exact term: a double, or a quotient of whole doubles."""
+    try:
+        nearest = float(value)
+    except OverflowError:
+        return None
+    if Fraction(nearest) == value:
+        return const(nearest)
+    if abs(value.numerator) < _WHOLE and value.denominator < _WHOLE:
+        return div(const(value.numerator), const(value.denominator))
+    return None
+
+
+def monomial_term(scale: Term, monomial: Monomial) -> Term:
+    """scale * product of atom^exponent, what has negative exponents below the line."""
+    above = [_power_term(atom, n) for atom, n in monomial if n > 0]
+    below = [_power_term(atom, -n) for atom, n in monomial if n < 0]
+    if isinstance(scale, Prim):  # a quotient of whole numbers
+        above, below = [scale.args[0], *above], [scale.args[1], *below]
+    else:
+        above = [scale, *above]
+    return div(mul(*above), mul(*below))
+
+
+def _power_term(atom: Term, n: int) -> Term:
+    return atom if n == 1 else pow_(atom, const(n))
