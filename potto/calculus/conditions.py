@@ -14,9 +14,9 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
-from potto.calculus.expand import DEEPEST, Resolve, arguments_of, expanded
+from potto.calculus.expand import DEEPEST, Resolve, expanded
 from potto.calculus.sampling import sample_value
-from potto.calculus.surfaces import uncurry
+from potto.calculus.surfaces import arguments_of, uncurry
 from potto.calculus.trace import spine
 from potto.core.terms import (
     ONE,

@@ -38,6 +38,7 @@ from potto.core.terms import (
     mul,
     neg,
     postorder,
+    postorder_by,
     pow_,
     prim,
     proj,
@@ -93,19 +94,7 @@ def zero_like(term: Term) -> Term:
 
 def _outside_binders(root: Term) -> list[Term]:
     """Every subterm that stands under no binder, children first."""
-    seen: set[Term] = set()
-    order: list[Term] = []
-    stack: list[tuple[Term, bool]] = [(root, False)]
-    while stack:
-        node, done = stack.pop()
-        if done:
-            order.append(node)
-        elif node not in seen:
-            seen.add(node)
-            stack.append((node, True))
-            if not isinstance(node, Integral | Sum | Lam):
-                stack.extend((child, False) for child in children(node) if child not in seen)
-    return order
+    return postorder_by(root, lambda node: () if isinstance(node, Integral | Sum | Lam) else children(node))
 
 
 def _slope(node: Term, name: str, slopes: Mapping[Term, Term]) -> Term:

@@ -45,6 +45,7 @@ from potto.core.terms import (
     lam,
     list_of,
     postorder,
+    postorder_by,
     proj,
     rebuild,
     substitute,
@@ -164,21 +165,13 @@ def heads_of(term: Term) -> frozenset[str]:
 
 def _outside(root: Term) -> list[Term]:
     """Every subterm under no binder, children first; of a sum the limits."""
-    seen: set[Term] = set()
-    order: list[Term] = []
-    stack: list[tuple[Term, bool]] = [(root, False)]
-    while stack:
-        node, done = stack.pop()
-        if done:
-            order.append(node)
-        elif node not in seen:
-            seen.add(node)
-            stack.append((node, True))
-            if isinstance(node, Sum):
-                stack.extend(((node.hi, False), (node.lo, False)))
-            elif not isinstance(node, Integral | Lam):
-                stack.extend((child, False) for child in reversed(children(node)))
-    return order
+    return postorder_by(root, _unbound)
+
+
+def _unbound(node: Term) -> tuple[Term, ...]:
+    if isinstance(node, Sum):
+        return node.lo, node.hi
+    return () if isinstance(node, Integral | Lam) else children(node)
 
 
 class _Pass:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from potto.calculus.surfaces import fitted, uncurry
+from potto.calculus.surfaces import arguments_of, uncurry
 from potto.calculus.trace import spine
 from potto.core.terms import App, Deriv, Global, Lam, Proj, Term, children, postorder, proj, rebuild, substitute
 
@@ -64,18 +64,6 @@ class _Expansion:
             inner = (*path, named) if isinstance(named, Global) else path
             self.known[key] = self.run(substitute(body, dict(zip(params, args, strict=True))), inner)
         return self.known[key]
-
-
-def arguments_of(function: Lam, groups: tuple[tuple[Term, ...], ...]) -> tuple[Term, ...] | None:
-    """The arguments of all groups, each group as its parameters take it; None if there are more than it has."""
-    args: list[Term] = []
-    shape: Term = function
-    for group in groups:
-        if not isinstance(shape, Lam):
-            return None
-        args.extend(fitted(group, len(shape.params)))
-        shape = shape.body
-    return tuple(args)
 
 
 def known_function(head: Term, resolve: Resolve, derive: Derive | None) -> Lam | None:

@@ -135,20 +135,26 @@ def carried_out(surface: Term, resolve: Resolve, depth: int = 0) -> Term:
     return memo[surface]
 
 
+def arguments_of(function: Lam, groups: tuple[tuple[Term, ...], ...]) -> tuple[Term, ...] | None:
+    """The arguments of all groups, each group as its parameters take it; None if there are more than it has."""
+    args: list[Term] = []
+    shape: Term = function
+    for group in groups:
+        if not isinstance(shape, Lam):
+            return None
+        args.extend(fitted(group, len(shape.params)))
+        shape = shape.body
+    return tuple(args)
+
+
 def _result(call: App, resolve: Resolve, depth: int) -> Term:
     head, groups = spine(call)
     function = head if isinstance(head, Lam) else None if isinstance(head, Deriv) else resolve(head)
     if not isinstance(function, Lam):
         return call
     params, body = uncurry(function, len(groups))
-    args: list[Term] = []
-    shape: Term = function
-    for group in groups:
-        if not isinstance(shape, Lam):
-            return call
-        args.extend(fitted(group, len(shape.params)))
-        shape = shape.body
-    if len(args) != len(params):
+    args = arguments_of(function, groups)
+    if args is None or len(args) != len(params):
         return call
     return carried_out(substitute(body, dict(zip(params, args, strict=True))), resolve, depth + 1)
 

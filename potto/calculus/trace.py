@@ -22,6 +22,7 @@ from potto.core.terms import (
     children,
     lam,
     postorder,
+    postorder_by,
 )  # fmt: skip
 
 
@@ -114,17 +115,7 @@ def immediate(term: Term) -> tuple[Term, ...]:
 
 @lru_cache(maxsize=16384)
 def layout(term: Term) -> Layout:
-    order: list[Term] = []
-    seen: set[Term] = set()
-    stack: list[tuple[Term, bool]] = [(term, False)]
-    while stack:
-        node, done = stack.pop()
-        if done:
-            order.append(node)
-        elif node not in seen:
-            seen.add(node)
-            stack.append((node, True))
-            stack.extend((c, False) for c in reversed(immediate(node)) if c not in seen)
+    order = postorder_by(term, immediate)
     sites: list[Site] = []
     index: dict[tuple[Term, int], int] = {}
 

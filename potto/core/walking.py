@@ -5,7 +5,7 @@ Owns what every pass is made of. Only binders recurse, and they nest no deeper t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from operator import attrgetter, is_
 from typing import Any
 
@@ -170,6 +170,22 @@ def substitute(term: Term, mapping: Mapping[str, Term]) -> Term:
     if not mapping:
         return term
     return _Substitution(mapping).run(term)
+
+
+def postorder_by(root: Term, below: Callable[[Term], Sequence[Term]]) -> list[Term]:
+    """Every distinct term that `below` leads to from the root once, after what is below it. Does not recurse."""
+    seen: set[Term] = set()
+    order: list[Term] = []
+    stack: list[tuple[Term, bool]] = [(root, False)]
+    while stack:
+        node, done = stack.pop()
+        if done:
+            order.append(node)
+        elif node not in seen:
+            seen.add(node)
+            stack.append((node, True))
+            stack.extend((part, False) for part in reversed(below(node)) if part not in seen)
+    return order
 
 
 class _Substitution:

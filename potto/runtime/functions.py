@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import Any
 
 from potto.core.terms import Lam
+from potto.integrate.pieces import still
 from potto.kernels.cells import Cell, Pattern, Value, map_arrays, pad
 
 
@@ -81,15 +82,3 @@ def _moves(value: Value, direction: int) -> bool:
     if isinstance(value, (tuple, list)):
         return any(_moves(v, direction) for v in value)
     return bool(value.pattern(direction + 1)[1 + direction])
-
-
-def still(value: Value) -> Value:
-    """The value with tangents and errors left out."""
-    if isinstance(value, Cell):
-        return Cell(value.v)
-    if isinstance(value, tuple):
-        return tuple(still(v) for v in value)
-    if isinstance(value, list):
-        return [still(v) for v in value]
-    assert isinstance(value, Closure)
-    return value.still()
