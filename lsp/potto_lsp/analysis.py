@@ -10,7 +10,8 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from potto.diagnostics import Diagnostic
-from potto.modules import chunk_start, module_diagnostics, names, open_files, source, statements
+from potto.modules import chunk_start, definition, module_diagnostics, names, open_files, source, statements
+from potto.modules.graph import dependencies, imported_files
 from potto.modules.texts import chunks, is_diffeo, parsed, syntax_diagnostics
 from potto.project import Project, Projects, read_project
 from potto.query import Database
@@ -30,6 +31,7 @@ logger = logging.getLogger(__name__)
 OF_TEXTS = frozenset({"parsed", "head", "chunk_references", "occurring_names"})
 OF_FILES = frozenset({"definition", "core", "core_term"})
 OF_GROUPS = frozenset({"_analyses"})
+MOST_USERS = 50  # files whose trees are made because a file that they import was opened
 
 
 class Analysis:
@@ -156,6 +158,15 @@ class Analysis:
         """Make the trees of a file that was opened, before the first keystroke asks for them."""
         for chunk in chunks(self.db, key):
             parsed(self.db, chunk.text, is_diffeo(key))
+
+    def parse_users(self, key: str) -> None:
+        """Make the trees of what uses a file's definitions elsewhere, before the first edit of one of their heads asks
+        for them all at once."""
+        users = [file for file in self.programs() if file != key and key in imported_files(self.db, file)]
+        for file in users[:MOST_USERS]:
+            for name in names(self.db, file):
+                if any(target.file == key for target in dependencies(self.db, file, name)):
+                    definition(self.db, file, name)
 
     # What there is to say
 

@@ -97,13 +97,12 @@ class Session:
         """The steps of what is done when there is nothing else to do."""
         if self.checked:
             yield from self.publisher.steps_again()
-            while self.to_parse:
-                key = self.to_parse.pop()
-                yield lambda key=key: self.analysis.parse(key)  # type: ignore[misc]
-            for key in [key for key in self.to_keep if key in self.analysis.documents]:
-                yield lambda key=key: self._keep(key)  # type: ignore[misc]
         else:
             yield from self._first_check()
+        for key in [key for key in self.to_parse if key in self.analysis.documents]:
+            yield lambda key=key: self._parse(key)  # type: ignore[misc]
+        for key in [key for key in self.to_keep if key in self.analysis.documents]:
+            yield lambda key=key: self._keep(key)  # type: ignore[misc]
         yield self.live.refresh
 
     def _first_check(self) -> Iterator[Callable[[], None]]:
@@ -126,6 +125,11 @@ class Session:
         yield self._all_checked
         for key in self.analysis.documents:
             yield lambda key=key: self._keep(key)  # type: ignore[misc]
+
+    def _parse(self, key: str) -> None:
+        self.analysis.parse(key)
+        self.analysis.parse_users(key)
+        self.to_parse.discard(key)
 
     def _keep(self, key: str) -> None:
         self.to_keep.discard(key)

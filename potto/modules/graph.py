@@ -20,7 +20,7 @@ N = TypeVar("N", bound=Hashable)
 _WORD = re.compile(r"[^\W\d]\w*")
 
 
-@query(travels=True)
+@query(travels=True, cuts=True)
 def imported_files(db: Database, file: str) -> tuple[str, ...]:
     """The files that a file imports, in order, each once."""
     found: dict[str, None] = {}
@@ -35,7 +35,7 @@ def imported_files(db: Database, file: str) -> tuple[str, ...]:
     return tuple(found)
 
 
-@query(travels=True)
+@query(travels=True, cuts=True)
 def import_group(db: Database, file: str) -> tuple[str, ...]:
     """The files that import each other, this one included, sorted; alone if it is in no cycle."""
     for group in components((file,), lambda f: imported_files(db, f)):
@@ -63,7 +63,7 @@ def import_cycle(db: Database, file: str) -> tuple[str, ...]:
     return ()
 
 
-@query
+@query(cuts=True)
 def references(db: Database, file: str, name: str) -> tuple[Reference, ...]:
     """The names `(None, name)` and members `(path, name)` that a definition refers to, in order, each once."""
     text = chunk_text(db, file, name)

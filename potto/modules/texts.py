@@ -80,14 +80,14 @@ def source(db: Database, file: str) -> SourceText | None:
     return SourceText(file, text) if isinstance(text, str) else None
 
 
-@query(travels=True)
+@query(travels=True, cuts=True)
 def problem(db: Database, file: str) -> Unreadable | None:
     """Why a file that is there has no text. Stands still while the text is edited."""
     text = content(db, file)
     return text if isinstance(text, Unreadable) else None
 
 
-@query(travels=True)
+@query(travels=True, cuts=True)
 def exists(db: Database, file: str) -> bool:
     """Whether there is such a file that an import could mean."""
     text = content(db, file)
@@ -191,7 +191,7 @@ def starts(db: Database, file: str) -> Mapping[str, int]:
     return layout(db, file).starts
 
 
-@query(travels=True)
+@query(travels=True, cuts=True)
 def outline(db: Database, file: str) -> Outline:
     """What a file defines and imports, without places."""
     found = layout(db, file)
@@ -236,7 +236,7 @@ def statements(db: Database, file: str) -> tuple[StatementRef, ...]:
     return tuple(found)
 
 
-@query
+@query(cuts=True)
 def imports(db: Database, file: str) -> tuple[Importing, ...]:
     """The imports of a file in order, their spans relative to their chunks: moving them changes nothing."""
     items = (head(db, text, is_diffeo(file)).importing for text in outline(db, file).import_texts)

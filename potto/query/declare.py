@@ -18,7 +18,7 @@ R = TypeVar("R")
 def query(function: Callable[Concatenate[Database, P], R], /) -> Callable[Concatenate[Database, P], R]: ...
 @overload
 def query(
-    *, cycle: Callable[..., Any] | None = None, keep: int = 0, travels: bool = False
+    *, cycle: Callable[..., Any] | None = None, keep: int = 0, travels: bool = False, cuts: bool = False
 ) -> Callable[[Callable[Concatenate[Database, P], R]], Callable[Concatenate[Database, P], R]]: ...
 def query(
     function: Callable[..., Any] | None = None,
@@ -27,16 +27,18 @@ def query(
     cycle: Callable[..., Any] | None = None,
     keep: int = 0,
     travels: bool = False,
+    cuts: bool = False,
 ) -> Any:
     """Declare a query `f(db, *hashable_args)`, called with positional arguments.
 
     `cycle(db, *args)` gives its value when it is found in a cycle. `keep`: about how many memos are kept, for a query
     whose arguments go out of use (texts); the longest unused go first, those of the present revision never.
-    `travels`: its answers can be pickled and are worth it, see `travel`.
+    `travels`: its answers can be pickled and are worth it, see `travel`. `cuts`: it stands at most edits of what it
+    reads, so that readers hang on it rather than on that; of others this shows when it has happened once.
     """
     if function is None:
-        return lambda f: _declare(Query(f, cycle, keep, travels))
-    return _declare(Query(function, cycle, keep, travels))
+        return lambda f: _declare(Query(f, cycle, keep, travels, cuts))
+    return _declare(Query(function, cycle, keep, travels, cuts))
 
 
 def _declare(declared: Query) -> Callable[..., Any]:

@@ -31,16 +31,16 @@ class Event:
 
 
 class Query:
-    """A declared query: its function, name, fallback in a cycle, how many memos to keep (0: all), and whether its
-    answers travel to other databases (see `travel`)."""
+    """A declared query: its function, name, fallback in a cycle, how many memos to keep (0: all), whether its answers
+    travel to other databases (see `travel`), and whether it `cuts`: stands at most edits of what it reads."""
 
-    __slots__ = ("fallback", "function", "keep", "name", "travels")
+    __slots__ = ("cuts", "fallback", "function", "keep", "name", "travels")
 
     def __init__(
-        self, function: Callable[..., Any], fallback: Callable[..., Any] | None, keep: int, travels: bool
+        self, function: Callable[..., Any], fallback: Callable[..., Any] | None, keep: int, travels: bool, cuts: bool
     ) -> None:
         self.function, self.fallback, self.keep, self.name = function, fallback, keep, function.__name__
-        self.travels = travels
+        self.travels, self.cuts = travels, cuts
 
 
 class Input:
@@ -58,8 +58,8 @@ class Memo:
 
     `index` is its place on the stack of running queries, or -1. `low` is the lowest place that it reaches by a cycle,
     `leaves` are the undurable nodes that it hangs on in the end: inputs, entries of tables, and memos of which it was
-    seen that they cut edits off (`cuts`). As long as none of them and nothing durable changes, it stands. None if they
-    are too many to be worth it, or not known.
+    seen, or is declared, that they cut edits off (`cuts`). As long as none of them and nothing durable changes, it
+    stands. None if they are too many to be worth it, or not known.
     `cyclic` says that a cycle leads back to it, `provisional` that it has finished but its cycle has not.
     """
 
@@ -85,7 +85,7 @@ class Memo:
         self.query, self.args, self.value = query, args, GONE
         self.deps: tuple[Node, ...] = ()
         self.leaves: tuple[Leaf, ...] | None = None
-        self.cuts = False
+        self.cuts = query.cuts
         self.verified_at, self.changed_at, self.durability = -1, -1, 0
         self.entries: dict[Any, Entry] | None = None
         self.index, self.low, self.cyclic, self.provisional = -1, 0, False, False

@@ -148,6 +148,33 @@ def test_of_hundreds_that_stand_only_the_one_that_may_not_is_looked_at() -> None
             assert len(events) < 20, events
 
 
+@query(cuts=True)
+def is_there(db: Database, name: str) -> bool:
+    return text(db, name) != ""
+
+
+@query
+def is_there_too(db: Database, name: str, number: int) -> bool:
+    return is_there(db, name) and number >= 0
+
+
+@query
+def all_there(db: Database, name: str) -> bool:
+    return sum(is_there_too(db, name, number) for number in range(100)) == 100
+
+
+def test_what_is_declared_to_cut_edits_off_does_so_at_the_first_one() -> None:
+    db = Database()
+    db.set_input(("text", "a"), "x")
+    assert all_there(db, "a")
+    db.set_input(("text", "a"), "y")
+    with db.recording() as events:
+        assert all_there(db, "a")
+    assert ran(events) == ["text", "is_there"] and len(ran(events, "reused")) < 5
+    db.set_input(("text", "a"), "")
+    assert not all_there(db, "a")
+
+
 def test_a_node_that_runs_first_may_read_who_hangs_on_it() -> None:
     db = Database()
     db.set_input(("text", "a"), "b")
