@@ -9,7 +9,6 @@ import os
 from collections.abc import Iterator, Sequence
 
 from potto.check import diagnostics, errors_of
-from potto.crew import Crew, helpers_for
 from potto.diagnostics import declare
 from potto.modules import Unreadable, module_diagnostics, names, open_files, source
 from potto.modules.files import MAX_BYTES, decode
@@ -108,6 +107,8 @@ class Library:
 
     def all_diagnostics(self, files: Sequence[str]) -> Iterator[tuple[Located, ...]]:
         """The same of many files, one after the other, with the help of other processes if they are worth it."""
+        from potto.crew import Crew, helpers_for
+
         with Crew(self.db, self.files.roots, files, helpers_for(files)) as crew:
             for file in files:
                 while crew.has_found:

@@ -21,6 +21,8 @@ from potto.query.travel import Receiver
 logger = logging.getLogger(__name__)
 ENOUGH = 200_000  # bytes of programs for each helper: about twice what is checked in the time that it takes to start
 MOST = 8
+# Not `-m`, which looks for every module in the working folder first.
+PROGRAM = "import sys; sys.path.append(sys.argv[1]); from potto.crew.helper import main; main()"
 AHEAD = 4  # files that a helper is given before it has told about the first
 
 
@@ -58,6 +60,7 @@ class Crew:
         self._left = dict.fromkeys(files)  # what nobody has begun
         self._lock = Lock()
         self._found: SimpleQueue[tuple[_Helper, Found]] = SimpleQueue()
+        self._taking: tuple[_Helper, Found] | None = None
         self._receivers: dict[tuple[_Helper, int], Receiver] = {}
         self._helpers: list[_Helper] = []
         self.texts = texts or {}  # of open files, to be replaced when they change
@@ -85,21 +88,26 @@ class Crew:
     @property
     def has_found(self) -> bool:
         """Whether there is something to `take`."""
-        return not self._found.empty()
+        return self._taking is not None or not self._found.empty()
 
     def take(self) -> str | None:
         """Take over what was found out about one file, and say which; None if there is nothing now, or nothing that
-        holds."""
-        try:
-            helper, found = self._found.get_nowait()
-        except Empty:
-            return None
-        if found.parcel is None:
-            return None
-        key = helper, found.round
+        holds. If that is cancelled, the next call goes on with it."""
+        if self._taking is None:
+            try:
+                self._taking = self._found.get_nowait()
+            except Empty:
+                return None
+        helper, found = self._taking
+        holds = found.parcel is not None and self._receiver(helper, found.round).take(found.parcel)
+        self._taking = None
+        return found.file if holds else None
+
+    def _receiver(self, helper: _Helper, round: int) -> Receiver:
+        key = helper, round
         if key not in self._receivers:
             self._receivers[key] = Receiver(self._db)
-        return found.file if self._receivers[key].take(found.parcel) else None
+        return self._receivers[key]
 
     def leave(self, file: str) -> None:
         """A file that is checked here needs no helper."""
@@ -151,9 +159,8 @@ class _Helper:
 
     def __init__(self) -> None:
         pipe = subprocess.PIPE
-        command = [sys.executable, "-m", "potto.crew.helper"]
-        home = Path(potto.__file__).parent.parent  # not where the user is: there may be modules of any name
-        self.process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, cwd=home)
+        command = [sys.executable, "-P", "-c", PROGRAM, str(Path(potto.__file__).parent.parent)]
+        self.process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL)
         assert self.process.stdin is not None and self.process.stdout is not None
         self._tasks, self.answers = self.process.stdin, self.process.stdout
         self._texts: Mapping[str, str] = {}

@@ -79,6 +79,3 @@ def main() -> None:
     except BrokenPipeError:
         os._exit(0)
 
-
-if __name__ == "__main__":
-    main()

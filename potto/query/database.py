@@ -8,7 +8,7 @@ from threading import get_ident
 from typing import Any, TypeVar, cast
 
 from potto.query.engine import Engine, drop
-from potto.query.nodes import FOREVER, MISSING, Event, Input, Memo, Node, Query, entry_of, same
+from potto.query.nodes import FOREVER, MISSING, Cancelled, Event, Input, Memo, Node, Query, entry_of, same
 
 K = TypeVar("K")
 V = TypeVar("V")
@@ -111,6 +111,8 @@ class Database(Engine):
     def adopt(self, table: Callable[..., Any], args: tuple[Hashable, ...], value: Any, deps: Iterable[Node]) -> Memo:
         """Take an answer that was found elsewhere from what `deps` are here now. One that is known here stays."""
         self._forbid_in_queries("adopt")
+        if self._cancelled == self._evaluation:
+            raise Cancelled
         query: Query = table.query  # type: ignore[attr-defined]
         memos = self._memos[query]
         memo = memos.get(args)

@@ -137,21 +137,28 @@ class Receiver:
         self._reads: list[int] = []  # the inputs below each node, a bit for each
         self._inputs: list[InputSent] = []
         self._digests: dict[Hashable, tuple[int, str]] = {}
+        self._begun: int | None = None  # where the nodes of a parcel begin that was not taken to its end
         self._same, self._other, self._revision = 0, 0, -1  # which inputs are the same here, in which revision
 
     def take(self, parcel: Parcel) -> bool:
-        """Take over what rests on nothing that is different here; whether that goes for the answer itself."""
+        """Take over what rests on nothing that is different here; whether that goes for the answer itself.
+
+        If it is cancelled, it goes on where it was when it is called with the same parcel again.
+        """
         with self._db.evaluating():
-            self._values += parcel.values
-            end = len(self._nodes) + len(parcel.nodes)
+            if self._begun is None:
+                self._values += parcel.values
+                self._begun = len(self._nodes)
+            end = self._begun + len(parcel.nodes)
             try:
-                for sent in parcel.nodes:
+                for sent in parcel.nodes[len(self._nodes) - self._begun :]:
                     node, reads = self._taken(sent)
                     self._reads.append(reads)
                     self._nodes.append(node)
-            finally:  # cancelled, or a query fails
+            except Exception:  # a query fails, and will so where it is asked for
                 self._reads += [0] * (end - len(self._reads))
                 self._nodes += [None] * (end - len(self._nodes))
+            self._begun = None
             return self._nodes[parcel.root] is not None
 
     def _taken(self, sent: Sent) -> tuple[Node | None, int]:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import pickle
 import random
+from typing import Any
 
 import pytest
 
-from potto.query import Database, query
+from potto.query import Cancelled, Database, query
+from potto.query.nodes import Memo
 from potto.query.travel import Receiver, Sender
 
 NAMES = "abcdefgh"
@@ -109,6 +111,28 @@ def test_what_is_known_here_stays() -> None:
 def test_an_input_that_is_not_there_must_not_be_there_here_either() -> None:
     there, here = database(a="one"), database(a="one", b="two")
     assert not sent(Sender(there), Receiver(here), "a", "b")
+
+
+def test_taking_over_can_be_cancelled_and_goes_on() -> None:
+    texts = {name: f"our {name}" for name in NAMES}
+    there, here = database(**texts), database(**texts)
+    parcel, receiver, cancelled = Sender(there).pack(total, *NAMES), Receiver(here), 0
+    adopt, turns = here.adopt, iter(range(10_000))
+
+    def impatient(*args: Any) -> Memo:
+        if next(turns) % 2 == 0:
+            here.cancel()
+        return adopt(*args)
+
+    here.adopt = impatient  # type: ignore[method-assign]
+    while True:
+        try:
+            assert receiver.take(parcel)
+            break
+        except Cancelled:
+            cancelled += 1
+    assert cancelled > len(NAMES)
+    assert ran(here, *NAMES) == (total(there, *NAMES), [])
 
 
 def test_what_cannot_be_found_raises_and_sends_nothing() -> None:
