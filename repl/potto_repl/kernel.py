@@ -18,7 +18,7 @@ from potto_repl.reply import Part
 from potto_repl.respond import respond, stream
 from potto_repl.script import entries
 from potto_repl.session import Conversation
-from potto_repl.symbols import readable
+from potto_repl.symbols import expanded, named, readable, typed
 
 
 class PottoKernel(Kernel):
@@ -45,7 +45,9 @@ class PottoKernel(Kernel):
                     return self._failed("PottoError", wrong[0].plain())
         except KeyboardInterrupt:
             return self._failed("KeyboardInterrupt", "interrupted; everything that was defined is still there")
-        return {"status": "ok", "execution_count": self.execution_count, "payload": [], "user_expressions": {}}
+        payload = [{"source": "ask_exit", "keepkernel": False}] if self.conversation.leaving else []
+        self.conversation.leaving = False
+        return {"status": "ok", "execution_count": self.execution_count, "payload": payload, "user_expressions": {}}
 
     def _answered(self, text: str, silent: bool) -> list[Part]:
         said = []
@@ -76,11 +78,16 @@ class PottoKernel(Kernel):
         return {"status": "error", "execution_count": self.execution_count, **error}
 
     def do_complete(self, code: str, cursor_pos: int) -> dict[str, Any]:
-        """What can stand at the cursor."""
-        found = candidates(self.conversation, code[:cursor_pos])
-        length = found[0].length if found else 0
-        return {"status": "ok", "matches": [item.text for item in found], "cursor_start": cursor_pos - length,
-                "cursor_end": cursor_pos, "metadata": {}}  # fmt: skip
+        """What can stand at the cursor; for `\\theta` its symbol, for `\\the` the names that begin so."""
+        word = typed(code[:cursor_pos])
+        if word is not None:
+            symbol = expanded(word)
+            matches, length = [symbol] if symbol is not None else named(word), len(word)
+        else:
+            found = candidates(self.conversation, code[:cursor_pos])
+            matches, length = [item.text for item in found], found[0].length if found else 0
+        return {"status": "ok", "matches": matches, "cursor_start": cursor_pos - length, "cursor_end": cursor_pos,
+                "metadata": {}}  # fmt: skip
 
     def do_is_complete(self, code: str) -> dict[str, Any]:
         """Whether a console should hand the cell in."""

@@ -37,6 +37,11 @@ def expanded(word: str) -> str | None:
     return matches.pop() if len(matches) == 1 else None
 
 
+def named(word: str) -> list[str]:
+    r"""The symbols whose names begin with what was typed, as they are typed: `\phi` and `\psi` of `\p`."""
+    return sorted(f"\\{name}" for name in SYMBOLS if name.startswith(word.removeprefix("\\")))
+
+
 def pretty(text: str, unicode: bool) -> str:
     """A formula with the symbols that Potto reads as well."""
     if not unicode:

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 
 from potto.modules import statements
 from potto.modules.texts import chunks
+from potto.runtime.advice import ROUGH
 from potto.session import Defined, Imported, Valued
 from potto.syntax import nodes, tokenize
 from potto_repl.session import Conversation, Entry, plain_names
@@ -100,9 +101,11 @@ class _Writer:
 
     def _live(self, entry: Entry, text: str, value: Valued) -> str:
         """An expression with what came out, as a definition too if its answer is used later."""
-        shown = self._renamed(text, self.current)
-        one_line = " ".join(shown.split())
-        lines = []
+        comments = [token for token in tokenize(text) if token.kind == "COMMENT"]
+        lines = [token.text for token in comments if not text[: token.start].rpartition("\n")[2].strip()]
+        for token in reversed(comments):
+            text = text[: token.start] + text[token.end :]
+        one_line = " ".join(self._renamed(text, self.current).split())
         if entry.number in self.used:
             answer = self._fresh(f"answer_{entry.number}")
             self.taken.add(answer)
@@ -128,13 +131,15 @@ class _Writer:
         return f"{name}_{number}" if name in known or not name.startswith("answer_") else name
 
     def _renamed(self, text: str, scope: dict[str, str]) -> str:
-        """The text with the names of the session as they are called in the file."""
+        """The text with the names of the session as they are called in the file; names that it binds itself stay."""
+        from potto.ide.index import index
+
         pieces, at = [], 0
-        for token in tokenize(text):
-            new = scope.get(token.text) if token.kind == "NAME" else None
-            if new is not None and new != token.text:
-                pieces += [text[at : token.start], new]
-                at = token.end
+        for found in index(self.session.db, text, False).occurrences:
+            new = scope.get(found.name) if found.binder < 0 and found.role in ("use", "define") else None
+            if new is not None and new != found.name:
+                pieces += [text[at : found.span.start], new]
+                at = found.span.end
         return "".join([*pieces, text[at:]])
 
 
@@ -143,8 +148,8 @@ def _expected(value: Valued) -> str | None:
     if not value.estimates or "<" in value.text or "unknown" in value.text or "nan" in value.text:
         return None
     estimate = value.estimates[0]
-    if estimate.method in ("mc", "qmc") or "mc" in estimate.method:
-        return None  # another seed, other digits
+    if "mc" in estimate.method or ROUGH in estimate.reasons:
+        return None  # it was sampled, or made of what was: another seed, other digits
     return value.text
 
 

@@ -82,5 +82,23 @@ def test_completion_inspection_and_completeness(client):
     found = client.complete("1 + rend", reply=True, timeout=30)["content"]
     assert found["matches"] == ["renderer"] and found["cursor_start"] == 4
     assert "renderer : " in client.inspect("renderer(1)", 3, reply=True, timeout=30)["content"]["data"]["text/plain"]
+    for typed, matches in (("1 + \\theta", ["θ"]), ("\\ps", ["ψ"]), ("\\ph", ["φ"]), ("\\nope", [])):
+        found = client.complete(typed, reply=True, timeout=30)["content"]
+        assert found["matches"] == matches and found["cursor_start"] == typed.index("\\")
+    assert "\\theta" in client.complete("\\t", reply=True, timeout=30)["content"]["matches"]
     client.is_complete("def f(t)")
     assert client.get_shell_msg(timeout=30)["content"] == {"status": "incomplete", "indent": "    "}
+
+
+def test_leaving_is_asked_of_the_console(client):
+    reply, _ = run(client, "1 + 1\n:quit")
+    assert reply["payload"] == [{"source": "ask_exit", "keepkernel": False}]
+    reply, shown = run(client, "2 + 2")
+    assert reply["payload"] == [] and any("= 4 " in content["text"] for _, content in shown)
+
+
+def test_answers_of_cells_stay_and_no_codes_for_terminals_are_sent(client):
+    run(client, "def half(t) integral [0, 1] [x < t]/2 d(x)\nhalf(0.5)")
+    _, shown = run(client, "_ * 4\n:help\nnothing?")
+    text = "".join(content["text"] for kind, content in shown if kind == "stream")
+    assert "= 1 ± " in text and "\x1b" not in text and "Ctrl-C stops" not in text
