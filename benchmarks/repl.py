@@ -3,9 +3,9 @@
 On a real terminal: `potto --version`, start to the first prompt, the first expression after it, and from a key to its
 echo with a module of 2,000 lines loaded and what is typed being checked. In the process: what a key waits for
 (highlighting, the question whether an entry is over) and completion. And which libraries are imported when.
-Targets in milliseconds: 60, 250, 300, and 10 at the 99th percentile for all that a key waits for. The second column says
-how much of the processor that took: for the prompt and the first expression on Linux, all threads together, so that
-what is loaded beside the prompt counts too.
+Targets in milliseconds: 60, 250, 300, and 10 at the 99th percentile for all that a key waits for. The second column
+says how much of the processor that took: for the prompt and the first expression on Linux, all threads together, so
+that what is loaded beside the prompt counts too.
 """
 
 from __future__ import annotations
