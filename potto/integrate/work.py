@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from potto.integrate import maps
+from potto.integrate.divergence import given_up
 from potto.integrate.forms import Ends, Totals, sums, totals
 from potto.integrate.judge import doubtful, missed_peak, too_coarse
 from potto.integrate.maps import Segments
@@ -102,7 +103,7 @@ class Work:
             done = done.pick(~bad).join(self.refine(halves, ends, tally))
         else:
             found = totals(self, done, ends)
-        return sums(self, found, ends)
+        return given_up(self, done, found, sums(self, found, ends))
 
     def good_enough(self, p: Pieces, found: Totals, ends: Ends | None) -> bool:
         """Whether whole segments do as they are for every member, by the strictest reading of what is asked for."""

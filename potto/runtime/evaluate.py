@@ -21,7 +21,7 @@ from potto.diagnostics import PottoError
 from potto.kernels import compile as compiling
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Value
-from potto.runtime.advice import ROUGH
+from potto.runtime.advice import INFINITE, NO_VALUE, ROUGH
 from potto.runtime.estimate import Estimate, OneSided
 from potto.runtime.functions import Closure, Derivative
 from potto.runtime.machine import Books, Linker, Machine
@@ -125,6 +125,8 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
     flat = [*_flat(numbers, bounds), *_flat(tangents, tangent_bounds)]
     scale = max((_largest(v) for v, _ in flat), default=0.0)
     missed = next((m for v, e in flat if (m := _missed(v, e, scale, settings))), None)
+    if missed == INFINITE and not books.methods:
+        missed = None  # of 1/0 no integral is to blame
     if not reasons and missed is not None:
         reasons.append(ROUGH if any(_rough(value, settings) for value in books.used.values()) else missed)
     return Estimate(
@@ -215,7 +217,9 @@ def _missed(value: Any, error: Any, scale: float, settings: Settings) -> str | N
         return None
     v, e = np.abs(np.asarray(value, dtype=float)), np.asarray(error, dtype=float)
     if np.isnan(v).any():
-        return "the value is not a number"
+        return NO_VALUE if np.isinf(e).any() else "the value is not a number"
+    if (np.isinf(v) & np.isinf(e)).any():
+        return INFINITE
     if np.isnan(e).any() or (np.isinf(e) & ~np.isinf(v)).any():
         return "the error is not known"
     bad = ~(e <= np.maximum(settings.atol, settings.rtol * v)) & ~np.isinf(v)

@@ -18,7 +18,7 @@ from potto.kernels.errors import wrong_call
 from potto.modules import statements
 from potto.query import Database
 from potto.render import Located, ProgramError
-from potto.runtime.advice import ROUGH, advice
+from potto.runtime.advice import DIVERGENT, ROUGH, advice
 from potto.runtime.estimate import Estimate
 from potto.runtime.evaluate import Clock, Program, report
 from potto.runtime.functions import Closure
@@ -164,7 +164,7 @@ def remarks(estimate: Estimate, place: Span, settings: Settings) -> Iterator[Dia
 
     Of an answer by sampling nobody expects the accuracy of quadrature; its digits say how good it is.
     """
-    if _has_nan(estimate.value) or _has_nan(estimate.tangent):
+    if (_has_nan(estimate.value) or _has_nan(estimate.tangent)) and not DIVERGENT & {*estimate.reasons}:
         yield NO_NUMBER(
             place,
             "this is not a number",

@@ -1,0 +1,92 @@
+"""Integrals that have no value, or none that refinement comes near to.
+
+Owns `given_up`. Where pieces at an end of a segment are as small as they get and still err, the integrand grows there
+like a power of the distance, u^-a. From a = 1 on its integral is infinite: the answer is inf or -inf, or nan where both
+come together. Where a is less, so that there is a value which is out of reach, or where such a piece lies elsewhere, at
+a pole, the answer is nan. It is never a number.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from potto.integrate import maps
+from potto.integrate.forms import Totals
+from potto.integrate.pieces import Pieces, Sums
+from potto.integrate.rules import EPS
+from potto.kernels.cells import Array, Ints
+
+if TYPE_CHECKING:
+    from potto.integrate.work import Work
+
+# The error of a value, as a part of what is added up, from which on it is no value; that of a piece which is to blame.
+HOPELESS, BLAMED = 1e-2, 1e-3
+# How far from an end the power is read off, in lengths of the segment (or their roots, where it is a turning point),
+# and how well that tells it from 1.
+NEAR, NEAR_TURNING = (1e-9, 1e-10, 1e-11, 0.3, 0.5, 0.8), (1e-4, 1e-5, 1e-6, 0.3, 0.5, 0.8)
+POWER = 1e-5
+# Pieces that lie so close to an end are at it.
+AT = 1e-6
+# A piece within a segment that is as small as this and still errs lies at a pole.
+SMALLEST = 1e-12
+
+
+def given_up(work: Work, p: Pieces, found: Totals, sums: Sums) -> Sums:
+    """The sums, without the values of integrals that diverge at the end of a segment."""
+    error, size = found.error[:, 0], found.size[:, 0]
+    scale = np.stack([work.parent.siblings(row, work.root) for row in size]) if work.number else size
+    hopeless: Any = np.asarray(~(error <= HOPELESS * scale) & (size > 0))
+    if not hopeless.any() or work.machine.exhausted():
+        return sums
+    owner = work.seg.owner[p.segment]
+    errors = p.error.reshape(work.width, -1, p.segment.size)[:, 0]
+    blamed = (~(errors <= BLAMED * size[:, owner]) & hopeless[:, owner]).any(axis=0)
+    grows: Any = np.zeros((work.width, work.batch, 2), dtype=bool)  # to inf, to -inf
+    lost: Any = np.zeros((work.width, work.batch), dtype=bool)
+    low, high = p.u0 < AT, p.u1 > 1 - AT
+    inside = blamed & (p.u1 - p.u0 < SMALLEST) & ~low & ~high
+    if not inside.any() and not (blamed & (low | high)).any():
+        return sums
+    index = np.nonzero(hopeless.any(axis=0)[work.seg.owner])[0]
+    for upper in (False, True):
+        guilty = np.isin(index, p.segment[blamed & (high if upper else low)])
+        if index.size:
+            sign = _growth(work, index, upper)
+            sign = np.where(guilty | (np.abs(sign) == 1), sign, 0.0)
+            for c in range(work.width):  # several segments may have one owner
+                np.logical_or.at(grows[c, :, 0], work.seg.owner[index], sign[c] > 0)
+                np.logical_or.at(grows[c, :, 1], work.seg.owner[index], sign[c] < 0)
+                lost[c] |= np.isin(np.arange(work.batch), work.seg.owner[index[np.isnan(sign[c])]])
+    up, down = grows[..., 0] & hopeless, grows[..., 1] & hopeless
+    poles = np.zeros(work.batch, dtype=bool)
+    poles[owner[inside]] = True
+    lost = ((lost | (poles & ~up & ~down)) & hopeless) | (up & down)
+    if not (up | down | lost).any():
+        return sums
+    v = np.where(lost, np.nan, np.where(up, np.inf, np.where(down, -np.inf, sums.v)))
+    gone = ~np.isfinite(v) & hopeless
+    return Sums(v, np.where(gone, np.inf, sums.e), np.where(gone[:, None], np.nan, sums.t),
+                np.where(gone[:, None], np.inf, sums.et))  # fmt: skip
+
+
+def _growth(work: Work, index: Ints, high: bool) -> Array:
+    """1 or -1 where the integrand goes to inf or -inf at an end too fast to be integrated, nan where it is not known
+    what it does there, 0 where it does nothing of the kind, next to what it is elsewhere: (m, S)."""
+    seg = work.seg.pick(index)
+    turning = np.isin(seg.kind, (maps.LEFT, maps.RIGHT, maps.BOTH))
+    near = np.where(turning[:, None], np.array(NEAR_TURNING), np.array(NEAR))
+    u, rest = (1 - near, near) if high else (near, 1 - near)
+    x, slope, label = maps.points(seg, u, rest)
+    h, _ = work.values(seg, index, x, label, slope)
+    h = h.reshape(work.width, -1, *h.shape[1:])[:, 0]
+    with np.errstate(all="ignore"):
+        power = np.log(h[..., 2] / h[..., 1]) / np.log(10.0)
+        before = np.log(h[..., 1] / h[..., 0]) / np.log(10.0)
+        nearest = np.where(turning, NEAR_TURNING[2] ** 2, NEAR[2]) * (seg.b - seg.a)
+        off = POWER + 4 * EPS * np.abs(seg.b if high else seg.a) / nearest
+        least = 1 - np.where(np.isfinite(off), off, POWER)
+        steady = np.isinf(h[..., 2]) | ((power >= least) & (before >= least))
+        counts = ~(np.abs(h[..., 2]) * near[:, 2] < BLAMED * np.abs(h[..., 3:]).max(axis=-1))
+    return np.where(counts, np.where(steady, np.sign(h[..., 2]), np.nan), 0.0)

@@ -1,0 +1,63 @@
+"""Integrals that diverge give inf, -inf or nan and say so; those that merely look like it give their value."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+import potto
+
+INF, NAN = math.inf, math.nan
+DIVERGENT = [
+    ("integral [0, 1] t/x d(x)", 1.0, INF),
+    ("integral [0, 1] -t/x d(x)", 1.0, -INF),
+    ("integral [1, 0] t/x d(x)", 1.0, -INF),
+    ("integral [0, 1] t/x^2 d(x)", 1.0, INF),
+    ("integral [0, 1] x^(-t) d(x)", 1.0001, INF),
+    ("integral [0, 1] [x < t]/x^1.5 d(x)", 0.5, INF),
+    ("integral [0, 1] [x > t]/(x - t) d(x)", 0.5, INF),
+    ("integral [0, 1] 1/abs(x - t) d(x)", 0.3, INF),
+    ("integral [0, 1] 1/(x - t) d(x)", 0.3, NAN),
+    ("integral [0, 2] tan(t*x) d(x)", 1.0, NAN),
+    ("integral [0, inf] t d(x)", 1.0, INF),
+    ("integral [1, inf] t/x d(x)", 1.0, INF),
+    ("integral [0, inf] exp(t*x) d(x)", 1.0, INF),
+    ("integral [0, inf] sin(t*x) d(x)", 1.0, NAN),
+    ("integral [-inf, inf] t*x d(x)", 1.0, NAN),
+    ("integral [-inf, inf] t d(x)", 1.0, INF),
+    ("integral ([0, 1], [0, 1]) t/(x*y) d(x, y)", 1.0, INF),
+]
+
+
+@pytest.mark.parametrize(("text", "t", "answer"), DIVERGENT, ids=[row[0] for row in DIVERGENT])
+def test_a_divergent_integral_is_no_number(text: str, t: float, answer: float) -> None:
+    f = potto.compile(f"def f(t) {text}").f
+    found = f(t=t)
+    assert not found.converged and found.reasons
+    assert math.isinf(found.error)
+    assert found.value == answer or (math.isnan(answer) and math.isnan(found.value))
+    rate = potto.grad(f, "t")(t=t)
+    assert not rate.converged
+    assert not math.isfinite(rate.tangent) or math.isinf(rate.tangent_error) or rate.tangent_error > abs(rate.tangent)
+
+
+def test_what_cannot_be_told_from_a_divergent_integral_is_no_number_either() -> None:
+    found = potto.compile("def f(t) integral [0, 1] x^(-t) d(x)").f(t=0.9999)  # 10,000
+    assert math.isnan(found.value) and math.isinf(found.error) and not found.converged
+
+
+@pytest.mark.parametrize(
+    ("text", "t", "exact"),
+    [
+        ("integral [0, 1] x^(-t) d(x)", 0.95, 20.0),
+        ("integral [0, 1] x^(-t) d(x)", 0.5, 2.0),
+        ("integral [0, 1] log(t*x) d(x)", 1.0, -1.0),
+        ("integral [0, 1] [x > t]/sqrt(x - t) d(x)", 0.5, math.sqrt(2)),
+        ("integral [1, inf] t/x^1.5 d(x)", 1.0, 2.0),
+        ("integral [-1, 1] x/(abs(x)^1.5 + t) d(x)", 1e-12, 0.0),
+    ],
+)
+def test_singular_integrals_that_converge_are_numbers(text: str, t: float, exact: float) -> None:
+    found = potto.compile(f"def f(t) {text}").f(t=t)
+    assert abs(found.value - exact) <= found.error <= 1e-6
