@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 from potto.diagnostics import Diagnostic
 from potto.modules import chunk_start, definition, module_diagnostics, names, open_files, source, statements
 from potto.modules.graph import dependencies, imported_files
-from potto.modules.texts import chunks, is_diffeo, parsed, syntax_diagnostics
+from potto.modules.lookup import bindings
+from potto.modules.texts import chunk_text, chunks, imports, is_diffeo, parsed, syntax_diagnostics
 from potto.project import Project, Projects, read_project
 from potto.query import Database
 from potto.render import Located
@@ -164,7 +165,11 @@ class Analysis:
         for them all at once."""
         users = [file for file in self.programs() if file != key and key in imported_files(self.db, file)]
         for file in users[:MOST_USERS]:
+            bound = {name.partition(".")[0] for item in imports(self.db, file) for name, _ in bindings(item)}
             for name in names(self.db, file):
+                text = chunk_text(self.db, file, name) or ""
+                if not any(word in text for word in bound):
+                    continue  # what uses nothing from elsewhere needs no tree to say so
                 if any(target.file == key for target in dependencies(self.db, file, name)):
                     definition(self.db, file, name)
 

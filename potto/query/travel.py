@@ -27,6 +27,7 @@ InputSent = tuple[Hashable, str]
 AnswerSent = tuple[int, Args, int, tuple[int, ...]]
 EntrySent = tuple[int, Hashable, None]
 Sent = InputSent | AnswerSent | EntrySent
+MOST_BELOW = 5_000_000  # memos on the way down: more than there are in any database
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,28 +71,34 @@ class Sender:
 
     def _look_at(self, root: Memo) -> None:
         """See all that a memo rests on, what is below first; without recursion."""
-        stack, begun = [root], set[Memo]()
+        views, stack = self._views, [root]
         while stack:
             memo = stack[-1]
-            if memo in self._views:
+            height = len(stack)
+            if memo not in views:
+                for dep in memo.deps:
+                    if (source := dep.source) is not None and source not in views:
+                        stack.append(source)
+                if len(stack) == height:
+                    views[memo] = self._view(memo)
+            if len(stack) == height:
                 stack.pop()
-            elif memo in begun:
-                stack.pop()
-                self._views[memo] = self._view(memo)
-            else:
-                begun.add(memo)
-                below = (dep.source for dep in memo.deps)
-                stack += [source for source in below if source is not None and source not in self._views]
+            elif height > MOST_BELOW:
+                raise RecursionError("a memo rests on itself")
 
     def _view(self, memo: Memo) -> tuple[int, ...]:
         below: dict[int, None] = {}
         for dep in memo.deps:
-            if isinstance(dep, Input):
+            number = self._numbers.get(dep)
+            if number is not None:
+                below[number] = None
+            elif isinstance(dep, Input):
                 below[self._input(dep)] = None
             elif isinstance(dep, Entry) and dep.source.query.travels:
-                below[self._entry(dep, self._views[dep.source][0])] = None
+                below[self._number(dep, (self._views[dep.source][0], dep.key, None))] = None
             else:
-                below.update(dict.fromkeys(self._views[dep.source]))
+                for number in self._views[dep.source]:
+                    below[number] = None
         if not memo.query.travels:
             return tuple(below)
         query, value = self._value(address(memo.query)), self._value(memo.value)
@@ -103,16 +110,9 @@ class Sender:
         return number
 
     def _input(self, node: Input) -> int:
-        number = self._numbers.get(node)
-        if number is None:
-            if node not in self._keys:
-                self._keys = {node: key for key, node in self._db.inputs()}
-            number = self._number(node, (self._keys[node], digest(node.value)))
-        return number
-
-    def _entry(self, node: Entry, table: int) -> int:
-        number = self._numbers.get(node)
-        return self._number(node, (table, node.key, None)) if number is None else number
+        if node not in self._keys:
+            self._keys = {node: key for key, node in self._db.inputs()}
+        return self._number(node, (self._keys[node], digest(node.value)))
 
     def _value(self, value: Any) -> int:
         """The number of a value; equal ones are sent once, so that they are one object on the other side."""
