@@ -46,7 +46,10 @@ try {
 } catch (error) {
   if (!results.at(-1)?.error) report({ name: "the run", error: error.stack, milliseconds: Date.now() - began });
 } finally {
-  await code.close();
+  const since = Date.now();
+  const left = await code.close();
+  const error = left.length ? `these are still there:\n${left.join("\n")}` : null;
+  report({ name: "nothing is left behind when all windows are closed", error, milliseconds: Date.now() - since });
 }
 const failed = results.filter(({ error }) => error).length;
 console.log(`${results.length - failed} of ${results.length} in ${((Date.now() - began) / 1000).toFixed(0)} s`);

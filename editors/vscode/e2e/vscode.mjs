@@ -1,6 +1,6 @@
 // A real Visual Studio Code without a screen: its server with the packaged extension, and pages of it in Chromium.
 import { spawn, spawnSync } from "node:child_process";
-import { cpSync, existsSync, mkdirSync, mkdtempSync, rmSync, symlinkSync, writeFileSync } from "node:fs";
+import { cpSync, existsSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, readlinkSync, rmSync, symlinkSync, writeFileSync } from "node:fs";
 import { createServer } from "node:net";
 import { tmpdir } from "node:os";
 import { dirname, join } from "node:path";
@@ -10,7 +10,7 @@ import { chromium } from "playwright-core";
 export const here = dirname(fileURLToPath(import.meta.url));
 const root = join(here, "..", "..", "..");
 const inner = join(here, "node_modules", "code-server", "lib", "vscode");
-const LOADING = 60_000;
+const LOADING = 120_000;
 
 const SETTINGS = {
   "chat.disableAIFeatures": true,
@@ -60,6 +60,13 @@ export async function start(vsix, chromiumPath) {
   mkdirSync(join(lost, ".vscode"), { recursive: true });
   cpSync(join(here, "workspace", "shapes.po"), join(lost, "shapes.po"));
   writeFileSync(join(lost, ".vscode", "settings.json"), JSON.stringify({ "potto.server.path": "/nowhere/potto" }));
+  const parts = ["one", "two"].map((name) => join(folder, "several", name)); // a workspace of two folders
+  for (const part of parts) mkdirSync(part, { recursive: true });
+  cpSync(join(here, "workspace", "broken.po"), join(parts[0], "broken.po"));
+  for (const name of ["renderer.po", "shapes.po"]) cpSync(join(here, "workspace", name), join(parts[1], name));
+  symlinkSync(join(root, ".venv"), join(parts[1], ".venv"));
+  const several = join(folder, "several", "both.code-workspace");
+  writeFileSync(several, JSON.stringify({ folders: parts.map((path) => ({ path })) }));
   const data = join(folder, "data");
   mkdirSync(join(data, "data", "Machine"), { recursive: true });
   writeFileSync(join(data, "data", "Machine", "settings.json"), JSON.stringify(SETTINGS));
@@ -86,8 +93,10 @@ export async function start(vsix, chromiumPath) {
     server.kill();
     await Promise.race([ended, new Promise((resolve) => setTimeout(resolve, 3000))]);
     if (server.exitCode === null) server.kill("SIGKILL");
+    const left = await leftIn(folder);
     if (process.env.POTTO_E2E_KEEP) console.log(`kept: ${folder}`);
     else rmSync(folder, { recursive: true, force: true, maxRetries: 5 });
+    return left;
   };
   try {
     await answering(`http://127.0.0.1:${port}/`, server, () => said);
@@ -100,7 +109,23 @@ export async function start(vsix, chromiumPath) {
     await close();
     throw error;
   }
-  return { port, hostWorkspace, workspace, lost, browser, terminal, close, said: () => said };
+  return { port, folder, hostWorkspace, workspace, lost, several, browser, terminal, close, said: () => said };
+}
+
+/** The processes that work in a folder, and do not end soon. */
+async function leftIn(folder) {
+  const until = Date.now() + 15_000;
+  for (;;) {
+    const found = readdirSync("/proc").flatMap((id) => {
+      try {
+        return readlinkSync(`/proc/${id}/cwd`).startsWith(folder) ? [readFileSync(`/proc/${id}/cmdline`, "utf8").replaceAll("\0", " ")] : [];
+      } catch {
+        return []; // it has ended, or is not ours
+      }
+    });
+    if (!found.length || Date.now() > until) return found;
+    await new Promise((resolve) => setTimeout(resolve, 100));
+  }
 }
 
 async function answering(url, server, said) {
@@ -117,7 +142,7 @@ async function answering(url, server, said) {
   throw new Error(`the server does not answer:\n${said()}`);
 }
 
-/** A window on a folder. `payload` are pairs that Visual Studio Code's web page understands. */
+/** A window on a folder, or on a workspace of several. `payload` are pairs that Visual Studio Code's web page understands. */
 export async function open(code, folder, payload, prepare = async () => undefined) {
   const context = await code.browser.newContext({ viewport: { width: 1280, height: 800 } });
   const page = await context.newPage();
@@ -128,7 +153,8 @@ export async function open(code, folder, payload, prepare = async () => undefine
     return inside ? route.continue() : route.abort();
   });
   await prepare(page);
-  const query = new URLSearchParams({ folder, payload: JSON.stringify([["skipWelcome", "true"], ...payload]) });
+  const kind = folder.endsWith(".code-workspace") ? "workspace" : "folder";
+  const query = new URLSearchParams({ [kind]: folder, payload: JSON.stringify([["skipWelcome", "true"], ...payload]) });
   await page.goto(`${local}?${query}`);
   return page;
 }

@@ -5,7 +5,7 @@ const path = require("node:path");
 const vscode = require("vscode");
 
 const { api, eventually, find, folder, open, run, text, uri } = require("./helpers");
-const { LIFE } = require("./life");
+const life = require("./life");
 
 const TESTS = {
   async "the extension is off until a Potto file is opened"() {
@@ -243,7 +243,7 @@ const TESTS = {
 exports.run = async () => {
   const only = process.env.POTTO_E2E_ONLY;
   const results = [];
-  for (const [name, test] of Object.entries({ ...TESTS, ...LIFE })) {
+  for (const [name, test] of Object.entries({ ...TESTS, ...life.LIFE })) {
     if (only && results.length && !new RegExp(only).test(name)) continue;
     const started = Date.now();
     let error = null;
@@ -257,5 +257,5 @@ exports.run = async () => {
     if (error && results.length === 1) break; // there is no extension: nothing else can hold
   }
   await vscode.commands.executeCommand("workbench.action.closeAllEditors").then(undefined, () => undefined);
-  fs.writeFileSync(path.join(folder.fsPath, "host-results.json"), JSON.stringify({ results, activation: api()?.activationMilliseconds }));
+  fs.writeFileSync(path.join(folder.fsPath, "host-results.json"), JSON.stringify({ results, activation: api()?.activationMilliseconds, memory: life.figures }));
 };

@@ -203,6 +203,19 @@ exports.LIFE = {
     await vscode.commands.executeCommand("workbench.action.revertAndCloseActiveEditor");
   },
 
+  async "a file that is renamed is imported by its new name"() {
+    const { document } = await open("renderer.po");
+    const rename = async (from, to) => {
+      const move = new vscode.WorkspaceEdit();
+      move.renameFile(uri(from), uri(to));
+      assert.ok(await vscode.workspace.applyEdit(move));
+      await eventually(() => document.lineAt(1).text, (line) => line === `from ${to.slice(0, -3)} import disc`);
+      await eventually(() => diagnostics(document.uri), (codes) => !codes.length);
+    };
+    await rename("shapes.po", "forms.po");
+    await rename("forms.po", "shapes.po");
+  },
+
   async "files that are renamed and deleted are followed"() {
     const [one, two] = [uri("fleeting.po"), uri("moved.po")];
     fs.writeFileSync(one.fsPath, "bad = nowhere\n");
@@ -216,4 +229,22 @@ exports.LIFE = {
     await vscode.commands.executeCommand("workbench.action.closeActiveEditor");
     await eventually(() => diagnostics(two), (codes) => !codes.length);
   },
+};
+
+/** Megabytes of memory that a process holds. */
+const memory = (id) => Number(/VmRSS:\s+(\d+)/.exec(fs.readFileSync(`/proc/${id}/status`, "utf8"))[1]) / 1000;
+
+exports.LIFE["memory stays small with all examples open"] = async () => {
+  const before = memory(process.pid);
+  fs.cpSync(path.join(__dirname, "..", "..", "..", "..", "examples"), at("examples"), { recursive: true });
+  const names = fs.readdirSync(at("examples"), { recursive: true }).filter((name) => /\.(po|diffeo)$/.test(name));
+  const programs = names.map((name) => uri(`examples/${name}`));
+  assert.ok(programs.length > 10);
+  for (const uri of programs) await vscode.window.showTextDocument(uri, { preview: false });
+  const last = await vscode.workspace.openTextDocument(programs.at(-1));
+  const evaluation = await evaluating(last);
+  const id = await server();
+  const [host, own, other] = [memory(process.pid), memory(id), memory(evaluation)];
+  exports.figures = { programs: programs.length, host, before, server: own, evaluation: other };
+  assert.ok(host - before < 100 && own < 300 && other < 600, JSON.stringify(exports.figures));
 };

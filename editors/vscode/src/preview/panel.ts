@@ -53,6 +53,8 @@ class Preview {
   private readonly gone: vscode.Disposable[] = [];
   private readonly asked = new Map<number, vscode.CancellationTokenSource>();
   private timer: NodeJS.Timeout | undefined;
+  private outdated = false; // while it is covered
+  private wanted: string | null = null; // the function to show next, if it was asked for
 
   constructor(
     context: vscode.ExtensionContext,
@@ -72,6 +74,7 @@ class Preview {
     this.gone.push(
       this.panel.webview.onDidReceiveMessage((message: FromPreview) => void this.received(message)),
       this.panel.onDidDispose(() => this.dispose()),
+      this.panel.onDidChangeViewState(() => this.uncovered()),
       server.onDidChangeState((state) => {
         if (state.kind === "running") void this.refresh();
       }),
@@ -127,12 +130,25 @@ class Preview {
     for (const disposable of this.gone) disposable.dispose();
   }
 
+  /** A preview that is covered leaves the evaluation to those that are seen, and is drawn anew when it is seen again. */
+  private uncovered(): void {
+    if (!this.panel.visible) {
+      this.outdated ||= this.asked.size > 0;
+      for (const source of this.asked.values()) source.cancel();
+    } else if (this.outdated) void this.refresh();
+  }
+
   private send(message: ToPreview): void {
     void this.panel.webview.postMessage(message);
   }
 
   /** Tell the page what can be drawn now; it asks for samples of what it shows. */
-  private async refresh(show: string | null = null): Promise<void> {
+  private async refresh(name: string | null = null): Promise<void> {
+    this.wanted = name ?? this.wanted;
+    this.outdated = !this.panel.visible;
+    if (this.outdated) return;
+    const show = this.wanted;
+    this.wanted = null;
     try {
       const scenes = await scenesOf(this.server, this.uri);
       const finest = vscode.workspace.getConfiguration("potto").get("preview.resolution", 160);
@@ -171,7 +187,7 @@ class Preview {
     } catch (error) {
       const { code } = error as { code?: unknown };
       const outdated = source.token.isCancellationRequested || code === CONTENT_MODIFIED;
-      this.send({ type: "failed", id, message: messageOf(error), outdated });
+      this.send({ type: "failed", id, message: advised(messageOf(error)), outdated });
     } finally {
       this.asked.delete(id);
       source.dispose();
@@ -195,6 +211,10 @@ class Preview {
   }
 }
 
+/** What stopped for want of time can be given more. */
+const advised = (message: string): string =>
+  message.startsWith("stopped after ") ? `${message}; the setting potto.evaluation.timeLimit gives it more` : message;
+
 const title = (uri: vscode.Uri): string => `Preview ${posix.basename(uri.path)}`;
 
 function page(webview: vscode.Webview, root: vscode.Uri): string {
@@ -215,7 +235,7 @@ function page(webview: vscode.Webview, root: vscode.Uri): string {
   <main id="pictures"></main>
   <p id="probe" aria-live="off"></p>
   <p id="status" role="status"></p>
-  <div id="problem" role="alert" hidden><pre></pre><button type="button">Try again</button></div>
+  <div id="problem" role="alert" hidden><div></div><button type="button">Try again</button></div>
   <section id="parameters" aria-label="Parameters"></section>
   <script nonce="${nonce}" src="${script}"></script>
 </body>

@@ -53,15 +53,31 @@ new ResizeObserver(draw).observe(pictures);
 new MutationObserver(draw).observe(document.body, { attributes: true }); // another theme
 host.postMessage({ type: "ready" });
 
-problem.querySelector("button")?.addEventListener("click", () => ask(true));
+problem.querySelector("button")?.addEventListener("click", () => {
+  problem.hidden = true;
+  pictures.classList.remove("blank");
+  status.textContent = "evaluating…";
+  ask(true);
+});
 
 /** Say what is wrong, and dim what was drawn before. */
 function complain(message: string): void {
-  const text = problem.querySelector("pre");
-  if (text) text.textContent = message;
+  problem.firstElementChild?.replaceChildren(...explained(message));
   problem.hidden = false;
-  pictures.classList.add("stale");
+  pictures.classList.add(drawn ? "stale" : "blank");
   if (status.dataset["settled"] !== "true") status.textContent = "";
+}
+
+/** A message with its excerpts of programs: they keep their columns, the sentences are wrapped. */
+function explained(message: string): HTMLElement[] {
+  const parts: HTMLElement[] = [];
+  for (const line of message.split("\n")) {
+    const tag = /^\s*(\d+\s*\||\||-->)/.test(line) ? "pre" : "p";
+    const last = parts.at(-1);
+    if (tag === "pre" && last?.tagName === "PRE") last.textContent = `${last.textContent ?? ""}\n${line}`;
+    else parts.push(make(tag, { textContent: tag === "p" ? line.replace(/^\s*= /, "") : line }));
+  }
+  return parts;
 }
 
 /** The functions are these now: go on with the one that is shown, or with the one that is asked for. */
@@ -196,7 +212,7 @@ function arrived(outcome: Outcome): void {
     : undefined;
   drawn = { outcome, grid, view: asked.view, axes: asked.axes, wrt: asked.wrt, cells: coloured };
   problem.hidden = true;
-  pictures.classList.remove("stale");
+  pictures.classList.remove("stale", "blank");
   tell(outcome, grid);
   draw();
 }
