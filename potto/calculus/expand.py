@@ -70,6 +70,8 @@ def known_function(head: Term, resolve: Resolve, derive: Derive | None) -> Lam |
     """The function that the head of a call is, if it is known."""
     if isinstance(head, Global):
         found = resolve(head)
+        if isinstance(found, Deriv) and derive is not None:  # a derivative that has a name
+            return known_function(found, resolve, derive)
         return found if isinstance(found, Lam) else None
     if isinstance(head, Deriv) and derive is not None:
         inner = known_function(head.function, resolve, derive)

@@ -340,8 +340,9 @@ class Machine:
 
     def integral(self, term: Integral, env: dict[str, Value]) -> Value:
         from potto.runtime.integrals import integrate
-        from potto.runtime.prepare import held, placed, prepared
+        from potto.runtime.prepare import filled, held, placed, prepared
 
+        term, env = filled(term, env)
         known = self.linker.placed.get(term)
         if known is None:
             known = self.linker.placed[term] = placed(term, lambda g: self.linker.term(g.module, g.name))

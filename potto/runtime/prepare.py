@@ -10,15 +10,20 @@ from __future__ import annotations
 from functools import lru_cache
 
 from potto.calculus.deltas import without_deltas
+from potto.calculus.derivative import NotSmooth
+from potto.calculus.dual import Differentiator
 from potto.calculus.expand import Resolve, expanded
+from potto.calculus.pivots import NoClosedForm
 from potto.core.terms import (
     Branch,
     Delta,
+    Deriv,
     Global,
     Integral,
     Prim,
     Sum,
     Term,
+    Var,
     add,
     children,
     integral,
@@ -29,6 +34,9 @@ from potto.core.terms import (
     sum_,
     var,
 )
+from potto.diagnostics import PottoError
+from potto.kernels.cells import Value
+from potto.runtime.functions import Closure
 
 FEW = 4  # branches that one integrand may have before its summands are integrated apart
 
@@ -51,7 +59,9 @@ def prepared(term: Integral) -> Term:
 
 
 def placed(term: Integral, resolve: Resolve) -> Integral:
-    """The integral with the calls of definitions that place its deltas carried out: `delta(cond (x, y) c)`."""
+    """The integral with the calls of definitions that place its deltas carried out: `delta(cond (x, y) c)`. Of a
+    derivative under it, of a function that jumps over its variables, the deltas are written out."""
+    term = _with_spikes(term, resolve)
     nodes = postorder(term)
     if not any(isinstance(n, Delta) and any(isinstance(g, Global) for g in postorder(*n.coordinates)) for n in nodes):
         return term
@@ -62,6 +72,62 @@ def placed(term: Integral, resolve: Resolve) -> Integral:
     found = memo[term]
     assert isinstance(found, Integral)
     return found
+
+
+def filled(term: Integral, env: dict[str, Value]) -> tuple[Integral, dict[str, Value]]:
+    """With the functions in the place of those parameters whose derivatives are taken in the integrand; what they have
+    captured joins the environment under names of its own."""
+    for name in _derived_parameters(term):
+        function = env.get(name)
+        if type(function) is not Closure:
+            continue
+        names = {captured: f"{captured}@{name}" for captured in function.captured}
+        own = substitute(function.lam, {captured: var(new) for captured, new in names.items()})
+        found = substitute(term, {name: own})
+        assert isinstance(found, Integral)
+        term = found
+        env = {**env, **{new: function.captured[captured] for captured, new in names.items()}}
+    return term, env
+
+
+@lru_cache(maxsize=4096)
+def _derived_parameters(term: Integral) -> tuple[str, ...]:
+    """The functions among the parameters whose derivatives are taken in an integrand."""
+    derived = (node.function for node in postorder(term.body) if isinstance(node, Deriv))
+    return tuple(sorted({inner.name for inner in derived if isinstance(inner, Var)} & term.free))
+
+
+def _with_spikes(term: Integral, resolve: Resolve) -> Integral:
+    """The integrand with derivatives carried out, if that brings deltas over the variables of integration.
+
+    Kernels carry the tangents of derivatives from point to point, where a delta is nowhere: `D Real[x]` is
+    `(Real[x], Dist[x])` for what jumps. Where no such derivative is reached, the term is the same.
+    """
+    if not _derives(term.body, resolve):
+        return term
+    try:
+        body = Differentiator(resolve).carried_out(term.body)
+    except (NoClosedForm, NotSmooth, PottoError):  # of an integral in the function, whose derivative takes numbers
+        return term
+    variables = frozenset(term.variables)
+    before = {node for node in postorder(term.body) if isinstance(node, Delta)}
+    found = any(isinstance(n, Delta) and n not in before and n.coordinates[0].free & variables for n in postorder(body))
+    return _over(term, body) if found else term
+
+
+def _derives(body: Term, resolve: Resolve) -> bool:
+    """Whether a derivative and a jump are both reached from an integrand."""
+    seen: set[Term] = set()
+    todo, kinds = [body], set[type[Term]]()
+    while todo:
+        for node in postorder(todo.pop()):
+            if isinstance(node, Global) and node not in seen:
+                seen.add(node)
+                known = resolve(node)
+                todo += [] if known is None else [known]
+            elif isinstance(node, Deriv | Branch):
+                kinds.add(type(node))
+    return kinds == {Deriv, Branch}
 
 
 @lru_cache(maxsize=1024)
