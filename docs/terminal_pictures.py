@@ -81,7 +81,7 @@ def screen_of(session: Session, columns: int = 92) -> Any:
                 except pexpect.TIMEOUT:
                     pass
 
-        settle(2.0)
+        settle(5.0)  # until everything is loaded that gives colours
         for entry in session.entries:
             for line in entry.split("\n"):
                 process.send(f"{line}\r")

@@ -9,6 +9,7 @@ import argparse
 import os
 import sys
 import threading
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from potto.settings import Settings
@@ -30,6 +31,7 @@ class Loader:
         self._ready = threading.Event()
         self._started = False
         self._lock = threading.Lock()
+        self.told: Callable[[], None] | None = None  # is called when the session is there
 
     def start(self) -> None:
         """Begin to load, if that has not begun."""
@@ -69,6 +71,8 @@ class Loader:
         finally:
             self._ready.set()
         if self._session is not None:
+            if self.told is not None:
+                self.told()
             self._session.evaluate(WARM)  # the first kernel, plan and rule cost more than all later ones
             from potto_repl import complete  # noqa: F401  (for the first Tab)
 

@@ -116,6 +116,7 @@ class Terminal:
         self.prompt_session.default_buffer.on_text_changed += lambda buffer: self._typed(buffer.text)
         self._suggest = AutoSuggestFromHistory()
         self._attached = False
+        loader.told = self._checked  # what was typed before that has no colours yet
 
     # The loop
 

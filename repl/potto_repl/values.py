@@ -55,7 +55,8 @@ def tail(estimate: Estimate, settings: Settings) -> str:
         return ""
     words = [estimate.method]
     if "mc" in estimate.method:
-        words += [f"{settings.samples:,} samples", f"seed {settings.seed}"]
+        most = "up to " if "qmc" in estimate.method else ""  # it stops where that is enough, or the budget is spent
+        words += [f"{most}{settings.samples:,} samples", f"seed {settings.seed}"]
     words += [f"{estimate.evals:,} evaluations", seconds(estimate.seconds)]
     return ", ".join(words)
 

@@ -168,3 +168,33 @@ def test_progress_comes_late_and_goes_away():
         time.sleep(0.8)
     text = screen.getvalue()
     assert "step 3" in text and "s left" in text and text.endswith("\r\x1b[K")
+
+
+def test_what_was_typed_while_everything_was_loading_is_coloured_then():
+    running = threading.Event()
+
+    class Late(Loader):
+        def _load(self):
+            running.wait(20)
+            super()._load()
+
+    late = Late(DEFAULTS)
+    with create_pipe_input() as keyboard, create_app_session(input=keyboard, output=DummyOutput()):
+        terminal = Terminal(late, history=InMemoryHistory())
+        drawn = []
+        terminal.prompt_session.app.invalidate = lambda: drawn.append(terminal.prompt_session.lexer)
+
+        def finish():
+            while not terminal.prompt_session.app.is_running:
+                time.sleep(0.01)
+            running.set()
+            for _ in range(200):
+                if terminal.lexers[1] in drawn:  # another lexer: the same text is coloured anew
+                    break
+                time.sleep(0.05)
+            keyboard.send_text(CTRL_C)
+
+        threading.Thread(target=finish, daemon=True).start()
+        with pytest.raises(KeyboardInterrupt):
+            terminal.read()
+    assert terminal.lexers[1] in drawn
