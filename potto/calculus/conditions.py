@@ -11,7 +11,7 @@ leads to no condition is not exported: a definition costs by its own size and no
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
 from potto.calculus.expand import DEEPEST, Resolve, expanded
@@ -29,6 +29,7 @@ from potto.core.terms import (
     Global,
     Integral,
     Lam,
+    Prim,
     Proj,
     Sum,
     Term,
@@ -161,8 +162,8 @@ def conditions_of(term: Term, skeletons: Resolve, whole: Resolve) -> tuple[Condi
     body = term
     while isinstance(body, Lam):
         body = body.body
-    found = walk.term(body, _Place({}, {}, (), (), None))
-    return tuple({(c.coordinates, c.anchor): c for c in found}.values())
+    walk.term(body, _Place({}, {}, (), (), None))
+    return tuple({(c.coordinates, c.anchor): c for c in walk.found}.values())
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,8 +189,9 @@ class _Walk:
         self.box: dict[str, tuple[float, float]] = {}
         self.seen: set[tuple[object, ...]] = set()
         self.taken: set[str] = set()
+        self.found: list[Condition] = []
 
-    def term(self, term: Term, place: _Place) -> Iterator[Condition]:
+    def term(self, term: Term, place: _Place) -> None:
         nodes = postorder(term)
         self.taken |= term.free
         for node in nodes:
@@ -202,11 +204,11 @@ class _Walk:
         heads = {node.function for node in nodes if isinstance(node, App)}
         for node in nodes:
             if isinstance(node, Branch | Delta):
-                yield from self.condition(node, place)
+                self.condition(node, place)
             elif isinstance(node, App) and node not in heads:
-                yield from self.call(node, place)
+                self.call(node, place)
 
-    def condition(self, node: Branch | Delta, place: _Place) -> Iterator[Condition]:
+    def condition(self, node: Branch | Delta, place: _Place) -> None:
         coordinates = node.coordinates
         over = self.box.keys() if place.caller is None else place.caller
         if over.isdisjoint(_reached(coordinates[:1], place)):
@@ -222,20 +224,14 @@ class _Walk:
         if any(isinstance(part, App) for part in postorder(surface)):
             return  # a function parameter decides: the caller who passes it checks
         box = {v: b for v, b in self.box.items() if any(v in c.free for c in coordinates)}
-        yield Condition(
-            coordinates,
-            isinstance(node, Branch) and node.strict,
-            place.anchor or node,
-            isinstance(node, Delta),
-            box,
-            place.calls,
-        )
+        strict, anchor = isinstance(node, Branch) and node.strict, place.anchor or node
+        self.found.append(Condition(coordinates, strict, anchor, isinstance(node, Delta), box, place.calls))
 
     def seen_through(self, term: Term, place: _Place) -> Term:
         known = {**place.mapping, **place.functions}
         return expanded(substitute(term, known), self.whole)
 
-    def call(self, node: App, place: _Place) -> Iterator[Condition]:
+    def call(self, node: App, place: _Place) -> None:
         head, groups = spine(node)
         caller = place.caller
         dual = isinstance(head, Deriv)
@@ -257,7 +253,7 @@ class _Walk:
         if not isinstance(function, Lam):
             return
         known = {**place.mapping, **place.functions}
-        given = tuple(tuple(substitute(a, known) for a in group) for group in groups)
+        given = tuple(tuple(_given(a, known) for a in group) for group in groups)
         if dual:
             given = tuple(tuple(_primal(a) for a in group) for group in given)
         key = (head, given, caller)
@@ -268,12 +264,12 @@ class _Walk:
         if inner is not None:
             body, mapping, functions = inner
             there = _Place(mapping, functions, (*place.calls, name), path, place.anchor or node, caller)
-            yield from self.term(body, there)
+            self.term(body, there)
 
     def goes_in(self, groups: tuple[tuple[Term, ...], ...], caller: frozenset[str], place: _Place) -> bool:
         """Whether a variable of integration or a function is given to a call; else the rest is the callee's."""
         flat = [item for group in groups for arg in group for item in (arg.items if isinstance(arg, Tuple) else (arg,))]
-        if any(isinstance(arg, Lam | Global | Deriv) for arg in flat):
+        if any(isinstance(arg, Lam | Global | Deriv) and not _is_open(arg, place) for arg in flat):
             return True
         if place.functions and any(isinstance(arg, Var) and arg.name in place.functions for arg in flat):
             return True
@@ -291,7 +287,7 @@ class _Walk:
             self.taken |= arg.free
         body, own = self.apart(body, params)
         mapping: dict[str, Term] = {}
-        functions: dict[str, Term] = dict(place.functions)
+        functions = {name: place.functions[name] for name in body.free if name in place.functions}
         for param, arg in zip(own, args, strict=True):
             if isinstance(arg, Lam | Global | Deriv):
                 functions[param] = arg
@@ -314,6 +310,25 @@ class _Walk:
             body = _renamed(body, names)
         self.taken |= set(own)
         return body, tuple(own)
+
+
+def _is_open(function: Lam | Global | Deriv, place: _Place) -> bool:
+    """Whether what a function gives hangs on a function that only the callers of the definition know, and it brings no
+    condition of its own: then no condition that it decides can be told here."""
+    if not isinstance(function, Lam):
+        return False
+    parts = postorder(function.body)
+    if any(not isinstance(part, App | Var | Const | Prim | Tuple | Proj) for part in parts):
+        return False
+    heads = (spine(part)[0] for part in parts if isinstance(part, App))
+    return any(isinstance(head, Var) and head.name in function.free - place.functions.keys() for head in heads)
+
+
+def _given(argument: Term, known: Mapping[str, Term]) -> Term:
+    """An argument with what is known put in. In one that is a function, calls of functions that are known by now are
+    carried out: left as they are, each level of a chain that passes a function on would go through all before it."""
+    found = substitute(argument, known)
+    return expanded(found, lambda _: None) if found is not argument and isinstance(found, Lam) else found
 
 
 def _reached(terms: Iterable[Term], place: _Place) -> set[str]:

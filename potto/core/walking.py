@@ -5,7 +5,7 @@ Owns what every pass is made of. Only binders recurse, and they nest no deeper t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from operator import attrgetter, is_
 from typing import Any
 
@@ -156,7 +156,8 @@ def bound_names(term: Term) -> tuple[str, ...]:
 
 def fresh(name: str, taken: Iterable[str]) -> str:
     """A name like `name` that is not taken: `x`, `x'1`, `x'2`, ..."""
-    taken = set(taken)
+    if not isinstance(taken, Set):
+        taken = set(taken)
     stem, number, candidate = name.split("'")[0], 0, name
     while candidate in taken:
         number += 1

@@ -6,6 +6,7 @@ import textwrap
 
 import pytest
 
+from potto.calculus import conditions
 from potto.calculus.conditions import has_conditions
 from potto.calculus.diffeo import DiffeoInfo, check_conditions, diffeo_info, exported
 from potto.calculus.expand import expanded
@@ -336,6 +337,19 @@ def test_calls_that_double_at_every_level_are_followed_to_an_end() -> None:
     levels = [f"def f{n}(x)\n    f{n - 1}(2*x) + f{n - 1}(x/3)\n" for n in range(1, 30)]
     text = "\n".join(["def f0(x)\n    [x < 1]\n", *levels, "def g(t)\n    integral [0, 1] f29(x*t) d(x)\n"])
     assert check(text) == []  # there are 2^29 conditions
+
+
+def test_a_chain_that_hands_a_function_on_is_followed_once_a_level(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[object] = []
+    entered = conditions._Walk.entered
+    monkeypatch.setattr(conditions._Walk, "entered", lambda *given: (seen.append(given), entered(*given))[1])
+    levels = [f"def f{n}(h, t)\n    f{n - 1}(\\x . h(x) + {n}, t)\n" for n in range(1, 40)]
+    chain = "\n".join(["def f0(h, t)\n    integral [0, 1] [h(x) > t] d(x)\n", *levels])
+    assert check(chain) == []
+    assert not seen  # no level knows `h`, so none has to look into the one below
+    (said,) = check(chain + "\ndef g(h, t)\n    f39(\\x . h(x)*[x*sin(x)*exp(x) < t], t)\n")
+    assert said.code == "P0402"
+    assert len(seen) < 3 * 40
 
 
 def test_a_condition_that_a_passed_function_brings_is_the_callers() -> None:
