@@ -170,7 +170,7 @@ async function noServer({ page, picture }) {
 
 async function severalFolders({ page, picture, file }) {
   const row = page.locator(".explorer-folders-view .monaco-list-row", { hasText: "two" }).first();
-  await row.waitFor({ timeout: 15_000 }).catch(() => page.reload()); // a window now and then misses its workspace
+  await row.waitFor({ timeout: 8000 }).catch(() => page.reload()); // a window now and then misses its workspace
   await row.waitFor();
   await page.locator(`${EDITOR} .squiggly-error`).first().waitFor();
   await page.locator(".statusbar-item", { hasText: "Potto" }).locator(".codicon-check").first().waitFor();
