@@ -27,6 +27,7 @@ from potto.integrate.pieces import Evaluator, Pieces, Sums, column, gather, join
 from potto.integrate.plan import LevelPlan
 from potto.integrate.rules import EPS, Rule, gauss, truncation
 from potto.integrate.tally import Tally
+from potto.integrate.undefined import mend
 from potto.kernels.cells import Array, Cell, Ints, Mask, Number, Value, pad
 
 if TYPE_CHECKING:
@@ -197,6 +198,8 @@ class Work:
         if weight.shape[1] == 1 and self.few_doubles(seg, weight):
             off, label = maps.displaced(seg, x, label)
         h, inner = self.values(seg, p.segment, x, label, weight)
+        if not whole:
+            mend(self, seg, p.segment, u, du, h, inner)
         if off is not None:
             part = off * (seg.b - seg.a)[:, None] / weight
             slope = h @ rule.derivative

@@ -1,0 +1,41 @@
+"""Nodes that rounding puts where the integrand is not defined.
+
+Owns `mend`. Close to an end of a segment where roots merge an integrand like 1/sqrt(r^2 - x^2 - y^2) has a radicand of
+the size of its rounding, and may come out as nan. There, in the coordinate that the segment is run through by, it is
+smooth: its values a little further in stand for those.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from potto.integrate import maps
+from potto.integrate.maps import Segments
+from potto.kernels.cells import Array, Ints
+
+if TYPE_CHECKING:
+    from potto.integrate.work import Work
+
+# As close as this to an end, in the coordinate, values are taken for those at this distance: the closest that will do.
+CLOSE = (1e-6, 1e-4, 1e-2)
+
+
+def mend(work: Work, seg: Segments, index: Ints, u: Array, du: Array, h: Array, bounds: Array | None) -> None:
+    """Put values, and bounds of their errors, from further in where channels (C, P, n) are no numbers.
+
+    u, du: (P, n) as for the map.
+    """
+    turning = np.isin(seg.kind, (maps.LEFT, maps.RIGHT, maps.BOTH))[:, None]
+    for close in CLOSE if turning.any() else ():
+        bad = ~np.isfinite(h).all(axis=0) & turning & ((u < close) | (u > 1 - close))
+        rows = np.nonzero(bad.any(axis=1))[0]
+        if not rows.size:
+            break
+        part, inner = seg.pick(rows), np.clip(u[rows], close, 1 - close)
+        x, slope, label = maps.points(part, inner)
+        found, errors = work.values(part, index[rows], x, label, slope * np.broadcast_to(du, u.shape)[rows])
+        h[:, rows] = np.where(bad[rows], found, h[:, rows])
+        if bounds is not None and errors is not None:
+            bounds[:, rows] = np.where(bad[rows], errors, bounds[:, rows])
