@@ -19,6 +19,7 @@ from potto.calculus.expand import expanded
 from potto.calculus.invert import Failure, Inverse, invert
 from potto.calculus.isolate import Guard
 from potto.calculus.linear import affine
+from potto.calculus.maps import many, unknown_call, wrong_shape
 from potto.calculus.pivots import NoClosedForm
 from potto.calculus.relevance import may_integrate
 from potto.calculus.sides import unguarded
@@ -26,17 +27,14 @@ from potto.calculus.trace import spine
 from potto.calculus.verdict import (
     COMPONENTS,
     NO_INVERSE,
-    NOT_DIFFERENTIABLE,
     WRONG_INVERSE,
     Problem,
     failure,
     judge,
-    kinks,
     listed,
     singular,
 )
 from potto.calculus.verify import Refuted, Untested, Verified, verify
-from potto.core.printer import format_term
 from potto.core.simplify import simplify
 from potto.core.terms import (
     ONE,
@@ -241,7 +239,8 @@ def _studied(db: Database, file: str, name: str) -> _Study:
     where = tuple(guard for truth in parts.where for guard in guards_of(truth))
     box = _box(where, variables)
     span = _components_span(item)
-    problem = _wrong_shape(components, variables, box) or singular(components, variables)
+    problem = wrong_shape(components, variables, box) or unknown_call(components, variables)
+    problem = problem or singular(components, variables)
     if problem is not None:
         return _Study((_diagnostic(problem, span),), None)
     what = _Map(components, variables, parts.groups, where, box)
@@ -265,31 +264,6 @@ def _components_span(item: nodes.DiffeoDefinition) -> Span:
     if not item.components:
         return item.name_span
     return item.components[0].span.cover(item.components[-1].span)
-
-
-def _wrong_shape(components: Sequence[Term], variables: Sequence[str], box: Box) -> Problem | None:
-    if len(components) != len(variables):
-        return Problem(
-            COMPONENTS,
-            f"{_many(len(components), 'component')} over {_many(len(variables), 'variable')}",
-            f"{len(components)} here, {_many(len(variables), 'variable')}",
-            (),
-            f"give {_many(len(variables), 'component')}: an invertible map has as many as variables",
-        )
-    kink = kinks(components, variables, box)
-    if kink is None:
-        return None
-    return Problem(
-        NOT_DIFFERENTIABLE,
-        f"the map is not differentiable where `{format_term(kink)}` is 0",
-        "has a kink",
-        ("a diffeomorphism is differentiable everywhere, and so is its inverse",),
-        "keep to one side of the kink with `where`, or split the map at it",
-    )
-
-
-def _many(count: int, noun: str) -> str:
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def _inverted(item: nodes.DiffeoDefinition, what: _Map, found: Inverse | Failure, span: Span) -> _Study:
@@ -334,8 +308,8 @@ def _authors(
     if len(values) != len(what.components) or len(parts) != len(what.variables):
         problem = Problem(
             COMPONENTS,
-            f"the inverse takes {_many(len(values), 'value')} to {_many(len(parts), 'component')}, "
-            f"but the map takes {_many(len(what.variables), 'variable')} to {_many(len(what.components), 'component')}",
+            f"the inverse takes {many(len(values), 'value')} to {many(len(parts), 'component')}, "
+            f"but the map takes {many(len(what.variables), 'variable')} to {many(len(what.components), 'component')}",
             "wrong number",
             (),
             "the inverse takes the components, in their order, back to the variables",

@@ -373,6 +373,12 @@ def test_a_diffeomorphism_that_is_none_is_reported_where_it_is_defined_and_not_w
     assert said.code == "P0401" and "whose determinant is 0" in str(said.notes)
 
 
+def test_a_diffeomorphism_that_calls_what_it_is_given_is_refused() -> None:
+    (said,) = check("diffeo d(x, y; c) = (x + y + c(x), x - y)")
+    assert said.code == "P0402" and "`c(x)`" in said.message
+    assert codes("diffeo d(x, y; c, k) = (x + y + c(k), x - y)") == []
+
+
 # Calls carried out
 
 

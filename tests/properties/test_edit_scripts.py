@@ -57,6 +57,14 @@ def test_incremental_is_from_scratch(seed: int) -> None:
     run_script(seed)
 
 
+FOUND = [506559]  # a diffeomorphism that calls its parameter made the check fail
+
+
+@pytest.mark.parametrize("seed", FOUND)
+def test_what_was_found(seed: int) -> None:
+    run_script(seed)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("first", range(1000, 1000 + SCRIPTS, 100))
 def test_incremental_is_from_scratch_for_long(first: int) -> None:
