@@ -24,6 +24,7 @@ from potto.kernels.cells import Cell, Value
 from potto.runtime.advice import INFINITE, NO_VALUE, ROUGH
 from potto.runtime.estimate import Estimate, OneSided
 from potto.runtime.functions import Closure, Derivative
+from potto.runtime.inherited import rough, widened
 from potto.runtime.machine import Books, Linker, Machine
 from potto.settings import DEFAULTS, Settings
 
@@ -41,7 +42,12 @@ class Program:
 
     def value(self, machine: Machine, term: Term, env: Mapping[str, Value] | None = None) -> Value:
         """The value of a term, with every internal limit turned into a PottoError."""
-        return guarded(lambda: machine.term(opened(term), dict(env or {})))
+
+        def found(machine: Machine) -> Value:
+            return guarded(lambda: machine.term(opened(term), dict(env or {})))
+
+        value = found(machine)
+        return widened(value, machine, found) if machine.books.used and not machine.directions else value
 
     def evaluate(self, term: Term, settings: Settings = DEFAULTS, env: Mapping[str, Value] | None = None) -> Estimate:
         """The estimate of a term. Raises PottoError where the program has no value."""
@@ -128,7 +134,8 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
     if missed == INFINITE and not books.methods:
         missed = None  # of 1/0 no integral is to blame
     if not reasons and missed is not None:
-        reasons.append(ROUGH if any(_rough(value, settings) for value in books.used.values()) else missed)
+        used = any(rough(value, settings.rtol, settings.atol) for value in books.used.values())
+        reasons.append(ROUGH if used else missed)
     return Estimate(
         numbers,
         bounds,
@@ -138,15 +145,6 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
         reasons=tuple(reasons),
         **common,  # type: ignore[arg-type]
     )
-
-
-def _rough(value: Value, settings: Settings) -> bool:
-    """Whether an answer is itself less accurate than is asked for now."""
-    if isinstance(value, tuple | list):
-        return any(_rough(item, settings) for item in value)
-    if not isinstance(value, Cell) or not value.e:
-        return False
-    return _missed(value.v, value.e, _largest(value.v), settings) is not None
 
 
 def _notes(books: Books) -> list[OneSided]:

@@ -23,6 +23,7 @@ from potto.world import World
 from potto_repl.reply import Part
 
 SLOW = 5.0  # seconds; of a derivative that took longer the parts are not looked for, which would take as long again
+MANY = 200_000  # evaluations; fewer that took long waited for something else, which only the first time takes
 TINY = 1e-13
 
 
@@ -77,7 +78,7 @@ def parts_of(world: World, file: str, expr: nodes.Expr, dual: Estimate, settings
     Of a second derivative the interior is the integral of the integrand's second derivative, and the rest the boundary.
     Samples are the same in both evaluations, so that their difference has the noise of the boundary alone.
     """
-    if dual.seconds > SLOW or dual.tangent is None:
+    if (dual.seconds > SLOW and dual.evals > MANY) or dual.tangent is None:
         return None
     term = _called(world, elaborate_expression(world.db, file, expr).term)
     program = world.program

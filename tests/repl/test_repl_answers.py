@@ -141,7 +141,8 @@ def test_an_answer_is_the_value_that_was_answered(talk):
     first = talk.session.entries[-1].outcomes[0].estimates[0]
     talk.all(":set seed 8", ":set samples 5000", "def f(t) 100*t")  # nothing of this changes what was answered
     again = talk.data("_")
-    assert (again["value"], again["error"]) == (first.value, first.error) and 1e-3 < first.error < 0.1
+    assert again["value"] == first.value and 1e-3 < first.error < 0.1
+    assert again["error"] == pytest.approx(first.error, rel=1e-12)
     assert again["evals"] == 0
     twice = talk.data("_2 * 2")
     assert (twice["value"], twice["error"]) == pytest.approx((2 * first.value, 2 * first.error), rel=1e-12)
@@ -158,6 +159,21 @@ def test_an_answer_stands_still_in_a_derivative(talk):
     assert talk.data("deriv(g)((2, 1))")["tangent"] == pytest.approx(0.25, rel=1e-12)
     talk("\\x . f(x)^2")  # a function goes on as a function
     assert talk.data("deriv(_)((0.5, 1))")["tangent"] == pytest.approx(1, rel=1e-12)
+
+
+def test_the_error_of_an_answer_reaches_what_is_made_of_it(talk):
+    talk.all(JUMP, ":method mc", ":set samples 1000", "f(0.3)")
+    error = talk.data("_")["error"]
+    talk.all(":method auto", "g = \\t . integral [0, 1] [x < _2*t] d(x)")
+    data = talk.data("deriv(g)((2, 1))")  # 2a and a: how fast the jump moves is no better known than a
+    assert data["error"] == pytest.approx(2 * error, rel=1e-9)
+    assert data["tangent_error"] == pytest.approx(error, rel=1e-9)
+    assert data["interior"] == 0 and data["boundary"] == pytest.approx(data["tangent"], rel=1e-12)
+    pair = talk.data("(_2, [_2^2, 5])")
+    assert pair["error"][0] == pytest.approx(error, rel=1e-9) and pair["error"][1][1] == 0
+    assert pair["error"][1][0] == pytest.approx(2 * 0.3 * error, rel=0.2)
+    sharp = talk.data("_2*0 + f(0.5)")
+    assert sharp["error"] < 1e-12
 
 
 def test_an_answer_outlives_its_file(talk):
