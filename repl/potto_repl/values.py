@@ -23,7 +23,7 @@ from potto.world import World
 from potto_repl.reply import Part
 
 SLOW = 5.0  # seconds; of a derivative that took longer the parts are not looked for, which would take as long again
-MANY = 200_000  # evaluations; fewer that took long waited for something else, which only the first time takes
+MANY = 2_000_000  # evaluations; fewer that took long waited for something else, which only the first time takes
 TINY = 1e-13
 
 
