@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -57,6 +57,7 @@ TINY = 1e-280
 # How far off a rule may be for a sum that cancels, as a part of what it is when nothing does.
 NOISE = 1e-12
 MOST_REGIONS = 512
+UNKNOWN = object()
 
 Path = tuple[tuple[int, int], ...]
 
@@ -76,7 +77,7 @@ class Straight:
     surfaces: Lam
     names: tuple[str, ...]
     faces: dict[tuple[bool, ...], Term] = field(default_factory=dict, compare=False)
-    regions: dict[Any, Region | None] = field(default_factory=dict, compare=False)
+    regions: dict[Any, object] = field(default_factory=dict, compare=False)
 
     @property
     def items(self) -> tuple[tuple[Term, ...], ...]:
@@ -142,33 +143,39 @@ class _NotPlain(Exception):
 
 def _cells(
     plan: Straight, machine: Evaluator, env: dict[str, Value], frame: tuple[Cell, ...]
-) -> Iterator[Stretch]:
-    """The cells between the cuts, with the integrand on each; those on which it is 0 left out.
+) -> tuple[tuple[Stretch, ...], float]:
+    """The cells between the cuts, with the integrand on each; those on which it is 0 left out. And the least length.
 
     frame: the bounds and cuts of the outermost variable.
     """
     tracked = machine.with_directions(machine.directions if machine.costs is not None else 0).tracking()
+    cells: list[Stretch] = []
+    here, shortest = dict(env), math.inf
 
-    def over(i: int, here: dict[str, Value], path: Path) -> Iterator[Stretch]:
+    def over(i: int, path: Path) -> None:
+        nonlocal shortest
         if i == len(plan.variables):
             face = plan.face(_sides(plan, tracked, here))
             dark = isinstance(face, Const) and face.value == 0
             if machine.costs is not None:
                 machine.costs.stretches(1, 0 if dark else 1)
             if not dark:
-                yield Stretch(path, face)
+                cells.append(Stretch(path, face))
             return
         values = evaluated(plan.frames[i], tracked, here) if i else frame
-        for low, high, middle in _stretches(plan, i, tracked, values):
-            yield from over(i + 1, {**here, plan.variables[i]: Cell(middle)}, (*path, (low, high)))
+        for low, high, middle, length in _stretches(plan, i, tracked, values):
+            here[plan.variables[i]] = Cell(middle)
+            shortest = min(shortest, length)
+            over(i + 1, (*path, (low, high)))
 
-    return over(0, env, ())
+    over(0, ())
+    return tuple(cells), shortest
 
 
 def _stretches(
     plan: Straight, i: int, machine: Evaluator, values: tuple[Cell, ...]
-) -> list[tuple[int, int, float]]:
-    """Between which rows of the frame one variable runs, and the middles."""
+) -> list[tuple[int, int, float, float]]:
+    """Between which rows of the frame one variable runs, the middles and the lengths."""
     if machine.costs is not None:
         for surface, rows in plan.jumps[i]:
             roots = [(values[row].v, values[row].t) for row in rows]
@@ -187,7 +194,7 @@ def _stretches(
     kept.append(hi)
     if any(b[0] - a[0] <= a[1] + b[1] for a, b in itertools.pairwise(kept)):
         raise _NotPlain
-    return [(a[2], b[2], 0.5 * (a[0] + b[0])) for a, b in itertools.pairwise(kept)]
+    return [(a[2], b[2], 0.5 * (a[0] + b[0]), b[0] - a[0]) for a, b in itertools.pairwise(kept)]
 
 
 def _sides(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> tuple[bool, ...]:
@@ -205,28 +212,36 @@ def _sides(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> tuple[b
 # What is proved
 
 
-def _region(plan: Straight, cells: tuple[Stretch, ...], values: Mapping[str, float], reach: float, rtol: float) -> Any:
+def _region(
+    plan: Straight, cells: tuple[Stretch, ...], values: Mapping[str, float], reach: float, shortest: float, rtol: float
+) -> Region | None:
     """What is known of the rules for these cells, in the region in which the parameters lie; proved once.
 
     Regions are as large as the parameters, or as the domain where that is larger; if nothing can be proved of those,
-    as the parameters alone.
+    as the parameters alone, then as the shortest stretch.
     """
-    rtol = min(rtol, LOOSEST)
-    for least in (reach, 0.0):
+    sizes = [{n: max(abs(v), reach) for n, v in values.items()}]
+    if any(abs(v) < reach / 8 for v in values.values()):
+        sizes.append({n: abs(v) or reach for n, v in values.items()})
+    if shortest < reach / 8:
+        sizes.append({n: min(abs(v) or reach, shortest) for n, v in values.items()})
+    for size in sizes:
         places = []
         for name, value in values.items():
-            step = 2.0 ** math.floor(math.log2(max(abs(value), least) or reach)) * REGION
+            step = 2.0 ** math.floor(math.log2(size[name])) * REGION
             if step < TINY:
                 return None
             places.append((name, round(value / (2 * step)) * 2 * step, step))
         key = (cells, tuple(places), rtol)
-        if key not in plan.regions:
+        region = plan.regions.get(key, UNKNOWN)
+        if region is UNKNOWN:
             if len(plan.regions) >= MOST_REGIONS:
                 plan.regions.clear()
             middle, radius = {n: m for n, m, _ in places}, {n: r for n, _, r in places}
-            plan.regions[key] = proved(plan.variables, plan.items, cells, middle, radius, MARGIN * rtol)
-        if plan.regions[key] is not None or all(abs(v) >= reach / 8 for v in values.values()):
-            return plan.regions[key]
+            region = proved(plan.variables, plan.items, cells, middle, radius, MARGIN * rtol)
+            plan.regions[key] = region
+        if region is not None:
+            return region  # type: ignore[return-value]
     return None
 
 
@@ -240,12 +255,12 @@ def certain(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Sums |
     values: dict[str, float] = {}
     for name in plan.names:
         cell = env.get(name)
-        if not isinstance(cell, Cell) or not isinstance(cell.v, float) or not math.isfinite(cell.v):
+        if not isinstance(cell, Cell) or cell.arrays() or not math.isfinite(cell.v):
             return None
-        values[name] = cell.v
+        values[name] = float(cell.v)
     frame = evaluated(plan.frames[0], machine.tracking(), env)
     try:
-        cells = tuple(_cells(plan, machine, env, frame))
+        cells, shortest = _cells(plan, machine, env, frame)
     except _NotPlain:
         return None
     k = machine.directions
@@ -253,7 +268,8 @@ def certain(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Sums |
         return Sums(np.zeros((1, 1)), np.zeros((1, 1)), np.zeros((1, k, 1)), np.zeros((1, k, 1)))
     region = None
     if len(cells) <= MOST_CELLS:
-        region = _region(plan, cells, values, float(frame[1].v - frame[0].v), machine.rtol)
+        reach = float(frame[1].v - frame[0].v)
+        region = _region(plan, cells, values, reach, shortest, min(machine.rtol, LOOSEST))
     if region is None or sum(region.outer) * math.prod(region.inner) > MOST_NODES:
         return None
     sums = summed(plan.variables, plan.frames, region, machine, env, frame)

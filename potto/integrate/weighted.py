@@ -72,7 +72,7 @@ def summed(
         if i:
             frame = evaluated(frames[i], tracked, here)
             nodes = gauss(region.inner[i - 1]).nodes
-        found = _between(_block(frame, machine.directions, shape), *rows[i], i > 0)
+        found = _between(_block(frame, machine.directions, shape), rows[i], i > 0)
         if found is None:
             return None
         lo, width, off = found
@@ -80,7 +80,8 @@ def summed(
             weights = weights[..., None] * gauss(region.inner[i - 2]).weights
         for name in variables[:i]:
             here[name] = here[name].map(_deeper)  # type: ignore[union-attr]
-        here[variable] = _placed(lo, width, off, nodes, i > 0)
+        moves = [any(cell.t[d] is not None for cell in frame) for d in range(machine.directions)]
+        here[variable] = _placed(lo, width, off, nodes, i > 0, moves)
         length, rounded = _times(length, rounded, width, off, i > 1)
         shape = here[variable].v.shape  # type: ignore[union-attr]
     values = _integrand(region.cells, owner, tracked, here, shape)
@@ -91,12 +92,12 @@ def summed(
 
 
 @lru_cache(maxsize=4096)
-def _rows(region: Region) -> tuple[tuple[Ints, Ints], ...]:
-    """Per variable, for every node of the outermost one, which rows of the frame are the ends of its cell."""
+def _rows(region: Region) -> tuple[Ints, ...]:
+    """Per variable, for every node of the outermost one, which rows of the frame are the ends of its cell: (2, P)."""
     owner, _, _ = _outer(region.outer)
     count = len(region.cells[0].rows)
     ends = np.array([cell.rows for cell in region.cells])[owner]
-    return tuple((ends[:, i, 0].copy(), ends[:, i, 1].copy()) for i in range(count))
+    return tuple(ends[:, i].T.copy() for i in range(count))
 
 
 def _deeper(array: Array) -> Array:
@@ -118,24 +119,23 @@ def _block(frame: Sequence[Cell], k: int, shape: tuple[int, ...]) -> Array:
     return out
 
 
-def _between(block: Array, low: Ints, high: Ints, check: bool) -> tuple[Array, Array, Array] | None:
+def _between(block: Array, rows: Ints, inner: bool) -> tuple[Array, Array, Array] | None:
     """Per node the lower end, the length, and the rounding of both: (1 + k, P, ...). None where cuts cross."""
-    member = np.arange(low.size) if check else np.zeros(low.size, dtype=np.int64)
-    lo, hi = block[:, :, low, member], block[:, :, high, member]
-    width = hi[0] - lo[0]
-    if check:
+    ends = block[:, :, rows, np.arange(rows.shape[1])] if inner else block[:, :, rows, 0]
+    lo, hi = ends[0, :, 0], ends[0, :, 1]
+    width = hi - lo
+    if inner:
         places = block[0, 0]
-        if not (width[0] > 0).all() or ((places > lo[0, 0]) & (places < hi[0, 0])).any():
+        if not (width[0] > 0).all() or ((places > lo[0]) & (places < hi[0])).any():
             return None
-    return lo[0], width, lo[1] + hi[1] + EPS * (np.abs(lo[0]) + np.abs(hi[0]))
+    return lo, width, (ends[1] + EPS * np.abs(ends[0])).sum(axis=1)
 
 
-def _placed(lo: Array, width: Array, off: Array, nodes: Array, inner: bool) -> Cell:
+def _placed(lo: Array, width: Array, off: Array, nodes: Array, inner: bool, moves: Sequence[bool]) -> Cell:
     """The nodes of a variable, which move with the ends of its stretch."""
     if inner:
         lo, width, off = lo[..., None], width[..., None], off[..., None]
     at = lo + width * nodes
-    moves = [bool(lo[d].any() or width[d].any()) for d in range(1, len(at))]
     t = tuple(at[d] if m else None for d, m in enumerate(moves, 1))
     return Cell(at[0], off[0], t, tuple(off[d] if m else None for d, m in enumerate(moves, 1)))
 
@@ -146,7 +146,7 @@ def _times(length: Any, rounded: Any, width: Array, off: Array, deeper: bool) ->
         return width, off
     if deeper:
         length, rounded = length[..., None], rounded[..., None]
-    product, error = length * width[0], rounded * np.abs(width[0]) + np.abs(length) * off[0]
+    product, error = length * width[0], rounded * width[0] + np.abs(length) * off[0]
     product[1:] += length[0] * width[1:]
     error[1:] += rounded[0] * np.abs(width[1:]) + np.abs(length[0]) * off[1:]
     return product, error + 2 * EPS * np.abs(product)
@@ -156,7 +156,7 @@ def _integrand(
     cells: tuple[Stretch, ...], owner: Ints, machine: Evaluator, here: dict[str, Value], shape: tuple[int, ...]
 ) -> Array:
     """Numbers, errors and magnitudes of the integrand at the nodes: (3, 1 + k, *shape)."""
-    out = np.empty((3, 1 + machine.directions, *shape))
+    out = np.zeros((3, 1 + machine.directions, *shape))
     faces = dict.fromkeys(cell.body for cell in cells)
     for face in faces:
         function = function_of(face)
@@ -166,8 +166,10 @@ def _integrand(
             env = {n: v.map(lambda a, index=index: a[index]) for n, v in env.items()}  # type: ignore[union-attr]
         cell = machine.evaluate(function, env, None)
         assert isinstance(cell, Cell)
-        block = _block((cell,), machine.directions, shape if index is None else (index.size, *shape[1:]))
-        out[:2, :, slice(None) if index is None else index] = block[:, :, 0]
+        for part, numbers in enumerate(((cell.v, *cell.t), (cell.e, *cell.et))):
+            for row, number in enumerate(numbers):
+                if number is not None:
+                    out[part, row, ... if index is None else index] = number
     np.abs(out[0], out=out[2])
     return out
 

@@ -8,6 +8,7 @@ order in the errors.
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -20,6 +21,10 @@ ZERO = "0.0"
 ONE = "1.0"
 UNIT_ROUNDOFF = 2.0**-53
 COMPARISONS = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!="}
+
+
+_HOLDS = {"lt": operator.lt, "le": operator.le, "gt": operator.gt, "ge": operator.ge, "eq": operator.eq,
+          "ne": operator.ne}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +44,13 @@ class Scalar:
     def plain(self) -> bool:
         """Whether there is nothing but a value."""
         return self.exact and not any(self.t)
+
+
+def _number(x: Scalar) -> float | None:
+    """The number that a constant is."""
+    if not x.plain or x.v[0].isalpha():
+        return None
+    return float(x.v)
 
 
 @lru_cache(maxsize=4096)
@@ -66,6 +78,7 @@ class Lines:
         self.lines: list[str] = []
         self.functions: dict[str, str] = {}
         self.count = 0
+        self.known: dict[str, str] = {}
         self.none: tuple[None, ...] = (None,) * directions
 
     def name(self, letter: str = "v") -> str:
@@ -73,8 +86,14 @@ class Lines:
         return f"{letter}{self.count}"
 
     def let(self, expression: str, letter: str = "v") -> str:
+        """A variable that holds the expression: the one that already does, where arithmetic is met again."""
+        known = self.known.get(expression)
+        if known is not None:
+            return known
         name = self.name(letter)
         self.lines.append(f"{name} = {expression}")
+        if "rt." not in expression:
+            self.known[expression] = name
         return name
 
     def ufunc(self, name: str) -> str:
@@ -111,6 +130,11 @@ class Lines:
     # Builtins
 
     def apply(self, op: str, args: Sequence[Scalar]) -> Scalar:
+        if not self.rounding and (op == "add" or op in COMPARISONS):
+            numbers = [number for a in args if (number := _number(a)) is not None]
+            if len(numbers) == len(args):  # in a partial derivative: the exponent of a power, and whether it is 0
+                folded = sum(numbers) if op == "add" else _HOLDS[op](*numbers)
+                return self.constant(folded) if op == "add" else self.plain(repr(folded))
         if op in COMPARISONS:
             a, b = args
             return self.plain(self.let(f"{a.v} {COMPARISONS[op]} {b.v}", "m"))
@@ -134,6 +158,8 @@ class Lines:
         if op == "neg":
             return self.let(f"-{a[0]}")
         if op == "pow":
+            if a[1] in (ZERO, ONE):
+                return ONE if a[1] == ZERO else a[0]
             square = {"2.0": "{0}*{0}", "3.0": "{0}*{0}*{0}"}.get(a[1])
             if square is not None:
                 return self.let(square.format(a[0]))
@@ -239,6 +265,9 @@ class Lines:
         return memo[term]
 
     def select(self, mask: str, a: Scalar, b: Scalar) -> Scalar:
+        if mask in ("True", "False"):
+            return a if mask == "True" else b
+
         def pick(x: str | None, y: str | None) -> str | None:
             if x == y:
                 return x
