@@ -30,8 +30,8 @@ from potto.integrate.enclosures import Form, enclosed
 from potto.kernels.cells import Array, Bools
 
 MOST_NODES = 16
-# Radii of the discs that are tried, in half-lengths of the cell; the last two are for polynomials.
-RADII = (1.25, 1.5, 1.8, 2.2, 2.6, 3.0, 3.4, 3.8, 4.4, 5.0, 6.0, 8.0, 12.0, 20.0, 1e3, 1e6)
+# Radii of the discs that are tried, in half-lengths of the cell; the last three are for polynomials.
+RADII = (1.25, 1.5, 1.8, 2.2, 2.6, 3.0, 3.4, 3.8, 4.4, 5.0, 6.0, 8.0, 12.0, 20.0, 1e3, 1e8, 1e16)
 # Into how many boxes the real interval of each of the other variables is cut, by the number of variables.
 BOXES = {1: 1, 2: 6, 3: 3}
 # What rounding may add to a bound.
@@ -101,7 +101,7 @@ def proved(
         h[i] = 2 * radius[name]
         start[name] = Form(np.float64(middle[name]), unit[i], 0.0, h)
     n = np.arange(2, MOST_NODES + 1)[:, None]
-    powers = SURE * 32 / 15 * rho ** (-2.0 * n) / (1 - rho**-2.0)  # (orders, radii)
+    powers = np.maximum(SURE * 32 / 15 * rho ** (-2.0 * n) / (1 - rho**-2.0), 1e-300)  # (orders, radii)
     errors, total = np.zeros((len(cells), count, n.size)), 0.0
     for i, cell in enumerate(cells):
         form = _on_cell(variables, frames, cell, dict(start), unit, centres, h)

@@ -66,13 +66,15 @@ Path = tuple[tuple[int, int], ...]
 class Straight:
     """The terms of an integral for this way: frames per variable (bounds, then cuts), the integrand without calls.
 
-    jumps: per variable the surfaces that it crosses, with the rows of the frame that are their places. surfaces: what
-    the integrand's branches depend on, as one function to a tuple. names: parameters.
+    jumps: per variable the surfaces that it crosses, with the rows of the frame that are their places. turning: the
+    rows where something is like a square root. surfaces: what the integrand's branches depend on, as one function to a
+    tuple. names: parameters.
     """
 
     variables: tuple[str, ...]
     frames: tuple[Lam, ...]
     jumps: tuple[tuple[tuple[Term, tuple[int, ...]], ...], ...]
+    turning: tuple[frozenset[int], ...]
     body: Term
     surfaces: Lam
     names: tuple[str, ...]
@@ -116,12 +118,12 @@ def straight(term: Integral, levels: Sequence[LevelPlan], inline: Resolve) -> St
         )
         for level in levels
     )
-    return Straight(term.variables, frames, jumps, body, function_of(tuple_(surfaces)), tuple(sorted(free)))
+    turning = tuple(frozenset(row for row, (_, turns) in enumerate(level.rows, 2) if turns) for level in levels)
+    return Straight(term.variables, frames, jumps, turning, body, function_of(tuple_(surfaces)), tuple(sorted(free)))
 
 
 def _not_plain(level: LevelPlan) -> bool:
-    turning = any(turning for _, turning in level.rows) or any(cut.turning for cut in level.level.cuts)
-    return bool(level.searched or level.families or turning or any(level.turned)) or len(level.rows) > MOST_CUTS
+    return bool(level.searched or level.families or any(level.turned)) or len(level.rows) > MOST_CUTS
 
 
 def _on_sides(body: Term, sides: Mapping[Term, bool]) -> Term:
@@ -191,6 +193,8 @@ def _stretches(
     for place in sorted(rest):
         if place[0] >= lo[0] - lo[1] - place[1] and place[0] <= hi[0] + hi[1] + place[1]:
             kept.append(place)
+    if not plan.turning[i].isdisjoint(row for _, _, row in kept):
+        raise _NotPlain
     kept.append(hi)
     if any(b[0] - a[0] <= a[1] + b[1] for a, b in itertools.pairwise(kept)):
         raise _NotPlain
