@@ -18,7 +18,6 @@ from potto.calculus.dual import Differentiator
 from potto.calculus.expand import expanded
 from potto.calculus.invert import Failure, Inverse, invert
 from potto.calculus.isolate import Guard
-from potto.calculus.linear import affine
 from potto.calculus.maps import many, unknown_call, wrong_shape
 from potto.calculus.pivots import NoClosedForm
 from potto.calculus.relevance import may_integrate
@@ -35,23 +34,17 @@ from potto.calculus.verdict import (
     singular,
 )
 from potto.calculus.verify import Refuted, Untested, Verified, verify
+from potto.calculus.where import box_of, guards_of
 from potto.core.simplify import simplify
 from potto.core.terms import (
-    ONE,
-    ZERO,
     App,
     Branch,
-    Const,
     Deriv,
     Global,
     Hole,
     Integral,
-    Prim,
     Term,
-    const,
-    if_,
     postorder,
-    sub,
     substitute,
     var,
 )
@@ -237,7 +230,7 @@ def _studied(db: Database, file: str, name: str) -> _Study:
     if not variables or any(isinstance(n, Hole) for n in postorder(*components)):
         return _Study((), None)
     where = tuple(guard for truth in parts.where for guard in guards_of(truth))
-    box = _box(where, variables)
+    box = box_of(where, variables)
     span = _components_span(item)
     problem = wrong_shape(components, variables, box) or unknown_call(components, variables)
     problem = problem or singular(components, variables)
@@ -354,28 +347,3 @@ def _wrong(what: _Map, refuted: Refuted) -> Problem:
 
 
 # The branch
-
-
-def guards_of(truth: Term) -> list[Guard]:
-    """A condition of `where`, as surfaces that are positive where it holds."""
-    match truth:
-        case Prim(op="and", args=args):
-            return [guard for arg in args for guard in guards_of(arg)]
-        case Prim(op="lt" | "le" as op, args=(a, b)):
-            return [Guard(sub(b, a), op == "lt")]
-        case _:
-            return [Guard(sub(if_(truth, ONE, ZERO), const(0.5)))]
-
-
-def _box(where: Iterable[Guard], variables: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """Bounds of single variables, where `where` says them as constants."""
-    box: dict[str, tuple[float, float]] = {}
-    for guard in where:
-        for name in guard.surface.free & frozenset(variables):
-            found = affine(guard.surface, (name,))
-            if found is None or not isinstance(found.rest, Const) or not isinstance(found.coefficients[0], Const):
-                continue
-            slope, bound = found.coefficients[0].value, -found.rest.value / found.coefficients[0].value
-            lo, hi = box.get(name, (float("-inf"), float("inf")))
-            box[name] = (max(lo, bound), hi) if slope > 0 else (lo, min(hi, bound))
-    return box

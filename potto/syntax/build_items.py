@@ -55,6 +55,8 @@ def definition(context: Context, v: Values) -> Item:
             )
         )
     parameters = _groups(context, groups)
+    if not groups and len(lines) == 1 and isinstance(lines[0], Binding):  # `def f x = e`, which is said already
+        lines = [ErrorExpr(lines[0].span, "")]
     bindings, body = _block(context, lines)
     span = Span(v[0].start, body.span.end)
     if not name.text:

@@ -13,6 +13,7 @@ from potto.diagnostics import Diagnostic, Related
 from potto.source import Span
 from potto.syntax import kinds
 from potto.syntax.nodes import (
+    Apply,
     Argument,
     Binder,
     Compare,
@@ -169,7 +170,8 @@ def _not_a_name(context: Context, written: Written, what: str) -> None:
     span = written.value.span
     shown = context.text[span.start : span.end]
     message = f"`{shown}` is no name: a {what} must be one" if len(shown) < 40 else f"a {what} must be a name"
-    context.report(kinds.NOT_A_NAME(span, message))
+    apart = isinstance(written.value, Apply) and all(isinstance(a.value, Name) for a in written.value.arguments)
+    context.report(kinds.NOT_A_NAME(span, message, help="write `,` between the two" if apart else ""))
 
 
 def as_binders(context: Context, group: Group, what: str) -> tuple[Binder, ...]:

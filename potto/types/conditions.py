@@ -107,6 +107,7 @@ def _condition(inference: Inference, node: nodes.If) -> None:
         kind = "diffeo"
     elif not isinstance(found, Truth | Unknown):
         inference.report(_no_condition(found, node.condition))
+        kind = "bracket"  # that it varies is no second mistake
     inference.conditions[id(node)] = kind
 
 

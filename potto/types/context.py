@@ -318,6 +318,8 @@ def mismatch(actual: Type, expected: Type, expr: nodes.Expr, what: str) -> Diagn
         help = "give the derivative of the function: `deriv(…)`" if undone else ""
     elif isinstance(resolve(actual), Function):
         help = "apply the function to arguments"
+    elif isinstance(resolve(actual), Real) and isinstance(resolve(expected), Diffeo):
+        help = "it decides a condition there; a number is compared first: `if t > 0 then … else …`"
     elif isinstance(resolve(actual), Real) and isinstance(resolve(expected), Function):
         help = "it is applied there, as a function; if a product is meant, write it with `*`"
     return kinds.MISMATCH(

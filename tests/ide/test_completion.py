@@ -159,9 +159,9 @@ def test_a_list_is_fast_in_a_large_workspace():
     times = []
     for n in range(20):
         f.library.files.set_text(f.file, f.text().replace("a + fun", f"a + {n} + fun"))
-        start = time.perf_counter()
+        start = time.process_time()
         ide.completions(f.db, f.file, f.offset + 4 + (n > 9))
-        times.append(time.perf_counter() - start)
+        times.append(time.process_time() - start)
     assert sorted(times)[len(times) // 2] < 0.02  # the goal is 0.005 on an idle machine
 
 

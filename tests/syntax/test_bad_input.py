@@ -70,11 +70,11 @@ ENORMOUS: dict[str, Callable[[], str]] = {
 @pytest.mark.parametrize("name", ENORMOUS)
 def test_enormous_input_is_read_in_linear_time(name: str) -> None:
     text = ENORMOUS[name]()
-    before = time.perf_counter()
+    before = time.process_time()
     for chunk in itertools.islice(split(text), 100):
         parse_chunk(chunk.text)
     completeness(text[:100_000])
-    assert time.perf_counter() - before < SECONDS
+    assert time.process_time() - before < SECONDS
 
 
 @pytest.mark.parametrize(
