@@ -36,8 +36,9 @@ def _guarded(arguments: list[str]) -> int:
     try:
         os.getcwd()
     except OSError:
-        sys.stderr.write("potto: the folder that this is run in is gone: change to another one\n")
-        return FAILED
+        if arguments[:1] != ["lsp"]:  # whose client says where files are
+            sys.stderr.write("potto: the folder that this is run in is gone: change to another one\n")
+            return FAILED
     try:
         status = dispatch(arguments)
         sys.stdout.flush()
