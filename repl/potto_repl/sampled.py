@@ -6,6 +6,7 @@ axes. A derivative counts with its tangent. Where the program has no value, a pi
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -52,6 +53,9 @@ class Axes:
 def axes_of(session: Conversation, text: str, count: int, usage: str) -> Axes:
     """An expression as a function of its axes. Raises Refusal, ProgramError."""
     free = free_names(session, text)
+    called = [name for name in free if re.search(rf"\b{re.escape(name)}\s*\(", text)]
+    if called:
+        raise Refusal(f"`{called[0]}` is not defined", f"define it first, such as `def {called[0]}(x) x^2`")
     if free:
         if len(free) != count:
             listed = ", ".join(f"`{name}`" for name in free)

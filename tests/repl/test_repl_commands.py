@@ -192,6 +192,15 @@ def test_undo_and_reset(talk):
     assert talk(":undo").text == "there is nothing to undo"
 
 
+def test_undo_takes_back_as_many_as_are_asked_for(talk):
+    talk.all("a = 1", "b = 2", "c = 3", "a + b")
+    lines = talk(":undo 2").text.splitlines()
+    assert [line.partition(":")[0] for line in lines] == ["took back entry 3", "took back entry 2"]
+    assert talk.data("a")["value"] == 1 and talk("b").failed and talk("_4").failed
+    assert talk(":undo x").failed and talk(":undo 0").failed and talk.data("a")["value"] == 1
+    assert len(talk(":undo 9").text.splitlines()) == 1 and talk("a").failed
+
+
 def test_an_entry_with_an_error_is_not_undone(talk):
     talk.all("a = 1")
     talk("b = nothing")
@@ -446,6 +455,13 @@ def test_plot_says_what_it_cannot_draw(talk):
     talk("def h(a, b) a + b")
     for wrong in (":plot", ":plot h", ":plot a*b", ":plot x 1 0"):
         assert talk(wrong).failed, wrong
+
+
+def test_image_says_what_it_cannot_draw(talk):
+    for wrong in ("0", "-5", "2.5", "257", "1 2 3"):
+        assert talk(f":image x*y {wrong}").failed, wrong
+    assert "`shade` is not defined" in talk(":image shade(x, y)").text
+    assert "`curve` is not defined" in talk(":plot curve(x)").text
 
 
 def test_pictures_are_saved(talk):

@@ -191,5 +191,6 @@ def explain(session: Conversation, text: str) -> Part:
     page = pages.page(code)
     if page is None:
         near = difflib.get_close_matches(code, pages.codes(), 1)
-        raise Refusal(f"there is no diagnostic {code}", f"did you mean `{near[0]}`?" if near else "")
+        help = f"did you mean `{near[0]}`?" if near else "a code is like P0301"
+        raise Refusal(f"there is no diagnostic {code}", help)
     return Part("answer", page.text.rstrip(), {"code": code, "title": page.title}, prose=True)

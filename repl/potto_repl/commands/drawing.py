@@ -107,7 +107,9 @@ def image(session: Conversation, text: str) -> Part:
     what, numbers = (found["what"], found["numbers"].split()) if found else (text, [])
     if not what:
         raise Refusal("there is nothing to draw", "write `:image f`")
-    pixels = max(2, min(int(number(numbers.pop(0))), MOST_PIXELS)) if len(numbers) in (1, 5) else 32
+    pixels = number(numbers.pop(0)) if len(numbers) in (1, 5) else 32.0
+    if not (pixels == int(pixels) and 2 <= pixels <= MOST_PIXELS):
+        raise Refusal(f"an image has from 2 to {MOST_PIXELS} pixels in each direction, not {pixels:g}")
     if len(numbers) not in (0, 4):
         raise Refusal("a box is four numbers, X0 X1 Y0 Y1", "write `:image f 64 -1 1 -1 1`")
     x0, x1, y0, y1 = map(number, numbers) if numbers else (0.0, 1.0, 0.0, 1.0)
@@ -116,11 +118,12 @@ def image(session: Conversation, text: str) -> Part:
         axes = axes_of(session, what.strip(), 2, ":image f")
     else:
         axes = derivative_of(session, named[1], 2, named[2], ":image f by NAME")
-    picture = image_of(grid(session, axes, (x0, x1, y0, y1), pixels, pixels), pixels, signed=axes.dual)
+    count = int(pixels)
+    picture = image_of(grid(session, axes, (x0, x1, y0, y1), count, count), count, signed=axes.dual)
     session.last_picture = picture
     shown = half_blocks(picture, unicode=session.options.unicode, color=False)
     dark, light = ("blue below 0", "red above") if picture.signed else ("dark", "light")
     scale = f"{axes.label}: {picture.low:.4g} ({dark}) to {picture.high:.4g} ({light})"
-    data = {"image": axes.label, "pixels": pixels, "low": picture.low, "high": picture.high, "_picture": picture,
+    data = {"image": axes.label, "pixels": count, "low": picture.low, "high": picture.high, "_picture": picture,
             "_scale": scale}  # fmt: skip
     return Part("picture", f"{shown}\n{scale}", data)

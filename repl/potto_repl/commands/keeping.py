@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from potto_repl.registry import command
-from potto_repl.reply import Part, answer
+from potto_repl.reply import Part, Refusal, answer
 from potto_repl.session import Conversation
 
 
@@ -20,13 +20,17 @@ def history(session: Conversation, text: str) -> Part:
     return Part("answer", "\n".join(shown) or "nothing was entered", {"history": listed})
 
 
-@command("undo", "u")
-def undo(session: Conversation, text: str) -> Part:
-    """Take back the last definition, import or load, and the answers since: names mean again what they meant before."""
-    label = session.undo()
-    if label is None:
-        return answer("there is nothing to undo", undone=None)
-    return answer(f"took back {label}", undone=label)
+@command("undo", "u", argument="[N]")
+def undo(session: Conversation, text: str) -> list[Part]:
+    """Take back the last definition, import or load, and the answers since: names mean again what they meant before.
+
+    `:undo 3` takes back the last three.
+    """
+    if text and not (text.isdecimal() and int(text)):
+        raise Refusal(f"`:undo` takes back as many changes as it is told, not `{text}`", "write `:undo` or `:undo 3`")
+    labels = [label for _ in range(min(int(text or 1), len(session.undoing))) if (label := session.undo()) is not None]
+    said = [answer(f"took back {label}", undone=label) for label in labels]
+    return said or [answer("there is nothing to undo", undone=None)]
 
 
 @command("reset")
