@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from potto.integrate.rules import EPS
 from potto.kernels.cells import Array, Ints
 
 LINEAR, LEFT, RIGHT, BOTH, UP, DOWN, WHOLE = range(7)
@@ -90,6 +91,17 @@ def off_the_ends(seg: Segments, x: Array) -> Array:
     """Points that crowd at an end, none of them rounded onto it: there an integrand may be infinite."""
     low, high = np.nextafter(seg.a, seg.b)[:, None], np.nextafter(seg.b, seg.a)[:, None]
     return np.where(x <= seg.a[:, None], low, np.where(x >= seg.b[:, None], high, x))
+
+
+def trembling(seg: Segments, x: Array) -> Array:
+    """How much values next to a turning point change as points are rounded, relatively: (P, n), 0 on other segments.
+
+    Values like the power -3/2 of the distance, which second derivatives have there, and half a unit of the last place.
+    """
+    left, right = seg.left[:, None], seg.right[:, None]
+    near = np.where(np.isin(seg.kind, (LEFT, BOTH))[:, None], x - left, np.inf)
+    near = np.minimum(near, np.where(np.isin(seg.kind, (RIGHT, BOTH))[:, None], right - x, np.inf))
+    return np.minimum(0.75 * EPS * np.abs(x) / np.maximum(near, EPS * np.abs(x)), 1.0)
 
 
 def displaced(seg: Segments, x: Array, label: Array) -> tuple[Array, Array]:

@@ -69,7 +69,7 @@ def truncation(size: Array) -> Array:
     slowing = last > 1.15 * mean
     if slowing.any():
         algebraic = np.log(2.0) / np.log((n - 0.5) / (n - 2.5))
-        share = np.where(slowing, np.fmax(share, 0.375 * np.fmin(last, 1.0) ** algebraic), share)
+        share = np.where(slowing, np.fmax(share, 1.5 * np.fmin(last, 1.0) ** algebraic), share)
     return 8 * end * share  # type: ignore[no-any-return]
 
 

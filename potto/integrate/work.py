@@ -205,6 +205,8 @@ class Work:
             slope = h @ rule.derivative
             h = np.where(np.isfinite(slope) & (np.abs(part) < 0.1), h - part * slope, h)
         self.estimate(p, seg, h, rule, self.shake(p, seg, x, weight, off is not None))
+        if self.k and seg.kind.any():
+            p.floor = p.floor + (np.abs(h) * maps.trembling(seg, x)) @ rule.weights
         if inner is not None:
             p.floor = p.floor + np.abs(inner) @ rule.weights
         return p

