@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.stamp
 VSCODE := editors/vscode
 
-TESTS := $(BIN)/python -m pytest -n auto --maxprocesses 8 --dist worksteal
+TESTS := $(BIN)/python -m pytest -n auto --maxprocesses 8 --dist worksteal --durations 20
 
 .PHONY: demo test quick fuzz check format clean vsix e2e
 

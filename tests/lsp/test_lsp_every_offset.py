@@ -12,7 +12,13 @@ from potto_lsp.features import FEATURES
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 FILES = sorted(path for suffix in ("po", "diffeo") for path in EXAMPLES.rglob(f"*.{suffix}"))
-ABOUT_PLACES = [method for method in FEATURES if method.startswith("textDocument/")]
+# What is asked of a whole file, whatever the place: once a line is enough.
+ABOUT_FILES = {
+    f"textDocument/{name}"
+    for name in ("documentSymbol", "codeLens", "semanticTokens/full", "semanticTokens/full/delta", "foldingRange",
+                 "documentLink", "formatting", "diagnostic")
+}  # fmt: skip
+QUESTIONS = [method for method in FEATURES if method.startswith("textDocument/")]
 RESOLVED = {
     "textDocument/completion": "completionItem/resolve",
     "textDocument/codeAction": "codeAction/resolve",
@@ -29,7 +35,7 @@ def ask_at(client: Client, uri: str, line: int, character: int) -> None:
         "range": {"start": position, "end": {"line": line + 2, "character": 0}}, "ch": "\n", "options": {},
         "context": {"diagnostics": [], "includeDeclaration": True},
     }  # fmt: skip
-    begun = {method: client.begin(method, params) for method in ABOUT_PLACES}
+    begun = {method: client.begin(method, params) for method in QUESTIONS if method not in ABOUT_FILES or not character}
     for method, id in begun.items():
         answer = client.answer(id, 60)
         assert answer.get("error", {}).get("code") in (None, -32803), (method, position, answer)

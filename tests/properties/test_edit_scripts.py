@@ -21,7 +21,7 @@ from potto.modules.texts import content
 from potto.types import interface
 
 ROOT = "/edited"
-SCRIPTS = int(os.environ.get("POTTO_SCRIPTS", "1500"))
+SCRIPTS = int(os.environ.get("POTTO_SCRIPTS", "500"))
 
 
 def seen(lib: Library, offsets: dict[str, list[int]]) -> dict[Hashable, Any]:
