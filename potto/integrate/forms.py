@@ -19,11 +19,6 @@ if TYPE_CHECKING:
     from potto.integrate.work import Work
 
 
-# On a graded piece the smooth part of an integrand is a polynomial (x becomes t^11), whose end looks like a fast decay.
-# What is beyond it falls in a way of its own: so much of the last coefficients may be missing.
-HIDDEN = 0.05
-
-
 @dataclass(frozen=True)
 class Ends:
     """The integrand at both ends of every segment, sides as on the segment, and its rounding there: (m, S) each."""
@@ -54,11 +49,6 @@ def totals(work: Work, p: Pieces, ends: Ends | None) -> Totals:
     k = work.k
     integral, error, size = added(work, np.concatenate((p.integral, p.error + p.floor, p.size)), p, 3)
     error = np.where(np.isnan(integral) | np.isnan(error), np.inf, error)
-    if p.end.any() and p.tail.size:
-        for c, tail in enumerate(p.tail):
-            hidden = np.where(p.end != 0, HIDDEN * tail, 0.0)
-            hidden = np.where(np.isnan(hidden), np.inf, hidden)
-            error[c, 0] += np.bincount(work.seg.owner[p.segment], hidden, minlength=work.batch)
     moving = integral[:, 1 : 1 + k], error[:, 1 : 1 + k]
     if not work.both:
         return Totals(integral, error, size, moving, None, None)

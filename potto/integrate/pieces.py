@@ -102,6 +102,18 @@ class Pieces:
             self.coefficients = self.heights = None
         return self
 
+    def places(self, index: Any) -> Pieces:
+        """Some of the pieces, not measured yet."""
+        return Pieces(self.segment[index], self.u0[index], self.u1[index], self.end[index])
+
+    def held_against(self, again: Pieces, at: Any) -> None:
+        """The pieces `at`, measured again with more nodes: off by no more than that changed them."""
+        self.settled()
+        change = np.abs(again.integral - self.integral[:, at])
+        again.error = np.maximum(again.error, change)
+        for name in ("integral", "error", "floor", "size", "most", "ends", "tail"):
+            getattr(self, name)[:, at] = getattr(again, name)
+
     def pick(self, index: Any) -> Pieces:
         self.settled()
         return Pieces(self.segment[index], self.u0[index], self.u1[index], self.end[index],

@@ -40,8 +40,8 @@ NODE_ROUNDING = 0.5
 FAR = 8
 MOST_HALVINGS = 64
 # Nodes for pieces that were too coarse: first more of them on the same piece, then on halves.
-HIGH_ORDER = 14
-HALF_ORDER = 14
+HIGH_ORDER = HALF_ORDER = 14
+MORE = 6  # for graded pieces, on which what is smooth is a polynomial, whose end looks like a fast decay
 # The relative error of a piece up to which more nodes promise more than halves do.
 PROMISING = 1e-2
 DOUBTFUL_ROUNDS = 8
@@ -52,7 +52,7 @@ BESIDE = 1e-9
 
 @dataclass
 class Work:
-    """The integrals of one batch over one variable: nodes, values, estimates, refinement."""
+    """The integrals of one batch over one variable."""
 
     parent: Iteration
     number: int
@@ -139,8 +139,7 @@ class Work:
             nearly = (coarse.error <= PROMISING * coarse.size).all(axis=0) if turn == 0 else np.zeros(0, dtype=bool)
             if nearly.any():
                 near, far = coarse.pick(nearly), coarse.pick(~nearly)
-                same = Pieces(near.segment, near.u0, near.u1, near.end)
-                fresh = self.replaced(near, same, HIGH_ORDER, tally)
+                fresh = self.replaced(near, near.places(slice(None)), HIGH_ORDER, tally)
                 if far.segment.size:
                     fresh = fresh.join(self.replaced(far, self.halve(far), HALF_ORDER, tally))
             else:
@@ -154,6 +153,8 @@ class Work:
         """The new pieces that stand for the old ones, measured; the books follow."""
         copies = new.u0.size // old.u0.size
         new = self.measure(new, order)
+        if (graded := np.nonzero(new.end)[0]).size:
+            new.held_against(self.measure(new.places(graded), order + MORE), graded)
         new.excess, new.stuck = np.tile(old.excess, copies), np.tile(old.stuck, copies)
         tally.replace(self, old, new)
         return new
@@ -179,7 +180,7 @@ class Work:
         if p.segment.size > rows:
             return joined(
                 [
-                    self.measure(Pieces(p.segment[part], p.u0[part], p.u1[part], p.end[part]), order)
+                    self.measure(p.places(part), order)
                     for part in (slice(i, i + rows) for i in range(0, p.segment.size, rows))
                 ]
             )

@@ -1,6 +1,7 @@
 """What typing means: when an entry is over, how a new line is indented, what a paste says.
 
-Owns `is_over`, `indentation`, `unprompted` and `untabbed`. Texts in, texts out: the parser decides, the keys obey.
+Owns `is_over`, `indentation`, `flush_left`, `unprompted` and `untabbed`. Texts in, texts out: the parser
+decides, the keys obey.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ def is_over(text: str) -> bool:
     from potto.syntax import completeness
     from potto_repl.symbols import readable
 
+    text = flush_left(text)
     lines = text.split("\n")
     if lines[-1].startswith("#") and all(line.startswith("#") for line in lines):
         return False  # a comment goes with the definition below it; an empty line ends it
@@ -36,6 +38,12 @@ def is_over(text: str) -> bool:
     if len(lines) == 1 or not lines[-1].strip():
         return True
     return not (_BLOCK.match(text) and lines[-1][:1].isspace()) or verdict == "wrong"
+
+
+def flush_left(text: str) -> str:
+    """An entry whose first line is indented, as one copies it from the middle of a page, moved to the first column."""
+    blanks = text[: len(text) - len(text.lstrip(" \t"))]
+    return "\n".join(line.removeprefix(blanks) for line in text.split("\n")) if blanks else text
 
 
 def indentation(text: str) -> str:

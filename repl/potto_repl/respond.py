@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from potto.diagnostics import PottoError
 from potto.render import Located, ProgramError
 from potto_repl import commands as _commands  # noqa: F401  (fills the table)
+from potto_repl.editing import flush_left
 from potto_repl.registry import Result, find
 from potto_repl.reply import Part, Refusal, Reply, diagnostic, note
 from potto_repl.session import Conversation
@@ -26,7 +27,7 @@ def respond(session: Conversation, text: str) -> Reply:
 
 def stream(session: Conversation, text: str) -> Iterator[Part]:
     """The answer part by part, as it comes. An interrupt goes through; what was entered so far stays."""
-    recording = session.record
+    text, recording = flush_left(text), session.record
     said: list[Part] = []
     try:
         for part in _guarded(session, text):

@@ -15,6 +15,12 @@ def test_a_definition_echoes_its_type(talk):
     assert talk(JUMP).text == "f : (t: Real) -> Real"
 
 
+def test_an_entry_may_be_indented_as_on_the_page_that_it_is_copied_from(talk):
+    assert talk(" 1 + 1").text == "_1 = 2 : Real"
+    assert talk("    def g(t)\n        3*t").text == "g : (t: Real*) -> Real"
+    assert talk("  g(2)").parts[0].data["value"] == 6
+
+
 def test_a_definition_shadows_with_a_note(talk):
     talk(JUMP)
     reply = talk("def f(t) t")
