@@ -153,7 +153,7 @@ class Work:
         """The new pieces that stand for the old ones, measured; the books follow."""
         copies = new.u0.size // old.u0.size
         new = self.measure(new, order)
-        if (graded := np.nonzero(new.end)[0]).size:
+        if (graded := np.nonzero((new.end != 0) & (new.error <= PROMISING * new.size).all(axis=0))[0]).size:
             new.held_against(self.measure(new.places(graded), order + MORE), graded)
         new.excess, new.stuck = np.tile(old.excess, copies), np.tile(old.stuck, copies)
         tally.replace(self, old, new)
