@@ -29,12 +29,12 @@ def segment(c: Any) -> Any:
 
 # name, integral, parameters, the two that it is differentiated by, the answer, how large the error may be
 BODIES: list[tuple[str, str, dict[str, float], str, str, Any, float]] = [
-    ("ball", SPACE.format("[x^2 + y^2 + z^2 < r^2]"), {"r": 1.1}, "r", "r", 8 * PI * 1.1, 20.0),
+    ("ball", SPACE.format("[x^2 + y^2 + z^2 < r^2]"), {"r": 1.1}, "r", "r", 8 * PI * 1.1, 1e-2),
     ("disc", PLANE.format("[x^2 + y^2 < r^2]"), {"r": 1.1}, "r", "r", 2 * PI, 1e-9),
     ("disc by its square", PLANE.format("[x^2 + y^2 < r]"), {"r": 1.1}, "r", "r", 0, 1e-6),
     ("ellipse", PLANE.format("[(x/a)^2 + (y/b)^2 < 1]"), {"a": 1.1, "b": 0.7}, "a", "b", PI, 1e-9),
-    ("ellipsoid, two axes", ELLIPSOID, AXES, "a", "b", 4 * PI / 3 * mp.mpf(0.9), 1e-3),
-    ("ellipsoid, one axis", ELLIPSOID, AXES, "a", "a", 0, 10.0),
+    ("ellipsoid, two axes", ELLIPSOID, AXES, "a", "b", 4 * PI / 3 * mp.mpf(0.9), 1e-5),
+    ("ellipsoid, one axis", ELLIPSOID, AXES, "a", "a", 0, 1e-3),
     ("corner of a box", PLANE.format("[x < a]*[y < b]"), {"a": 0.3, "b": 0.7}, "a", "b", 1, 1e-12),
     ("corner along the diagonal", PLANE.format("[x < a]*[y < a]"), {"a": 0.3}, "a", "a", 2, 1e-12),
     ("lens", PLANE.format("[(x - d/2)^2 + y^2 < 1]*[(x + d/2)^2 + y^2 < 1]"), {"d": 0.8}, "d", "d",
