@@ -17,12 +17,12 @@ from potto.calculus.derivative import NotSmooth
 from potto.calculus.dual import Differentiator
 from potto.calculus.expand import expanded
 from potto.calculus.invert import Failure, Inverse, invert
-from potto.calculus.isolate import Guard
 from potto.calculus.maps import many, unknown_call, wrong_shape
 from potto.calculus.pivots import NoClosedForm
 from potto.calculus.relevance import may_integrate
 from potto.calculus.sides import unguarded
 from potto.calculus.trace import spine
+from potto.calculus.undo import Guard
 from potto.calculus.verdict import (
     COMPONENTS,
     NO_INVERSE,

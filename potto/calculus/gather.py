@@ -13,9 +13,9 @@ from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 
 from potto.calculus.collect import Collected, collect, dominators
-from potto.calculus.isolate import Guard, Step, Steps, Stuck
 from potto.calculus.normal import is_zero, shorter
 from potto.calculus.radicals import TWO, minus, quotient, signed, square_root
+from potto.calculus.undo import Guard, Step, Steps, Stuck
 from potto.core.terms import (
     ONE,
     PI,

@@ -2,7 +2,7 @@
 
 Owns `sections`. The roots of `surface = 0` in a variable come out as terms over the other variables, nan where a root
 does not exist. A list of goals `inner = value` is worked off: where one argument of a builtin contains the variable,
-the builtin is undone (`isolate`); where several do, the goal is split, collected as a polynomial of something, or
+the builtin is undone (`undo`); where several do, the goal is split, collected as a polynomial of something, or
 given up with the reason. Nothing here looks at numbers.
 """
 
@@ -14,10 +14,10 @@ from fractions import Fraction
 
 from potto.calculus.collect import collect
 from potto.calculus.gather import split
-from potto.calculus.isolate import Guard, Step, Stuck, step
 from potto.calculus.normal import shorter
 from potto.calculus.radicals import NAN, guarded
 from potto.calculus.ranges import positive
+from potto.calculus.undo import Guard, Step, Stuck, step
 from potto.core.printer import format_term
 from potto.core.terms import (
     ZERO,

@@ -12,9 +12,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from potto.calculus.isolate import Guard
 from potto.calculus.normal import equal
 from potto.calculus.sampling import points, sample_value
+from potto.calculus.undo import Guard
 from potto.core.terms import Const, Term, children, const, postorder, prim, rebuild, substitute, var
 
 _POINTS = 4000

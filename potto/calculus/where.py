@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from potto.calculus.isolate import Guard
 from potto.calculus.linear import affine
+from potto.calculus.undo import Guard
 from potto.core.terms import ONE, ZERO, Const, Prim, Term, const, if_, sub
 
 

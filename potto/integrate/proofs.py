@@ -1,7 +1,7 @@
 """How many nodes are enough, proved before any is evaluated.
 
 Owns `Cell`, `Region` and `proved`. On a cell between known cuts the integrand is one formula, analytic wherever
-`enclosures` can bound it. If |f| <= M on the ellipse with foci -1, 1 and half-axes adding up to rho, the Gauss rule
+`discs` can bound it. If |f| <= M on the ellipse with foci -1, 1 and half-axes adding up to rho, the Gauss rule
 with n nodes errs, relative to the length of its interval, by at most
 
     (32/15) M rho^(-2n) / (1 - rho^(-2))                                                (n >= 2)
@@ -26,7 +26,7 @@ from functools import lru_cache
 import numpy as np
 
 from potto.core.terms import Term
-from potto.integrate.enclosures import Form, enclosed
+from potto.integrate.discs import Form, enclosed
 from potto.kernels.cells import Array, Bools
 
 MOST_NODES = 16

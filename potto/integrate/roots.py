@@ -1,7 +1,7 @@
 """Sections of surfaces that have no closed form: periodic families, and roots found by numbers.
 
 Owns `searched_rows`. A family is a root for each integer in a range that the bounds give. Where nothing is known but
-the surface itself, cells with one root each are told apart by enclosures (`isolate`); where these are not to be had (a
+the surface itself, cells with one root each are told apart by enclosures (`brackets`); where these are not to be had (a
 call, a conditional) sign changes are looked for on a grid that is refined where the surface comes close to zero without
 crossing it. Each is polished; how a root moves follows from the surface's own derivatives.
 """
@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from potto.core.terms import Lam, Term, lam
+from potto.integrate.brackets import Brackets, isolated, slope_of
 from potto.integrate.cuts import SEARCHED, Row, as_array
-from potto.integrate.isolate import Brackets, isolated, slope_of
 from potto.integrate.pieces import still
 from potto.integrate.plan import LevelPlan, function_of
 from potto.integrate.rules import EPS

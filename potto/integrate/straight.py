@@ -33,7 +33,7 @@ from potto.core.terms import (
     substitute,
     tuple_,
 )
-from potto.integrate.enclosures import enclosable
+from potto.integrate.discs import enclosable
 from potto.integrate.pieces import Evaluator, Sums
 from potto.integrate.proofs import Cell as Stretch
 from potto.integrate.proofs import Region, proved

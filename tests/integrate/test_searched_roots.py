@@ -17,7 +17,7 @@ from scipy import special
 
 import potto
 from potto.core.terms import const, mul, prim, var
-from potto.integrate.enclose import enclosure
+from potto.integrate.intervals import enclosure
 
 # a, w, p, b, t
 KEPT = [

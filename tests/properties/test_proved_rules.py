@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from potto.core.terms import Const, Prim, Term, Var, add, const, div, mul, neg, pow_, prim, sub, var
-from potto.integrate.enclosures import Form, enclosed
+from potto.integrate.discs import Form, enclosed
 from potto.integrate.proofs import Cell, Region, proved
 
 OPS: dict[str, Callable[..., Any]] = {

@@ -15,7 +15,7 @@ import numpy as np
 from potto.calculus.derivative import NotSmooth, partial
 from potto.core.simplify import simplify
 from potto.core.terms import Term
-from potto.integrate.enclose import Interval, enclosure, known
+from potto.integrate.intervals import Interval, enclosure, known
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 
 FINEST = 48  # halvings of the whole
