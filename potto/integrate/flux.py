@@ -20,32 +20,30 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
 
-from potto.calculus.derivative import NotSmooth, partial
-from potto.calculus.linear import affine
-from potto.calculus.ranges import range_of
 from potto.calculus.sweep import Product
-from potto.core.simplify import simplify
-from potto.core.terms import Term, const, mul
+from potto.core.terms import Term, const, mul, sub, var
 from potto.integrate.chart import Chart, Point, label_of
-from potto.integrate.cuts import as_array, frame_rows
+from potto.integrate.cuts import Row, as_array, frame_rows
 from potto.integrate.lines import End, Line, label_name, leaving, line, offset
 from potto.integrate.pieces import Sums, still
 from potto.integrate.plan import Plan, function_of
 from potto.integrate.roots import searched_rows
 from potto.integrate.rules import EPS
-from potto.kernels.cells import Array, Bools, Cell, Mask, pad
+from potto.integrate.transversal import pivots
+from potto.kernels.cells import Array, Bools, Cell, Mask, Value, pad
 
-# How much flatter than the steepest a pivot may be to do alone: its weight then varies by that factor at most.
-STEEP = 4.0
 # A root that phi's own slope puts further away than this (in labels) is not one that phi passes through smoothly.
 OFF = 1e-6
 ASIDE = 1e-7
+JUMPED = 16.0  # from how many times that on what phi is beside a root, measured by its slope, is no power of it
 ROUNDING = 16 * EPS  # of what crosses at one point
+PLACED = 4 * EPS  # of the place of a point, going through its label
 LINES = 1 << 11  # lines searched at once
 
 Integrand = Callable[[Point, dict[int, Mask], int], Sums]
@@ -128,53 +126,8 @@ class Surface:
 
     @cached_property
     def pivots(self) -> tuple[int, ...]:
-        """The variables that it is solved for: one if that is known to do, otherwise all of them."""
-        if len(self.axes) == 1:
-            return self.axes
-        lengths = self._box()
-        slopes = None if lengths is None else self._slopes(lengths)
-        if slopes is None or lengths is None:
-            return self.axes
-        most = {i: hi * _length(lengths[i]) for i, (_, hi) in slopes.items()}
-        least = {i: lo * _length(lengths[i]) for i, (lo, _) in slopes.items()}
-        order = sorted(self.axes, key=lambda i: (i != self.number, -least[i]))
-        for i in order:
-            if least[i] > 0 and STEEP * least[i] >= max(most.values()):
-                return (i,)
-        return self.axes
-
-    def _box(self) -> dict[int, tuple[float, float]] | None:
-        """The bounds of the variables if they are the same everywhere."""
-        box: dict[int, tuple[float, float]] = {}
-        names = {level.variable for level in self.chart.plan.levels}
-        for i in self.axes:
-            level = self.chart.plan.levels[i]
-            if (level.level.lo.free | level.level.hi.free) & names:
-                return None
-            lo, hi = self.chart.bounds(level, self.chart.start(1, self.machine.directions).env, self.machine)
-            a, b = float(np.ravel(lo.v)[0]), float(np.ravel(hi.v)[0])
-            box[i] = (min(a, b), max(a, b))
-        return box
-
-    def _slopes(self, box: dict[int, tuple[float, float]]) -> dict[int, tuple[float, float]] | None:
-        """The least and the greatest |d psi/dx_i|; None if that is not known."""
-        names = {i: self.chart.plan.levels[i].variable for i in self.axes}
-        found = affine(self.term, tuple(names.values()))
-        if found is None and any(np.isinf(end) for ends in box.values() for end in ends):
-            return None
-        terms = _partials(self.term, tuple(names.values())) if found is None else found.coefficients
-        if terms is None:
-            return None
-        known: dict[str, tuple[float, float]] = {names[i]: ends for i, ends in box.items()}
-        for name, value in self.chart.env.items():
-            if isinstance(value, Cell):
-                at = float(np.ravel(value.v)[0])
-                known[name] = (at, at)
-        out: dict[int, tuple[float, float]] = {}
-        for i, term in zip(names, terms, strict=True):
-            r = range_of(term, known)
-            out[i] = (max(r.lo, -r.hi, 0.0), max(abs(r.lo), abs(r.hi)))
-        return out if all(np.isfinite(hi) for _, hi in out.values()) else None
+        """The variables that it is solved for."""
+        return pivots(self.chart, self.term, self.axes, self.number)
 
     # Points on the surface
 
@@ -191,16 +144,19 @@ class Surface:
         labels.insert(pivot, None)
         before = self.chart.place(self.chart.start(n, k), labels, 0, pivot, crowding=range(pivot))
         lo, hi, roots, weight = self.roots(before, labels, pivot, along, n)
+        terms = [root for cut in along.plan.level.cuts for root in cut.roots or ()]
         t, et = nothing.t, nothing.et
         seen: list[Array] = []
-        for root in roots:
+        for row, term in zip_longest(roots, terms):
+            root = as_array(row.x, n)
             inside = (root > np.minimum(lo.v, hi.v)) & (root < np.maximum(lo.v, hi.v))
             for other in seen:
                 inside &= root != other
             seen.append(root)
             if inside.any():
                 labels[pivot] = np.where(inside, label_of(lo, hi, root), 0.5)
-                more, error = self.at(labels, pivot, inside, n)
+                off = np.where(inside, (0.0 if row.e is None else row.e) + PLACED * _reach(lo, hi, root), 0.0)
+                more, error = self.at(labels, pivot, inside, off, term)
                 t, et = t + more, et + error
         if weight is not None:
             t, et = t * weight, et * weight
@@ -208,9 +164,10 @@ class Surface:
 
     def roots(
         self, before: Point, labels: list[Array | None], pivot: int, along: Line, n: int
-    ) -> tuple[Cell, Cell, list[Array], Array | None]:
+    ) -> tuple[Cell, Cell, list[Row], Array | None]:
         """The bounds of the pivot and where the surface is crossed along it, nan for those that are not there.
 
+        Closed forms come first, in the order of the line's cuts.
         The label of the surface's innermost variable is crowded where the pivot is further out, and put into `labels`;
         with what weight, comes last.
         """
@@ -231,20 +188,26 @@ class Surface:
             else:
                 point.env[label_name(level.variable)] = Cell(offset(self.ends[number], u))
         assert along.plan is not None
-        values = machine.evaluate(along.plan.frame, {p: point.env[p] for p in along.plan.frame.params}, None)
+        values = machine.tracking().evaluate(
+            along.plan.frame, {p: point.env[p] for p in along.plan.frame.params}, None
+        )
         assert isinstance(values, tuple)
         lo, hi, rows = frame_rows(along.plan, values)
-        rows += searched_rows(along.plan, point.env, lo, hi, n, machine)
-        return lo, hi, [as_array(r.x, n) for r in rows], weight
+        return lo, hi, rows + searched_rows(along.plan, point.env, lo, hi, n, machine), weight
 
-    def at(self, labels: list[Array | None], pivot: int, inside: Bools, n: int) -> tuple[Array, Array]:
-        """[F] phi_theta |phi_j|/|grad phi|^2 at points of the surface, and its error: (m, k, n) each."""
-        k = self.machine.directions
+    def at(
+        self, labels: list[Array | None], pivot: int, inside: Bools, off: Array, root: Term | None
+    ) -> tuple[Array, Array]:
+        """[F] phi_theta |phi_j|/|grad phi|^2 at points of the surface, and its error: (m, k, n) each.
+
+        off: how far from the surface the points may be, by rounding. root: the pivot there, where it has a closed form.
+        """
+        k, n = self.machine.directions, off.size
         axes = self.axes if len(self.pivots) > 1 else (pivot,)
         marked = {axis: k + i for i, axis in enumerate(axes)}
         wide = k + len(axes)
         point = self.placed(labels, pivot, marked, n)
-        phi, slopes = self.slopes(point, wide, n)
+        phi, slopes = self.slopes(self.term, point, wide, n)
         j = marked[pivot]
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             steep = np.abs(slopes[j])
@@ -252,22 +215,66 @@ class Surface:
             rates = slopes[:k] / (steep * ((slopes[k:] / steep) ** 2).sum(axis=0))
         odd = inside & ~smooth
         if odd.any():
-            rates[:, odd] = self.beside(labels, pivot, marked, n)[:, odd]
+            rates[:, odd] = self.beside(labels, pivot, marked, point, root)[:, odd]
+        unknown = inside & np.isnan(rates).any(axis=0)
+        if unknown.any():
+            self.machine.note_unfinished("a condition jumps by itself where it is not known how that place moves")
         counts = inside & (rates != 0).any(axis=0)
         costs = self.machine.costs
         if costs is not None:
             costs.sampled(self.term, inside, rates)
         if not counts.any():  # nothing that is differentiated moves it here
             return np.zeros((1, k, n)), np.zeros((1, k, n))
+        if self.chart.plan.hides:
+            above, below = self.off_the_surface(labels, pivot, n)
+        else:
+            above, below = self.both_sides(point, pivot, off)
+        rates = np.where(counts, rates, 0.0)
+        jump, error = np.where(counts, above.v - below.v, 0.0), np.where(counts, above.e + below.e, 0.0)
+        t = jump[:, None, :] * np.where(unknown, 0.0, rates)
+        et = np.where(unknown & (jump[:, None, :] != 0), np.inf, error[:, None, :] * np.abs(np.nan_to_num(rates)))
+        return t, et + ROUNDING * np.abs(t)
+
+    def both_sides(self, point: Point, pivot: int, off: Array) -> tuple[Sums, Sums]:
+        """The integrand just above and just below the surface, at points that are `off` by so much along the pivot."""
         frozen = Point({name: still(v) for name, v in point.env.items()}, Cell(point.volume.v))
+        name = self.chart.plan.levels[pivot].variable
+        x = frozen.env[name]
+        assert isinstance(x, Cell)
+        frozen.env[name] = Cell(x.v, off)
+        n, costs = off.size, self.machine.costs
         sides = self.sides(frozen, n)
         with nullcontext() if costs is None else costs.apart(1.0):
             above = self.integrand(frozen, sides, n)
             below = self.integrand(frozen, {g: np.logical_not(mask) for g, mask in sides.items()}, n)
-        rates = np.where(counts, rates, 0.0)
-        jump, error = np.where(counts, above.v - below.v, 0.0), np.where(counts, above.e + below.e, 0.0)
-        t = jump[:, None, :] * rates
-        return t, error[:, None, :] * np.abs(rates) + ROUNDING * np.abs(t)
+        return above, below
+
+    def off_the_surface(self, labels: list[Array | None], pivot: int, n: int) -> tuple[Sums, Sums]:
+        """The same where some sides can't be forced: from points so close to the surface that they fall on its sides.
+
+        Two on each side tell by how much the integrand changes on the way to it.
+        """
+        costs, u = self.machine.costs, labels[pivot]
+        assert u is not None
+        found = []
+        for way in (1.0, -1.0):
+            near, far = (
+                self.placed([*labels[:pivot], u + way * step, *labels[pivot + 1 :]], pivot, {}, n)
+                for step in (ASIDE, 2 * ASIDE)
+            )
+            phi, _ = self.slopes(self.term, near, self.machine.directions, n)
+            with nullcontext() if costs is None else costs.apart(0.5):
+                one, two = (self.integrand(Point({x: still(v) for x, v in p.env.items()}, Cell(p.volume.v)), {}, n)
+                            for p in (near, far))  # fmt: skip
+            change = np.where(one.v == two.v, 0.0, two.v - one.v)
+            found.append((phi, Sums(one.v - change, one.e + two.e + np.abs(change), one.t, one.et)))
+        (phi, one), (_, other) = found
+        up = phi >= 0
+        above, below = (
+            Sums(np.where(first, one.v, other.v), np.where(first, one.e, other.e), one.t, one.et)
+            for first in (up, ~up)
+        )
+        return above, below
 
     def placed(self, labels: list[Array | None], pivot: int, marked: dict[int, int], n: int) -> Point:
         """Points with every variable at its label, those of the axes moving. Cuts along the pivot's way are not known
@@ -289,27 +296,55 @@ class Surface:
             sides[group] = side
         return sides
 
-    def beside(self, labels: list[Array | None], pivot: int, marked: dict[int, int], n: int) -> Array:
-        """The same where phi has a pole, a kink or no slope, from just beside: nothing if its sign does not change."""
-        k = self.machine.directions
-        wide = k + len(marked)
+    def beside(
+        self, labels: list[Array | None], pivot: int, marked: dict[int, int], point: Point, root: Term | None
+    ) -> Array:
+        """The same where phi has a pole, a kink, a jump or no slope: nothing if its sign does not change.
+
+        Its root's formula, where there is one, tells how such a place moves; otherwise phi itself just beside it does,
+        unless it jumps there from one finite value to another. nan where that is not known.
+        """
+        wide = self.machine.directions + len(marked)
+        u = labels[pivot]
+        assert u is not None
         found = []
         for side in (-ASIDE, ASIDE):
-            u = labels[pivot]
-            assert u is not None
-            moved = [*labels[:pivot], u + side, *labels[pivot + 1 :]]
-            point = self.placed(moved, pivot, marked, n)
-            found.append(self.slopes(point, wide, n))
+            moved = self.placed([*labels[:pivot], u + side, *labels[pivot + 1 :]], pivot, marked, u.size)
+            found.append(self.slopes(self.term, moved, wide, u.size))
         (below, _), (above, slopes) = found
+        change = (np.sign(above) - np.sign(below)) / 2
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            if root is None:
+                far = np.maximum(np.abs(above), np.abs(below)) > JUMPED * ASIDE * np.abs(slopes[marked[pivot]])
+            else:
+                env = {**point.env, **self.labelled(labels, pivot, marked)}
+                psi = sub(var(self.chart.plan.levels[pivot].variable), root)
+                _, slopes = self.slopes(psi, Point(env, point.volume), wide, u.size)
+                far = np.zeros(u.size, dtype=bool)
             steep = slopes[marked[pivot]]
-            rates = slopes[:k] / (steep * ((slopes[k:] / steep) ** 2).sum(axis=0))
-            change = (np.sign(above) - np.sign(below)) / 2
-        return np.where(np.isfinite(rates), rates * change, 0.0)
+            rates = slopes[: self.machine.directions] / (
+                steep * ((slopes[self.machine.directions :] / steep) ** 2).sum(axis=0)
+            )
+        rates = np.where(far, np.nan, np.where(np.isfinite(rates), rates, 0.0))
+        return np.where(change == 0, 0.0, rates * change)
 
-    def slopes(self, point: Point, wide: int, n: int) -> tuple[Array, Array]:
+    def labelled(self, labels: list[Array | None], pivot: int, marked: dict[int, int]) -> dict[str, Value]:
+        """What roots along the pivot are written in where bounds follow it."""
+        wide = self.machine.directions + len(marked)
+        env: dict[str, Value] = {}
+        for number in range(pivot + 1, self.number + 1):
+            u, end = labels[number], self.ends[number]
+            if u is None:
+                continue
+            with np.errstate(divide="ignore"):
+                slope = np.ones(u.size) if end is None else 1 / (1 - u) ** 2 if end[1] > 0 else -1 / u**2
+            t = tuple(slope if marked.get(number) == d else None for d in range(wide))
+            env[label_name(self.chart.plan.levels[number].variable)] = Cell(offset(end, u), None, t)
+        return env
+
+    def slopes(self, phi: Term, point: Point, wide: int, n: int) -> tuple[Array, Array]:
         """phi and its tangents: those of the parameters, then those of the labels."""
-        function = function_of(self.term)
+        function = function_of(phi)
         env = {name: pad(point.env[name], wide) for name in function.params}
         value = self.machine.with_directions(wide).evaluate(function, env, None)
         assert isinstance(value, Cell)
@@ -323,14 +358,7 @@ def joined(parts: list[Sums]) -> Sums:
     return Sums(*(np.concatenate([getattr(p, name) for p in parts], axis=-1) for name in names))
 
 
-def _length(ends: tuple[float, float]) -> float:
-    length = ends[1] - ends[0]
-    return length if np.isfinite(length) else 1.0
-
-
-@lru_cache(maxsize=1024)
-def _partials(surface: Term, names: tuple[str, ...]) -> tuple[Term, ...] | None:
-    try:
-        return tuple(simplify(partial(surface, name)) for name in names)
-    except NotSmooth:
-        return None
+def _reach(lo: Cell, hi: Cell, x: Array) -> Array:
+    """The largest number that a point's place is worked out from."""
+    ends = [np.where(np.isfinite(end.v), np.abs(end.v), 0.0) for end in (lo, hi)]
+    return np.maximum(np.maximum(*ends), np.abs(x))

@@ -168,11 +168,13 @@ class _Run:
         if not self.machine.directions or self.machine.frozen:
             return ()
         count = len(self.plan.levels)
-        resting = replace(self, machine=self.machine.with_directions(0))
+        still = self.machine.with_directions(0)
+        resting, tracked = replace(self, machine=still), replace(self, machine=still.tracking())
         found = []
         for term, number, forces in factors(self.plan, self.drawn):
             inner = number >= self.drawn
-            integrand, stop = (resting.body, count) if inner else (resting.integrand, self.drawn)
+            integrand = resting.integrand if self.exact and not inner else tracked.body
+            stop = count if inner else self.drawn
             surface = Surface(self.chart, term, number, forces, stop, self.drawn if inner else None, integrand)
             if not inner or min(surface.pivots) < self.drawn:
                 found.append(surface)

@@ -1,7 +1,8 @@
 """What to do about an estimate that is not as accurate as was asked: told by why it is not.
 
-Owns `advice`, the reasons of integrals that diverge, and `ROUGH`, of which a reader need not be warned: that answer
-came with its error. The reasons are those of `Estimate.reasons`; one that is not known here gets advice that suits all.
+Owns `advice`, the reasons of integrals that diverge and of samples that were too few, and `ROUGH`, of which a reader
+need not be warned: that answer came with its error. The reasons are those of `Estimate.reasons`; one that is not known
+here gets advice that suits all.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from collections.abc import Iterable
 INFINITE = "the integral is infinite, or beyond what numbers can hold"
 NO_VALUE = "the integral has no value, or none within reach"
 DIVERGENT = {INFINITE, NO_VALUE}
+TOO_FEW = "so many samples give fewer digits than were asked for"
 ROUGH = "an answer that it is made of is no more accurate"
 _LESS = "ask for less accuracy (`--rtol`)"
 _POLE = (

@@ -21,7 +21,7 @@ from potto.diagnostics import PottoError
 from potto.kernels import compile as compiling
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Value
-from potto.runtime.advice import INFINITE, NO_VALUE, ROUGH
+from potto.runtime.advice import INFINITE, NO_VALUE, ROUGH, TOO_FEW
 from potto.runtime.estimate import Estimate, OneSided
 from potto.runtime.functions import Closure, Derivative
 from potto.runtime.inherited import rough, widened
@@ -130,7 +130,8 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
     reasons = list(books.unfinished)
     flat = [*_flat(numbers, bounds), *_flat(tangents, tangent_bounds)]
     scale = max((_largest(v) for v, _ in flat), default=0.0)
-    missed = next((m for v, e in flat if (m := _missed(v, e, scale, settings))), None)
+    drawn = not books.methods.isdisjoint(("mc", "qmc"))
+    missed = next((m for v, e in flat if (m := _missed(v, e, scale, settings, drawn))), None)
     if missed == INFINITE and not books.methods:
         missed = None  # of 1/0 no integral is to blame
     if not reasons and missed is not None:
@@ -205,8 +206,8 @@ def _largest(value: Any) -> float:
     return float(np.max(np.abs(value), initial=0.0, where=np.isfinite(value)))
 
 
-def _missed(value: Any, error: Any, scale: float, settings: Settings) -> str | None:
-    """Why an answer is not as accurate as was asked, or None.
+def _missed(value: Any, error: Any, scale: float, settings: Settings, drawn: bool) -> str | None:
+    """Why an answer is not as accurate as was asked, or None. `drawn`: it is made of samples.
 
     `scale` is the size of the whole answer: a small tangent beside a large value, or a pixel of a picture that is all
     but zero by cancellation, is measured against its neighbours.
@@ -224,6 +225,8 @@ def _missed(value: Any, error: Any, scale: float, settings: Settings) -> str | N
     bad &= e > max(1e-12, settings.rtol) * max(scale, 1e-300)
     bad &= (v > 1e3 * e) | (e > 1e-10)
     if bad.any():
+        if drawn:
+            return TOO_FEW
         if (e[bad] > 0.1 * v[bad]).any():
             return "no accuracy was reached: the integral diverges, or its integrand is too rough"
         return "rounding limits the accuracy" if (e[bad] < 1e-6 * v[bad]).all() else "the error estimate is too large"

@@ -119,8 +119,7 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
         from potto.integrate.sampling import sample
 
         plan = plan_for(machine, term, linked)
-        known = plan.reaches and not plan.hides
-        sums = counted(sample(plan, machine, plan.environment(env, linked.env), batch, method), known, machine)
+        sums = counted(sample(plan, machine, plan.environment(env, linked.env), batch, method), plan.reaches, machine)
         machine.books.methods.add("mc" if method == "mc" else "qmc")
         return sums
     machine.books.methods.add("quadrature")

@@ -6,7 +6,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal
 
 import mpmath as mp
 import pytest
@@ -74,3 +74,40 @@ def test_integrals_in_integrals_end_when_their_budget_does() -> None:
     assert any("budget" in reason for reason in found.reasons)
     assert found.evals < 4_000_000
     assert math.isnan(found.value) or found.error > 0
+
+
+@pytest.mark.parametrize("method", ["mc", "qmc"])
+@pytest.mark.parametrize(("name", "n", "exact"), CASES, ids=[f"{name} {n}" for name, n, _ in CASES])
+def test_sampling_finds_their_jumps_beside_them(
+    name: str, n: int, exact: Callable[[Any], Any], method: Literal["mc", "qmc"]
+) -> None:
+    f = potto.grad(getattr(potto.compile(PROGRAM), name), "t")
+    for seed in range(3):
+        with potto.settings(method=method, samples=2_000, seed=seed):
+            found = f(n=n, t=0.7)
+        assert abs(found.value - exact(mp.mpf(0.7))) <= found.error
+        assert abs(found.tangent - mp.diff(exact, 0.7)) <= found.tangent_error <= 1e-10
+
+
+@pytest.mark.parametrize("method", ["mc", "qmc"])
+def test_sampling_finds_curves_that_cannot_be_forced(method: Literal["mc", "qmc"]) -> None:
+    """How many of the parabolas x + y^2 = t k/4 a point is below of, k = 1..4, weighs it; their lengths are integrals."""
+    program = """
+def below(n, x, y, t) if n > 0 then [x + y*y < t*n/4] + below(n - 1, x, y, t) else 0
+def f(t) integral ([0, 1], [0, 1]) (integral [0, below(4, x, y, t)] 2*z*x d(z)) d(x, y)
+"""
+
+    def exact(t: Any) -> Any:
+        # the square of the count is a sum of 2 j - 1, and j curves are ahead below that of t (5 - j)/4
+        def part(j: int) -> Any:
+            s = t * (5 - j) / 4
+            return (2 * j - 1) * mp.quad(lambda y: min(s - y * y, 1) ** 2 / 2, [0, mp.sqrt(max(s - 1, 0)), mp.sqrt(s)])
+
+        return sum(part(j) for j in range(1, 5))
+
+    f = potto.grad(potto.compile(program).f, "t")
+    for seed in range(3):
+        with potto.settings(method=method, samples=4_000, seed=seed):
+            found = f(t=0.7)
+        assert abs(found.value - exact(mp.mpf(0.7))) <= found.error < 0.1
+        assert abs(found.tangent - mp.diff(exact, 0.7)) <= found.tangent_error < 0.1

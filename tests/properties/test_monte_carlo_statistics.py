@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
+import mpmath as mp
 import numpy as np
 import pytest
 
@@ -108,6 +110,13 @@ PROBLEMS = (
         T * (math.exp(4) * T + math.exp(3) * (1 - T)) + (1 - T) * (T + math.e * (1 - T)),
         2 * T * math.exp(4) + (1 - 2 * T) * math.exp(3) + (1 - 2 * T) - 2 * math.e * (1 - T),
     ),
+    # A sector of a disc, pi/2 + t/2; the cut of the angle stays where it is
+    Problem(
+        "sector",
+        "integral ([-1, 1], [-1, 1]) [atan2(y, x) < t]*[x^2 + y^2 < 1] d(x, y)",
+        math.pi / 2 + T / 2,
+        0.5,
+    ),
     Problem("reversed", "integral ([1, 0], [0, 1]) [x*y < t] d(x, y)", -T * (1 - math.log(T)), math.log(T)),
 )
 
@@ -128,6 +137,17 @@ def scores(problem: Problem, method: str, seeds: range) -> tuple[list[float], li
             else:  # nothing is left to chance, as where the surface is a point: good to rounding
                 assert abs(got - exact) <= max(error, 1e-9 * abs(exact))
     return values, tangents
+
+
+@pytest.mark.parametrize("method", ["mc", "qmc"])
+def test_what_nothing_is_drawn_for_is_as_good_as_its_rounding(method: Literal["mc", "qmc"]) -> None:
+    """The derivative of a step on a line is the integrand there: cos(200 t), whose argument is rounded."""
+    f = potto.deriv(potto.compile("def f(t) integral [0, 1] [x < t]*cos(200*x) d(x)").f)
+    for t in np.linspace(0.01, 0.99, 40):
+        with potto.settings(method=method, samples=64):
+            answer = f((t, 1.0))
+        exact = mp.cos(200 * mp.mpf(t))
+        assert abs(answer.tangent - exact) <= answer.tangent_error < 1e-12
 
 
 def check_mean(found: list[float]) -> None:
