@@ -91,7 +91,7 @@ def test_sampling_finds_their_jumps_beside_them(
 
 @pytest.mark.parametrize("method", ["mc", "qmc"])
 def test_sampling_finds_curves_that_cannot_be_forced(method: Literal["mc", "qmc"]) -> None:
-    """How many of the parabolas x + y^2 = t k/4 a point is below of, k = 1..4, weighs it; their lengths are integrals."""
+    """A point is weighed by how many of the parabolas x + y^2 = t k/4, k = 1..4, it is below of."""
     program = """
 def below(n, x, y, t) if n > 0 then [x + y*y < t*n/4] + below(n - 1, x, y, t) else 0
 def f(t) integral ([0, 1], [0, 1]) (integral [0, below(4, x, y, t)] 2*z*x d(z)) d(x, y)
