@@ -78,11 +78,9 @@ class Call:
         self.world.need(self.file, whole)
         inferred = infer_expression(self.world.db, self.file, whole)
         wrong = [d for d in inferred.diagnostics if d.severity == "error"]
-        elaborated = elaborate_expression(self.world.db, self.file, whole)
-        wrong = wrong or [d for d in elaborated.diagnostics if d.severity == "error"]
         if wrong:
             raise ProgramError([Located(None, d) for d in wrong], self.world.source)
-        return elaborated.term
+        return elaborate_expression(self.world.db, self.file, whole).term
 
 
 def applied(expr: nodes.Expr, form: Form) -> nodes.Expr:

@@ -122,7 +122,6 @@ class World(Library):
         inferred = infer_expression(self.db, file, parsed.expr)
         self._stop(inferred.diagnostics, sources)
         elaborated = elaborate_expression(self.db, file, parsed.expr)
-        self._stop(elaborated.diagnostics, sources)
         chosen = settings or current(self.settings(file))
         try:
             estimate = self.program.evaluate(elaborated.term, chosen)

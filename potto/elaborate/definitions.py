@@ -10,7 +10,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from potto.core.terms import Term, hole, tuple_, var
-from potto.diagnostics import Diagnostic
 from potto.elaborate import binders, calls, expressions  # noqa: F401  (imported for their rules)
 from potto.elaborate.context import Elaboration, lambdas
 from potto.elaborate.values import EMPTY, Closure, Scope
@@ -28,12 +27,11 @@ Names = tuple[str, ...]
 class Elaborated:
     """A core term, and where its branches, plain conditionals, deltas, calls and integrals were written.
 
-    Spans are relative to the chunk. `diagnostics` is for what only elaboration can see: the checkers say the rest.
+    Spans are relative to the chunk. What is wrong is a `Hole` in the term: the checkers say it.
     """
 
     term: Term
     origins: tuple[tuple[Term, Span], ...] = ()
-    diagnostics: tuple[Diagnostic, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

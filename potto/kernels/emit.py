@@ -15,11 +15,11 @@ from functools import lru_cache
 
 from potto.calculus.derivative import partial
 from potto.core.terms import Branch, Const, If, Prim, Term, Var, postorder, var
+from potto.kernels.whole import ROUNDING, SELECTING, UNIT_ROUNDOFF
 from potto.primitives import PRIMITIVES
 
 ZERO = "0.0"
 ONE = "1.0"
-UNIT_ROUNDOFF = 2.0**-53
 COMPARISONS = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!="}
 
 
@@ -173,7 +173,7 @@ class Lines:
         t = tuple(self.total([x for a in args if (x := a.t[d])]) for d in range(self.directions))
         e = self.total([a.e for a in args if a.e])
         et = tuple(self.total([x for a in args if (x := a.et[d])]) for d in range(self.directions))
-        return self.rounded(Scalar(v, e, t, et))
+        return self.rounded(Scalar(v, e, t, et), "add", args)
 
     def mul(self, args: Sequence[Scalar]) -> Scalar:
         result = args[0]
@@ -202,12 +202,12 @@ class Lines:
             ]
             et.append(self.total(bounds))
         e = self.total([f"abs({p}*{q})" for p, q in ((a.v, b.e), (b.v, a.e)) if q])
-        return self.rounded(Scalar(v, e, tuple(t), tuple(et)))
+        return self.rounded(Scalar(v, e, tuple(t), tuple(et)), "mul", (a, b))
 
     def chain(self, op: str, args: Sequence[Scalar], v: str) -> Scalar:
         """The chain rule by the registry's partials, for arguments that move or are not exact."""
         if all(a.plain for a in args):
-            return self.rounded(self.plain(v))
+            return self.rounded(self.plain(v), op, args)
         names, first = partials(op, len(args))
         if not first:  # a builtin that jumps: constant between its jumps
             return self.plain(v)
@@ -227,14 +227,18 @@ class Lines:
                             bounds.append(f"abs({self.product(curve, args[i].t[d] or ONE, args[j].e or ONE)})")
             et.append(self.total(bounds))
         e = self.total([f"abs({self.product(slope[i], x)})" for i in moving if (x := args[i].e)])
-        return self.rounded(Scalar(v, e, tuple(t), tuple(et)))
+        return self.rounded(Scalar(v, e, tuple(t), tuple(et)), op, args)
 
-    def rounded(self, x: Scalar) -> Scalar:
+    def rounded(self, x: Scalar, op: str, args: Sequence[Scalar]) -> Scalar:
         """With the rounding of this operation added to the bounds, where the kernel keeps track of it."""
         if not self.rounding:
             return x
-        unit = repr(UNIT_ROUNDOFF)
-        e = self.let(f"{x.e + ' + ' if x.e else ''}{unit}*abs({x.v})", "e")
+        e = x.e
+        if op not in SELECTING:
+            unit = f"{UNIT_ROUNDOFF!r}*abs({x.v})"
+            if op in ROUNDING:
+                unit = f"{self.ufunc('whole.' + op)}({', '.join((x.v, *(a.v for a in args)))})"
+            e = self.let(f"{e + ' + ' if e else ''}{unit}", "e")
         et = tuple(
             self.let(f"{old + ' + ' if old else ''}{2 * UNIT_ROUNDOFF!r}*abs({t})", "e") if t else old
             for t, old in zip(x.t, x.et, strict=True)

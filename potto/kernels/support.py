@@ -1,7 +1,7 @@
 """The functions that generated kernels call by name.
 
 Owns `function`, which finds them: "sqrt" is numpy's, "special.erf" scipy's (imported at the first use), "potto.clamp"
-one of `potto.kernels.ufuncs`, "support.select" one of those below.
+one of `potto.kernels.ufuncs`, "whole.add" one of `potto.kernels.whole`, "support.select" one of those below.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 
 from potto.kernels.cells import Cell, Mask, Number, Value
 from potto.kernels.errors import wrong_call
+from potto.kernels.whole import ROUNDING
 
 
 @lru_cache(maxsize=256)
@@ -25,6 +26,8 @@ def function(path: str) -> Callable[..., Any]:
         return getattr(importlib.import_module("scipy.special"), name)  # type: ignore[no-any-return]
     if where == "potto":
         return getattr(importlib.import_module("potto.kernels.ufuncs"), name)  # type: ignore[no-any-return]
+    if where == "whole":
+        return ROUNDING[name]
     if where == "support":
         return globals()[name]  # type: ignore[no-any-return]
     return getattr(np, name)  # type: ignore[no-any-return]

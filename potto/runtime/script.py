@@ -143,11 +143,7 @@ def evaluate_in(
 ) -> tuple[Value, bool]:
     """The value of an expression that may use the file's names and those of an environment, and whether it is that of
     a derivative. Raises PottoError."""
-    elaborated = elaborate_expression(db, file, expr, tuple(env))
-    wrong = [d for d in elaborated.diagnostics if d.severity == "error"]
-    if wrong:
-        raise PottoError(wrong)
-    term = elaborated.term
+    term = elaborate_expression(db, file, expr, tuple(env)).term
     value = program.value(machine, term, {n: v for n, v in env.items() if n in term.free})
     return value, gives_dual(term, program.linker, env)
 

@@ -13,7 +13,7 @@ from potto.core.terms import Sum, lam
 from potto.diagnostics import PottoError
 from potto.kernels import errors
 from potto.kernels.cells import Array, Cell, Number, Trace, Value, all_arrays, map_arrays
-from potto.kernels.emit import UNIT_ROUNDOFF
+from potto.kernels.whole import UNIT_ROUNDOFF
 
 if TYPE_CHECKING:
     from potto.runtime.machine import Machine

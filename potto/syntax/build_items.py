@@ -140,7 +140,10 @@ def equation(context: Context, v: Values) -> Item:
             )
         )
         return Definition(span, function.id, function.span, groups, None, (), body, True)
-    if not isinstance(left, ErrorExpr):
+    several = [item.id for item in left.items if isinstance(item, Name)] if isinstance(left, Tuple) else []
+    if isinstance(left, Tuple) and len(several) == len(left.items):
+        context.report(kinds.several_names(left.span, several))
+    elif not isinstance(left, ErrorExpr):
         context.report(
             kinds.NOT_A_NAME(left.span, "only a name can be defined", help="write `name = e`; to compare, write `==`")
         )

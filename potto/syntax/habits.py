@@ -134,9 +134,12 @@ def tuple_without_parentheses(stop: Stop) -> Diagnostic | None:
         rest = rest[2:]
     if len(names) < 2 or rest[0].kind != "EQ" or names[0].kind != "NAME":
         return None
+    span = names[0].span.cover(names[-1].span)
+    if names[0] is stop.tokens[0]:
+        return kinds.several_names(span, [name.text for name in names])
     shown = ", ".join(name.text for name in names)
     return kinds.NOT_A_NAME(
-        names[0].span.cover(names[-1].span),
+        span,
         "names that take a tuple apart stand in parentheses",
         help=f"write `({shown}) = …`",
     )

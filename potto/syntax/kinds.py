@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from potto.diagnostics import declare
+from collections.abc import Sequence
+
+from potto.diagnostics import Diagnostic, declare
+from potto.source import Span
 
 MISSING_EXPRESSION = declare("P0101", "an expression is missing")
 BRACKETS = declare("P0102", "brackets that do not match")
@@ -25,3 +28,12 @@ BAD_IMPORT = declare("P0118", "an import that is not well formed")
 DEFINITION_HEAD = declare("P0119", "the head of a definition is not well formed")
 DIFFEO_FORM = declare("P0120", "a diffeomorphism that is not well formed")
 NAMED_ARGUMENT = declare("P0121", "a named argument outside of a call")
+
+
+def several_names(span: Span, names: Sequence[str]) -> Diagnostic:
+    """`u, v = pair` where definitions stand, with or without parentheses."""
+    head = ", ".join(names)
+    each = "; ".join(f"`{name} = let ({head}) = … in {name}`" for name in names[:2])
+    if len(names) == 2:
+        each = f"`pair = …`, then `{names[0]} = fst pair` and `{names[1]} = snd pair`"
+    return NOT_A_NAME(span, "a definition has one name", label="several names", help=f"write {each}")

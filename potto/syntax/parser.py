@@ -203,8 +203,9 @@ def _without_doubled(found: list[Diagnostic], stop: Stop) -> list[Diagnostic]:
 
 
 def _causes(found: list[Diagnostic], stops: list[Diagnostic]) -> list[Diagnostic]:
-    """A line that is no result because it was not understood has its message already; so has what is no name."""
-    codes = (kinds.LAST_LINE.code, kinds.NOT_A_NAME.code)
+    """A line that is no result because it was not understood has its message already; so has what is no name, or no
+    head of a definition."""
+    codes = (kinds.LAST_LINE.code, kinds.NOT_A_NAME.code, kinds.DEFINITION_HEAD.code)
     places = [stop.span for stop in stops]
     return [d for d in found if d.code not in codes or not any(d.span.start <= p.start < d.span.end for p in places)]
 

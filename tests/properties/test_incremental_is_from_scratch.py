@@ -67,7 +67,7 @@ def seen(library: Library, root: str) -> dict[Hashable, Any]:
         found[file] = library.diagnostics(key)
         for name in names(library.db, key):
             elaborated = core(library.db, key, name)
-            found[file, name] = (elaborated.term, elaborated.diagnostics, interface(library.db, key, name))
+            found[file, name] = (elaborated.term, interface(library.db, key, name))
     return found
 
 

@@ -100,6 +100,9 @@ def test_a_line_that_is_indented_more_goes_on() -> None:
         ("x = 2y", "to multiply, write `2*y`"),
         ("def f(a)\n    (p, q), r = a\n    p", "to make a tuple, write parentheses around it"),
         ("def f(a)\n    p, q = a\n    p", "write `(p, q) = …`"),
+        ("u, v = (1, 2)", "write `pair = …`, then `u = fst pair` and `v = snd pair`"),
+        ("(u, v) = (1, 2)", "write `pair = …`, then `u = fst pair` and `v = snd pair`"),
+        ("u, v, w = (1, 2, 3)", "write `u = let (u, v, w) = … in u`; `v = let (u, v, w) = … in v`"),
     ],
 )
 def test_the_hint_is_what_to_write(text: str, help: str) -> None:
