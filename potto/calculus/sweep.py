@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import lru_cache
 
+from potto.calculus.radicals import minus
 from potto.calculus.ranges import positive
 from potto.calculus.solve import Family, Sections, Unsolvable, sections
 from potto.calculus.surfaces import Decide, Finding, Resolve, findings
@@ -33,10 +34,19 @@ class Jump:
 
 
 @dataclass(frozen=True, slots=True)
+class Face:
+    """A surface as it was written, and the canonical form, of the same sign, by which it is known."""
+
+    form: Term
+    key: Term
+
+
+@dataclass(frozen=True, slots=True)
 class Cut:
     """A surface that cuts one variable.
 
-    surface: canonical, up to positive scale and sign, so that the same condition met twice is one cut.
+    surface: as it was written, on the side of its canonical form: multiplied out, (x - 1e8)^2 + (y - 1e8)^2 - t^2 would
+        lose its t. key: the canonical form, so that the same condition met twice is one cut.
     jumps: the branches that it decides; none for a kink, an edge or a place where an inner section changes.
     steps: a branch that is decided further in jumps here all the same: of (x - t)*(y - s) >= 0 at x = t.
     turning: the integrand behaves like a square root there.
@@ -44,6 +54,7 @@ class Cut:
     """
 
     surface: Term
+    key: Term
     jumps: tuple[Jump, ...]
     turning: bool
     roots: tuple[Term, ...] | None
@@ -59,13 +70,13 @@ class Cut:
 
 @dataclass(frozen=True, slots=True)
 class Product:
-    """A canonical surface as a product: (sign) * along * outer factors, up to a positive scale.
+    """A surface as a product: (sign) * along * outer factors, up to a positive scale.
 
-    along: what varies with the variable that the surface cuts. outer: factors that do not, canonical.
+    along: what varies with the variable that the surface cuts. outer: factors that do not.
     """
 
     along: Term
-    outer: tuple[Term, ...]
+    outer: tuple[Face, ...]
     sign: int
 
 
@@ -82,10 +93,10 @@ class Level:
 
 @dataclass(slots=True)
 class _Placed:
-    """A surface in its canonical form, what it is a product of (canonical, up to `sign`), and what is known of it."""
+    """A surface, what it is a product of (up to `sign`), and what is known of it."""
 
-    surface: Term
-    factors: tuple[Term, ...]
+    face: Face
+    factors: tuple[Face, ...]
     sign: int
     jumps: list[Jump] = field(default_factory=list)
     turning: bool = False
@@ -101,12 +112,12 @@ class _Pool:
     def put(
         self, surface: Term, jump: tuple[tuple[int, ...], bool] | None, turning: bool, steps: bool = False
     ) -> None:
-        canonical, orientation = _canonical(surface)
-        if not canonical.free:
+        face, orientation = _face(surface)
+        if not face.key.free:
             return
-        if canonical not in self.surfaces:
-            self.surfaces[canonical] = _Placed(canonical, *_factored(surface, orientation))
-        placed = self.surfaces[canonical]
+        if face.key not in self.surfaces:
+            self.surfaces[face.key] = _Placed(face, *_factored(surface, orientation))
+        placed = self.surfaces[face.key]
         if jump is not None:
             placed.jumps.append(Jump(jump[0], orientation, jump[1]))
         placed.turning |= turning
@@ -114,19 +125,25 @@ class _Pool:
 
     def take(self, variable: str) -> list[_Placed]:
         """The surfaces that vary along a variable. What is a factor of one and does not stays, as a step."""
-        taken = [placed for surface, placed in self.surfaces.items() if variable in surface.free]
+        taken = [placed for key, placed in self.surfaces.items() if variable in key.free]
         for placed in taken:
-            del self.surfaces[placed.surface]
+            del self.surfaces[placed.face.key]
         for placed in taken:
             for factor in placed.factors:
-                if variable not in factor.free:
-                    self.put(factor, None, placed.turning, bool(placed.jumps) or placed.steps)
+                if variable not in factor.key.free:
+                    self.put(factor.form, None, placed.turning, bool(placed.jumps) or placed.steps)
         return taken
 
 
 @lru_cache(maxsize=8192)
-def _canonical(surface: Term) -> tuple[Term, int]:
-    return normalized_surface(surface)
+def _face(surface: Term) -> tuple[Face, int]:
+    """A surface on the side of its canonical form, and +1 or -1 for whether it was there already.
+
+    Where variables cancel in the canonical form, that is the surface.
+    """
+    key, side = normalized_surface(surface)
+    form = surface if side > 0 else minus(surface)
+    return Face(form if form.free == key.free else key, key), side
 
 
 @lru_cache(maxsize=8192)
@@ -166,7 +183,7 @@ def sweep(term: Integral, found: Iterable[Finding], resolve: Resolve, decide: De
                 if f.kind != "center":
                     pool.put(f.surface, None, f.kind == "edge")
     outer = (
-        *(Finding("edge" if placed.turning else "kink", surface) for surface, placed in pool.surfaces.items()),
+        *(Finding("edge" if placed.turning else "kink", placed.face.form) for placed in pool.surfaces.values()),
         *(Finding("center", surface) for surface in centers),
     )
     return Sweep(tuple(reversed(levels)), outer)
@@ -188,35 +205,45 @@ def outer_findings(term: Integral, resolve: Resolve, decide: Decide) -> tuple[Fi
 
 def _cut(placed: _Placed, variable: str) -> Cut:
     jumps, turning, steps = tuple(placed.jumps), placed.turning, placed.steps
-    here = tuple(f for f in placed.factors if variable in f.free)
-    outer = tuple(f for f in placed.factors if variable not in f.free)
-    product = Product(_product(here), outer, placed.sign) if outer else None
+    here = tuple(f for f in placed.factors if variable in f.key.free)
+    outer = tuple(f for f in placed.factors if variable not in f.key.free)
+    product = Product(_product(tuple(f.form for f in here)), outer, placed.sign) if outer else None
+    surface, key = placed.face.form, placed.face.key
     roots: dict[Term, None] = {}
     families: dict[Family, None] = {}
     for part in here:
-        found = _sections(part, variable)
-        if isinstance(found, Unsolvable) or not found.complete:
-            return Cut(placed.surface, jumps, turning, None, (), steps, product)
+        found = _roots(part, variable)
+        if found is None:
+            return Cut(surface, key, jumps, turning, None, (), steps, product)
         roots.update(dict.fromkeys((*found.roots, *found.poles)))
         families.update(dict.fromkeys((*found.families, *found.pole_families)))
-    return Cut(placed.surface, jumps, turning, tuple(roots), tuple(families), steps, product)
+    return Cut(surface, key, jumps, turning, tuple(roots), tuple(families), steps, product)
+
+
+def _roots(part: Face, variable: str) -> Sections | None:
+    """All the roots of a factor: of the form as written, which keeps digits, else of the canonical one."""
+    for surface in (part.form, part.key):
+        found = _sections(surface, variable)
+        if isinstance(found, Sections) and found.complete:
+            return found
+    return None
 
 
 def cut_along(surface: Term, variable: str) -> Cut:
     """A surface as a cut of one variable, whatever it decides."""
-    return _cut(_Placed(surface, *_factored(surface, 1)), variable)
+    return _cut(_Placed(Face(surface, surface), *_factored(surface, 1)), variable)
 
 
 def _product(terms: tuple[Term, ...]) -> Term:
     return prim("mul", *terms) if len(terms) > 1 else terms[0]
 
 
-def _factored(surface: Term, orientation: int) -> tuple[tuple[Term, ...], int]:
-    """Canonical factors of a surface written as a product, and the sign of its canonical form against theirs.
+def _factored(surface: Term, orientation: int) -> tuple[tuple[Face, ...], int]:
+    """The factors of a surface written as a product, and the sign of its canonical form against theirs.
 
     A surface that is none, or in which a factor comes twice, is its own and only factor.
     """
-    found: dict[Term, None] = {}
+    found: dict[Term, Face] = {}
     sign, waiting = orientation, [surface]
     while waiting:
         item = waiting.pop()
@@ -231,12 +258,12 @@ def _factored(surface: Term, orientation: int) -> tuple[tuple[Term, ...], int]:
             case _ if positive(item):
                 pass
             case _:
-                canonical, turned = _canonical(item)
-                if canonical in found or not canonical.free:
-                    return (_canonical(surface)[0],), 1
+                face, turned = _face(item)
+                if face.key in found or not face.key.free:
+                    return (_face(surface)[0],), 1
                 sign *= turned
-                found[canonical] = None
-    return (tuple(found), sign) if len(found) > 1 else ((_canonical(surface)[0],), 1)
+                found[face.key] = face
+    return (tuple(found.values()), sign) if len(found) > 1 else ((_face(surface)[0],), 1)
 
 
 def _points(centers: list[Term], variable: str) -> tuple[Term, ...]:
@@ -257,13 +284,15 @@ def _shadows(cuts: tuple[Cut, ...], variable: str, lo: Term, hi: Term) -> Iterab
             if not (isinstance(bound, Const) and bound.value in (float("inf"), float("-inf"))):
                 yield substitute(along, {variable: bound}), False
         found = _sections(along, variable)
+        if cut.product is None and not (isinstance(found, Sections) and found.complete):
+            found = _sections(cut.key, variable)
         if isinstance(found, Sections):
             for turn in found.turning:
                 yield turn, True
     solved = [c for c in cuts if c.roots][:MOST_PAIRS]
     for first in solved:
         for second in solved:
-            if first is not second and first.surface.digest < second.surface.digest:
+            if first is not second and first.key.digest < second.key.digest:
                 yield from _crossings(first, second, variable)
 
 

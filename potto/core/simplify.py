@@ -12,7 +12,7 @@ from fractions import Fraction
 from functools import lru_cache
 
 from potto.core.normal_form import as_term, leading, normal_form
-from potto.core.polynomials import number
+from potto.core.polynomials import Polynomial
 from potto.core.rewrite import Rewriter
 from potto.core.sampling import vanishes
 from potto.core.terms import ONE, ZERO, Const, Prim, Term, Var, add, const, div, mul, neg, postorder, pow_
@@ -113,7 +113,9 @@ def normalized_surface(surface: Term) -> tuple[Term, int]:
     """The canonical form of a condition's surface, and +1 or -1 for its side: surface = positive * side * canonical.
 
     Surfaces that differ by a constant scale or sign, or in the order of sums and products, have one canonical form.
-    Its first monomial has coefficient 1. Coefficients are compared exactly and rounded last.
+    Its first monomial has coefficient 1, or one between 1 and 2 where the others could not be written exactly else.
+    What cannot be written exactly at all is its own canonical form: rounded, (x - 1e8)^2 < 0.25 and (x - 1e8)^2 < 0.36
+    would be one surface. A canonical form tells surfaces apart; where they are, the form as written knows better.
     """
     form = normal_form(surface)
     if not form:
@@ -121,18 +123,12 @@ def normalized_surface(surface: Term) -> tuple[Term, int]:
     first = leading(form)
     side = 1 if form[first] > 0 else -1
     monic = {monomial: coefficient / form[first] for monomial, coefficient in form.items()}
-    written = as_term(monic) or _rounded(monic) or as_term({m: c * side for m, c in form.items()})
+    written = as_term(monic) or as_term(_scaled(form, abs(form[first]), side))
     return (surface, 1) if written is None else (written, side)
 
 
-def _rounded(form: dict[tuple[tuple[Term, int], ...], Fraction]) -> Term | None:
-    """As `as_term`, with coefficients rounded to doubles; None if one of them is out of range."""
-    rounded: dict[tuple[tuple[Term, int], ...], Fraction] = {}
-    for monomial, coefficient in form.items():
-        if number(coefficient) is None:
-            size = abs(coefficient)
-            if not Fraction(2) ** -1000 < size < Fraction(2) ** 1000:
-                return None
-            coefficient = Fraction(float(coefficient))
-        rounded[monomial] = coefficient
-    return as_term(rounded)
+def _scaled(form: Polynomial, size: Fraction, side: int) -> Polynomial:
+    """A polynomial times the power of two that brings `size` to between 1 and 2: doubles stay doubles."""
+    power = size.numerator.bit_length() - size.denominator.bit_length()
+    power -= size < Fraction(2) ** power
+    return {monomial: side * coefficient / Fraction(2) ** power for monomial, coefficient in form.items()}

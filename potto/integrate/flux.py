@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from potto.calculus.sweep import Product
+from potto.calculus.sweep import Face, Product
 from potto.core.terms import Term, const, mul, sub, var
 from potto.integrate.chart import Chart, Point, label_of
 from potto.integrate.cuts import Row, as_array, frame_rows
@@ -55,7 +55,7 @@ def factors(plan: Plan, drawn: int) -> list[tuple[Term, int, tuple[tuple[int, Te
     Where a factor of a product is 0 that decides nothing for itself, the product changes its side all the same. The
     sides of products that `drawn` variables don't reach are settled by whoever integrates those further in.
     """
-    numbers = {group.cut.surface: group.number for group in plan.groups}
+    numbers = {group.cut.key: group.number for group in plan.groups}
     levels = {group: number for number, level in enumerate(plan.levels) for group in level.decided}
     found: dict[int, tuple[Term, int, list[tuple[int, Term | None]]]] = {}
     for group in plan.groups:
@@ -65,17 +65,17 @@ def factors(plan: Plan, drawn: int) -> list[tuple[Term, int, tuple[tuple[int, Te
     for group in plan.groups:
         product = group.cut.product
         for factor in () if product is None else product.outer:
-            if product is None or factor not in numbers:
+            if product is None or factor.key not in numbers:
                 continue
-            _, level, forces = found[numbers[factor]]
+            _, level, forces = found[numbers[factor.key]]
             if level >= drawn or levels[group.number] < drawn:
                 forces.append((group.number, _rest(product, factor)))
     return [(term, level, tuple(forces)) for term, level, forces in found.values()]
 
 
-def _rest(product: Product, factor: Term | None) -> Term:
+def _rest(product: Product, factor: Face | None) -> Term:
     """A product without one of its outer factors, or without what varies along its variable."""
-    rest = [f for f in product.outer if f != factor]
+    rest = [f.form for f in product.outer if f != factor]
     return mul(const(product.sign), *rest, *(() if factor is None else (product.along,)))
 
 

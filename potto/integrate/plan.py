@@ -223,7 +223,7 @@ def _deciding(
     A factor that does not vary with the variable has its side decided where it does: at a node beside the place where
     it is 0, its own value may be rounding.
     """
-    known = {g.cut.surface: g.number for g in groups}
+    known = {g.cut.key: g.number for g in groups}
     terms: list[Term] = []
     turned: list[tuple[int, ...]] = []
     for number in decided:
@@ -232,10 +232,10 @@ def _deciding(
             terms.append(cut.surface)
             turned.append(())
             continue
-        rest = [f for f in cut.product.outer if f not in known]
+        rest = [f.form for f in cut.product.outer if f.key not in known]
         term = prim("mul", cut.product.along, *rest) if rest else cut.product.along
         terms.append(term if cut.product.sign > 0 else neg(term))
-        turned.append(tuple(known[f] for f in cut.product.outer if f in known))
+        turned.append(tuple(known[f.key] for f in cut.product.outer if f.key in known))
     return tuple(terms), tuple(turned)
 
 

@@ -1,0 +1,59 @@
+"""Scenes far from the origin: what is a difference in the program is solved as one, and never multiplied out.
+
+(x - 1e8)^2 + (y - 1e8)^2 - t^2 as a polynomial has the constant 2e16 - t^2, in which t is lost. Closed forms by mpmath,
+for the doubles that the program has.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mpmath as mp
+import pytest
+
+import potto
+
+FAR = (1e3, 1e5, 1e8, -1e8, 1e10)
+EPS = 2.0**-52
+
+
+def covered(answer: Any, value: Any, tangent: Any) -> None:
+    with mp.workdps(50):
+        assert abs(answer.value - value) <= answer.error + EPS * abs(value)
+        assert abs(answer.tangent - tangent) <= answer.tangent_error + EPS * abs(tangent)
+
+
+@pytest.mark.parametrize("far", FAR)
+def test_the_radius_of_a_disc(far: float) -> None:
+    box, o = f"[{far - 1!r}, {far + 1!r}]", f"({far!r})"
+    f = potto.compile(f"def f(t)\n    integral ({box}, {box}) [(x - {o})^2 + (y - {o})^2 < t^2] d(x, y)").f
+    answer = potto.deriv(f)((0.3, 1.0))
+    covered(answer, mp.pi * mp.mpf(0.3) ** 2, 2 * mp.pi * mp.mpf(0.3))
+    assert answer.error <= 1e-14 * abs(far) and answer.tangent_error <= 1e-13 * abs(far)
+
+
+@pytest.mark.parametrize("far", FAR)
+def test_a_disc_that_moves(far: float) -> None:
+    """Weighted by (x - far)^2 it is pi/4 (d^2 + 1/16) for a disc of radius 1/2 at the distance d."""
+    box, o = f"[{far - 1!r}, {far + 1!r}]", f"({far!r})"
+    f = potto.compile(
+        f"def f(t)\n    integral ({box}, {box}) [(x - t)^2 + (y - {o})^2 < 1/4]*(x - {o})^2 d(x, y)"
+    ).f
+    answer = potto.deriv(f)((far + 0.3, 1.0))
+    with mp.workdps(50):
+        d = mp.mpf(far + 0.3) - mp.mpf(far)
+        covered(answer, mp.pi / 4 * (d**2 + mp.mpf(1) / 16), mp.pi / 2 * d)
+    assert answer.error <= 1e-14 * abs(far) and answer.tangent_error <= 1e-14 * abs(far)
+
+
+def test_surfaces_that_only_differ_behind_the_last_digit_of_what_they_multiply_out_to() -> None:
+    """1e16 - 0.25 and 1e16 - 0.36 are the same double; the two conditions are not the same surface."""
+    f = potto.compile("""
+def f(t)
+    integral [99999999, 100000001] [(x - 1e8)^2 < t^2] + 10*[(x - 1e8)^2 < t^2 + 0.11] d(x)
+""").f
+    answer = potto.deriv(f)((0.5, 1.0))
+    with mp.workdps(50):
+        wide = mp.sqrt(mp.mpf(0.25) + mp.mpf(0.11))
+        covered(answer, 1 + 20 * wide, 2 + 10 / wide)
+    assert answer.error <= 1e-5
