@@ -29,7 +29,7 @@ def test_the_radius_of_a_disc(far: float) -> None:
     f = potto.compile(f"def f(t)\n    integral ({box}, {box}) [(x - {o})^2 + (y - {o})^2 < t^2] d(x, y)").f
     answer = potto.deriv(f)((0.3, 1.0))
     covered(answer, mp.pi * mp.mpf(0.3) ** 2, 2 * mp.pi * mp.mpf(0.3))
-    assert answer.error <= 1e-14 * abs(far) and answer.tangent_error <= 1e-13 * abs(far)
+    assert answer.error <= 3e-14 * abs(far) and answer.tangent_error <= 1e-13 * abs(far)
 
 
 @pytest.mark.parametrize("far", FAR)
