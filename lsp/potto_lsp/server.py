@@ -159,7 +159,7 @@ class Server:
         assert self.worker is not None
         self._edits += 1
 
-        def run() -> None:
+        def run(job: Job) -> None:
             change()
 
         self.worker.put(Job("edit", run))
@@ -167,17 +167,18 @@ class Server:
     def later(self, action: Callable[[], None]) -> None:
         """Do something on the thread that owns the database."""
         assert self.worker is not None
-        self.worker.put(Job("quick", action))
+        self.worker.put(Job("quick", lambda job: action()))
 
     def _ask(self, id: Id, feature: Feature, params: Any) -> None:
         assert self.session is not None and self.worker is not None
         uri = uri_of(params)
         document = None if uri is None else self.documents.get(uri)
         ask = Ask(self.session, params)
-        job = Job("slow" if feature.slow else "quick", lambda: self._answer(id, job, feature, ask, document))
+        job = Job("slow" if feature.slow else "quick", lambda job: self._answer(id, job, feature, ask, document))
         if document is not None and feature.method != "textDocument/diagnostic":
             job.outdated = lambda: self._outdated(ask, document)
-            job.drop = lambda: self._finish(id, job, error=(errors.CONTENT_MODIFIED, "the document has changed", None))
+            told = (errors.CONTENT_MODIFIED, "the document has changed", None)
+            job.drop = lambda job: self._finish(id, job, error=told)
         with self._lock:
             self._jobs[id] = job
         self.worker.put(job)

@@ -28,12 +28,15 @@ _claims = Lock()
 
 @dataclass(eq=False)
 class Job:
-    """Something to do. Whoever `claim`s it may answer it, and nobody else."""
+    """Something to do. Whoever `claim`s it may answer it, and nobody else.
+
+    `run` and `drop` are given the job, so that none refers to itself: a document stays no longer than its questions.
+    """
 
     kind: Literal["edit", "quick", "slow", "idle"]
-    run: Callable[[], None]
+    run: Callable[[Job], None]
     outdated: Callable[[], bool] = field(default=lambda: False)
-    drop: Callable[[], None] = field(default=lambda: None)
+    drop: Callable[[Job], None] = field(default=lambda job: None)
     stop: Callable[[], None] = field(default=lambda: None)
     _claimed: bool = False
 
@@ -112,7 +115,7 @@ class Worker:
         if step is None:
             self._steps = None
             return None
-        return Job("idle", step)
+        return Job("idle", lambda job: step())
 
     def _receive(self, wait: bool) -> None:
         try:
@@ -142,12 +145,12 @@ class Worker:
         if job.claimed:
             return
         if job.kind != "edit" and job.outdated():
-            job.drop()
+            job.drop(job)
             return
         self._since, self._running = time.monotonic(), job
         try:
             with self._db.evaluating():
-                job.run()
+                job.run(job)
         except Cancelled:
             self._give_way(job)
         except Exception:
@@ -158,6 +161,6 @@ class Worker:
     def _give_way(self, job: Job) -> None:
         """Come back to a job after all that is more urgent; to a step of idle time only if no edit starts them anew."""
         if job.kind == "idle":
-            self._steps = chain([job.run], self._steps or ())
+            self._steps = chain([lambda: job.run(job)], self._steps or ())
         elif not job.claimed:
             self._slow.appendleft(job)

@@ -21,13 +21,16 @@ Server = Callable[..., Client]
 Uri = Callable[[str], str]
 HEAVY = ("numpy", "scipy", "llvmlite", "mpmath", "matplotlib", "prompt_toolkit", "pygls", "lsprotocol")
 TEXT = "def f(t)\n    integral [0, 1] [x < t] * x d(x)\n#> f(0.5)\ny = f(0.25)\n"
-# Says on standard error, at the end and in answer to an edit, which heavy modules the server has.
+# Says on standard error, when it is asked, which heavy modules the server has and how many texts of open files.
 SPY = f"""
-import sys
+import gc, sys
 from potto_lsp import notifications
+from potto_lsp.documents import Document
 from potto.__main__ import main
 def told(server, params):
     found = [name for name in {HEAVY!r} if name in sys.modules]
+    gc.unfreeze()
+    print("DOCUMENTS", sum(isinstance(o, Document) for o in gc.get_objects()), file=sys.stderr)
     print("LOADED", found, file=sys.stderr, flush=True)
 notifications.NOTIFICATIONS["$/spy"] = told
 sys.exit(main(["lsp"]))
@@ -53,6 +56,10 @@ class Spied(Client):
             time.sleep(0.01)
         found: list[str] = json.loads(self.stderr.decode().rpartition("LOADED ")[2].strip().replace("'", '"'))
         return found
+
+    def documents(self) -> int:
+        """How many documents there were when it was asked last."""
+        return int(self.stderr.rpartition(b"DOCUMENTS ")[2].split()[0])
 
 
 def test_no_numbers_are_loaded_but_in_the_evaluation_process(tmp_path: Path) -> None:
@@ -197,4 +204,21 @@ def test_the_server_does_not_stay_when_its_folder_is_gone(tmp_path: Path) -> Non
     client.open((gone / "main.po").as_uri(), "def f(t) one\n")
     found = client.note("textDocument/publishDiagnostics")["diagnostics"]
     assert [said["code"] for said in found] == ["P0201"]
+    assert client.stop() == 0
+
+
+def test_old_documents_go_at_once(tmp_path: Path) -> None:
+    """Questions refer to the text that they were about. Whatever waits for the garbage collector to go makes the
+    server grow by a text a keystroke until the collector comes, in the middle of typing."""
+    main = tmp_path / "main.po"
+    main.write_text(TEXT)
+    client = Spied(tmp_path, EVERYTHING)
+    client.start()
+    client.open(main.as_uri(), TEXT)
+    place = {"textDocument": {"uri": main.as_uri()}, "position": {"line": 0, "character": 4}}
+    for version in range(2, 42):
+        client.change(main.as_uri(), version, {"text": TEXT + "#" * version})
+        assert client.ask("textDocument/hover", place) is not None
+    client.loaded()
+    assert 1 <= client.documents() <= 3
     assert client.stop() == 0
