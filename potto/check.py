@@ -6,19 +6,17 @@ nothing of each other's messages; here they meet. No numbers, no files, no rende
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import replace
-from zlib import crc32
 
 from potto.calculus.diffeo import check_conditions
 from potto.diagnostics import Diagnostic, Related
 from potto.modules import chunk_start, module_diagnostics, names, statements
+from potto.modules.graph import runs
 from potto.modules.texts import syntax_diagnostics
 from potto.query import Database, query
 from potto.render import Located
 from potto.types import check_definition, check_statement, interface
-
-BLOCK, MOST_OF_BLOCK = 12, 32  # definitions in the mean, and at most
 
 _ORDER = {"error": 0, "warning": 1, "info": 2, "hint": 3}
 
@@ -28,8 +26,8 @@ def diagnostics(db: Database, file: str) -> tuple[Located, ...]:
     """Everything about a file, in the order of its text. As one memo, so that a file that an edit does not reach costs
     nothing."""
     found = [*syntax_diagnostics(db, file), *module_diagnostics(db, file)]
-    for block in _blocks(names(db, file)):
-        for name, said in block_diagnostics(db, file, block):
+    for run in runs(names(db, file)):
+        for name, said in run_diagnostics(db, file, run):
             start = chunk_start(db, file, name)
             found += [absolute(db, file, d, start) for d in said]
     for reference in statements(db, file):
@@ -37,27 +35,12 @@ def diagnostics(db: Database, file: str) -> tuple[Located, ...]:
     return tuple(Located(file, d) for d in arranged(found))
 
 
-def _blocks(names: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
-    """Names in runs of a few; where one ends hangs on its names alone, so that a new definition changes one or two."""
-    start = 0
-    for index, name in enumerate(names, 1):
-        if index - start == MOST_OF_BLOCK or crc32(name.encode("utf-8", "surrogatepass")) % BLOCK == 0:
-            yield names[start:index]
-            start = index
-    if start < len(names):
-        yield names[start:]
-
-
 @query(keep=2048)
-def block_diagnostics(
-    db: Database, file: str, block: tuple[str, ...]
+def run_diagnostics(
+    db: Database, file: str, run: tuple[str, ...]
 ) -> tuple[tuple[str, tuple[Diagnostic, ...]], ...]:
-    """What is said of some neighbouring definitions, by name, of those of which there is something to say.
-
-    At every keystroke all definitions of a file are asked whether anything is new, and those of all that import it: a
-    run of them that shares what it hangs on is asked once.
-    """
-    found = ((name, definition_diagnostics(db, file, name)) for name in block)
+    """What is said of some neighbouring definitions, by name, of those of which there is something to say."""
+    found = ((name, definition_diagnostics(db, file, name)) for name in run)
     return tuple((name, said) for name, said in found if said)
 
 

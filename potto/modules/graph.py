@@ -8,8 +8,9 @@ other, so the groups of all definitions are found once for a group of files, and
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Hashable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from typing import TypeVar
+from zlib import crc32
 
 from potto.modules.free import Reference
 from potto.modules.lookup import DefinitionTarget, ModuleTarget, Target, bindings, find_module, resolve, resolve_member
@@ -17,6 +18,7 @@ from potto.modules.texts import chunk_references, chunk_text, imports, is_diffeo
 from potto.query import Database, query
 
 N = TypeVar("N", bound=Hashable)
+RUN, MOST_OF_RUN = 12, 32  # definitions in the mean, and at most
 _WORD = re.compile(r"[^\W\d]\w*")
 
 
@@ -102,19 +104,16 @@ def _definition_groups(db: Database, files: tuple[str, ...]) -> Mapping[Definiti
     In a file that imports none of them each goes by its own name. So they are looked for by words first: most cannot
     need each other by what is written, and of those no tree is made.
     """
-    definitions = [DefinitionTarget(file, name) for file in files for name in names(db, file)]
-    place = {target: index for index, target in enumerate(definitions)}
-
-    def may_need(target: DefinitionTarget) -> Iterable[DefinitionTarget]:
-        return (DefinitionTarget(target.file, name) for name in _mentioned(db, target.file, target.name))
+    if len(files) == 1 and files[0] not in imported_files(db, files[0]):
+        suspects = [DefinitionTarget(files[0], name) for name in _suspects(db, files[0])]
+    else:
+        suspects = [DefinitionTarget(file, name) for file in files for name in names(db, file)]
+    place = {target: index for index, target in enumerate(suspects)}
 
     def needs(target: DefinitionTarget) -> Iterable[DefinitionTarget]:
         return (needed for needed in dependencies(db, target.file, target.name) if needed in place)
 
     table: dict[DefinitionTarget, tuple[DefinitionTarget, ...]] = {}
-    suspects = definitions
-    if len(files) == 1 and files[0] not in imported_files(db, files[0]):
-        suspects = [target for group in components(definitions, may_need) if len(group) > 1 for target in group]
     for group in components(suspects, needs):
         if len(group) > 1:
             ordered = tuple(sorted(group, key=place.__getitem__))
@@ -122,16 +121,50 @@ def _definition_groups(db: Database, files: tuple[str, ...]) -> Mapping[Definiti
     return table
 
 
-@query
-def _mentioned(db: Database, file: str, name: str) -> tuple[str, ...]:
-    """The other definitions of a file whose names occur as words in the text of one."""
-    text = chunk_text(db, file, name)
-    return () if text is None else tuple(sorted(_names_in(db, file).intersection(_WORD.findall(text)) - {name}))
+def _suspects(db: Database, file: str) -> list[str]:
+    """The definitions of a file that mention each other in a circle, in the order of the text."""
+    defined = names(db, file)
+    mentioned = dict(item for run in runs(defined) for item in _mentioned(db, file, run))
+    groups = components(defined, mentioned.__getitem__)
+    circles = {name for group in groups if len(group) > 1 for name in group}
+    return [name for name in defined if name in circles]
+
+
+@query(keep=2048)
+def _mentioned(db: Database, file: str, run: tuple[str, ...]) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """Of some neighbouring definitions of a file the others whose names occur as words in their texts."""
+    found, known = [], _names_in(db, file)
+    for name in run:
+        text = chunk_text(db, file, name)
+        words = frozenset[str]() if text is None else _words(db, text)
+        found.append((name, tuple(sorted(known.intersection(words) - {name}))))
+    return tuple(found)
+
+
+@query(keep=1024)
+def _words(db: Database, text: str) -> frozenset[str]:
+    """The words in a chunk: which of them are names of definitions changes more often than they do."""
+    return frozenset(_WORD.findall(text))
 
 
 @query
 def _names_in(db: Database, file: str) -> frozenset[str]:
     return frozenset(names(db, file))
+
+
+def runs(names: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
+    """Names in runs of a few; where one ends hangs on its names alone, so that a new definition changes one or two.
+
+    At every keystroke the same is asked of all definitions of a file: a run of them that shares what it hangs on is
+    asked once.
+    """
+    start = 0
+    for index, name in enumerate(names, 1):
+        if index - start == MOST_OF_RUN or crc32(name.encode("utf-8", "surrogatepass")) % RUN == 0:
+            yield names[start:index]
+            start = index
+    if start < len(names):
+        yield names[start:]
 
 
 def components(starts: Iterable[N], needs: Callable[[N], Iterable[N]]) -> list[list[N]]:

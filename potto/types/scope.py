@@ -18,7 +18,7 @@ from potto.modules.hints import did_you_mean, elsewhere, known_elsewhere, near_n
 from potto.modules.lookup import Defined, DefinitionTarget, find_module, meaning, preludes, resolve_module
 from potto.modules.texts import imports, names
 from potto.primitives import PRIMITIVES
-from potto.query import Database
+from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import nodes
 from potto.types.interface import Interface
@@ -141,7 +141,7 @@ def undefined(outside: Outside, scope: Iterable[str], node: nodes.Name) -> Diagn
             label="only at the top of a script",
             help="write `print(…)` at the top of a script, in a line of its own",
         )
-    near = near_names(name, (*scope, *_file_names(outside), *builtin_names()))
+    near = near_names(name, (*near_names(name, scope), *_near_at_top(outside.db, outside.file, name)))
     help = known_elsewhere(name) or did_you_mean(near)
     module = elsewhere(outside.db, outside.file, name)
     if module is not None:
@@ -177,12 +177,19 @@ def _no_module(node: nodes.Member, what: str, help: str = "") -> Diagnostic:
     return NOT_DEFINED(node.path_span, message, label="not a module", help=help)
 
 
-def _file_names(outside: Outside) -> tuple[str, ...]:
+@query(keep=256)
+def _near_at_top(db: Database, file: str, name: str) -> tuple[str, ...]:
+    """The names at the top of a file, and the builtins, that `name` may have been meant to be. A query, since an import
+    that goes leaves the same name undefined in many definitions."""
+    return near_names(name, (*_file_names(db, file), *builtin_names()))
+
+
+def _file_names(db: Database, top: str) -> tuple[str, ...]:
     """The names at the top of a file, and behind an entry of a prompt those of the entries before."""
     found: list[str] = []
-    for file in (outside.file, *preludes(outside.db, outside.file)):
-        found += names(outside.db, file)
-        for item in imports(outside.db, file):
+    for file in (top, *preludes(db, top)):
+        found += names(db, file)
+        for item in imports(db, file):
             if isinstance(item, nodes.Import):
                 found.append(item.alias or item.module)
             else:
