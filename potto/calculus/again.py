@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 from potto.calculus.derivative import NotSmooth, partial
 from potto.calculus.dual import Differentiator, heads_of
-from potto.calculus.expand import Resolve
+from potto.calculus.expand import Resolve, named
 from potto.calculus.pivots import NoClosedForm
 from potto.core.terms import (
     ZERO,
@@ -30,8 +30,6 @@ from potto.core.terms import (
 )
 from potto.diagnostics import PottoError
 
-MOST_NAMES = 100  # that a definition may lead through
-
 
 class NoText(Exception):
     """A derivative that is not written down: says why."""
@@ -43,12 +41,7 @@ def first_derivative(term: Term, resolve: Resolve) -> Term:
     Differentiated, that is the second derivative along a curve: `dt` is the tangent of t, `ddt` that of dt.
     Raises NoText.
     """
-    at = term
-    for _ in range(MOST_NAMES):
-        known = resolve(at) if isinstance(at, Global) else None
-        if known is None:
-            break
-        at = known
+    at = named(term, resolve) if isinstance(term, Global) else term
     if not isinstance(at, Deriv):
         return at if isinstance(at, Lam) else term
     body, params = first_derivative(at.function, resolve), list[str]()

@@ -234,9 +234,9 @@ class _Walk:
     def call(self, node: App, place: _Place) -> None:
         head, groups = spine(node)
         caller = place.caller
-        dual = isinstance(head, Deriv)
+        order = 0
         while isinstance(head, Deriv):
-            head = head.function
+            head, order = head.function, order + 1
         if isinstance(head, Var) and head.name in place.functions:
             head, caller = place.functions[head.name], frozenset(self.box)
         if caller is None:
@@ -254,7 +254,7 @@ class _Walk:
             return
         known = {**place.mapping, **place.functions}
         given = tuple(tuple(_given(a, known) for a in group) for group in groups)
-        if dual:
+        for _ in range(order):
             given = tuple(tuple(_primal(a) for a in group) for group in given)
         key = (head, given, caller)
         if key in self.seen or len(self.seen) >= MOST_CALLS:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 
 from potto.calculus.boundary import at_bounds, at_surfaces, jumps, scaled, total, vanishes
 from potto.calculus.deltas import without_deltas
-from potto.calculus.derivative import partial, zero_like
+from potto.calculus.derivative import NotSmooth, partial, zero_like
 from potto.calculus.expand import Resolve, expanded, known_function
 from potto.calculus.trace import spine
 from potto.core.terms import (
@@ -218,6 +218,8 @@ class _Pass:
                 return self.sum(node)
             case Integral():
                 return self.integral(node)
+            case Delta() if self.owner.singular and any(self.found[p][1] is not ZERO for p in parts):
+                raise NotSmooth("a delta moves")
             case Const() | Global() | Lam() | Deriv() | Hole():
                 return node, ZERO
             case _:
@@ -288,7 +290,7 @@ class _Pass:
                 return self.tangents[name]
             case Deriv(function=inner):
                 known = known_function(inner, self.owner.resolve, self.owner.function)
-                return deriv(term) if known is None else self.owner.function(self.owner.function(known))
+                return deriv(term) if known is None else self.closed(self.owner.function(known))
             case App():
                 head, groups = spine(term)
                 result = self.function(head)

@@ -1,6 +1,6 @@
 """Calls carried out: a term in which known functions are replaced by what they do.
 
-Owns `expanded` and `known_function`.
+Owns `expanded`, `known_function` and `named`.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ Resolve = Callable[[Global], "Term | None"]
 Derive = Callable[[Lam], Lam]
 
 DEEPEST = 60  # calls inside calls
+MOST_NAMES = 100  # that a definition may lead through
 
 
 def expanded(term: Term, resolve: Resolve, derive: Derive | None = None) -> Term:
@@ -69,7 +70,7 @@ class _Expansion:
 def known_function(head: Term, resolve: Resolve, derive: Derive | None) -> Lam | None:
     """The function that the head of a call is, if it is known."""
     if isinstance(head, Global):
-        found = resolve(head)
+        found = named(head, resolve)
         if isinstance(found, Deriv) and derive is not None:  # a derivative that has a name
             return known_function(found, resolve, derive)
         return found if isinstance(found, Lam) else None
@@ -77,3 +78,13 @@ def known_function(head: Term, resolve: Resolve, derive: Derive | None) -> Lam |
         inner = known_function(head.function, resolve, derive)
         return None if inner is None else derive(inner)
     return head if isinstance(head, Lam) else None
+
+
+def named(name: Global, resolve: Resolve) -> Term | None:
+    """What a name stands for, through definitions that are other names."""
+    found: Term | None = name
+    for _ in range(MOST_NAMES):
+        if not isinstance(found, Global):
+            return found
+        found = resolve(found)
+    return None

@@ -102,16 +102,16 @@ def fitted(args: tuple[Term, ...], arity: int) -> tuple[Term, ...]:
     return args
 
 
-def underlying(head: Term, resolve: Resolve) -> tuple[Lam | None, bool]:
-    """The function that is called, or whose derivative is called; and whether it is the derivative."""
-    dual = False
+def underlying(head: Term, resolve: Resolve) -> tuple[Lam | None, int]:
+    """The function that is called, or whose derivative is called; and how many derivatives of it are taken."""
+    order = 0
     function: Term | None = head
     while function is not None and not isinstance(function, Lam):
         if isinstance(function, Deriv):
-            function, dual = function.function, True
+            function, order = function.function, order + 1
         else:
             function = resolve(function)
-    return function, dual
+    return function, order
 
 
 def findings(term: Term, resolve: Resolve, decide: Decide = undecided) -> tuple[Finding, ...]:
@@ -239,7 +239,7 @@ class _Search:
         self, site: CallSite, mapping: dict[str, Term], path: tuple[int, ...], calls: tuple[App, ...], depth: int
     ) -> Iterator[Finding]:
         head, before = _spine(substitute(site.head, mapping))
-        found, dual = underlying(head, self.resolve)
+        found, order = underlying(head, self.resolve)
         if found is None:
             return
         function = found
@@ -253,7 +253,7 @@ class _Search:
                 shape = shape.body
         if len(args) != len(params):
             return
-        if dual:
+        for _ in range(order):
             args = [_primal(a) for a in args]
         yield from self.term(body, dict(zip(params, args, strict=True)), path, (*calls, site.call), depth + 1)
 

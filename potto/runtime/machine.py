@@ -16,6 +16,7 @@ import numpy as np
 from potto.calculus.branch_cuts import opened
 from potto.calculus.deltas import PRODUCT_OF_DELTAS
 from potto.calculus.surfaces import uncurry
+from potto.calculus.tangents import Shape
 from potto.core.terms import (
     Branch,
     Deriv,
@@ -56,7 +57,7 @@ class Linker:
         self.held = held if held is not None else {}
         self.terms: dict[tuple[str, str], Term] = {}
         self.exactness: dict[Term, bool] = {}
-        self.placed: dict[Integral, Integral] = {}
+        self.placed: dict[tuple[Integral, tuple[Shape, ...], bool], Term] = {}
         self.constants: dict[tuple[str, str, Settings], Value] = {}
         self.duals: dict[tuple[Lam, bool], Lam] = {}
         self.reaches: dict[tuple[Term, ...], tuple[tuple[str, str, bytes], ...]] = {}
@@ -340,12 +341,19 @@ class Machine:
 
     def integral(self, term: Integral, env: dict[str, Value]) -> Value:
         from potto.runtime.integrals import integrate
-        from potto.runtime.prepare import filled, held, placed, prepared
+        from potto.runtime.prepare import filled, held, placed, prepared, shape_of
 
-        term, env = filled(term, env)
-        known = self.linker.placed.get(term)
+        def resolve(name: Global) -> Term:
+            return self.linker.term(name.module, name.name)
+
+        term, env = filled(term, env, resolve)
+        shapes = {name: shape_of(env[name]) for name in sorted(term.free)}
+        key = (term, tuple(shapes.values()), self.directions > 0)
+        known = self.linker.placed.get(key)
         if known is None:
-            known = self.linker.placed[term] = placed(term, lambda g: self.linker.term(g.module, g.name))
+            known = self.linker.placed[key] = placed(term, resolve, shapes.get, self.directions > 0)
+        if not isinstance(known, Integral):
+            return self.term(known, {n: env[n] for n in known.free})
         term = known
         if self.frozen:
             term, stopped = held(term)

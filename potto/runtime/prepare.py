@@ -7,6 +7,7 @@ conditions added up at a cost proportional to n. Owns `held` too: deltas that st
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import lru_cache
 
 from potto.calculus.deltas import without_deltas
@@ -14,7 +15,10 @@ from potto.calculus.derivative import NotSmooth
 from potto.calculus.dual import Differentiator
 from potto.calculus.expand import Resolve, expanded
 from potto.calculus.pivots import NoClosedForm
+from potto.calculus.shifted import shifted
+from potto.calculus.tangents import FUNCTION, NotShifted, Shape, Shapes
 from potto.core.terms import (
+    App,
     Branch,
     Delta,
     Deriv,
@@ -26,6 +30,7 @@ from potto.core.terms import (
     Var,
     add,
     children,
+    deriv,
     integral,
     neg,
     postorder,
@@ -34,9 +39,13 @@ from potto.core.terms import (
     sum_,
     var,
 )
-from potto.diagnostics import PottoError
-from potto.kernels.cells import Value
-from potto.runtime.functions import Closure
+from potto.diagnostics import PottoError, declare
+from potto.kernels import errors
+from potto.kernels.cells import Cell, Value
+from potto.primitives import PRIMITIVES
+from potto.runtime.functions import Closure, Derivative
+
+NOT_COUNTED = declare("P0510", "deltas of a derivative that were not found")
 
 FEW = 4  # branches that one integrand may have before its summands are integrated apart
 
@@ -58,76 +67,152 @@ def prepared(term: Integral) -> Term:
     return term
 
 
-def placed(term: Integral, resolve: Resolve) -> Integral:
+def placed(term: Integral, resolve: Resolve, shapes: Shapes, again: bool) -> Term:
     """The integral with the calls of definitions that place its deltas carried out: `delta(cond (x, y) c)`. Of a
-    derivative under it, of a function that jumps over its variables, the deltas are written out."""
-    term = _with_spikes(term, resolve)
-    nodes = postorder(term)
+    derivative under it, of a function that jumps, the deltas count (`_counted`).
+
+    shapes: how the values of free variables are built. again: whether it is to be differentiated.
+    Raises PottoError.
+    """
+    counted = _counted(term, resolve, shapes, again)
+    if not isinstance(counted, Integral):
+        return counted
+    term, nodes = counted, postorder(counted)
     if not any(isinstance(n, Delta) and any(isinstance(g, Global) for g in postorder(*n.coordinates)) for n in nodes):
         return term
     memo: dict[Term, Term] = {}
     for node in nodes:
         new = rebuild(node, tuple(memo[c] for c in children(node)))
         memo[node] = expanded(new, resolve) if isinstance(new, Delta) else new
-    found = memo[term]
-    assert isinstance(found, Integral)
-    return found
+    return memo[term]
 
 
-def filled(term: Integral, env: dict[str, Value]) -> tuple[Integral, dict[str, Value]]:
-    """With the functions in the place of those parameters whose derivatives are taken in the integrand; what they have
-    captured joins the environment under names of its own."""
-    for name in _derived_parameters(term):
-        function = env.get(name)
-        if type(function) is not Closure:
+def filled(term: Integral, env: dict[str, Value], resolve: Resolve) -> tuple[Integral, dict[str, Value]]:
+    """With the functions in the place of those parameters whose derivatives are taken in the integrand, or that take
+    derivatives themselves; what they have captured joins the environment under names of its own."""
+    reach = Reach(resolve)
+    given = {name: env[name] for name in term.free if isinstance(env[name], Closure)}
+    while given:
+        name, function = given.popitem()
+        order, primal = 0, function
+        while isinstance(primal, Derivative):
+            order, primal = order + 1, primal.primal
+        if type(primal) is not Closure or not (order or _is_derived(term, name) or reach.deltas(primal.lam)):
             continue
-        names = {captured: f"{captured}@{name}" for captured in function.captured}
-        own = substitute(function.lam, {captured: var(new) for captured, new in names.items()})
+        names = {captured: f"{captured}@{name}" for captured in primal.captured}
+        own: Term = substitute(primal.lam, {captured: var(new) for captured, new in names.items()})
+        for _ in range(order):
+            own = deriv(own)
         found = substitute(term, {name: own})
         assert isinstance(found, Integral)
         term = found
-        env = {**env, **{new: function.captured[captured] for captured, new in names.items()}}
+        joined = {new: primal.captured[captured] for captured, new in names.items()}
+        env = {**env, **joined}
+        given |= {new: value for new, value in joined.items() if isinstance(value, Closure)}
     return term, env
 
 
-@lru_cache(maxsize=4096)
-def _derived_parameters(term: Integral) -> tuple[str, ...]:
-    """The functions among the parameters whose derivatives are taken in an integrand."""
-    derived = (node.function for node in postorder(term.body) if isinstance(node, Deriv))
-    return tuple(sorted({inner.name for inner in derived if isinstance(inner, Var)} & term.free))
+def _is_derived(term: Integral, name: str) -> bool:
+    return any(isinstance(node, Deriv) and node.function is var(name) for node in postorder(term))
 
 
-def _with_spikes(term: Integral, resolve: Resolve) -> Integral:
-    """The integrand with derivatives carried out, if that brings deltas over the variables of integration.
+def shape_of(value: Value) -> Shape:
+    """How a value is built: None is a number, FUNCTION a function, a tuple has the shapes of its items."""
+    if isinstance(value, tuple):
+        return tuple(map(shape_of, value))
+    return None if isinstance(value, Cell) else FUNCTION
+
+
+def _counted(term: Integral, resolve: Resolve, shapes: Shapes, again: bool) -> Term:
+    """An equal term in which no tangent has a delta that points don't see.
 
     Kernels carry the tangents of derivatives from point to point, where a delta is nowhere: `D Real[x]` is
-    `(Real[x], Dist[x])` for what jumps. Where no such derivative is reached, the term is the same.
+    `(Real[x], Dist[x])` for what jumps. Where every jump has a closed form the deltas are written out; else the
+    integral is itself taken as a derivative (`shifted`), by numbers. For one that is to be differentiated once more
+    closed forms go first.
     """
-    if not _derives(term.body, resolve):
+    reach = Reach(resolve)
+    if not reach.deltas(term.body):
         return term
+    by_numbers = Integral in reach.derived(term.body)
+    if again or not by_numbers:
+        spelled = _with_spikes(term, reach)
+        if spelled is not None:
+            return spelled
     try:
-        body = Differentiator(resolve).carried_out(term.body)
-    except (NoClosedForm, NotSmooth, PottoError):  # of an integral in the function, whose derivative takes numbers
-        return term
+        found = shifted(term, resolve, reach.deltas, shapes)
+    except NotShifted as problem:
+        if by_numbers and not again:
+            spelled = _with_spikes(term, reach)
+            if spelled is not None:
+                return spelled
+        raise PottoError([NOT_COUNTED(
+            errors.NOWHERE, f"the deltas of a derivative under this integral were not found: {problem}",
+            help="differentiate the integral as a whole",
+        )]) from None  # fmt: skip
+    return term if found is None else found
+
+
+def _with_spikes(term: Integral, reach: Reach) -> Integral | None:
+    """The integrand with derivatives carried out; as it was if that brings no deltas over variables of integration.
+    None where some derivative has no closed form, or is of what is not known."""
+    try:
+        body = Differentiator(reach.resolve).carried_out(term.body)
+    except (NoClosedForm, NotSmooth, PottoError):
+        return None
     variables = frozenset(term.variables)
+    calls = (node for node in postorder(body) if isinstance(node, App) and node.free & variables)
+    if any(reach.deltas(call.function) for call in calls):
+        return None
     before = {node for node in postorder(term.body) if isinstance(node, Delta)}
     found = any(isinstance(n, Delta) and n not in before and n.coordinates[0].free & variables for n in postorder(body))
     return _over(term, body) if found else term
 
 
-def _derives(body: Term, resolve: Resolve) -> bool:
-    """Whether a derivative and a jump are both reached from an integrand."""
-    seen: set[Term] = set()
-    todo, kinds = [body], set[type[Term]]()
-    while todo:
-        for node in postorder(todo.pop()):
-            if isinstance(node, Global) and node not in seen:
-                seen.add(node)
-                known = resolve(node)
-                todo += [] if known is None else [known]
-            elif isinstance(node, Deriv | Branch):
-                kinds.add(type(node))
-    return kinds == {Deriv, Branch}
+class Reach:
+    """What is reached from terms, through definitions."""
+
+    def __init__(self, resolve: Resolve) -> None:
+        self.resolve = resolve
+        self.known: dict[Term, frozenset[type]] = {}
+
+    def kinds(self, term: Term) -> frozenset[type]:
+        """Deriv, Branch and Integral, where there are such terms; Prim for a builtin with a kink."""
+        found = self.known.get(term)
+        if found is None:
+            found = self.known[term] = frozenset(self._found(term))
+        return found
+
+    def derived(self, term: Term) -> frozenset[type]:
+        """What is reached from the functions that are derived; of one that is a parameter, it may be anything."""
+        found: set[type] = set()
+        for node in self._all(term):
+            if isinstance(node, Deriv):
+                found |= self.kinds(term if isinstance(node.function, Var) else node.function)
+        return frozenset(found)
+
+    def deltas(self, term: Term) -> bool:
+        """Whether something that jumps is derived, or something that bends twice."""
+        found = self.derived(term)
+        return Branch in found or found >= {Deriv, Prim}
+
+    def _all(self, term: Term) -> Iterator[Term]:
+        seen: set[Term] = set()
+        todo = [term]
+        while todo:
+            for node in postorder(todo.pop()):
+                yield node
+                if isinstance(node, Global) and node not in seen:
+                    seen.add(node)
+                    known = self.resolve(node)
+                    todo += [] if known is None else [known]
+
+    def _found(self, term: Term) -> Iterator[type]:
+        for node in self._all(term):
+            if isinstance(node, Deriv | Branch | Integral):
+                yield type(node)
+            elif isinstance(node, Prim) and PRIMITIVES[node.op].kinks(*node.args):
+                yield Prim
 
 
 @lru_cache(maxsize=1024)

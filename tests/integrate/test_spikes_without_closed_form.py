@@ -1,0 +1,135 @@
+"""Deltas of derivatives under an integral, where the function has an integral whose tangent has no closed form.
+
+H(y) is the length of [exp(z) + z - 1 > y] in [0, 1], 1 - Z(y) for Z(y) = y + 1 - W(exp(y + 1)) with Lambert's W.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import mpmath
+import pytest
+
+import potto
+
+PROGRAM = """
+def over(y, a) [y > a]
+def H(y) integral [0, 1] [exp(z) + z - 1 > y] d(z)
+def mixed(y, a) [y > a]*(1 + H(y))
+def inside(y, a) integral [0, 1] (if [y > a] then [exp(z) + z - 1 > y] else z) d(z)
+def edge(y, a) [y > H(a)]
+def pair(y, a) ([y > a]*H(y), 3*[y > 2*a])
+def points(p, q) [fst(p) + fst(q) > 1]*H(snd(p))
+def curried(c)(y) [y > c]*H(y)
+dmixed = deriv(mixed)
+renamed = dmixed
+def use(k, a) integral [0, 1] k(x, a) d(x)
+def deriving(k, a) integral [0, 1] x*snd(deriv(k)((x, 0), (a, 1))) d(x)
+def given(k, a) integral [0, 1] x*snd(k((x, 0), (a, 1))) d(x)
+def app(k, y) k(y)
+def dual(p, a) integral [0, 1] snd(deriv(mixed)((x, 0), p)) d(x)
+"""
+
+
+def h(y: mpmath.mpf) -> mpmath.mpf:
+    return mpmath.mpf(1) - (y + 1 - mpmath.lambertw(mpmath.exp(y + 1)).real)
+
+
+def slope(y: mpmath.mpf) -> mpmath.mpf:
+    z = 1 - h(y)
+    return -1 / (mpmath.exp(z) + 1)
+
+
+A = mpmath.mpf("0.4")
+M = -(1 + h(A))  # the integral over [0, 1] of the tangent of `mixed` along a
+SHIFTED: list[tuple[str, Callable[[], mpmath.mpf]]] = [
+    ("integral [0, 1] snd(deriv(mixed)((x, 0), (a, 1))) d(x)", lambda: M),
+    ("integral [0, 1] snd(dmixed((x, 0), (a, 1))) d(x)", lambda: M),
+    ("integral [0, 1] snd(renamed((x, 0), (a, 1))) d(x)", lambda: M),
+    ("integral [0, 1] snd(deriv(mixed)((x, 1), (a, 0))) d(x)", lambda: 1 + h(1)),  # mixed(1) - mixed(0)
+    ("integral [0, 1] snd(deriv(mixed)((2*x, x), (a, 0))) d(x)",
+     lambda: (1 + h(A))*A/4 + mpmath.quad(lambda y: slope(y)*y/4, [A, 2])),
+    ("integral [0, 1] snd(deriv(inside)((x, 0), (a, 1))) d(x)", lambda: 0.5 - h(A)),
+    ("integral [0, 1] snd(deriv(edge)((x, 0), (a, 1))) d(x)", lambda: -slope(A)),
+    ("integral [0, 1] (let (v, w) = deriv(pair)((x, 0), (a, 1)) in fst(w) + 2*snd(w)) d(x)", lambda: -h(A) - 12),
+    ("integral ([0, 1], [0, 1]) snd(deriv(points)(((x, y), (0, 0)), ((a, a), (1, 0)))) d(x, y)",
+     lambda: mpmath.quad(h, [0, 1])),
+    ("integral [0, 1] snd(deriv(curried)((a, 1))((x, 0))) d(x)", lambda: -h(A)),
+    ("integral [0, 1] (if [x > 0.3] then snd(deriv(mixed)((x, 0), (a, 1))) else 2) d(x)", lambda: M + 0.6),
+    ("integral [0, 1] (integral [0, x] snd(deriv(mixed)((x, 0), (a, 1)))*y d(y)) d(x)", lambda: M*A**2/2),
+    ("integral [0, 1] (integral [0, x] snd(deriv(mixed)((z, 0), (a, 1))) d(z)) d(x)", lambda: M*(1 - A)),
+    ("integral [0, 1] exp(integral [0, x] snd(deriv(mixed)((z, 0), (a, 1))) d(z)) d(x)",
+     lambda: A + (1 - A)*mpmath.exp(M)),  # no linear matter, but the inner integral is
+    ("integral (x ~ normal(0, 1)) snd(deriv(mixed)((x, 0), (a, 1))) d(x)", lambda: M*mpmath.npdf(A)),
+    ("integral [0, 1] (sum i in 1..3 (snd(deriv(mixed)((i*x, 0), (a, 1))))) d(x)", lambda: M*mpmath.mpf(11)/6),
+    (r"use(\(y, b) . snd(deriv(mixed)((y, 0), (b, 1))), a)", lambda: M),
+    (r"use(\(y, b) . integral [0, y] snd(deriv(mixed)((z, 0), (b, 1))) d(z), a)", lambda: M*(1 - A)),
+    ("deriving(mixed, a)", lambda: M*A),
+    ("given(deriv(mixed), a)", lambda: M*A),
+    ("given(renamed, a)", lambda: M*A),
+    (r"integral [0, 1] snd(deriv(app)(deriv(\y . [y > a]*H(y)), (x, 1))) d(x)", lambda: h(1)),
+    ("dual((a, 2), a)", lambda: 2*M),
+    ("integral [0, 1] (snd(deriv(H)((x, 1))))^2 d(x)", lambda: mpmath.quad(lambda y: slope(y)**2, [0, 1])),
+    ("integral [0, 1] (snd(deriv(H)((x, 1)))^2 + snd(deriv(mixed)((x, 0), (a, 1)))) d(x)",
+     lambda: mpmath.quad(lambda y: slope(y)**2, [0, 1]) + M),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("program", "expected"), SHIFTED, ids=[program for program, _ in SHIFTED])
+def test_the_deltas_count(program: str, expected: Callable[[], mpmath.mpf]) -> None:
+    got = potto.compile(f"{PROGRAM}def f(a) {program}\n").f(0.4)
+    assert abs(got.value - expected()) <= 1e-14 + got.error and got.error <= 1e-11
+
+
+@pytest.mark.parametrize(
+    ("program", "expected"),
+    [
+        # -M(a) for M = 1 + H: differentiated once more by the closed form of the jump
+        ("integral [0, 1] snd(deriv(mixed)((x, 0), (a, 1))) d(x)", lambda: -slope(A)),
+        ("deriving(mixed, a)", lambda: M - A*slope(A)),
+        (r"use(\(y, b) . integral [0, y] snd(deriv(mixed)((z, 0), (b, 1))) d(z), a)", lambda: -M - (1 - A)*slope(A)),
+    ],
+)  # fmt: skip
+def test_they_are_differentiated_in_their_turn(program: str, expected: Callable[[], mpmath.mpf]) -> None:
+    got = potto.deriv(potto.compile(f"{PROGRAM}def f(a) {program}\n").f)((0.4, 1.0))
+    assert abs(got.tangent - expected()) <= 1e-14 + got.tangent_error and got.tangent_error <= 1e-11
+
+
+def test_deltas_of_second_derivatives_count() -> None:
+    """The second derivative of [x > a] is the derivative of a delta, that of abs(x) is 2 delta(x)."""
+    m = potto.compile(r"""
+step = \y . [y > 0]
+def bend(y) abs(y)
+def slope(y) snd(deriv(bend)((y, 1)))
+def f(a) integral [-1, 1] x^2*snd(snd(deriv(deriv(step))(((x - a, 1), (1, 0))))) d(x)
+def g(a) integral [-1, 1] (x + 3)*snd(snd(deriv(deriv(bend))(((x - a, 1), (1, 0))))) d(x)
+def k(a) integral [-1, 1] (x + 3)*snd(deriv(slope)((x - a, 1))) d(x)
+""")
+    for function, value, tangent in ((m.f, -0.8, -2), (m.g, 6.8, 2), (m.k, 6.8, 2)):
+        got = potto.deriv(function)((0.4, 1.0))
+        assert abs(function(0.4).value - value) <= 1e-14
+        assert abs(got.value - value) <= 1e-14 and abs(got.tangent - tangent) <= 1e-13
+
+
+def test_what_a_function_under_two_derivatives_has_captured_moves() -> None:
+    m = potto.compile(r"def f(t) snd(deriv(\s . s^2*t^3)((2, 1)))")
+    got = potto.deriv(potto.deriv(m.f))(((1.5, 1.0), (1.0, 0.0)))
+    assert got.value == (13.5, 27.0) and got.tangent == (27.0, 36.0)  # of 4 t^3
+
+
+@pytest.mark.parametrize(
+    "program",
+    [
+        "integral [0, 1] often(2, x, a) d(x)",
+        r"integral [0, 1] snd(deriv(app)(\p . (fst(p)^2, 2*fst(p)*snd(p)), (x, 1), (a, 1))) d(x)",
+    ],
+)
+def test_what_is_not_seen_is_refused(program: str) -> None:
+    text = """
+def app(k, y, a) k(y)*[y > a]*H(y)
+def often(n, y, a) if n > 0 then often(n - 1, y, a) + snd(deriv(mixed)((y, 0), (a, 1))) else 0
+"""
+    m = potto.compile(f"{PROGRAM.replace('def app(k, y) k(y)', '')}{text}def f(a) {program}\n")
+    with pytest.raises(potto.PottoError) as caught:
+        m.f(0.4)
+    assert [d.code for d in caught.value.diagnostics] == ["P0510"]
