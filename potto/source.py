@@ -11,7 +11,10 @@ import bisect
 from dataclasses import dataclass
 from functools import cached_property
 
+from potto.quick import quick
 
+
+@quick
 @dataclass(frozen=True, slots=True, order=True)
 class Span:
     """A half-open range `[start, end)` of code points."""

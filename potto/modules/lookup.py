@@ -11,6 +11,7 @@ from __future__ import annotations
 import os.path
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from potto.modules.texts import exists, imports, names
 from potto.query import Database, query
@@ -19,9 +20,8 @@ from potto.syntax import nodes
 SUFFIXES = (".po", ".diffeo")
 
 
-@dataclass(frozen=True, slots=True)
-class DefinitionTarget:
-    """A definition of a file."""
+class DefinitionTarget(NamedTuple):
+    """A definition of a file. A tuple, as it is a key of nearly everything: those are compared ten times as fast."""
 
     file: str
     name: str

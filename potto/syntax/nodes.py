@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from potto.quick import quick
 from potto.source import Span
 from potto.syntax.type_nodes import DiffeoType as DiffeoType
 from potto.syntax.type_nodes import FunctionType as FunctionType
@@ -19,6 +20,7 @@ from potto.syntax.type_nodes import TupleType as TupleType
 from potto.syntax.type_nodes import TypeExpr as TypeExpr
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Number:
     span: Span
@@ -26,12 +28,14 @@ class Number:
     value: float
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Name:
     span: Span
     id: str
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Member:
     """`module.name`, written without blanks; `path` is the dotted module (`pkg.m`), `path_span` its place."""
@@ -43,6 +47,7 @@ class Member:
     name_span: Span
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Unary:
     span: Span
@@ -50,6 +55,7 @@ class Unary:
     operand: Expr
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Operand:
     """One further operand of a chain, with the operator in front of it."""
@@ -59,6 +65,7 @@ class Operand:
     value: Expr
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Chain:
     """`a + b - c` or `a * b / c`: left-associative operators of one precedence (`rest` is never empty)."""
@@ -68,6 +75,7 @@ class Chain:
     rest: tuple[Operand, ...]
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Power:
     span: Span
@@ -75,6 +83,7 @@ class Power:
     exponent: Expr
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Compare:
     """`a <= x < b`: a chained comparison (`rest` is never empty; ops: < <= > >= == !=)."""
@@ -84,6 +93,7 @@ class Compare:
     rest: tuple[Operand, ...]
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Logic:
     """`p and q and r` or `p or q`, flat."""
@@ -93,6 +103,7 @@ class Logic:
     operands: tuple[Expr, ...]
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Bracket:
     """The Iverson bracket `[p]`: 1 where p holds, else 0. p is a Compare, a Logic or a `not`."""
@@ -101,12 +112,14 @@ class Bracket:
     condition: Expr
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class ListLiteral:
     span: Span
     items: tuple[Expr, ...]
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Tuple:
     """`(a, b)`, two items or more."""
@@ -115,6 +128,7 @@ class Tuple:
     items: tuple[Expr, ...]
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Paren:
     """`(e)`: kept so that the formatter prints what was written."""
@@ -123,6 +137,7 @@ class Paren:
     inner: Expr
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class If:
     """`if p then a else b` or `p ? a : b`."""
@@ -134,6 +149,7 @@ class If:
     style: Literal["if", "?:"]
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Lambda:
     """`\\(x, y) . \\c . e` is two Lambdas; `\\(x, y) . c . e` is one with two groups. Each group is one call."""
@@ -143,6 +159,7 @@ class Lambda:
     body: Expr
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Argument:
     span: Span
@@ -151,6 +168,7 @@ class Argument:
     value: Expr
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Apply:
     """One group of arguments given to a function: `f(a, b)`, `f (a, b)`, `f x`. `f x y` is two Applys."""
@@ -161,6 +179,7 @@ class Apply:
     parenthesized: bool
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Interval:
     """`[lo, hi]` as the bounds of one variable of integration."""
@@ -170,6 +189,7 @@ class Interval:
     hi: Expr
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class MeasureBound:
     """`x ~ normal(m, s)` among the bounds of an integral."""
@@ -182,6 +202,7 @@ class MeasureBound:
     arguments: tuple[Expr, ...]
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Binder:
     """A variable where it is bound, here after `d`."""
@@ -190,6 +211,7 @@ class Binder:
     name: str
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Integral:
     """`integral (bounds) body d(variables)`: the first variable is the outermost."""
@@ -200,6 +222,7 @@ class Integral:
     variables: tuple[Binder, ...]
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Sum:
     """`sum i in lo..hi (body)`."""
@@ -211,6 +234,7 @@ class Sum:
     body: Expr
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Binding:
     """`name = e` or `(a, b) = e`; in a definition's block or in a `let`."""
@@ -220,6 +244,7 @@ class Binding:
     value: Expr
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Let:
     """`let a = e; (b, c) = f in body`."""
@@ -229,6 +254,7 @@ class Let:
     body: Expr
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class InlineDiffeo:
     """`diffeo(e, f)`: the condition holds where the first component is >= 0."""
@@ -237,6 +263,7 @@ class InlineDiffeo:
     components: tuple[Expr, ...]
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class ErrorExpr:
     """A place where the text could not be read as an expression. A diagnostic has said why."""
@@ -272,6 +299,7 @@ Expr = (
 # Top-level items: one per chunk
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class ImportedName:
     span: Span
@@ -281,6 +309,7 @@ class ImportedName:
     alias_span: Span | None
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class FromImport:
     """`from pkg.m import a, b as c`."""
@@ -291,6 +320,7 @@ class FromImport:
     names: tuple[ImportedName, ...]
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Import:
     """`import pkg.m` or `import pkg.m as k`."""
@@ -302,6 +332,7 @@ class Import:
     alias_span: Span | None
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Definition:
     """`def f(a, b)(c) body` (groups not empty) or `name = e` (groups empty).
@@ -319,6 +350,7 @@ class Definition:
     keyword: bool
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Inverse:
     """`inverse (u, v) . (x, y)`: the author's inverse of a diffeomorphism."""
@@ -328,6 +360,7 @@ class Inverse:
     components: tuple[Expr, ...]
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class DiffeoDefinition:
     """`diffeo name(x, y; c) = (u, v)` in a .po, or `name = \\(x, y) . \\c . (u, v)` in a .diffeo file.
@@ -349,12 +382,14 @@ class DiffeoDefinition:
     keyword: bool
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Print:
     span: Span
     arguments: tuple[Expr, ...]
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class For:
     """`for v in list: statements`."""
@@ -365,12 +400,14 @@ class For:
     body: tuple[Statement, ...]
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class ExpressionStatement:
     span: Span
     value: Expr
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class BrokenItem:
     """A chunk whose head could not be read. `name` is the best guess at what it was to define."""

@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from potto.quick import quick
 from potto.source import Span
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Parameter:
     span: Span
@@ -15,6 +17,7 @@ class Parameter:
     annotation: TypeExpr | None = None
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class RealType:
     """`Real`, `Real*` (accepts what varies) or `Real[x, y]`, `Dist[x]`."""
@@ -25,18 +28,21 @@ class RealType:
     variables: tuple[str, ...]
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class TupleType:
     span: Span
     items: tuple[TypeExpr, ...]
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class ListType:
     span: Span
     item: TypeExpr
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class FunctionType:
     """`(A, name: B) -> C`; parameters in one group."""
@@ -46,6 +52,7 @@ class FunctionType:
     result: TypeExpr
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class DiffeoType:
     """`Diffeo[2]`."""

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 
 from potto.diagnostics import Diagnostic
 from potto.modules.lookup import DefinitionTarget
+from potto.quick import quick
 from potto.source import Span
 from potto.syntax import nodes
 from potto.types import calls, conditions, flow_binders, flow_calls, flow_rules, integrals  # noqa: F401  (imported for their rules)
@@ -35,6 +36,7 @@ MAX_ROUNDS = 20
 Written = nodes.Definition | nodes.DiffeoDefinition
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Typed:
     """A name where it is bound or used inside a definition, with its type there."""

@@ -118,11 +118,12 @@ def bind(symbol: Value, actual: Value, binding: Binding, note: Step | None = Non
     """Let `actual` stand for a symbolic input. A number may stand for a pair (a dual)."""
     if note is not None and not isinstance(symbol, Abstract):
         actual = noted(actual, note)
+    if isinstance(symbol, Scalar):
+        for source in symbol.sources:
+            before = binding.values.get(source)
+            binding.values[source] = actual if before is None else join(before, actual)
+        return
     match symbol:
-        case Scalar(sources):
-            for source in sources:
-                before = binding.values.get(source)
-                binding.values[source] = actual if before is None else join(before, actual)
         case TupleValue(items):
             parts = actual.items if isinstance(actual, TupleValue) and len(actual.items) == len(items) else None
             for place, item in enumerate(items):
@@ -181,11 +182,11 @@ def _later_effects(result: Value) -> list[Effect]:
 def substitute(value: Value, binding: Binding) -> Value:
     """A value with what is bound put in."""
     values = binding.values
+    if isinstance(value, Scalar):
+        if values.keys().isdisjoint(value.sources):
+            return value
+        return _substitute_scalar(value, values)
     match value:
-        case Scalar(sources):
-            if not sources or not any(source in values for source in sources):
-                return value
-            return _substitute_scalar(value, values)
         case TupleValue(items):
             return TupleValue(tuple(substitute(item, binding) for item in items))
         case ListValue(item):
@@ -212,7 +213,7 @@ def _not_hidden(binding: Binding, inputs: tuple[Value, ...]) -> Binding:
 
 
 def _substitute_sources(sources: Sources, values: dict[Source, Value]) -> Sources:
-    if not any(source in values for source in sources):
+    if values.keys().isdisjoint(sources):
         return sources
     found: dict[Source, object] = {}
     for source, trail in sources.items():

@@ -15,7 +15,7 @@ from potto.modules.hints import did_you_mean, near_names
 from potto.primitives import PRIMITIVES
 from potto.syntax import nodes
 from potto.types import kinds
-from potto.types.context import Inference, Plan, comparison, describe, rule
+from potto.types.context import Inference, Plan, comparison, describe, mismatch, rule
 from potto.types.infer import is_known, special, strip
 from potto.types.scope import Builtin
 from potto.types.types import (
@@ -155,13 +155,16 @@ class _Filling:
         types: Sequence[Type],
     ) -> None:
         self.inference, self.node, self.groups, self.types = inference, node, groups, types
-        self.parameters = [parameter for group in groups for parameter in group]
+        self.parameters = groups[0] if len(groups) == 1 else [parameter for group in groups for parameter in group]
         self.slots: list[tuple[int, ...]] = [()] * len(self.parameters)
         self.positional = [place for place, argument in enumerate(node.arguments) if argument.name is None]
         self.spread = False
 
     def fill(self) -> bool:
         """Fill the parameters; False if that was reported to be impossible."""
+        if len(self.positional) == len(self.node.arguments) == len(self.parameters):
+            self.slots = [(place,) for place in self.positional]
+            return True
         if not self._keywords():
             return False
         if not self._pack() and not self._positions():
@@ -287,22 +290,25 @@ class _Filling:
         return function(left, rest)
 
     def _check(self) -> None:
-        inference, arguments = self.inference, self.node.arguments
         if self.spread:
             group = TupleOf(tuple(parameter.type for parameter in self.groups[0]))
-            what = f"the argument of {callee_name(self.node)}"
-            inference.give(self.types[0], group, arguments[0].value, what)
+            self._give(0, group, None)
             return
         for parameter, slot in zip(self.parameters, self.slots):
-            what = f"`{parameter.name}`" if parameter.name else "the argument"
-            what += f" of {callee_name(self.node)}"
             if len(slot) == 1:
-                inference.give(self.types[slot[0]], parameter.type, arguments[slot[0]].value, what)
+                self._give(slot[0], parameter.type, parameter.name)
             elif slot:
                 whole = resolve(parameter.type)
                 assert isinstance(whole, TupleOf)
                 for place, item in zip(slot, whole.items):
-                    inference.give(self.types[place], item, arguments[place].value, what)
+                    self._give(place, item, parameter.name)
+
+    def _give(self, place: int, expected: Type, name: str | None) -> None:
+        """Check that an argument fits what is expected of it, by the parameter of this name if it has one."""
+        if not self.inference.fits(self.types[place], expected):
+            what = f"`{name}`" if name else "the argument"
+            expr = self.node.arguments[place].value
+            self.inference.report(mismatch(self.types[place], expected, expr, f"{what} of {callee_name(self.node)}"))
 
 
 # Special forms

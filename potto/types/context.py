@@ -14,6 +14,7 @@ from typing import Any, Literal, TypeVar
 
 from potto.diagnostics import Diagnostic, Related
 from potto.modules.lookup import DefinitionTarget
+from potto.quick import quick
 from potto.source import Span
 from potto.syntax import nodes
 from potto.types import kinds
@@ -66,6 +67,7 @@ def ensure_stack() -> None:
         sys.setrecursionlimit(STACK)
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Plan:
     """Which arguments fill which parameters. Per group of the function: its slots, or None if it stays open.
@@ -134,7 +136,9 @@ class Inference:
 
     def need_number(self, type: Type, expr: nodes.Expr, where: str) -> None:
         found = resolve(type)
-        if isinstance(found, Real | Unknown | Dist) or (isinstance(found, Meta) and unify(found, REAL)):
+        if isinstance(found, Real) or (isinstance(found, Meta) and unify(found, REAL)):
+            return
+        if isinstance(found, Unknown | Dist):
             return
         self.report(_not_a_number(found, expr, where))
 
@@ -187,12 +191,8 @@ class Inference:
         if not unify(actual, expected):
             self.report(mismatch(actual, expected, expr, what))
 
-    def give(self, actual: Type, expected: Type, expr: nodes.Expr, what: str) -> None:
-        """Like `expect`, for an argument: a plain number may be given where a dual is expected."""
-        if not self._fits(actual, expected):
-            self.report(mismatch(actual, expected, expr, what))
-
-    def _fits(self, actual: Type, expected: Type) -> bool:
+    def fits(self, actual: Type, expected: Type) -> bool:
+        """Whether an argument fits what is expected: a plain number may also be given where a dual is."""
         actual, expected = resolve(actual), resolve(expected)
         if not isinstance(expected, TupleOf):
             return unify(actual, expected)
@@ -202,7 +202,7 @@ class Inference:
             self.later(lambda: self._fit_late(actual, expected))
             return True
         if isinstance(actual, TupleOf) and len(actual.items) == len(expected.items):
-            fits = [self._fits(item, other) for item, other in zip(actual.items, expected.items)]
+            fits = [self.fits(item, other) for item, other in zip(actual.items, expected.items)]
             return all(fits)
         return unify(actual, expected)
 

@@ -8,8 +8,7 @@ Rules by node are here and in `flow_calls` and `flow_binders`, registered by `wa
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -129,21 +128,17 @@ class Walk:
         if demanded:
             frame.effects.append(Effect(sink, Scalar(demanded)))
 
-    @contextmanager
-    def frame(self, inputs: Sequence[Value]) -> Iterator[Frame]:
-        """The walk inside a function. What does not concern its own inputs happens outside as well."""
-        inner = Frame(set(inputs_of(inputs)), set(ports_in(inputs)))
-        self.frames.append(inner)
-        yield inner
+    def _leave(self, frame: Frame) -> tuple[Effect, ...]:
+        """The walk inside a function has ended: its effects. What concerns inputs further out happens there as well."""
         self.frames.pop()
         kept: list[Effect] = []
-        for effect in inner.effects:
-            own, outer = _split(effect, inner)
+        for effect in frame.effects:
+            own, outer = _split(effect, frame)
             if own is not None:
                 kept.append(own)
             if outer is not None:
                 self.emit((outer,), Span(0, 0))
-        inner.effects = kept
+        return tuple(kept)
 
     # Functions
 
@@ -169,9 +164,10 @@ class Walk:
         if not groups:
             return body()
         inputs = self.inputs(groups[0])
-        with self.frame(inputs) as frame:
-            result = self.function(groups[1:], body)
-        return Closure(inputs, result, tuple(frame.effects))
+        frame = Frame(set(inputs_of(inputs)), set(ports_in(inputs)))
+        self.frames.append(frame)
+        result = self.function(groups[1:], body)
+        return Closure(inputs, result, self._leave(frame))
 
     def bindings(self, block: Sequence[nodes.Binding]) -> None:
         for binding in block:

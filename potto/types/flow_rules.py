@@ -49,11 +49,11 @@ def _paren(walk: Walk, node: nodes.Paren) -> Value:
 @walks(nodes.Name, nodes.Member)
 def _name(walk: Walk, node: nodes.Name | nodes.Member) -> Value:
     meaning = walk.inference.meanings.get(id(node))
+    if isinstance(meaning, Local):
+        value = walk.locals.get(meaning, HAZY)
+        walk.places[id(node)] = value
+        return value
     match meaning:
-        case Local():
-            value = walk.locals.get(meaning, HAZY)
-            walk.places[id(node)] = value
-            return value
         case Global(target, interface):
             return HAZY if interface.broken else walk.known(target, interface.flow)
         case Member(target):

@@ -7,6 +7,7 @@ known. Calls are in `calls`, binders of numbers (integrals, sums) in `integrals`
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 
 from potto.diagnostics import Diagnostic
 from potto.primitives import PRIMITIVES
@@ -77,10 +78,12 @@ def _member(inference: Inference, node: nodes.Member) -> Type:
 
 
 def _meant(inference: Inference, node: nodes.Name | nodes.Member, meaning: Meaning) -> Type:
+    if isinstance(meaning, Local):
+        meaning.used = True
+        return instantiate(meaning.type, meaning.generic, inference.level)
+    if isinstance(meaning, Builtin):
+        return _builtin(inference, node, meaning.name)
     match meaning:
-        case Local():
-            meaning.used = True
-            return instantiate(meaning.type, meaning.generic, inference.level)
         case Global(_, interface):
             return UNKNOWN if interface.broken else open_type(interface.type, inference.level)
         case Member(target):
@@ -89,8 +92,6 @@ def _meant(inference: Inference, node: nodes.Name | nodes.Member, meaning: Meani
             message = f"`{name}` is a module, not a value"
             inference.report(kinds.MISMATCH(node.span, message, label="a module", help=f"write `{name}.something`"))
             return UNKNOWN
-        case Builtin(name):
-            return _builtin(inference, node, name)
 
 
 def _builtin(inference: Inference, node: nodes.Name | nodes.Member, name: str) -> Type:
@@ -110,8 +111,13 @@ def _builtin(inference: Inference, node: nodes.Name | nodes.Member, name: str) -
             )
         )
         return UNKNOWN
-    primitive = PRIMITIVES[name]
-    return Function(tuple(Parameter(None, REAL) for _ in range(primitive.arity or 2)), REAL)
+    return _of_numbers(PRIMITIVES[name].arity or 2)
+
+
+@cache
+def _of_numbers(count: int) -> Function:
+    """A number for so many numbers."""
+    return Function((Parameter(None, REAL),) * count, REAL)
 
 
 # Arithmetic
@@ -288,18 +294,16 @@ def _bind_parts(inference: Inference, binding: nodes.Binding, type: Type) -> Non
 def is_known(inference: Inference, expr: nodes.Expr) -> bool:
     """Whether it is known which function this is, so that its parameters have names."""
     while True:
+        if isinstance(expr, nodes.Name) or isinstance(expr, nodes.Member):  # noqa: SIM101  (faster than a union)
+            meaning = inference.meanings.get(id(expr))
+            return meaning.known if isinstance(meaning, Local) else meaning is not None
         match expr:
             case nodes.Paren(inner=expr) | nodes.Let(body=expr):
                 continue
             case nodes.Apply(function=function):
                 expr = deriv_argument(inference, expr) or function
-            case nodes.Name() | nodes.Member():
-                meaning = inference.meanings.get(id(expr))
-                return meaning.known if isinstance(meaning, Local) else meaning is not None
-            case nodes.Lambda():
-                return True
             case _:
-                return False
+                return isinstance(expr, nodes.Lambda)
 
 
 def special(inference: Inference, expr: nodes.Expr) -> str | None:

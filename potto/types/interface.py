@@ -16,6 +16,7 @@ from typing import Any
 from potto.modules.lookup import DefinitionTarget
 from potto.types.algebra import flat, inputs_of, inputs_of_ports, join, ports_in
 from potto.types.types import (
+    REAL,
     UNKNOWN,
     Dist,
     Function,
@@ -51,6 +52,7 @@ from potto.types.values import (
     Value,
 )
 
+STARRED = Real(star=True)
 PLAIN_KINDS: tuple[SinkKind, ...] = ("condition", "jump", "sum", "equality", "declared")
 
 
@@ -166,9 +168,9 @@ class Closing:
         self._trees: dict[int, tuple[PortTree, ...]] = {}
 
     def value(self, value: Value) -> Value:
+        if isinstance(value, Scalar):
+            return self._scalar(value)
         match value:
-            case Scalar():
-                return self._scalar(value)
             case TupleValue(items):
                 return TupleValue(tuple(map(self.value, items)))
             case ListValue(item):
@@ -290,6 +292,8 @@ class Decorating:
         self.roles: dict[Source, str] = {}
 
     def type(self, type: Type, value: Value) -> Type:
+        if isinstance(value, Scalar):
+            return self._result(value) if isinstance(type, Real) else type
         if isinstance(type, Function) and isinstance(value, Choice):
             value = value.options[0]
         match type, value:
@@ -305,8 +309,6 @@ class Decorating:
                 return ListOf(self.type(item, inner))
             case TupleOf(items, dual), TupleValue(parts) if len(items) == len(parts):
                 return TupleOf(tuple(map(self.type, items, parts)), dual)
-            case Real(), Scalar():
-                return self._result(value)
             case _:
                 return type
 
@@ -330,7 +332,7 @@ class Decorating:
     def _result(self, value: Scalar) -> Type:
         if value.spikes:
             return Dist(self._over(spike.over for spike in value.spikes))
-        return Real(jumps=self._over(value.jumps)) if value.jumps else Real()
+        return Real(jumps=self._over(value.jumps)) if value.jumps else REAL
 
     def _over(self, surfaces: object) -> tuple[str, ...]:
         assert hasattr(surfaces, "__iter__")
@@ -341,9 +343,9 @@ class Decorating:
 
     def _input(self, type: Type, value: Value, still: set[Source] | None) -> Type:
         """The type of an input. `still`: the sources at which it is `Real`; None where no star is printed."""
+        if isinstance(type, Real) and isinstance(value, Scalar):
+            return REAL if still is None or not still.isdisjoint(value.sources) else STARRED
         match type, value:
-            case Real(), Scalar(sources):
-                return Real(star=still is not None and not any(source in still for source in sources))
             case TupleOf(items, dual), TupleValue(parts) if len(items) == len(parts):
                 inner = tuple(self._input(item, part, still) for item, part in zip(items, parts))
                 return TupleOf(inner, dual)

@@ -26,6 +26,7 @@ from potto.types.types import (
     resolve,
 )
 
+NUMBERS = (Real, Dist)
 MAX_LEAVES = 4096  # numbers in one tuple: beyond it a program is wrong (or hostile)
 
 
@@ -38,8 +39,8 @@ def unify(a: Type, b: Type) -> bool:
         return _bind(a, b)
     if isinstance(b, Meta):
         return _bind(b, a)
-    if isinstance(a, Real | Dist):
-        return isinstance(b, Real | Dist)
+    if isinstance(a, NUMBERS):
+        return isinstance(b, NUMBERS)
     if isinstance(a, Function):
         return isinstance(b, Function) and _unify_functions(a, b)
     if isinstance(a, TupleOf | Diffeo) and isinstance(b, TupleOf | Diffeo):
@@ -84,6 +85,9 @@ def _unify_tuples(a: TupleOf | Diffeo, b: TupleOf | Diffeo) -> bool:
 
 def _bind(meta: Meta, type: Type) -> bool:
     """Find `meta` to be `type`, unless that contains it; what `type` does not know yet sinks to the level of `meta`."""
+    if isinstance(type, NUMBERS):
+        meta.found = type
+        return True
     stack: list[Type] = [type]
     seen: set[int] = set()
     while stack:
@@ -124,16 +128,12 @@ def parts(type: Type) -> tuple[Type, ...]:
 def rebuild(type: Type, leaf: Callable[[Type], Type]) -> Type:
     """A type with every part that is no composite replaced by `leaf` of it."""
     type = resolve(type)
-    match type:
-        case TupleOf(items, dual):
-            return TupleOf(tuple(rebuild(item, leaf) for item in items), dual)
-        case ListOf(item):
-            return ListOf(rebuild(item, leaf))
-        case Function(group, result):
-            parameters = tuple(Parameter(p.name, rebuild(p.type, leaf)) for p in group)
-            return Function(parameters, rebuild(result, leaf))
-        case _:
-            return leaf(type)
+    if isinstance(type, Function):
+        parameters = tuple([Parameter(p.name, rebuild(p.type, leaf)) for p in type.parameters])
+        return Function(parameters, rebuild(type.result, leaf))
+    if isinstance(type, TupleOf):
+        return TupleOf(tuple([rebuild(item, leaf) for item in type.items]), type.dual)
+    return ListOf(rebuild(type.item, leaf)) if isinstance(type, ListOf) else leaf(type)
 
 
 def leaves(type: Type, limit: int = MAX_LEAVES) -> int:
@@ -176,7 +176,7 @@ def open_type(type: Type, level: int) -> Type:
     def leaf(part: Type) -> Type:
         if isinstance(part, Var):
             return fresh.setdefault(part.name, Meta(level))
-        return REAL if isinstance(part, Real | Dist) else part
+        return REAL if isinstance(part, NUMBERS) else part
 
     return rebuild(type, leaf)
 

@@ -15,6 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from potto.quick import quick
 from potto.source import Span
 
 SourceKind = Literal["variable", "input", "other"]  # other: the index of a sum, or what is wrong
@@ -38,6 +39,7 @@ class Source:
         return f"<{self.kind} {self.name}>"
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Step:
     """One step on the way of a dependence: a place and what happens there."""
@@ -47,6 +49,7 @@ class Step:
     argument: bool = False
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Joined:
     """A way made of two ways."""
@@ -60,6 +63,7 @@ Sources = Mapping[Source, Trail]
 Surface = frozenset[Source]
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Spike:
     """A delta: what its surface varies with, and a key that is the same for the same surface."""
@@ -68,6 +72,7 @@ class Spike:
     key: str
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Scalar:
     """A number, a truth value or anything whose inside is not known.
@@ -83,11 +88,13 @@ class Scalar:
     carriers: frozenset[Source] = frozenset()
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class TupleValue:
     items: tuple[Value, ...]
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class ListValue:
     item: Value
@@ -102,11 +109,13 @@ class Port:
     origin: object = None
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class PortTuple:
     items: tuple[PortTree, ...]
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class PortFunction:
     """A function is given: `inputs` is what it will be called with, `result` gets what it gives."""
@@ -134,6 +143,7 @@ class Sink:
     node: object = None
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Effect:
     """`value` goes to `to` when the function is called."""
@@ -142,6 +152,7 @@ class Effect:
     value: Value
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Closure:
     inputs: tuple[Value, ...]
@@ -158,6 +169,7 @@ class Abstract:
     taint: Sources = field(default_factory=dict)
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Choice:
     """One of several functions (the items of a list)."""
