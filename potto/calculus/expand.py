@@ -9,6 +9,7 @@ from collections.abc import Callable
 
 from potto.calculus.surfaces import arguments_of, uncurry
 from potto.calculus.trace import spine
+from potto.core.binders import apart
 from potto.core.terms import App, Deriv, Global, Lam, Proj, Term, children, postorder, proj, rebuild, substitute
 
 # The term of another definition: its skeleton, or all of it.
@@ -23,9 +24,10 @@ MOST_NAMES = 100  # that a definition may lead through
 def expanded(term: Term, resolve: Resolve, derive: Derive | None = None) -> Term:
     """The term with calls of known functions carried out; of derivatives too, if it is said how.
 
-    A call of a definition inside itself stays a call: how deep it goes is decided by values.
+    A call of a definition inside itself stays a call: how deep it goes is decided by values. Binders that get inside of
+    each other have names of their own.
     """
-    return _Expansion(resolve, derive).run(term, ())
+    return apart(_Expansion(resolve, derive).run(term, ()))
 
 
 class _Expansion:

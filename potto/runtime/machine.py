@@ -39,6 +39,7 @@ from potto.kernels.cells import Array, Cell, Number, Pattern, Trace, Value, pad,
 from potto.kernels.compile import Kernel, counts, kernel
 from potto.runtime.books import Books
 from potto.runtime.functions import Closure, Derivative, Paired
+from potto.runtime.reach import Reach
 from potto.settings import Settings
 
 DEEPEST_CALLS = 3000
@@ -57,6 +58,7 @@ class Linker:
         self.held = held if held is not None else {}
         self.terms: dict[tuple[str, str], Term] = {}
         self.exactness: dict[Term, bool] = {}
+        self.reach = Reach(lambda name: self.term(name.module, name.name))
         self.placed: dict[tuple[Integral, tuple[Shape, ...], bool], Term] = {}
         self.constants: dict[tuple[str, str, Settings], Value] = {}
         self.duals: dict[tuple[Lam, bool], Lam] = {}
@@ -343,15 +345,12 @@ class Machine:
         from potto.runtime.integrals import integrate
         from potto.runtime.prepare import filled, held, placed, prepared, shape_of
 
-        def resolve(name: Global) -> Term:
-            return self.linker.term(name.module, name.name)
-
-        term, env = filled(term, env, resolve)
+        term, env = filled(term, env, self.linker.reach)
         shapes = {name: shape_of(env[name]) for name in sorted(term.free)}
         key = (term, tuple(shapes.values()), self.directions > 0)
         known = self.linker.placed.get(key)
         if known is None:
-            known = self.linker.placed[key] = placed(term, resolve, shapes.get, self.directions > 0)
+            known = self.linker.placed[key] = placed(term, self.linker.reach, shapes.get, self.directions > 0)
         if not isinstance(known, Integral):
             return self.term(known, {n: env[n] for n in known.free})
         term = known

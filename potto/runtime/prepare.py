@@ -7,13 +7,12 @@ conditions added up at a cost proportional to n. Owns `held` too: deltas that st
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import lru_cache
 
 from potto.calculus.deltas import without_deltas
 from potto.calculus.derivative import NotSmooth
 from potto.calculus.dual import Differentiator
-from potto.calculus.expand import Resolve, expanded
+from potto.calculus.expand import expanded
 from potto.calculus.pivots import NoClosedForm
 from potto.calculus.shifted import shifted
 from potto.calculus.tangents import FUNCTION, NotShifted, Shape, Shapes
@@ -42,8 +41,8 @@ from potto.core.terms import (
 from potto.diagnostics import PottoError, declare
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Value
-from potto.primitives import PRIMITIVES
 from potto.runtime.functions import Closure, Derivative
+from potto.runtime.reach import Reach
 
 NOT_COUNTED = declare("P0510", "deltas of a derivative that were not found")
 
@@ -67,14 +66,14 @@ def prepared(term: Integral) -> Term:
     return term
 
 
-def placed(term: Integral, resolve: Resolve, shapes: Shapes, again: bool) -> Term:
+def placed(term: Integral, reach: Reach, shapes: Shapes, again: bool) -> Term:
     """The integral with the calls of definitions that place its deltas carried out: `delta(cond (x, y) c)`. Of a
     derivative under it, of a function that jumps, the deltas count (`_counted`).
 
     shapes: how the values of free variables are built. again: whether it is to be differentiated.
     Raises PottoError.
     """
-    counted = _counted(term, resolve, shapes, again)
+    counted = _counted(term, reach, shapes, again)
     if not isinstance(counted, Integral):
         return counted
     term, nodes = counted, postorder(counted)
@@ -83,21 +82,19 @@ def placed(term: Integral, resolve: Resolve, shapes: Shapes, again: bool) -> Ter
     memo: dict[Term, Term] = {}
     for node in nodes:
         new = rebuild(node, tuple(memo[c] for c in children(node)))
-        memo[node] = expanded(new, resolve) if isinstance(new, Delta) else new
+        memo[node] = expanded(new, reach.resolve) if isinstance(new, Delta) else new
     return memo[term]
 
 
-def filled(term: Integral, env: dict[str, Value], resolve: Resolve) -> tuple[Integral, dict[str, Value]]:
-    """With the functions in the place of those parameters whose derivatives are taken in the integrand, or that take
+def filled(term: Integral, env: dict[str, Value], reach: Reach) -> tuple[Integral, dict[str, Value]]:
+    """With the functions in the place of those parameters whose derivatives are taken in the integrand, or that lead to
     derivatives themselves; what they have captured joins the environment under names of its own."""
-    reach = Reach(resolve)
-    given = {name: env[name] for name in term.free if isinstance(env[name], Closure)}
+    given = {name: value for name in term.free if isinstance(value := env[name], Closure)}
+    derived = _derived_parameters(term) if given else ()
     while given:
         name, function = given.popitem()
-        order, primal = 0, function
-        while isinstance(primal, Derivative):
-            order, primal = order + 1, primal.primal
-        if type(primal) is not Closure or not (order or _is_derived(term, name) or reach.deltas(primal.lam)):
+        order, primal = _underived(function)
+        if type(primal) is not Closure or not (name in derived or _matters(function, reach)):
             continue
         names = {captured: f"{captured}@{name}" for captured in primal.captured}
         own: Term = substitute(primal.lam, {captured: var(new) for captured, new in names.items()})
@@ -109,11 +106,30 @@ def filled(term: Integral, env: dict[str, Value], resolve: Resolve) -> tuple[Int
         joined = {new: primal.captured[captured] for captured, new in names.items()}
         env = {**env, **joined}
         given |= {new: value for new, value in joined.items() if isinstance(value, Closure)}
+        derived = _derived_parameters(term)
     return term, env
 
 
-def _is_derived(term: Integral, name: str) -> bool:
-    return any(isinstance(node, Deriv) and node.function is var(name) for node in postorder(term))
+@lru_cache(maxsize=4096)
+def _derived_parameters(term: Integral) -> tuple[str, ...]:
+    """The functions among the parameters whose derivatives are taken in an integrand."""
+    derived = (node.function for node in postorder(term.body) if isinstance(node, Deriv))
+    return tuple(sorted({inner.name for inner in derived if isinstance(inner, Var)} & term.free))
+
+
+def _underived(function: Closure) -> tuple[int, Closure]:
+    order = 0
+    while isinstance(function, Derivative):
+        order, function = order + 1, function.primal
+    return order, function
+
+
+def _matters(function: Closure, reach: Reach) -> bool:
+    """Whether a function is a derivative of something that may jump, or leads to one."""
+    order, primal = _underived(function)
+    if reach.deltas(primal.lam) or (order and reach.kinds(primal.lam) & {Branch, Prim}):
+        return True
+    return any(_matters(value, reach) for value in primal.captured.values() if isinstance(value, Closure))
 
 
 def shape_of(value: Value) -> Shape:
@@ -123,7 +139,7 @@ def shape_of(value: Value) -> Shape:
     return None if isinstance(value, Cell) else FUNCTION
 
 
-def _counted(term: Integral, resolve: Resolve, shapes: Shapes, again: bool) -> Term:
+def _counted(term: Integral, reach: Reach, shapes: Shapes, again: bool) -> Term:
     """An equal term in which no tangent has a delta that points don't see.
 
     Kernels carry the tangents of derivatives from point to point, where a delta is nowhere: `D Real[x]` is
@@ -131,7 +147,6 @@ def _counted(term: Integral, resolve: Resolve, shapes: Shapes, again: bool) -> T
     integral is itself taken as a derivative (`shifted`), by numbers. For one that is to be differentiated once more
     closed forms go first.
     """
-    reach = Reach(resolve)
     if not reach.deltas(term.body):
         return term
     by_numbers = Integral in reach.derived(term.body)
@@ -140,7 +155,7 @@ def _counted(term: Integral, resolve: Resolve, shapes: Shapes, again: bool) -> T
         if spelled is not None:
             return spelled
     try:
-        found = shifted(term, resolve, reach.deltas, shapes)
+        found = shifted(term, reach.resolve, reach.deltas, shapes)
     except NotShifted as problem:
         if by_numbers and not again:
             spelled = _with_spikes(term, reach)
@@ -167,52 +182,6 @@ def _with_spikes(term: Integral, reach: Reach) -> Integral | None:
     before = {node for node in postorder(term.body) if isinstance(node, Delta)}
     found = any(isinstance(n, Delta) and n not in before and n.coordinates[0].free & variables for n in postorder(body))
     return _over(term, body) if found else term
-
-
-class Reach:
-    """What is reached from terms, through definitions."""
-
-    def __init__(self, resolve: Resolve) -> None:
-        self.resolve = resolve
-        self.known: dict[Term, frozenset[type]] = {}
-
-    def kinds(self, term: Term) -> frozenset[type]:
-        """Deriv, Branch and Integral, where there are such terms; Prim for a builtin with a kink."""
-        found = self.known.get(term)
-        if found is None:
-            found = self.known[term] = frozenset(self._found(term))
-        return found
-
-    def derived(self, term: Term) -> frozenset[type]:
-        """What is reached from the functions that are derived; of one that is a parameter, it may be anything."""
-        found: set[type] = set()
-        for node in self._all(term):
-            if isinstance(node, Deriv):
-                found |= self.kinds(term if isinstance(node.function, Var) else node.function)
-        return frozenset(found)
-
-    def deltas(self, term: Term) -> bool:
-        """Whether something that jumps is derived, or something that bends twice."""
-        found = self.derived(term)
-        return Branch in found or found >= {Deriv, Prim}
-
-    def _all(self, term: Term) -> Iterator[Term]:
-        seen: set[Term] = set()
-        todo = [term]
-        while todo:
-            for node in postorder(todo.pop()):
-                yield node
-                if isinstance(node, Global) and node not in seen:
-                    seen.add(node)
-                    known = self.resolve(node)
-                    todo += [] if known is None else [known]
-
-    def _found(self, term: Term) -> Iterator[type]:
-        for node in self._all(term):
-            if isinstance(node, Deriv | Branch | Integral):
-                yield type(node)
-            elif isinstance(node, Prim) and PRIMITIVES[node.op].kinks(*node.args):
-                yield Prim
 
 
 @lru_cache(maxsize=1024)
