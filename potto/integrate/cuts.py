@@ -67,9 +67,19 @@ class Meeting:
 
 
 @dataclass
+class Fold:
+    """Sections of a surface that appear, merge or turn just here, for some of the batch: `owner` (m,), place (m,)."""
+
+    cut: int
+    owner: Ints
+    x: Array
+
+
+@dataclass
 class Cuts:
     """The outcome for one variable: orientation (B,), segments, whether anything moves, edges.
 
+    brushes: edges at which only something further in changes. folds: where roots of one surface are at one place.
     conflict: cuts that coincide move differently, which is harmless only where the integrand does not jump there.
     """
 
@@ -80,6 +90,8 @@ class Cuts:
     bound_nan: Bools | None
     conflict: bool = False
     meetings: list[Meeting] = field(default_factory=list)
+    brushes: list[Edge] = field(default_factory=list)
+    folds: list[Fold] = field(default_factory=list)
 
 
 def as_array(x: Any, batch: int) -> Array:
@@ -121,6 +133,7 @@ def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, d
     t[:, 0], t[:, -1] = tl, th
     inside = np.zeros((count + 2, batch), dtype=bool)
     edges: list[Edge] = []
+    brushes: list[Edge] = []
     beyond: list[tuple[Array, bool]] = []
     for i, row in enumerate(rows, 1):
         root = as_array(row.x, batch)
@@ -137,8 +150,9 @@ def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, d
             t[d, i] = np.where(inner, speed, th[d])
         if row.turning or (row.cut >= 0 and _any_turning(plan, row)):
             beyond.append((root, True))
-        if directions and row.cut >= 0 and plan.level.cuts[row.cut].decides:
-            edges.extend(_edges(row, root, low, high, tl, th, directions, batch))
+        if directions and row.cut >= 0:
+            found = edges if plan.level.cuts[row.cut].decides else brushes
+            found.extend(_edges(row, root, low, high, tl, th, directions, batch))
     rank = np.zeros((count + 2, batch), dtype=np.int64)
     conflict = False
     if count == 1:  # in order already
@@ -146,7 +160,9 @@ def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, d
     elif count:
         x, e, t, rank, conflict = _sorted(plan, rows, x, e, t, inside)
     cuts = _pieces(x, e, t, rank, sign, beyond, edges)
-    cuts.conflict = conflict
+    cuts.conflict, cuts.brushes = conflict, brushes
+    if directions:
+        cuts.folds = _folds(plan, rows, low, high, directions, batch)
     if conflict:
         cuts.meetings = _meetings(plan, rows, inside, low.size, directions)
     return cuts
@@ -175,11 +191,30 @@ def _meetings(plan: LevelPlan, rows: list[Row], inside: Bools, batch: int, direc
     return out
 
 
+def _folds(plan: LevelPlan, rows: list[Row], low: Array, high: Array, directions: int, batch: int) -> list[Fold]:
+    """Where roots of one surface are at one place, or one on which the integrand jumps moves infinitely fast."""
+    out: list[Fold] = []
+    for i, row in enumerate(rows):
+        if row.cut < 0 or not (plan.level.cuts[row.cut].decides or row.turning or _any_turning(plan, row)):
+            continue
+        x = as_array(row.x, batch)
+        folded: Any = np.zeros(batch, dtype=bool)
+        if plan.level.cuts[row.cut].decides and any(not np.isfinite(t).all() for t in row.t if t is not None):
+            folded = ~np.isfinite(_tangents(row.t, batch, directions)).all(axis=0)
+        for other in rows[:i]:
+            if other.cut == row.cut:
+                folded = folded | (x == other.x)
+        owner = np.nonzero(folded & (x >= low) & (x <= high))[0]
+        if owner.size:
+            out.append(Fold(row.cut, owner, x[owner]))
+    return out
+
+
 def standing(cuts: Cuts) -> Cuts:
     """The same cuts, none of which moves."""
     seg = cuts.segments
     seg.ta, seg.tb = np.zeros_like(seg.ta), np.zeros_like(seg.tb)
-    return replace(cuts, moving=False, edges=[], conflict=False, meetings=[])
+    return replace(cuts, moving=False, edges=[], conflict=False, meetings=[], brushes=[], folds=[])
 
 
 def _any_turning(plan: LevelPlan, row: Row) -> bool:

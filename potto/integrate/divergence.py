@@ -15,14 +15,16 @@ import numpy as np
 from potto.integrate import maps
 from potto.integrate.forms import Totals
 from potto.integrate.pieces import Pieces, Sums
-from potto.integrate.rules import EPS
-from potto.kernels.cells import Array, Ints
+from potto.integrate.rules import EPS, gauss
+from potto.kernels.cells import Array, Bools, Ints
 
 if TYPE_CHECKING:
     from potto.integrate.work import Work
 
 # The error of a value, as a part of what is added up, from which on it is no value; that of a piece which is to blame.
 HOPELESS, BLAMED = 1e-2, 1e-3
+# How many times the errors of integrals further in an error may be that is nothing else.
+NOISE = 8.0
 # How far from an end the power is read off, in lengths of the segment (or their roots, where it is a turning point),
 # and how well that tells it from 1.
 NEAR, NEAR_TURNING = (1e-9, 1e-10, 1e-11, 0.3, 0.5, 0.8), (1e-4, 1e-5, 1e-6, 0.3, 0.5, 0.8)
@@ -43,6 +45,7 @@ def given_up(work: Work, p: Pieces, found: Totals, sums: Sums) -> Sums:
     owner = work.seg.owner[p.segment]
     errors = p.error.reshape(work.width, -1, p.segment.size)[:, 0]
     blamed = (~(errors <= BLAMED * size[:, owner]) & hopeless[:, owner]).any(axis=0)
+    blamed &= ~_noise(work, p, errors, blamed)
     grows: Any = np.zeros((work.width, work.batch, 2), dtype=bool)  # to inf, to -inf
     lost: Any = np.zeros((work.width, work.batch), dtype=bool)
     low, high = p.u0 < AT, p.u1 > 1 - AT
@@ -69,6 +72,22 @@ def given_up(work: Work, p: Pieces, found: Totals, sums: Sums) -> Sums:
     gone = ~np.isfinite(v) & hopeless
     return Sums(v, np.where(gone, np.inf, sums.e), np.where(gone[:, None], np.nan, sums.t),
                 np.where(gone[:, None], np.inf, sums.et))  # fmt: skip
+
+
+def _noise(work: Work, p: Pieces, errors: Array, blamed: Array) -> Bools:
+    """Which of the pieces err by no more than the integrals further in do, which cancel: (P,)."""
+    found: Bools = np.zeros(p.segment.size, dtype=bool)
+    index = np.nonzero(blamed)[0]
+    if work.last or not index.size:
+        return found
+    rule, seg = gauss(11), work.seg.pick(p.segment[index])
+    u, rest, du = maps.grade(p.u0[index], p.u1[index], p.end[index], rule.nodes)
+    x, dx, label = maps.points(seg, u, rest)
+    _, inner = work.values(seg, p.segment[index], maps.off_the_ends(seg, x), label, dx * du)
+    if inner is not None:
+        off = (inner @ rule.weights).reshape(work.width, -1, index.size)[:, 0]
+        found[index] = (np.isfinite(off) & (errors[:, index] <= NOISE * off)).all(axis=0)
+    return found
 
 
 def _growth(work: Work, index: Ints, high: bool) -> Array:

@@ -24,7 +24,7 @@ import numpy as np
 from potto.core.printer import format_term
 from potto.core.terms import Term
 from potto.integrate.cuts import Cuts, Edge, Meeting, as_array
-from potto.integrate.pieces import Evaluator, Sided, Sums, gather, still, take
+from potto.integrate.pieces import Evaluator, Folded, Sided, Sums, gather, still, take
 from potto.integrate.plan import LevelPlan
 from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value
 
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from potto.integrate.levels import Iteration
 
 MOST_AT_ONE_PLACE = 4
+# How far beside a bound the integral further in is looked at, twice, and what part of it may be lost across the bound.
+BESIDE, DISCONTINUITY = (1e-7, 1e-9), 1e-6
 
 
 @dataclass(frozen=True)
@@ -92,8 +94,52 @@ def count_places(
             machine.note_sided(named)
 
 
+def note_folds(number: int, level: LevelPlan, cuts: Cuts, machine: Evaluator) -> None:
+    """Say where sections of a surface appear or merge just here. At single nodes further out that is no matter."""
+    for fold in cuts.folds:
+        if number and 2 * fold.owner.size < cuts.sign.size:
+            continue
+        owner = None if number else tuple(map(int, fold.owner))
+        named = Sided(level.variable, level.level.cuts[fold.cut].surface, fold=True)
+        machine.note_fold(named, Folded(number, fold.cut, float(fold.x[0]), owner))
+
+
+def brush(
+    parent: Iteration, number: int, level: LevelPlan, cuts: Cuts, env: dict[str, Value], sides: dict[int, Mask],
+    machine: Evaluator,
+) -> None:  # fmt: skip
+    """Whether what is further in jumps at a bound on which it should only bend: a surface runs along the bound.
+
+    Looked at on both sides of the bound, with the surfaces of this variable as they are inside.
+    """
+    for edge in cuts.brushes:
+        if number and 2 * edge.owner.size < cuts.sign.size:
+            continue
+        here, inner = around(level, edge.owner, edge.x, not edge.upper, env, sides, machine)
+        frozen, size = machine.with_directions(0), edge.owner.size
+        further = parent.plan.levels[number + 1]
+        if number + 2 == len(parent.plan.levels) and not further.searched:
+            sections = frozen.evaluate(further.frame, {n: here[n] for n in further.frame.params}, None)
+            assert isinstance(sections, tuple)
+            if all(isinstance(at, Cell) and np.isfinite(at.v).all() for at in sections):
+                continue  # none of them runs along it
+        steps = []
+        with nullcontext() if machine.costs is None else machine.costs.apart():
+            for part in BESIDE:
+                aside = part * (1 + np.abs(edge.x))
+                inside, beyond = (
+                    parent.inside(number, {**here, level.variable: Cell(x)}, size, inner, frozen)[0]
+                    for x in (edge.x + aside, edge.x - aside)
+                )
+                steps.append(np.abs(inside - beyond))
+        whole = np.abs(inside) + np.abs(beyond)
+        if ((steps[1] > 0.5 * steps[0]) & (steps[1] > DISCONTINUITY * whole)).any():  # what bends would shrink
+            machine.note_degenerate(level.variable)
+
+
 def _not_known(scene: Scene, sums: Sums, owner: Ints, unknown: Bools, named: Sided) -> None:
     sums.et[:, :, owner] = np.where(unknown, np.inf, sums.et[:, :, owner])
+    assert named.surface is not None
     if named.other is None:
         where = f"{format_term(named.surface)} = 0 lies on a bound of `{scene.level.variable}`"
         scene.machine.note_unfinished(f"{where}, and beyond it the integrand is not finite")

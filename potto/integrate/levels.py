@@ -13,7 +13,7 @@ import numpy as np
 from potto.core.terms import Term
 from potto.integrate import maps
 from potto.integrate.cuts import Cuts, as_array, frame_rows, segments, standing
-from potto.integrate.edges import count_places
+from potto.integrate.edges import brush, count_places, note_folds
 from potto.integrate.maps import Segments
 from potto.integrate.pieces import Evaluator, Sums, components, gather, still, take
 from potto.integrate.plan import LevelPlan, Plan, vanishes
@@ -60,6 +60,10 @@ class Iteration:
                 sums.et = np.full_like(sums.et, np.inf)
             else:
                 count_places(self, number, level, cuts, env, outer, sums, machine)
+        if k and cuts.brushes and number + 1 < len(self.plan.levels):
+            brush(self, number, level, cuts, env, outer, machine)
+        if k and cuts.folds:
+            note_folds(number, level, cuts, machine)
         sums.v *= cuts.sign
         sums.t *= cuts.sign
         if cuts.bound_nan is not None:

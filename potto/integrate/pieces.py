@@ -20,11 +20,25 @@ from potto.kernels.errors import not_a_number
 
 @dataclass(frozen=True)
 class Sided:
-    """Why derivatives on the two sides differ: a surface lies on a bound of a variable, or on another surface."""
+    """Why derivatives on the two sides differ: a surface lies on a bound of a variable, or on another surface.
+
+    fold: or its sections along the variable appear or merge just here. Without a surface: some run along the variable.
+    """
 
     variable: str
-    surface: Term
+    surface: Term | None = None
     other: Term | None = None
+    fold: bool = False
+
+
+@dataclass(frozen=True)
+class Folded:
+    """A fold: at which variable, of which of its cuts, where, and for which of the batch; None where for all."""
+
+    number: int
+    cut: int
+    place: float
+    owner: tuple[int, ...] | None
 
 
 class Evaluator(Protocol):
@@ -48,6 +62,7 @@ class Evaluator(Protocol):
     @property
     def side(self) -> int: ...
     def note_sided(self, what: Sided) -> None: ...
+    def note_fold(self, what: Sided, where: Folded) -> None: ...
     def note_unfinished(self, reason: str) -> None: ...
     def note_degenerate(self, variable: str) -> None: ...
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 from potto.integrate import costs
 from potto.integrate.costs import Costs
-from potto.integrate.pieces import Sided
+from potto.integrate.pieces import Folded, Sided
 from potto.kernels.cells import Array, Value
 
 
@@ -76,6 +76,7 @@ class Books:
     unfinished: list[str] = field(default_factory=list)
     edges: list[tuple[Sided, Array, Array]] = field(default_factory=list)
     sided: dict[Sided, None] = field(default_factory=dict)
+    folds: dict[Sided, Folded] = field(default_factory=dict)
     methods: set[str] = field(default_factory=set)
     degenerate: set[str] = field(default_factory=set)
     second: bool = False

@@ -14,27 +14,38 @@ import numpy as np
 
 @dataclass(frozen=True)
 class OneSided:
-    """A surface lies on an edge of the domain, or on another surface that moves otherwise.
+    """A surface lies on an edge of the domain, or on another surface that moves otherwise, or folds just here.
 
-    The derivatives on the two sides of the parameters differ. other: the other surface, if there is one.
+    The derivatives on the two sides of the parameters differ, or are infinite. other: the other surface, if there is
+    one. fold: whether sections of the surface along the variable appear or merge here.
     """
 
     variable: str
-    surface: str
+    surface: str | None
     backward: Any
     forward: Any
     other: str | None = None
+    fold: bool = False
 
     def __str__(self) -> str:
+        which = f"the surface {self.surface}"
         place = f"lies on a bound of `{self.variable}`" if self.other is None else f"coincides with {self.other}"
+        if self.surface is None:
+            which, place = "surfaces", f"run along `{self.variable}`"
+        elif self.fold:
+            place = f"folds along `{self.variable}`"
+        if np.array_equal(self.backward, self.forward, equal_nan=True):
+            return f"{which} {place}: the derivative does not exist ({_number(self.forward)})"
         return (
-            f"the surface {self.surface} {place}: the one-sided derivatives differ "
+            f"{which} {place}: the one-sided derivatives differ "
             f"({_number(self.backward)} backward, {_number(self.forward)} forward)"
         )
 
 
 def _number(x: Any) -> str:
     flat = np.asarray(x, dtype=float).ravel()
+    if np.isnan(flat[:1]).any():
+        return "not known"
     return f"{flat[0]:.12g}" if flat.size == 1 else f"{flat[0]:.12g}, ..."
 
 

@@ -152,8 +152,8 @@ def _notes(books: Books) -> list[OneSided]:
     out: list[OneSided] = []
     for what, backward, forward in books.edges:
         other = None if what.other is None else f"{format_term(what.other)} = 0"
-        surface = f"{format_term(what.surface)} = 0"
-        note = OneSided(what.variable, surface, np.squeeze(backward), np.squeeze(forward), other)
+        surface = None if what.surface is None else f"{format_term(what.surface)} = 0"
+        note = OneSided(what.variable, surface, np.squeeze(backward), np.squeeze(forward), other, what.fold)
         if not any((o.surface, o.variable, o.other) == (surface, what.variable, other) for o in out):
             out.append(note)
     return out

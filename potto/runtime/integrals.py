@@ -10,8 +10,7 @@ import itertools
 import operator
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
-from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,11 +20,12 @@ from potto.core.terms import Integral, integral
 from potto.diagnostics import PottoError
 from potto.integrate.boxes import uncut
 from potto.integrate.levels import Iteration
-from potto.integrate.pieces import Sums
+from potto.integrate.pieces import Sums, still
 from potto.integrate.plan import Plan
 from potto.integrate.straight import certain
 from potto.kernels import errors
 from potto.kernels.cells import Array, Cell, Number, Value, all_arrays, map_arrays
+from potto.runtime.one_sided import beside_axes, beside_folds, from_both_sides, one_direction
 from potto.runtime.plans import Linked, link, plan_for, split_by_decisions
 
 if TYPE_CHECKING:
@@ -133,8 +133,19 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
         sums = counted(in_parts(plan, machine, plan.environment(env, linked.env), batch), plan.reaches, machine)
         if not machine.books.degenerate:
             if outermost and machine.books.sided and not machine.side:
-                from_both_sides(machine, plan, plan.environment(env, linked.env), batch, sums)
+                from_both_sides(machine, plan, plan.environment(env, linked.env), batch, sums, iterated)
+            if outermost and machine.books.folds:
+                beside_folds(machine, plan, linked, batch, sums, partial(_beside, machine, term))
             return turned_round(machine, order, linked, env, batch, sums) if outermost else sums
+    if outermost and machine.directions > 1:
+        return one_by_one(machine, term, linked, batch)
+    if outermost:
+        variable = min(machine.books.degenerate)
+        resting = link({n: still(v) for n, v in linked.env.items()})
+        values = solve(machine.with_directions(0), term, resting, resting.env, batch, False)
+        sums.v, sums.e = values.v, values.e
+        if beside_axes(machine, plan, linked, batch, sums, variable, partial(_beside, machine, term)):
+            return sums
     machine.note_unfinished(
         "surfaces run along the axes of several variables of integration at once: "
         "their boundary terms are not all counted"
@@ -143,15 +154,18 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
     return sums
 
 
-def from_both_sides(machine: Machine, plan: Plan, env: dict[str, Value], batch: int, sums: Sums) -> None:
-    """Note the one-sided derivatives of an integral in which a part has two; where the whole has one, that is it."""
-    reasons = tuple(machine.books.sided)
-    machine.books.sided.clear()
-    backward, forward = (iterated(plan, replace(machine, side=side), env, batch).t for side in (-1, 1))
-    same = np.abs(forward - backward) <= 1e-12 * (np.abs(forward) + np.abs(backward))
-    sums.t = np.where(same, forward, sums.t)
-    for what in () if same.all() else reasons:
-        machine.note_edge(what, backward, forward)
+def one_by_one(machine: Machine, term: Integral, linked: Linked, batch: int) -> Sums:
+    """The sums with each direction by itself: what runs along one variable may not move in it."""
+    parts = []
+    for d in range(machine.directions):
+        alone = link({n: one_direction(v, d) for n, v in linked.env.items()})
+        parts.append(solve(machine.with_directions(1), term, alone, alone.env, batch, True))
+    t, et = (np.concatenate([getattr(part, name) for part in parts], axis=1) for name in ("t", "et"))
+    return Sums(parts[0].v, parts[0].e, t, et)
+
+
+def _beside(machine: Machine, term: Integral, linked: Linked) -> Sums:
+    return solve(machine, term, linked, linked.env, 1, False)
 
 
 def turned_round(

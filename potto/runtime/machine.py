@@ -33,7 +33,7 @@ from potto.core.terms import (
 from potto.core.terms import Delta as DeltaTerm
 from potto.diagnostics import PottoError
 from potto.integrate.costs import Costs
-from potto.integrate.pieces import Sided, still
+from potto.integrate.pieces import Folded, Sided, still
 from potto.kernels import errors
 from potto.kernels.cells import Array, Cell, Number, Pattern, Trace, Value, pad, pattern
 from potto.kernels.compile import Kernel, counts, kernel
@@ -189,6 +189,10 @@ class Machine:
     def note_sided(self, what: Sided) -> None:
         """What an integral finds that stands in another one: how much it comes to, that one will say."""
         self.books.sided[what] = None
+
+    def note_fold(self, what: Sided, where: Folded) -> None:
+        """Where sections of a surface appear or merge: only what is beside the parameters tells about derivatives."""
+        self.books.folds.setdefault(what, where)
 
     def note_unfinished(self, reason: str) -> None:
         if reason not in self.books.unfinished:

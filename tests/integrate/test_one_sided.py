@@ -1,0 +1,107 @@
+"""Parameters at which a derivative has two sides, or none: folds, surfaces along axes and along bounds.
+
+Answers by hand: lengths and areas as functions of t on both sides of where they are asked for.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import potto
+
+INF = math.inf
+
+
+def rate(body: str, t: float = 0.0, by: float = 1.0) -> Any:
+    return potto.deriv(potto.compile(f"def f(t)\n    {body}").f)((t, by))
+
+
+FOLDS = [  # what is integrated, where, backward, forward
+    ("integral [-1, 1] [x^2 < t] d(x)", 0.0, 0.0, INF),  # 2 sqrt(t)
+    ("integral [-1, 1] [x^2 > t] d(x)", 0.0, 0.0, -INF),
+    ("integral [0, 1] [x^2 < t] d(x)", 0.0, 0.0, INF),  # and it lies on the bound
+    ("integral [0, 1] [(x - 1/2)^2 < t]*exp(x) d(x)", 0.0, 0.0, INF),
+    ("integral [-1, 1] [x^2 < t^2] d(x)", 0.0, -2.0, 2.0),  # 2 |t|
+    ("integral [-1, 1] [abs(x) < t] d(x)", 0.0, 0.0, 2.0),
+    ("integral [-1, 1] [x^4 < t] d(x)", 0.0, 0.0, INF),
+    ("integral [-1, 1] [x^3 < t] d(x)", 0.0, INF, INF),
+    ("integral [0, 3] [sin(x) > t] d(x)", 1.0, -INF, 0.0),  # pi - 2 asin(t)
+    ("integral ([-1, 1], [-1, 1]) [x^2 + y^2 < t] d(x, y)", 0.0, 0.0, math.pi),  # pi t
+    ("integral ([-1, 1], [-1, 1]) [x^2 + y^2 > t]*exp(x) d(x, y)", 0.0, 0.0, -math.pi),
+    ("integral ([-1e-150, 1e-150], [-1, 1]) [1e300*x^2 + y^2 < t] d(x, y)", 0.0, 0.0, math.pi * 1e-150),
+    ("integral ([0, 1], [-1, 1], [-1, 1]) [x^2 + z^2 < t]*y d(y, x, z)", 0.0, 0.0, math.pi / 2),
+    ("integral ([0, 1], [-1, 1]) [x^2 < t]*y d(y, x)", 0.0, 0.0, INF),
+]
+
+
+@pytest.mark.parametrize(("body", "t", "backward", "forward"), FOLDS, ids=[row[0] for row in FOLDS])
+def test_sections_that_appear_have_two_sides(body: str, t: float, backward: float, forward: float) -> None:
+    answer = rate(body, t)
+    note = answer.notes[0]
+    assert note.fold and "folds along" in str(note)
+    for found, exact in ((note.backward, backward), (note.forward, forward)):
+        assert float(found) == pytest.approx(exact, rel=1e-6, abs=0)
+
+
+def test_the_other_direction_turns_the_sides_round() -> None:
+    (note,) = rate("integral [-1, 1] [x^2 < t] d(x)", by=-1.0).notes
+    assert (float(note.backward), float(note.forward)) == (-INF, 0.0)
+
+
+SMOOTH = [  # roots at one place, and a derivative all the same
+    ("integral ([-1, 1], [0, 1]) [y > x^2 + t] d(x, y)", 0.0, -2.0),
+    ("integral ([-1, 1], [-1, 1]) [x^2 + y^2 < t^2] d(x, y)", 0.0, 0.0),  # pi t^2
+    ("integral ([-1, 1], [-1, 1], [-1, 1]) [x^2 + y^2 + z^2 < t] d(x, y, z)", 0.0, 0.0),  # t^1.5
+    ("integral ([-1, 1], [-1, 1]) [abs(x) + abs(y) < t] d(x, y)", 0.0, 0.0),  # 2 t^2
+    ("integral ([0, 1], [0, 1]) [x + y < t] d(x, y)", 0.0, 0.0),
+]
+
+
+@pytest.mark.parametrize(("body", "t", "exact"), SMOOTH, ids=[row[0] for row in SMOOTH])
+def test_where_both_sides_agree_there_is_a_derivative(body: str, t: float, exact: float) -> None:
+    answer = rate(body, t)
+    assert not answer.notes
+    assert abs(answer.tangent - exact) <= answer.tangent_error <= 1e-9
+
+
+def test_members_of_a_batch_have_sides_of_their_own() -> None:
+    f = potto.compile("def f(t)\n    integral [-1, 1] [x^2 < t]*exp(x) d(x)").f
+    answer = potto.deriv(f)((np.array([-0.1, 0.0, 0.1]), np.ones(3)))
+    exact = np.cosh(math.sqrt(0.1)) / math.sqrt(0.1)
+    assert answer.tangent[0] == 0.0 and abs(answer.tangent[2] - exact) <= answer.tangent_error[2] <= 1e-9
+    assert len(answer.notes) == 1
+
+
+def test_a_surface_that_turns_off_a_bound() -> None:
+    """t*y > x takes the triangle t/2 away for t > 0, and nothing for t < 0; at 0 it runs along the whole bound."""
+    (note,) = rate("integral ([0, 1], [0, 1]) [x - t*y > 0] d(x, y)").notes
+    assert (float(note.backward), float(note.forward)) == (0.0, pytest.approx(-0.5, rel=1e-12, abs=0))
+
+
+TURNED = "[abs(x*cos(t) + y*sin(t)) < a]*[abs(y*cos(t) - x*sin(t)) < b]"
+
+
+def test_a_rectangle_that_stands_upright() -> None:
+    """Its sides run along both axes: of x*y it is 2/3 a b (a^2 - b^2) sin(2t), and its area 4 a b."""
+    module = potto.compile(f"def f(t, a, b)\n    integral ([-1, 1], [-1, 1]) {TURNED}*(x*y + 1) d(x, y)")
+    answer = potto.grad(module.f, ["t", "a", "b"])(0.0, 0.5, 0.25)
+    exact = (4 / 3 * 0.125 * 0.1875, 1.0, 2.0)
+    for found, off, wanted in zip(answer.tangent, answer.tangent_error, exact, strict=True):
+        assert abs(found - wanted) <= off + 1e-15 and off <= 1e-7
+
+
+@pytest.mark.parametrize("t", [math.pi / 2, math.pi])
+def test_a_rectangle_that_stands_upright_but_for_rounding(t: float) -> None:
+    answer = rate(f"integral ([-1, 1], [-1, 1]) {TURNED}*x*y d(x, y)".replace("< a", "< 1/2").replace("< b", "< 1/4"), t)
+    assert abs(answer.tangent - math.cos(2 * t) / 32) <= answer.tangent_error <= 1e-7
+
+
+def test_an_odd_integrand_over_an_even_domain_is_0() -> None:
+    """What integrals further in leave is rounding: no reason to give up."""
+    f = potto.compile("def f(t)\n    integral ([-1, 1], [-1, 1]) [abs(x) < 1/2]*[abs(y) < 1/4]*x*y*t d(x, y)").f
+    answer = f(1.0)
+    assert abs(answer.value) <= answer.error <= 1e-14 and answer.converged
