@@ -96,7 +96,8 @@ def test_a_rectangle_that_stands_upright() -> None:
 
 @pytest.mark.parametrize("t", [math.pi / 2, math.pi])
 def test_a_rectangle_that_stands_upright_but_for_rounding(t: float) -> None:
-    answer = rate(f"integral ([-1, 1], [-1, 1]) {TURNED}*x*y d(x, y)".replace("< a", "< 1/2").replace("< b", "< 1/4"), t)
+    turned = TURNED.replace("< a", "< 1/2").replace("< b", "< 1/4")
+    answer = rate(f"integral ([-1, 1], [-1, 1]) {turned}*x*y d(x, y)", t)
     assert abs(answer.tangent - math.cos(2 * t) / 32) <= answer.tangent_error <= 1e-7
 
 
