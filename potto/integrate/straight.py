@@ -29,6 +29,7 @@ from potto.core.terms import (
     Var,
     children,
     postorder,
+    prim,
     rebuild,
     substitute,
     tuple_,
@@ -104,9 +105,8 @@ def straight(term: Integral, levels: Sequence[LevelPlan], inline: Resolve) -> St
     if len(nodes) > MOST_TERMS:
         return None
     surfaces = tuple(dict.fromkeys(node.surface for node in nodes if isinstance(node, Branch)))
-    without = _on_sides(body, dict.fromkeys(surfaces, True)), _on_sides(body, dict.fromkeys(surfaces, False))
     cuts = (cut for level in levels for cut in children(level.frame.body))
-    if not all(map(enclosable, (*surfaces, *without, *cuts))):
+    if not all(map(enclosable, (*surfaces, _all_sides(body), *cuts))):
         return None
     frames = tuple(level.frame for level in levels)
     free = body.free.union(*(frame.body.free for frame in frames)) - set(term.variables)
@@ -124,6 +124,17 @@ def straight(term: Integral, levels: Sequence[LevelPlan], inline: Resolve) -> St
 
 def _not_plain(level: LevelPlan) -> bool:
     return bool(level.searched or level.families or any(level.turned)) or len(level.rows) > MOST_CUTS
+
+
+def _all_sides(body: Term) -> Term:
+    """A term with everything in it that the integrand has on any of its sides."""
+    memo: dict[Term, Term] = {}
+    for node in postorder(body):
+        if isinstance(node, Branch):
+            memo[node] = prim("add", memo[node.then], memo[node.orelse])
+        else:
+            memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
+    return memo[body]
 
 
 def _on_sides(body: Term, sides: Mapping[Term, bool]) -> Term:

@@ -95,3 +95,14 @@ def test_what_cannot_be_bounded_is_integrated_all_the_same(body: str) -> None:
     with mp.workdps(40):
         off = float(abs(mp.mpf(r.value) - exact(mp.mpf(0.5))))
     assert off <= r.error + 1e-16
+
+
+def test_an_integral_on_a_side_between_others_is_integrated() -> None:
+    """Neither where all conditions hold nor where none does is there an integral."""
+    m = potto.compile("""
+def H(y) integral [0, 1] [z > y] d(z)
+def F(y, a) if [y > a] then (if [y > 0.51] then 2 else H(y)) else 0
+def f(a, s) integral [0, 1] F(x + s, a + s) d(x)
+""")
+    got = m.f(0.4937, 0.01)
+    assert abs(got.value - (0.0063 * (1 - 0.50685) + 2 * 0.5)) <= 1e-15 + got.error
