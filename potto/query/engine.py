@@ -12,6 +12,7 @@ import sys
 import threading
 from collections import defaultdict
 from collections.abc import Callable, Hashable
+from itertools import chain
 from threading import get_ident
 from typing import Any, Final, Literal
 
@@ -355,10 +356,12 @@ def leaves_of(deps: tuple[Node, ...]) -> tuple[Leaf, ...] | None:
                 widest = dep.leaves
     if not own and len(others) <= 1:
         return widest
-    found = set(own).union(*others)
-    if len(found) > LEAVES:
+    count = len(set(own).union(*others))
+    if count > LEAVES:
         return None
-    return widest if len(found) == len(widest) else tuple(found)  # most chains are straight: they share one
+    if count == len(widest):
+        return widest  # most chains are straight: they share one
+    return tuple(dict.fromkeys(chain(*others, own)))  # in the order of reading: in a set's they are verified at random
 
 
 def drop(table: dict[tuple[Hashable, ...], Memo], memos: list[Memo]) -> int:

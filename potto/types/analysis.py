@@ -8,7 +8,7 @@ walked again until they stand still (they only grow, and there are finitely many
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Set
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from potto.diagnostics import Diagnostic
 from potto.modules.lookup import DefinitionTarget
@@ -24,7 +24,7 @@ from potto.types.flow import Walk
 from potto.types.infer import bindings, returned
 from potto.types.interface import Closing, Decorating, Interface, chain_of
 from potto.types.lints import lints
-from potto.types.reasons import Reasons
+from potto.types.reasons import NO_REASONS, Reasons
 from potto.types.recursion import endless
 from potto.types.scope import Outside
 from potto.types.types import UNKNOWN, Diffeo, Dist, Function, Meta, Parameter, Real, Type, Unknown, groups_of, resolve
@@ -52,7 +52,7 @@ class Analysis:
 
     interface: Interface
     diagnostics: tuple[Diagnostic, ...]
-    reasons: Reasons = field(default_factory=Reasons)
+    reasons: Reasons = NO_REASONS
     names: tuple[Typed, ...] = ()
 
 

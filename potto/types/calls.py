@@ -271,6 +271,9 @@ class _Filling:
     def result(self, callee: Function) -> Type:
         """Check the arguments, note the plan, and give the type of the call."""
         self._check()
+        if len(self.groups) == 1:  # and so it is filled
+            self.inference.plans[id(self.node)] = Plan((tuple(self.slots),), self.spread)
+            return callee.result
         plan: list[tuple[tuple[int, ...], ...] | None] = []
         left: list[tuple[Parameter, ...]] = []
         start = 0

@@ -136,6 +136,10 @@ class _Calling:
         names = [p.name for p in self.groups[number]] if number < len(self.groups) else []
         notes: list[Step | None] = []
         for index, place in enumerate(places):
+            value = values[index]
+            if isinstance(value, Scalar) and not value.sources:  # no way leads through it
+                notes.append(None)
+                continue
             name = names[index] if index < len(names) else None
             passed = f"passed as `{name}` here" if name else f"passed to {callee_name(self.node)} here"
             notes.append(Step(self.node.arguments[place].value.span, passed, argument=True))

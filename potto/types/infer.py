@@ -125,10 +125,14 @@ def _of_numbers(count: int) -> Function:
 
 @rule(nodes.Chain)
 def _chain(inference: Inference, node: nodes.Chain) -> Type:
-    inference.number(node.first, f"the left of `{node.rest[0].op}`")
+    inference.number(node.first, _LEFT[node.rest[0].op])
     for operand in node.rest:
-        inference.number(operand.value, f"the right of `{operand.op}`")
+        inference.number(operand.value, _RIGHT[operand.op])
     return REAL
+
+
+_LEFT = {op: f"the left of `{op}`" for op in "+-*/"}
+_RIGHT = {op: f"the right of `{op}`" for op in "+-*/"}
 
 
 @rule(nodes.Power)

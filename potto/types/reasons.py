@@ -50,3 +50,6 @@ class Reasons:
 
     def given_at(self, number: int) -> Given | None:
         return next((g for g in self.given if g.number == number), None)
+
+
+NO_REASONS = Reasons()
