@@ -8,7 +8,7 @@ played through it, which shows what it demands.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from potto.types.algebra import flat, inputs_of, join, joined, jumps_of, merge, noted, ports_in, taint, then
@@ -38,22 +38,25 @@ from potto.types.values import (
 
 @dataclass
 class Binding:
-    """What stands for which symbolic input. `functions`: what is given for an input that is a function."""
+    """What stands for which symbolic input. `functions`: what is given for an input that is a function; `effects`: of
+    the function that is called."""
 
     values: dict[Source, Value] = field(default_factory=dict)
     functions: list[tuple[Value, Abstract, Step | None]] = field(default_factory=list)
     ports: set[Port] = field(default_factory=set)
     abstracts: dict[int, Value] = field(default_factory=dict)
+    effects: Sequence[Effect] = ()
 
 
 def call(function: Value, arguments: Sequence[Value], notes: Sequence[Step | None] = ()) -> tuple[Value, list[Effect]]:
     """What a function gives for one group of arguments, and what happens on the way."""
     match function:
         case Closure(inputs, result, effects):
-            binding = Binding()
+            binding = Binding(effects=effects)
             given = _regroup(len(inputs), arguments)
-            for place, (symbol, value) in enumerate(zip(inputs, given)):
-                bind(symbol, value, binding, notes[place] if place < len(notes) else None)
+            places = sorted(range(min(len(inputs), len(given))), key=lambda place: isinstance(inputs[place], Abstract))
+            for place in places:  # functions last: where they jump hangs on what they are given
+                bind(inputs[place], given[place], binding, notes[place] if place < len(notes) else None)
             return substitute(result, binding), played(effects, binding)
         case Abstract():
             return _call_abstract(function, _regroup(len(function.ports), arguments))
@@ -147,6 +150,8 @@ def _bind_function(symbol: Abstract, actual: Value, binding: Binding, note: Step
     answer: Value
     match actual:
         case Closure(inputs, result, effects):
+            if _jumps(result):
+                result = _across(result, dict(_arriving(symbol.ports, inputs, binding)))
             blank = Binding(dict.fromkeys(inputs_of(inputs), STILL))
             answer = substitute(result, blank)
             passed = _received([*effects, *_later_effects(result)], blank)
@@ -166,6 +171,59 @@ def _bind_function(symbol: Abstract, actual: Value, binding: Binding, note: Step
         _bind_function(symbol.result, answer, binding, note)
     else:
         bind(symbol.result, answer, binding, note)
+
+
+def _arriving(
+    ports: Sequence[PortTree], inputs: Sequence[Value], binding: Binding
+) -> Iterable[tuple[Source, Surface | None]]:
+    """What the inputs of a function that is passed vary with where the callee calls it; None for one that is given
+    nothing but what the callee integrates over."""
+    for tree, own in zip(ports, inputs):
+        if isinstance(tree, PortTuple) and isinstance(own, TupleValue):
+            yield from _arriving(tree.items, own.items, binding)
+        elif isinstance(tree, Port) and isinstance(own, Scalar):
+            values = [effect.value for effect in binding.effects if effect.to is tree]
+            bound = {source for value in values for source in flat(value) if source.kind == "variable"}
+            found = {source for value in values for source in flat(substitute(value, binding))} - bound
+            for source in own.sources:
+                yield source, None if bound and not found else frozenset(found)
+
+
+def _jumps(value: Value) -> bool:
+    while isinstance(value, Closure):
+        value = value.result
+    if isinstance(value, TupleValue):
+        return any(map(_jumps, value.items))
+    return isinstance(value, Scalar) and bool(value.jumps or value.spikes)
+
+
+def _across(value: Value, where: Mapping[Source, Surface | None]) -> Value:
+    """A value with its surfaces and deltas as the callee has them: gone where it integrates over them."""
+    if isinstance(value, Scalar):
+        if not (value.jumps or value.spikes):
+            return value
+        jumps = {moved for surface in value.jumps if (moved := _moved(surface, where))}
+        over = {(moved, spike.key) for spike in value.spikes if (moved := _moved(spike.over, where))}
+        spikes = frozenset(Spike(moved, key) for moved, key in over)
+        return Scalar(value.sources, frozenset(jumps), spikes, value.carriers)
+    match value:
+        case TupleValue(items):
+            return TupleValue(tuple(_across(item, where) for item in items))
+        case Closure(inputs, result, effects):
+            return Closure(inputs, _across(result, where), effects)
+        case _:
+            return value
+
+
+def _moved(surface: Surface, where: Mapping[Source, Surface | None]) -> Surface:
+    """A surface across what arrives; empty if it is integrated over."""
+    found: set[Source] = set()
+    for source in surface:
+        arrived = where.get(source, frozenset((source,)))
+        if arrived is None:
+            return frozenset()
+        found |= arrived
+    return frozenset(found)
 
 
 def _later_effects(result: Value) -> list[Effect]:

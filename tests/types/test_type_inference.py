@@ -7,6 +7,7 @@ import re
 import pytest
 from marks import FOLDER, database, local_types, type_of
 
+import potto
 from potto.syntax import parse_expression
 from potto.types import (
     Diffeo,
@@ -193,3 +194,26 @@ def test_derivative_types() -> None:
     assert format_type(derivative_type(Real(variables=("x",), jumps=("x",)))) == "(Real[x], Dist[x])"
     f = Function((Parameter("x", STAR),), Real(jumps=("x",)))
     assert format_type(derivative_type(f)) == "(dx: (Real*, Real*)) -> (Real, Dist[dx])"
+
+
+def test_a_function_that_is_passed_jumps_over_what_it_is_given() -> None:
+    """Its jumps are integrated over where the function that calls it does, or where that one's caller does."""
+    m = potto.compile(r"""
+def cover(shape) integral ([-1, 1], [-1, 1]) shape(x, y) d(x, y)
+def on(shape) cover(shape)
+def line(shape, y) integral [-1, 1] shape(x, y) d(x)
+def twice(shape, y) (integral [-1, 1] shape(x, y) d(x)) + shape(y, y)
+def app(k, y) k(y)
+def disc(r) cover(\(x, y) . [x^2 + y^2 < r])
+def passed_on(r) on(\(x, y) . [x < r])
+def plain(r) cover(\(x, y) . [r > 1]*x)
+def across(r, y) line(\(x, y) . [x + y < r], y)
+def along(r, y) line(\(x, y) . [y < r], y)
+def both(r, y) twice(\(x, y) . [x + y < r], y)
+def open(r, y) app(\y . [y < r], y)
+def closed(r) integral [0, 1] app(\y . [y < r], x) d(x)
+""")
+    number, spread = "(Real, Real)", "(Real, Dist[dr, dy])"
+    expected = {"disc": number, "passed_on": number, "plain": "(Real, Dist[dr])", "across": number, "along": spread,
+                "both": spread, "open": spread, "closed": number}  # fmt: skip
+    assert {name: str(potto.deriv(getattr(m, name)).type).partition(" -> ")[2] for name in expected} == expected
