@@ -10,15 +10,18 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from potto.quick import quick
 from potto.syntax import nodes
 from potto.syntax.nodes import Expr, Item, Node, Statement
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class _Bind:
     names: tuple[str, ...]
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class _Unbind:
     names: tuple[str, ...]

@@ -16,6 +16,7 @@ from typing import Literal
 from potto.diagnostics import Diagnostic
 from potto.modules.free import Reference, references_in
 from potto.query import Database, query
+from potto.quick import quick
 from potto.source import SourceText, Span
 from potto.syntax import Chunk, ParsedChunk, defined_name, nodes, parse_chunk, split
 
@@ -40,6 +41,7 @@ class StatementRef:
     statement: nodes.Print | nodes.For | nodes.ExpressionStatement
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Head:
     """What others need to know of a chunk without its tree. `importing` has spans relative to the chunk."""
@@ -50,6 +52,7 @@ class Head:
     importing: Importing | None = None
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Place:
     """The chunk that defines a name; `span` is the name's, relative to the chunk."""

@@ -12,6 +12,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from potto.quick import quick
 from potto.syntax.tokens import FIRST_NAME, normalized
 
 _LINE = re.compile(r"\n(?:#.*\n)*\f*([^\s])")
@@ -25,6 +26,7 @@ _INDENTED = re.compile(r"\n[^\S\n]+[^\s]")
 MOST_WASTED = 200_000
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Chunk:
     """`text` from the offset `start` of the file, without the blank lines after it."""

@@ -9,6 +9,7 @@ import re
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from potto.quick import quick
 from potto.source import Span
 
 
@@ -25,6 +26,7 @@ class Token(NamedTuple):
         return Span(self.start, self.end)
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Comment:
     """A comment from its `#` to the end of its line; `own_line` when nothing else stands on the line."""

@@ -46,6 +46,7 @@ class Typed:
     type: Type
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Analysis:
     """What is known about one definition. Its parts are read through queries, which stand still when they do."""

@@ -14,6 +14,7 @@ from functools import cache, lru_cache
 from typing import Any
 
 from potto.modules.lookup import DefinitionTarget
+from potto.quick import quick
 from potto.types.algebra import flat, inputs_of, inputs_of_ports, join, ports_in
 from potto.types.types import (
     REAL,
@@ -56,6 +57,7 @@ STARRED = Real(star=True)
 PLAIN_KINDS: tuple[SinkKind, ...] = ("condition", "jump", "sum", "equality", "declared")
 
 
+@quick
 @dataclass(frozen=True, slots=True)
 class Interface:
     """A definition as others see it.
