@@ -14,9 +14,9 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
+from potto.calculus.currying import arguments_of, groups_of, sizes_of, uncurry
 from potto.calculus.expand import DEEPEST, Resolve, expanded
 from potto.calculus.sampling import sample_value
-from potto.calculus.surfaces import arguments_of, uncurry
 from potto.calculus.trace import spine
 from potto.core.terms import (
     ONE,
@@ -250,6 +250,8 @@ class _Walk:
                 return
             name, path = head.name, (*path, head)
             function = self.skeletons(head)
+            if groups_of(function) < len(groups):  # it gives a function under another form: that is in its body alone
+                function = self.whole(head)
         if not isinstance(function, Lam):
             return
         known = {**place.mapping, **place.functions}
@@ -279,9 +281,9 @@ class _Walk:
         self, function: Lam, given: tuple[tuple[Term, ...], ...], place: _Place
     ) -> tuple[Term, dict[str, Term], dict[str, Term]] | None:
         """The callee's body with names of its own, and what its parameters stand for."""
-        params, body = uncurry(function, len(given))
+        params, body = uncurry(function, sizes_of(given))
         args = arguments_of(function, given)
-        if args is None or len(args) != len(params):
+        if len(args) != len(params):
             return None
         for arg in args:
             self.taken |= arg.free

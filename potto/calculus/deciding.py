@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from potto.calculus.surfaces import Resolve, fitted, uncurry, underlying
+from potto.calculus.currying import fitted, sizes_of, uncurry
+from potto.calculus.surfaces import Resolve, underlying
 from potto.core.terms import App, Global, If, Lam, Sum, Term, postorder
 
 
@@ -85,5 +86,5 @@ def _given(call: App, known: dict[Lam, frozenset[str]], resolve: Resolve) -> set
             if param in decides:
                 names |= arg.free
         inner = inner.body
-    params, _ = uncurry(function, len(groups))
+    params, _ = uncurry(function, sizes_of(groups))
     return names | (decides - set(params))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from potto.calculus.surfaces import arguments_of, uncurry
+from potto.calculus.currying import arguments_of, sizes_of, uncurry
 from potto.calculus.trace import spine
 from potto.core.binders import apart
 from potto.core.terms import App, Deriv, Global, Lam, Proj, Term, children, postorder, proj, rebuild, substitute
@@ -58,9 +58,9 @@ class _Expansion:
         function = known_function(head, self.resolve, self.derive)
         if function is None:
             return call
-        params, body = uncurry(function, len(groups))
+        params, body = uncurry(function, sizes_of(groups))
         args = arguments_of(function, groups)
-        if args is None or len(args) != len(params):
+        if len(args) != len(params):
             return call
         key = (function, args)
         if key not in self.known:

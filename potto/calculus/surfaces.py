@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal
 
+from potto.calculus.currying import arguments_of, groups_of, sizes_of, uncurry
 from potto.calculus.trace import CallSite, Part, Side, layout, spine
 from potto.core.terms import (
     App,
@@ -30,13 +31,10 @@ from potto.core.terms import (
     Tuple,
     children,
     const,
-    fresh,
     postorder,
     proj,
     rebuild,
-    rename_bound,
     substitute,
-    tuple_,
 )  # fmt: skip
 from potto.primitives import PRIMITIVES
 
@@ -76,32 +74,6 @@ def undecided(term: Term) -> float | None:
     return term.value if isinstance(term, Const) else None
 
 
-def uncurry(function: Lam, groups: int) -> tuple[tuple[str, ...], Term]:
-    """The parameters and the body that `groups` groups of arguments reach; fewer if the function has fewer."""
-    params, body = function.params, function.body
-    for _ in range(groups - 1):
-        if not isinstance(body, Lam):
-            break
-        clash = set(params) & set(body.params)
-        if clash:
-            names: dict[str, str] = {}
-            for name in clash:
-                names[name] = fresh(name, {*params, *body.params, *body.free, *names.values()})
-            body = rename_bound(body, names)
-            assert isinstance(body, Lam)
-        params, body = params + body.params, body.body
-    return params, body
-
-
-def fitted(args: tuple[Term, ...], arity: int) -> tuple[Term, ...]:
-    """A group of arguments as the parameters take it: one tuple for several parameters, or several for one."""
-    if len(args) == 1 and arity > 1:
-        return tuple(proj(args[0], i) for i in range(arity))
-    if arity == 1 and len(args) > 1:
-        return (tuple_(args),)
-    return args
-
-
 def underlying(head: Term, resolve: Resolve) -> tuple[Lam | None, int]:
     """The function that is called, or whose derivative is called; and how many derivatives of it are taken."""
     order = 0
@@ -135,26 +107,14 @@ def carried_out(surface: Term, resolve: Resolve, depth: int = 0) -> Term:
     return memo[surface]
 
 
-def arguments_of(function: Lam, groups: tuple[tuple[Term, ...], ...]) -> tuple[Term, ...] | None:
-    """The arguments of all groups, each group as its parameters take it; None if there are more than it has."""
-    args: list[Term] = []
-    shape: Term = function
-    for group in groups:
-        if not isinstance(shape, Lam):
-            return None
-        args.extend(fitted(group, len(shape.params)))
-        shape = shape.body
-    return tuple(args)
-
-
 def _result(call: App, resolve: Resolve, depth: int) -> Term:
     head, groups = spine(call)
     function = head if isinstance(head, Lam) else None if isinstance(head, Deriv) else resolve(head)
     if not isinstance(function, Lam):
         return call
-    params, body = uncurry(function, len(groups))
+    params, body = uncurry(function, sizes_of(groups))
     args = arguments_of(function, groups)
-    if args is None or len(args) != len(params):
+    if len(args) != len(params):
         return call
     return carried_out(substitute(body, dict(zip(params, args, strict=True))), resolve, depth + 1)
 
@@ -238,24 +198,39 @@ class _Search:
     def call(
         self, site: CallSite, mapping: dict[str, Term], path: tuple[int, ...], calls: tuple[App, ...], depth: int
     ) -> Iterator[Finding]:
-        head, before = _spine(substitute(site.head, mapping))
-        found, order = underlying(head, self.resolve)
+        found = self.called(substitute(site.head, mapping))
         if found is None:
             return
-        function = found
+        function, before, order = found
         groups = (*before, *(tuple(substitute(a, mapping) for a in group) for group in site.groups))
-        params, body = uncurry(function, len(groups))
-        args: list[Term] = []
-        shape: Lam = function
-        for group in groups:
-            args.extend(fitted(group, len(shape.params)))
-            if isinstance(shape.body, Lam):
-                shape = shape.body
+        params, body = uncurry(function, sizes_of(groups))
+        args = arguments_of(function, groups)
         if len(args) != len(params):
             return
         for _ in range(order):
-            args = [_primal(a) for a in args]
+            args = tuple(map(_primal, args))
         yield from self.term(body, dict(zip(params, args, strict=True)), path, (*calls, site.call), depth + 1)
+
+    def called(self, head: Term) -> tuple[Lam, tuple[tuple[Term, ...], ...], int] | None:
+        """What stands at the head of a call: the function, what it was given before, how many derivatives are taken.
+
+        A function that earlier calls gave in full is what these gave, as it is when the program runs.
+        """
+        head, before = _spine(head)
+        function, order = underlying(head, self.resolve)
+        while function is not None and groups_of(function) < len(before):
+            own = groups_of(function)
+            params, body = uncurry(function, sizes_of(before[:own]))
+            args = arguments_of(function, before[:own])
+            if len(args) != len(params):
+                return None
+            for _ in range(order):
+                args = tuple(map(_primal, args))
+            head, first = _spine(substitute(body, dict(zip(params, args, strict=True))))
+            before = (*first, *before[own:])
+            function, more = underlying(head, self.resolve)
+            order += more
+        return None if function is None else (function, before, order)
 
 
 _MOST_PIECES = 16

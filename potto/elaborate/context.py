@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeVar
 
-from potto.core.terms import INF, PI, Term, Tuple, fresh, global_, hole, lam, proj, var
+from potto.core.terms import INF, PI, Lam, Term, Tuple, app, fresh, global_, hole, lam, proj, var
 from potto.elaborate import builtins
 from potto.elaborate.values import Builtin, Closure, Scope, Value
 from potto.modules.builtins import is_builtin
@@ -137,7 +137,18 @@ class Elaboration:
         for group in closure.groups:
             names, scope = self.bind(group, scope)
             groups.append(names)
-        return lambdas(groups, self.as_term(self.body(closure, scope)))
+        return lambdas(groups, self.whole(self.as_term(self.body(closure, scope))))
+
+    def whole(self, term: Term) -> Term:
+        """A function that calls or names give, with parameters of its own: `\\c . f(x)(c)` for f(x). So a function has
+        as many groups of parameters as its type says, and what it does with them can be seen in it."""
+        from potto.elaborate.signatures import groups_of_term
+
+        groups = () if isinstance(term, Lam) else groups_of_term(self.db, term)
+        own = [tuple(self.fresh(slot.name or "x") for slot in group) for group in groups]
+        for names in own:
+            term = app(term, tuple(map(var, names)))
+        return lambdas(own, term)
 
     def body(self, closure: Closure, scope: Scope) -> Value:
         """The body of a function whose parameters are in scope."""

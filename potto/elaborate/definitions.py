@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from potto.core.terms import Term, hole, tuple_, var
+from potto.core.terms import App, Global, Term, hole, tuple_, var
 from potto.elaborate import binders, calls, expressions  # noqa: F401  (imported for their rules)
 from potto.elaborate.context import Elaboration, lambdas
 from potto.elaborate.values import EMPTY, Closure, Scope
@@ -70,7 +70,16 @@ def core(db: Database, file: str, name: str) -> Elaborated:
     groups = tuple(tuple(parameter.name for parameter in group) for group in item.groups)
     if groups:
         return _finished(elaboration, elaboration.as_term(Closure(groups, item.bindings, item.body, EMPTY)))
-    return _finished(elaboration, elaboration.term(item.body, elaboration.block(item.bindings, EMPTY)))
+    value = elaboration.term(item.body, elaboration.block(item.bindings, EMPTY))
+    return _finished(elaboration, elaboration.whole(value) if _is_call(value) else value)
+
+
+def _is_call(term: Term) -> bool:
+    """Whether a term is a call of a definition, not of its derivative."""
+    head = term
+    while isinstance(head, App):
+        head = head.function
+    return head is not term and isinstance(head, Global)
 
 
 @query

@@ -191,7 +191,8 @@ def derivative_parts(found: DerivativeText, conditions: Iterable[ConditionInfo] 
         if moved:
             listed = [f"- {code(where)} {_moved(by)}" for where, by in moved.items()]
             lines.append("\n".join(["**surfaces**", "", *listed]))
-    lines += [f"*{note}*" for note in found.notes]
+    told = [item.reason for item in found.integrals if item.reason]
+    lines += [f"*{note}*" for note in found.notes if not any(reason in note for reason in told)]
     return lines
 
 

@@ -40,8 +40,18 @@ def extractions(place: At) -> Iterator[Offer]:
     path = path[: place_in + 1]
     work = Extraction(place, chunk, item, path)
     yield Offer("Extract to a local name", "refactor.extract", work.local, rename_at=work.local_name_at)
-    if not isinstance(path[-1], nodes.InlineDiffeo):
+    if not isinstance(path[-1], nodes.InlineDiffeo) and not _decides(path):
         yield Offer("Extract to a definition", "refactor.extract", work.definition, rename_at=work.definition_name_at)
+
+
+def _decides(path: Sequence[Node]) -> bool:
+    """Whether an expression is a bracket that stands as a condition: a function would give a number there."""
+    inner = path[-1]
+    for node in reversed(path[:-1]):
+        if not isinstance(node, nodes.Paren | nodes.Unary | nodes.Logic):
+            return isinstance(path[-1], nodes.Bracket) and isinstance(node, nodes.If) and node.condition is inner
+        inner = node
+    return False
 
 
 def _trimmed(text: str, span: Span) -> Span:

@@ -1,6 +1,6 @@
 """Quick fixes for conditions: a plain one over a variable of integration made diffeomorphic, an inverse written down.
 
-Owns `bracket_fixes` and `inverse_fixes`.
+Owns `bracket_fixes` and `inverse_fixes`, and `judged`: what a comparison would be in brackets.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from potto.ide.explaining import diffeo_of, inverse_text
 from potto.ide.model import Change, Edit
 from potto.ide.offers import At, Offer, reads
 from potto.ide.places import ChunkAt, chunk_at
+from potto.query import Database
 from potto.source import Span
 from potto.syntax import extent, node_at, nodes, walk
 from potto.syntax.nodes import Expr
@@ -44,7 +45,7 @@ def condition_at(place: At, chunk: ChunkAt, span: Span) -> Expr | None:
             continue
         for inner in path[number + 1 :]:
             if inner is node.condition or isinstance(inner, nodes.Paren | nodes.Logic | nodes.Unary | nodes.Compare):
-                whole = _without_parentheses(node.condition)
+                whole = without_parentheses(node.condition)
                 if extent(inner) == span and whole.span.start <= span.start and span.end <= whole.span.end:
                     return whole
             else:
@@ -52,7 +53,7 @@ def condition_at(place: At, chunk: ChunkAt, span: Span) -> Expr | None:
     return None
 
 
-def _without_parentheses(expr: Expr) -> Expr:
+def without_parentheses(expr: Expr) -> Expr:
     while isinstance(expr, nodes.Paren):
         expr = expr.inner
     return expr
@@ -63,7 +64,7 @@ def _bracket(place: At, chunk: ChunkAt, condition: Expr, said: Diagnostic) -> It
     item = chunk.parsed(place.db).item
     where = "" if place.chunk is not None and chunk.start == place.chunk.start else f" in `{getattr(item, 'name', '')}`"
     equal = any(isinstance(n, nodes.Compare) and any(o.op in ("==", "!=") for o in n.rest) for n in walk(condition))
-    verdict = None if equal else _judged(place, chunk, condition)
+    verdict = None if equal else judged(place.db, chunk, condition)
     if equal or isinstance(verdict, Problem):
         return  # a bracket would only be the next mistake
     if reads(chunk, [Edit(condition.span, f"[{written}]")]) is not None:
@@ -79,30 +80,37 @@ def _bracket(place: At, chunk: ChunkAt, condition: Expr, said: Diagnostic) -> It
 
 def completed_diffeo(place: At, chunk: ChunkAt, condition: Expr) -> str | None:
     """`diffeo(…)` for a comparison over variables of integration, with the coordinates that complete it."""
-    verdict = _judged(place, chunk, condition)
+    verdict = judged(place.db, chunk, condition)
     if not isinstance(verdict, tuple):
         return None
     shown = [format_term(simplify(part)) for part in verdict]
     return f"diffeo({', '.join(shown)})"
 
 
-def _judged(place: At, chunk: ChunkAt, condition: Expr) -> tuple[Term, ...] | Problem | None:
+def judged(db: Database, chunk: ChunkAt, condition: Expr) -> tuple[Term, ...] | Problem | None:
     """The coordinates of a comparison over variables of integration, completed, or why there are none; None for what is
     no comparison over them."""
-    if not isinstance(condition, nodes.Compare) or len(condition.rest) != 1:
+    term = compared(db, chunk, condition)
+    if term is None:
         return None
-    visible = [binder for _, binder in chunk.index(place.db).visible(condition.span.start)]
-    names = [binder.name for binder in visible]
-    bracket = nodes.Bracket(condition.span, condition)
-    term = elaborate_expression(place.db, chunk.file, bracket, names).term
-    if not isinstance(term, Branch) or any(isinstance(node, Hole) for node in postorder(term)):
-        return None
+    visible = [binder for _, binder in chunk.index(db).visible(condition.span.start)]
     variables = tuple(binder.name for binder in visible if binder.kind == "variable")
     used = tuple(v for v in variables if any(v in c.free for c in term.coordinates))
     if not used:
         return None
     verdict = judge(term.coordinates, variables, {})
     return verdict if isinstance(verdict, Problem) else (*term.coordinates, *verdict.completion)
+
+
+
+def compared(db: Database, chunk: ChunkAt, condition: Expr) -> Branch | None:
+    """The branch that one comparison is in brackets; None for what is none."""
+    if not isinstance(condition, nodes.Compare) or len(condition.rest) != 1:
+        return None
+    names = [binder.name for _, binder in chunk.index(db).visible(condition.span.start)]
+    bracket = nodes.Bracket(condition.span, condition)
+    term = elaborate_expression(db, chunk.file, bracket, names).term
+    return term if isinstance(term, Branch) and not any(isinstance(n, Hole) for n in postorder(term)) else None
 
 
 def inverse_fixes(place: At, said: Diagnostic) -> Iterator[Offer]:

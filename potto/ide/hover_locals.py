@@ -202,8 +202,8 @@ def _value(db: Database, chunk: ChunkAt, span: Span, type: Type) -> list[str]:
     node, source = bound_by(db, chunk, span) or (None, "")
     parts: list[str] = []
     match node:
-        case nodes.Binding(value=value) if len(text := written(source, value)) <= LONG_VALUE:
-            parts.append(f"is {code(text)}")
+        case nodes.Binding():
+            parts += _bound_to(node, source, span)
         case nodes.Sum(lo=lo, hi=hi):
             parts.append(f"from {code(written(source, lo))} to {code(written(source, hi))}")
         case nodes.For(iterable=iterable) if len(text := written(source, iterable)) <= LONG_VALUE:
@@ -213,6 +213,21 @@ def _value(db: Database, chunk: ChunkAt, span: Span, type: Type) -> list[str]:
     if isinstance(type, Real) and type.variables:
         parts.append("varies with " + ", ".join(code(v) for v in type.variables))
     return parts
+
+
+def _bound_to(binding: nodes.Binding, source: str, span: Span) -> Iterator[str]:
+    """What a name is bound to: of several names in parentheses, the part that belongs to it."""
+    value: nodes.Expr = binding.value
+    which = ""
+    if len(binding.targets) > 1:
+        number = next((n for n, t in enumerate(binding.targets) if t.span == span), 0)
+        if isinstance(value, nodes.Tuple) and len(value.items) == len(binding.targets):
+            value = value.items[number]
+        else:
+            which = f"part {number + 1} of "
+    text = written(source, value)
+    if len(text) <= LONG_VALUE:
+        yield f"is {which}{code(text)}"
 
 
 __all__ = ["bound_by", "local_markdown", "local_type"]

@@ -1,26 +1,29 @@
 """Hover: what a word means, with its type, its derivative's type, and what the calculus knows of it.
 
-Owns `hover`. Parts: definitions and modules here, local names in `hover_locals`, formulas in `explaining`.
+Owns `hover`. Parts: definitions and modules here, local names in `hover_locals`, conditions in `hover_conditions`,
+formulas in `explaining`.
 """
 
 from __future__ import annotations
 
 import inspect
 import os.path
+import re
 
+from potto.check import definition_diagnostics
 from potto.core.printer import format_term
 from potto.core.simplify import simplify
-from potto.core.terms import Branch, Term, postorder, var
+from potto.core.terms import Branch, Term, var
 from potto.ide.documents import definition_head, documentation, module_documentation
 from potto.ide.explaining import (
     code,
     condition_infos,
-    condition_markdown,
     derivative_parts,
     derivative_text,
     diffeo_markdown,
     fence,
 )
+from potto.ide.hover_conditions import RULE, at_condition, condition_after
 from potto.ide.hover_locals import local_markdown
 from potto.ide.model import Hover
 from potto.ide.places import ChunkAt, chunk_at, word_at
@@ -39,12 +42,11 @@ from potto.measures import MEASURES, Measure
 from potto.modules import definition, names
 from potto.primitives import PRIMITIVES, Primitive
 from potto.query import Database, query
-from potto.source import Span
 from potto.syntax import nodes
-from potto.types import format_type, interface
+from potto.types import check_definition, format_type, interface
 
+_CALL = re.compile(r"\w+\([^()]*\)")  # a formula that can be a factor as it stands
 MOST_NAMES = 40  # definitions of a module that a hover lists
-RULE = "\n\n---\n\n"
 
 
 def hover(db: Database, file: str, offset: int) -> Hover | None:
@@ -55,7 +57,7 @@ def hover(db: Database, file: str, offset: int) -> Hover | None:
     chunk = chunk_at(db, file, offset)
     if chunk is None:
         return None
-    return _at_word(db, chunk, offset) or _at_condition(db, chunk, offset)
+    return _at_word(db, chunk, offset) or _at_place(db, chunk, offset)
 
 
 def symbol_markdown(db: Database, file: str, symbol: Symbol) -> str:
@@ -82,8 +84,11 @@ def definition_markdown(db: Database, file: str, name: str) -> str:
     if said:
         parts.append(said)
     found = interface(db, file, name)
+    wrong = [d for d in check_definition(db, file, name) if d.severity == "error"]
     if found.broken:
         parts.append("*This definition has errors; the type is what can be read of it.*")
+    elif wrong:
+        parts.append(f"*This definition has an error:* {wrong[0].message}")
     facts: list[str] = []
     if found.plain:
         facts.append("must not vary: " + ", ".join(code(p) for p in found.plain))
@@ -92,11 +97,19 @@ def definition_markdown(db: Database, file: str, name: str) -> str:
     item = definition(db, file, name)
     if isinstance(item, nodes.DiffeoDefinition):
         known = diffeo_markdown(db, file, name)
-        parts.append(known if known is not None else "*no diffeomorphism: the diagnostics say why*")
+        parts.append(known if known is not None else _no_diffeo(db, file, name))
     elif item is not None:
         derivative = derivative_text(db, file, name)
         parts += [] if derivative is None else derivative_parts(derivative, condition_infos(db, file, name))
     return "\n\n".join(parts)
+
+
+def _no_diffeo(db: Database, file: str, name: str) -> str:
+    """Why a definition is no diffeomorphism."""
+    wrong = next((d for d in definition_diagnostics(db, file, name) if d.severity == "error"), None)
+    if wrong is None:
+        return "**no diffeomorphism**"
+    return "\n\n".join([f"**no diffeomorphism**: {wrong.message}", *wrong.notes])
 
 
 @query
@@ -166,12 +179,8 @@ def _rule(primitive: Primitive) -> str:
     parts = []
     for name, partial in zip(builtin_parameters(primitive), primitive.partials(*arguments)):
         text = format_term(simplify(partial))
-        simple = text.isidentifier() or ("(" in text and text.index("(") > 0 and text[: text.index("(")].isidentifier())
-        whole = (
-            text
-            if (simple and text.count("(") <= 1) or any(isinstance(n, Branch) for n in postorder(partial))
-            else f"({text})"
-        )
+        bracket = isinstance(partial, Branch) and text.startswith("[")
+        whole = text if bracket or text.isidentifier() or _CALL.fullmatch(text) else f"({text})"
         parts.append(f"d{name}" if text == "1" else f"{whole}*d{name}")
     shown = ", ".join(builtin_parameters(primitive))
     return f"d {primitive.name}({shown}) = {' + '.join(parts)}"
@@ -226,44 +235,15 @@ def _at_word(db: Database, chunk: ChunkAt, offset: int) -> Hover | None:
         if derivative is not None and derivative.integrals:
             parts.insert(0, "\n\n".join(derivative_parts(derivative)))
     elif word in ("if", "then", "else", "diffeo", "and", "or", "not") and name is not None:
-        condition = _at_condition(db, chunk, offset) or _condition_after(db, chunk, name, relative)
+        condition = at_condition(db, chunk, name, relative) or condition_after(db, chunk, name, relative)
         if condition is not None:
             parts.insert(0, condition.markdown)
     return Hover(chunk.absolute(place), RULE.join(parts))
 
 
-def _condition_after(db: Database, chunk: ChunkAt, name: str, relative: int) -> Hover | None:
-    """The condition of the `if` at a place."""
-    for info in condition_infos(db, chunk.file, name):
-        if 0 <= info.span.start - relative <= 3:
-            return Hover(chunk.absolute(info.span), condition_markdown(info))
-    return None
-
-
-def _at_condition(db: Database, chunk: ChunkAt, offset: int) -> Hover | None:
-    """The innermost condition around an offset."""
-    name = owner(db, chunk)
-    relative = offset - chunk.start
-    if name is None or _in_comment(db, chunk, relative):
-        return None
-    around = [i for i in condition_infos(db, chunk.file, name) if _near(chunk.text, i.span, relative)]
-    if not around:
-        return None
-    innermost = min(around, key=lambda info: len(info.span)).span
-    shown = [condition_markdown(info) for info in around if info.span == innermost]
-    return Hover(chunk.absolute(_around(chunk.text, innermost)), RULE.join(shown))
-
-
-def _near(text: str, span: Span, at: int) -> bool:
-    around = _around(text, span)
-    return around.start <= at <= around.end
-
-
-def _around(text: str, span: Span) -> Span:
-    """A condition with the bracket around it."""
-    left = text[max(span.start - 1, 0) : span.start]
-    closed = {"[": "]", "(": ")"}.get(left, "")
-    return Span(span.start - 1, span.end + 1) if closed and text[span.end : span.end + 1] == closed else span
+def _at_place(db: Database, chunk: ChunkAt, offset: int) -> Hover | None:
+    name, relative = owner(db, chunk), offset - chunk.start
+    return None if name is None or _in_comment(db, chunk, relative) else at_condition(db, chunk, name, relative)
 
 
 def _in_comment(db: Database, chunk: ChunkAt, relative: int) -> bool:

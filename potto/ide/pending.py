@@ -144,7 +144,7 @@ def _after_parameters(text: str, name_end: int) -> int:
 
 def _call(chunk: ChunkAt, text: str, start: int, open: int, at: int) -> PendingCall:
     before = _arguments(text, open + 1, at)
-    after = _arguments(text, at, len(text), stop=True)
+    after = _arguments(text, at, len(text), _depth(text[open + 1 : at]))
     current = before[-1] + (after[0] if after else "")
     names = [found.group(1) for part in (*before[:-1], current, *after[1:]) if (found := _KEYWORD.match(part))]
     mine = _KEYWORD.match(current)
@@ -164,16 +164,17 @@ def _call(chunk: ChunkAt, text: str, start: int, open: int, at: int) -> PendingC
     )
 
 
-def _arguments(text: str, start: int, end: int, stop: bool = False) -> list[str]:
-    """The texts between commas outside of brackets; `stop`: until the parenthesis that closes the call."""
+def _arguments(text: str, start: int, end: int, inside: int | None = None) -> list[str]:
+    """The texts between commas outside of brackets; `inside`: until the parenthesis that closes the call, where so
+    many brackets of its arguments are open at the start."""
     parts: list[str] = []
-    depth, last = 0, start
+    depth, last = inside or 0, start
     for position in range(start, end):
         char = text[position]
         if char in "([":
             depth += 1
         elif char in ")]":
-            if depth == 0 and stop:
+            if depth == 0 and inside is not None:
                 end = position
                 break
             depth = max(0, depth - 1)
@@ -181,3 +182,11 @@ def _arguments(text: str, start: int, end: int, stop: bool = False) -> list[str]
             parts.append(text[last:position])
             last = position + 1
     return [*parts, text[last:end]]
+
+
+def _depth(text: str) -> int:
+    """How many brackets a text leaves open."""
+    depth = 0
+    for char in text:
+        depth = depth + 1 if char in "([" else max(0, depth - 1) if char in ")]" else depth
+    return depth

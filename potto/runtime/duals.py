@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from potto.calculus.currying import sizes_of
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Trace, Value
 from potto.runtime.functions import Closure, Derivative, Paired
@@ -31,7 +32,7 @@ def call_derivative(
     if machine.directions or isinstance(primal, Paired):
         machine.books.second = machine.books.second or machine.directions > 0
         return machine.call(dual_function(machine, primal), groups, None)
-    _, arities = machine.linker_shape(primal.lam, len(groups))
+    _, arities = machine.linker_shape(primal.lam, sizes_of(groups))
     carrying = machine.with_directions(1)
     dual_groups = tuple(
         tuple(merge(arg) for arg in fit(group, arity)) for group, arity in zip(groups, arities, strict=False)

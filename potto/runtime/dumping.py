@@ -15,11 +15,13 @@ def kernel_text(program: Program, file: str, name: str) -> str | None:
     if not isinstance(term, Lam):
         return None
     machine = program.machine(DEFAULTS).with_directions(1)
-    groups, body = 0, _body(term)
+    body = _body(term)
+    sizes: list[int] = []
     inner: Term = term
     while isinstance(inner, Lam):
-        groups, inner = groups + 1, inner.body
-    whole, _ = machine.linker_shape(term, groups)
+        sizes.append(len(inner.params))
+        inner = inner.body
+    whole, _ = machine.linker_shape(term, tuple(sizes))
     patterns = tuple(_pattern(parameter, body) for parameter in whole.params)
     return kernel(lam(whole.params, whole.body), patterns, 1, True, machine).text
 

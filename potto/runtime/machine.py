@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from potto.calculus.branch_cuts import opened
+from potto.calculus.currying import sizes_of, uncurry
 from potto.calculus.deltas import PRODUCT_OF_DELTAS
-from potto.calculus.surfaces import uncurry
 from potto.calculus.tangents import Shape
 from potto.core.terms import (
     Branch,
@@ -289,26 +289,26 @@ class Machine:
 
             return call_paired(self, function, groups, trace)
         self.enter()
-        whole, arities = self.linker_shape(function.lam, len(groups))
+        whole, arities = self.linker_shape(function.lam, sizes_of(groups))
         args = [function.captured[n] for n in sorted(function.captured)]
         for group, arity in zip(groups, arities):
             args.extend(fit(group, arity))
         value = self.run(whole, args, trace)
         self.books.depth -= 1
-        rest = groups[len(arities) :]
-        return self.call(value, rest, None) if rest else value
+        return value
 
-    def linker_shape(self, function: Lam, groups: int) -> tuple[Lam, tuple[int, ...]]:
-        """The function with captured names and as many groups of parameters as are given at once."""
-        key = (function, groups)
+    def linker_shape(self, function: Lam, sizes: tuple[int, ...]) -> tuple[Lam, tuple[int, ...]]:
+        """The function with captured names and as many groups of parameters as are given at once; with the size of
+        each group."""
+        key = (function, sizes)
         found = _shapes.get(key)
         if found is None:
-            params, body = uncurry(function, groups)
+            params, body = uncurry(function, sizes)
             arities: list[int] = []
             inner: Term = function
-            while isinstance(inner, Lam) and len(arities) < groups:
-                arities.append(len(inner.params))
-                inner = inner.body
+            for size in sizes:
+                arities.append(len(inner.params) if isinstance(inner, Lam) else size)
+                inner = inner.body if isinstance(inner, Lam) else inner
             captured = tuple(sorted(function.free))
             found = (lam(captured + params, body), tuple(arities))
             if len(_shapes) > 10_000:
@@ -367,7 +367,7 @@ class Machine:
         return integrate(self, term, env)
 
 
-_shapes: dict[tuple[Lam, int], tuple[Lam, tuple[int, ...]]] = {}
+_shapes: dict[tuple[Lam, tuple[int, ...]], tuple[Lam, tuple[int, ...]]] = {}
 
 
 def _any_inexact(values: dict[str, Value]) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from snippets import elaborated, program, term
 
-from potto.core.terms import Hole, app, const, deriv, global_, mul, proj, sub, tuple_, var
+from potto.core.terms import Hole, app, const, deriv, global_, lam, mul, proj, sub, tuple_, var
 from potto.elaborate import signature
 
 X, Y, P = var("x"), var("y"), var("p")
@@ -26,8 +26,15 @@ def test_keywords_bind_in_any_place_and_the_others_fill_in_order(call):
     assert term(DEFINED + f"def f(x, y) {call}").body is app(app(G, (const(1), X)), (Y,))
 
 
-def test_a_group_that_gets_nothing_stays_open():
-    assert term(DEFINED + "def f(x) g(1, x)").body is app(G, (const(1), X))
+def test_a_group_that_gets_nothing_becomes_a_group_of_the_caller():
+    whole = app(app(G, (const(1), X)), (var("c"),))
+    assert term(DEFINED + "def f(x) g(1, x)") is lam(("x",), lam(("c",), whole))
+    assert term(DEFINED + "def f(x) (let h = g(1, x) in h)") is lam(("x",), lam(("c",), whole))
+    given = app(app(G, (const(1), const(2))), (var("c"),))
+    assert term(DEFINED + "f = g(1, 2)") is lam(("c",), given)
+    assert term(DEFINED + "f = g") is G
+    dual = app(app(deriv(G), (P,)), (var("dc"),))
+    assert term("def g(a)(c) a - c\ndef f(p) deriv(g)(p)") is lam(("p",), lam(("dc",), dual))
 
 
 @pytest.mark.parametrize("call", ["g(1)", "g(z=1, 2)(3)", "g(1, 2, 3, 4)", "g(1, 2, a=3, b=4)", "g(c=1)", "g()"])
@@ -36,8 +43,8 @@ def test_what_does_not_fit_is_a_hole(call):
 
 
 def test_a_tuple_for_a_group_and_a_group_for_a_tuple():
-    assert term(DEFINED + "def f(p) g(p)").body is app(G, (proj(P, 0), proj(P, 1)))
-    assert term(DEFINED + "def f(x) let p = (x, 1) in g(p)").body is app(G, (X, const(1)))
+    assert term(DEFINED + "def f(p, y) g(p)(y)").body is app(app(G, (proj(P, 0), proj(P, 1))), (Y,))
+    assert term(DEFINED + "def f(x, y) let p = (x, 1) in g(p)(y)").body is app(app(G, (X, const(1))), (Y,))
     one = "def g(p) fst(p) + snd(p)\n"
     assert term(one + "def f(x) g(x, 2)").body is app(G, (tuple_((X, const(2))),))
     assert term(one + "def f(x) g((x, 2))").body is app(G, (tuple_((X, const(2))),))

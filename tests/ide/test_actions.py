@@ -137,6 +137,14 @@ def test_extract_a_definition():
     assert after == "value = 1\nextracted = 2*pi\n\ny = extracted\n"
 
 
+def test_a_bracket_that_decides_stays_in_its_place():
+    text = "def f(t)\n    integral [0, 1] (if $<[x < t]$> then x else 1) d(x)\n"
+    assert "Extract to a definition" not in fixture(text).actions()
+    assert "let value = [x < t] in (if value then x else 1)" in fixed(text, "Extract to a local name")
+    text = "def f(t)\n    integral [0, 1] (if [x < t] then $<[x > 0.5]$>*x*t else 1) d(x)\n"
+    assert "def extracted(x)\n    [x > 0.5]\n" in fixed(text, "Extract to a definition")
+
+
 def test_inline_a_local_name():
     assert fixed("def f(a)\n    $0b = a + 1\n    b*2 + b\n", "Inline `b`") == "def f(a)\n    (a + 1)*2 + (a + 1)\n"
     assert fixed("def f(a) let b = a in $0b*2\n", "Inline `b`") == "def f(a) a*2\n"
@@ -152,6 +160,9 @@ def test_complete_the_arguments_of_a_dual_call():
     assert fixed(text, "Complete the arguments of `dg`").endswith("print(dg(dc=(0, 1), dshader=deriv(shader)))\n")
     text = "def g(a, b) a*b\nprint(deriv(g)(db=2, $0))\n"
     assert fixed(text, "Complete the arguments of `dg`").endswith("print(deriv(g)(db=2, da=(0, 1)))\n")
+    text = "def g(a, b) a*b\nprint(deriv(g)(da=(0.5, $01)))\n"
+    assert fixed(text, "Complete the arguments of `dg`").endswith("print(deriv(g)(da=(0.5, 1), db=(0, 1)))\n")
+    assert not fixture("def g(a, b) a*b\nprint(deriv(g)(da=(0.5, $01), db=2))\n").actions()
 
 
 def test_imports_in_order():

@@ -236,3 +236,63 @@ def test_a_condition_without_an_inverse_in_closed_form_says_so():
     singular = "(if $0diffeo(x + y + t, 2*x + 2*y) then 1 else 0)"
     shown = fixture(f"def f(t)\n    integral ([0, 1], [0, 1]) {singular} d(x, y)\n").hover()
     assert "no diffeomorphism" in shown and "determinant is 0" in shown
+
+
+def test_plain_condition_says_what_decides_it():
+    f = fixture("def f(n, x) if n > 0 then x*f(n - 1, x) else 1\n")
+    assert f.hover("> 0") == "**plain condition**, decided by `n`: no integral jumps with it"
+
+
+def test_plain_condition_that_varies_shows_what_it_would_be_in_brackets():
+    f = fixture("def f(t)\n    integral [0, 1] (if x < t then 1 else 0) d(x)\n")
+    text = f.hover("< t")
+    assert text.startswith("**plain condition**, but it varies inside the integral")
+    assert text.endswith("In brackets it would be\n\n```potto\ndiffeo(t - x)\n```")
+    f = fixture("def f(t)\n    integral [0, 1] (if x^5 + sin(x*t) + x^2 > 0.3 then 1 else 0) d(x)\n")
+    text = f.hover("> 0.3")
+    assert "In brackets it would be\n\n**no diffeomorphism**: no inverse was found for `x^5 + sin(x*t)" in text
+
+
+def test_conditions_that_are_joined_are_not_called_plain():
+    f = fixture("def f(t)\n    integral [0, 1] ([x < t] and [x > t/2] ? 1 : 0) d(x)\n")
+    assert "plain" not in f.hover("and") and "Both conditions." in f.hover("and")
+
+
+def test_bracket_over_parameters_says_where_it_jumps():
+    f = fixture("def step(y, k) [y > 2*k]*y\n")
+    assert f.hover("> 2") == (
+        "**jump** where `y = 2*k`, moved by `y`, `k`\n\n"
+        "It is made a diffeomorphism where `step` is given something that varies."
+    )
+
+
+def test_what_has_an_error_says_which():
+    text = fixture("def f(t)\n    integral [0, 1] (if x < t then 1 else 0) d(x)\n").hover("f(")
+    assert "*This definition has an error:* this condition depends on the variable of integration `x`" in text
+    text = fixture("diffeo bad(x, y; a) = (x + y, 2*x + 2*y)\n").hover("bad")
+    assert "**no diffeomorphism**: (x + y, 2*x + 2*y) is not invertible in `x` and `y`: its determinant is 0" in text
+    assert "coordinate 2 varies only together with coordinate 1" in text
+
+
+def test_names_in_parentheses_are_bound_to_their_parts():
+    f = fixture("def f(p, c)\n    (r, g) = (c, c^2)\n    (a, b) = p\n    r + g + a + b\n")
+    assert "is `c^2`" in f.hover("g + a")
+    assert "is part 2 of `p`" in f.hover("b\n")
+
+
+@pytest.mark.parametrize(
+    ("name", "rule"),
+    [
+        ("abs", "d abs(x) = (if [x >= 0] then 1 else -1)*dx"),
+        ("clamp", " + (if [lo <= x] then [x > hi] else [lo > hi])*dhi"),
+        ("max", "d max(x, y) = [y <= x]*dx + [y > x]*dy"),
+        ("sin", "d sin(x) = cos(x)*dx"),
+    ],
+)
+def test_rules_read_as_they_are_meant(name, rule):
+    assert rule in fixture(f"y = {name}\n").hover(name)
+
+
+def test_why_a_boundary_has_no_closed_form_is_said_once():
+    text = fixture("def f(t)\n    integral [0, 1] [x^5 + sin(x*t) + x^2 > 0.3] d(x)\n").hover("f(")
+    assert text.count("which no single inverse undoes") == 1
