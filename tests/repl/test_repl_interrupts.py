@@ -67,7 +67,7 @@ def test_an_interrupt_ends_it_and_nothing_else(screen, line):
             break
     assert min(took) < AT_ONCE
     screen.say(":type slow", r"slow : \(t: Real\) -> Real")
-    screen.say(":eval _3 + 1", r"43 . .* : Real")
+    screen.say(":eval _3 + 1", r"43 : Real")
 
 
 def test_samples_are_interrupted_and_settings_kept(screen):
