@@ -2,7 +2,8 @@
 
 Owns `conditions_of` and `skeleton`. A function exports what `skeleton` keeps of it: its branches, deltas and calls,
 over its parameters; so a caller's check reads no more of a callee than that. Conditions that a callee has over its own
-variables of integration alone are the callee's to check, unless a function that the caller passed brought them in.
+variables of integration alone are the callee's to check, unless a function that the caller passed brought them in or
+decides them.
 
 So a call is only entered if a variable of integration or a function goes in with its arguments, and a call of what
 leads to no condition is not exported: a definition costs by its own size and not by all that lies below its calls.
@@ -83,8 +84,10 @@ def skeleton(term: Term, leads_on: Callable[[Global], bool] = lambda _: True) ->
 
     `leads_on`: whether a definition that is called has conditions, or calls that lead to some.
     """
+    if isinstance(term, Deriv | Global):  # another name, or the derivative of another definition
+        return term
     groups: list[tuple[str, ...]] = []
-    body = term
+    body: Term = term
     while isinstance(body, Lam):
         groups.append(body.params)
         body = body.body
@@ -129,7 +132,9 @@ def called_definition(call: App) -> Global | None:
 
 def has_conditions(exported: Term | None) -> bool:
     """Whether a skeleton has conditions, or calls that might lead to some."""
-    body = exported
+    if isinstance(exported, Deriv | Global):
+        return True
+    body: Term | None = exported
     while isinstance(body, Lam):
         body = body.body
     return isinstance(exported, Lam) and not (isinstance(body, Tuple) and not body.items)
@@ -210,7 +215,8 @@ class _Walk:
 
     def condition(self, node: Branch | Delta, place: _Place) -> None:
         coordinates = node.coordinates
-        over = self.box.keys() if place.caller is None else place.caller
+        mine = _decided_by(coordinates[0], place.functions)
+        over = self.box.keys() if mine or place.caller is None else place.caller
         if over.isdisjoint(_reached(coordinates[:1], place)):
             return
         if isinstance(coordinates[0], Proj) and coordinates[0].index == 0 and len(coordinates) == 1:
@@ -249,7 +255,8 @@ class _Walk:
             if path.count(head) >= _TWICE or len(path) >= DEEPEST:
                 return
             name, path = head.name, (*path, head)
-            function = self.skeletons(head)
+            function, further = self.followed(head)
+            order += further
             if groups_of(function) < len(groups):  # it gives a function under another form: that is in its body alone
                 function = self.whole(head)
         if not isinstance(function, Lam):
@@ -267,6 +274,18 @@ class _Walk:
             body, mapping, functions = inner
             there = _Place(mapping, functions, (*place.calls, name), path, place.anchor or node, caller)
             self.term(body, there)
+
+    def followed(self, name: Global) -> tuple[Term | None, int]:
+        """The skeleton that a name leads to through other names, and how many derivatives are taken on the way."""
+        found, order = self.skeletons(name), 0
+        for _ in range(DEEPEST):
+            if isinstance(found, Deriv):
+                found, order = found.function, order + 1
+            elif isinstance(found, Global):
+                found = self.skeletons(found)
+            else:
+                break
+        return found, order
 
     def goes_in(self, groups: tuple[tuple[Term, ...], ...], caller: frozenset[str], place: _Place) -> bool:
         """Whether a variable of integration or a function is given to a call; else the rest is the callee's."""
@@ -312,6 +331,12 @@ class _Walk:
             body = _renamed(body, names)
         self.taken |= set(own)
         return body, tuple(own)
+
+
+def _decided_by(surface: Term, functions: Mapping[str, Term]) -> bool:
+    """Whether a function that was passed decides a condition: then it is its caller's, over whatever it varies with."""
+    heads = (spine(part)[0] for part in postorder(surface) if isinstance(part, App)) if functions else ()
+    return any(isinstance(head, Var) and head.name in functions for head in heads)
 
 
 def _is_open(function: Lam | Global | Deriv, place: _Place) -> bool:

@@ -85,7 +85,7 @@ def pattern(value: Value, directions: int) -> Pattern:
     """
     if isinstance(value, Cell):
         tangents = [0 if x is None else 1 if x.__class__ is float and x == 1.0 else 2 for x in value.t]
-        inexact = value.e is not None or (value.et.count(None) != len(value.et))
+        inexact = value.e is not None or (bool(value.et) and any(x is not None for x in value.et))
         return (inexact, tuple(tangents) or (0,) * directions)
     if isinstance(value, tuple):
         return ("tuple", *(pattern(item, directions) for item in value))

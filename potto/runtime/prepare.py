@@ -151,14 +151,14 @@ def _counted(term: Integral, reach: Reach, shapes: Shapes, again: bool) -> Term:
         return term
     by_numbers = Integral in reach.derived(term.body)
     if again or not by_numbers:
-        spelled = _with_spikes(term, reach)
+        spelled = _with_spikes(term, reach, again)
         if spelled is not None:
             return spelled
     try:
         found = shifted(term, reach.resolve, reach.deltas, shapes)
     except NotShifted as problem:
         if by_numbers and not again:
-            spelled = _with_spikes(term, reach)
+            spelled = _with_spikes(term, reach, False)
             if spelled is not None:
                 return spelled
         raise PottoError([NOT_COUNTED(
@@ -168,9 +168,10 @@ def _counted(term: Integral, reach: Reach, shapes: Shapes, again: bool) -> Term:
     return term if found is None else found
 
 
-def _with_spikes(term: Integral, reach: Reach) -> Integral | None:
-    """The integrand with derivatives carried out; as it was if that brings no deltas over variables of integration.
-    None where some derivative has no closed form, or is of what is not known."""
+def _with_spikes(term: Integral, reach: Reach, anyway: bool) -> Integral | None:
+    """The integrand with derivatives carried out; as it was if that brings no deltas over variables of integration,
+    unless that is wanted `anyway`: it shows where the tangents jump. None where some derivative has no closed form, or
+    is of what is not known."""
     try:
         body = Differentiator(reach.resolve).carried_out(term.body)
     except (NoClosedForm, NotSmooth, PottoError):
@@ -181,7 +182,7 @@ def _with_spikes(term: Integral, reach: Reach) -> Integral | None:
         return None
     before = {node for node in postorder(term.body) if isinstance(node, Delta)}
     found = any(isinstance(n, Delta) and n not in before and n.coordinates[0].free & variables for n in postorder(body))
-    return _over(term, body) if found else term
+    return _over(term, body) if found or anyway else term
 
 
 @lru_cache(maxsize=1024)

@@ -398,3 +398,34 @@ def test_a_recursion_is_carried_out_once() -> None:
     found = expanded(call, lambda g: lam(("n",), body))
     assert found is add(call, ONE)
     assert not any(isinstance(n, Branch) for n in postorder(found))
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        (r"over(\x . x*sin(9*x)*exp(x), t)", ["P0402"]),
+        ("over(wave, t)", ["P0402"]),
+        ("on(wave, t)", ["P0402"]),  # handed on
+        ("inner(wave, t)", ["P0402"]),  # called by what is handed on
+        ("snd(renamed(deriv(wave), (t, 1)))", ["P0402"]),  # through a derivative that has names
+        (r"over(\x . x + exp(x), t)", []),  # increasing
+        (r"on(\x . x^2, t)", []),
+        (r"integral [0, 1] over(\x . wave(x) + y, t) d(y)", []),  # solved for y
+        ("unused(wave, t)", []),  # it decides nothing
+    ],
+)
+def test_a_condition_that_a_passed_function_decides_is_checked_where_it_is_passed(body: str, said: list[str]) -> None:
+    db = database(
+        """
+def wave(x) x*sin(9*x)*exp(x)
+def over(h, t) integral [0, 1] [h(x) > t] d(x)
+def on(h, t) over(h, t)
+def inner(k, t) over(\\x . k(x)^2, t)
+def unused(h, t) integral [0, 1] [x > t]*h(x) d(x)
+dover = deriv(over)
+renamed = dover
+"""
+        + f"def f(t) {body}\n"
+    )
+    assert [d.code for d in check_conditions(db, FILE, "f")] == said
+    assert not check_conditions(db, FILE, "over") and not check_conditions(db, FILE, "inner")

@@ -133,3 +133,18 @@ def often(n, y, a) if n > 0 then often(n - 1, y, a) + snd(deriv(mixed)((y, 0), (
     with pytest.raises(potto.PottoError) as caught:
         m.f(0.4)
     assert [d.code for d in caught.value.diagnostics] == ["P0510"]
+
+
+def test_a_tangent_that_jumps_is_cut_where_it_jumps() -> None:
+    """The tangent of G along a is -c/y [y > c a]: integrated over y with y it is -c (1 - c a), whose slope is c^2."""
+    m = potto.compile("""
+def G(y, a) integral [0, 1] [z*y > 0.59*a] d(z)
+def f(a) integral [0, 1] x*snd(deriv(G)((x, 0), (a, 1))) d(x)
+def g(a) integral [0, 1] x*snd(deriv(G)((x, x - 0.64), (a, 1))) d(x)
+""")
+    got = potto.deriv(m.f)((0.3437, 1.0))
+    assert abs(got.value + 0.59 * (1 - 0.59 * 0.3437)) <= 1e-15 and abs(got.tangent - 0.59**2) <= 1e-14
+    # Along y - 0.64 as well: c a/y^2 more of it, times y (y - 0.64), from c a on.
+    exact = mpmath.diff(lambda a: mpmath.quad(lambda y: -0.59 + 0.59*a*(y - 0.64)/y, [0.59*a, 1]), 0.3437)
+    got = potto.deriv(m.g)((0.3437, 1.0))
+    assert abs(got.tangent - exact) <= 1e-12 + got.tangent_error and got.tangent_error <= 1e-11
