@@ -354,7 +354,7 @@ def leaves_of(deps: tuple[Node, ...]) -> tuple[Leaf, ...] | None:
             others.append(dep.leaves)
             if len(dep.leaves) > len(widest):
                 widest = dep.leaves
-    if not own and len(others) <= 1:
+    if len(others) <= 1 and all(dep in widest for dep in own):
         return widest
     count = len(set(own).union(*others))
     if count > LEAVES:

@@ -1,9 +1,9 @@
 """The questions about types, memoized: interfaces, diagnostics, expressions and statements.
 
 What a definition needs is fetched before it is analysed, so that no inference runs inside another one. Its analysis is
-one query; `interface` and `check_definition` are its parts, each of which stands still when an edit does not change it:
-whoever uses a definition reads its `interface` only. `plain_reasons` and `typed_names` are asked of few definitions, by
-messages and editors; for those it is analysed once more.
+one query; `interface` is the part of it that stands still when an edit does not change it: whoever uses a definition
+reads that only. `plain_reasons` and `typed_names` are asked of few definitions, by messages and editors; for those it
+is analysed once more.
 """
 
 from __future__ import annotations
@@ -48,7 +48,6 @@ def interface(db: Database, file: str, name: str) -> Interface:
     return unknown_interface(name) if found is None else found.interface
 
 
-@query
 def check_definition(db: Database, file: str, name: str) -> tuple[Diagnostic, ...]:
     """What is wrong with a definition. Spans are relative to its chunk."""
     found = _analysis(db, file, name)

@@ -154,7 +154,7 @@ def undefined(outside: Outside, scope: Iterable[str], node: nodes.Name) -> Diagn
             label="only at the top of a script",
             help="write `print(…)` at the top of a script, in a line of its own",
         )
-    near = near_names(name, (*near_names(name, scope), *_near_at_top(outside.db, outside.file, name)))
+    near = near_names(name, (*scope, *_near_at_top(outside.db, outside.file, name)))
     help = known_elsewhere(name) or did_you_mean(near)
     module = elsewhere(outside.db, outside.file, name)
     if module is not None:
