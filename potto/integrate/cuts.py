@@ -67,6 +67,22 @@ class Meeting:
 
 
 @dataclass
+class Sliver:
+    """Jumps that rounding does not tell apart, from one another or from a bound, for some of the batch.
+
+    `owner` (m,), place (m,), width (m,): how far apart they may be all the same; speed (m,): that of the fastest, over
+    the range of the variable; upper: whether seen from below.
+    """
+
+    cuts: tuple[int, ...]
+    owner: Ints
+    x: Array
+    width: Array
+    speed: Array
+    upper: bool
+
+
+@dataclass
 class Fold:
     """Sections of a surface that appear, merge or turn just here, for some of the batch: `owner` (m,), place (m,)."""
 
@@ -80,6 +96,7 @@ class Cuts:
     """The outcome for one variable: orientation (B,), segments, whether anything moves, edges.
 
     brushes: edges at which only something further in changes. folds: where roots of one surface are at one place.
+    slivers: what may lie between cuts that are taken for one.
     conflict: cuts that coincide move differently, which is harmless only where the integrand does not jump there.
     """
 
@@ -92,6 +109,7 @@ class Cuts:
     meetings: list[Meeting] = field(default_factory=list)
     brushes: list[Edge] = field(default_factory=list)
     folds: list[Fold] = field(default_factory=list)
+    slivers: list[Sliver] = field(default_factory=list)
 
 
 def as_array(x: Any, batch: int) -> Array:
@@ -154,13 +172,15 @@ def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, d
             found = edges if plan.level.cuts[row.cut].decides else brushes
             found.extend(_edges(row, root, low, high, tl, th, directions, batch))
     rank = np.zeros((count + 2, batch), dtype=np.int64)
-    conflict = False
+    conflict = merged = False
     if count == 1:  # in order already
         rank[1] = _rank(plan, rows[0]) * inside[1]
     elif count:
-        x, e, t, rank, conflict = _sorted(plan, rows, x, e, t, inside)
+        x, e, t, rank, conflict, merged = _sorted(plan, rows, x, e, t, inside)
     cuts = _pieces(x, e, t, rank, sign, beyond, edges)
     cuts.conflict, cuts.brushes = conflict, brushes
+    if merged or not nested:
+        cuts.slivers = _slivers(plan, rows, low, high, (el, eh), directions, batch)
     if directions:
         cuts.folds = _folds(plan, rows, low, high, directions, batch)
     if conflict:
@@ -188,6 +208,31 @@ def _meetings(plan: LevelPlan, rows: list[Row], inside: Bools, batch: int, direc
             speeds = t[met][:, :, owner]
             merged = np.take_along_axis(speeds, x[met][:, owner].argmin(axis=0)[None, None], axis=0)[0]
             out.append(Meeting(tuple(rows[jumps[m]].cut for m in met), owner, x[n, owner], speeds, merged))
+    return out
+
+
+def _slivers(
+    plan: LevelPlan, rows: list[Row], low: Array, high: Array, ends: tuple[Any, Any], directions: int, batch: int
+) -> list[Sliver]:
+    jumps = [row for row in rows if row.cut >= 0 and plan.level.cuts[row.cut].decides]
+    places = [as_array(row.x, batch) for row in jumps]
+    off = [SEARCHED * EPS * np.abs(x) if row.e is None else row.e for row, x in zip(jumps, places, strict=True)]
+    off = [np.where(np.isfinite(e), e, 0.0) for e in off]
+    fast = [np.abs(_tangents(row.t, batch, directions)).max(axis=0, initial=0.0) / (high - low) for row in jumps]
+    out: list[Sliver] = []
+
+    def put(cuts: tuple[int, ...], x: Array, gap: Any, width: Any, speed: Array, upper: bool) -> None:
+        owner = np.nonzero((gap <= width) & (width > 0) & (low < high))[0]
+        if owner.size:
+            out.append(Sliver(cuts, owner, x[owner], np.broadcast_to(width, batch)[owner], speed[owner], upper))
+
+    for i, x in enumerate(places):
+        put((jumps[i].cut,), low, np.where(x <= low, low - x, np.inf), off[i] + ends[0], fast[i], False)
+        put((jumps[i].cut,), high, np.where(x >= high, x - high, np.inf), off[i] + ends[1], fast[i], True)
+        for j in range(i):
+            if jumps[j].cut != jumps[i].cut:
+                gap = np.where((x > low) & (x < high), np.abs(x - places[j]), np.inf)
+                put((jumps[j].cut, jumps[i].cut), x, gap, off[i] + off[j], np.maximum(fast[i], fast[j]), True)
     return out
 
 
@@ -249,7 +294,7 @@ def _edges(
 
 def _sorted(
     plan: LevelPlan, rows: list[Row], x: Array, e: Array, t: Array, inside: Bools
-) -> tuple[Array, Array, Array, Ints, bool]:
+) -> tuple[Array, Array, Array, Ints, bool, bool]:
     conflict = False
     order = np.argsort(x, axis=0, kind="stable")
     # the bounds stay first and last even among equals: candidates were clipped to the upper bound
@@ -267,7 +312,7 @@ def _sorted(
             apart = np.abs(t[:, 1:] - t[:, :-1]) > 1e-9 * (np.abs(t[:, 1:]) + np.abs(t[:, :-1]))
             conflict = bool((same & apart.any(axis=0)).any())
             _agree(t, same, rank)
-    return x, e, t, rank, conflict
+    return x, e, t, rank, conflict, bool(close.any())
 
 
 def _rank(plan: LevelPlan, row: Row) -> int:

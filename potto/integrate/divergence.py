@@ -71,7 +71,7 @@ def given_up(work: Work, p: Pieces, found: Totals, sums: Sums) -> Sums:
     v = np.where(lost, np.nan, np.where(up, np.inf, np.where(down, -np.inf, sums.v)))
     gone = ~np.isfinite(v) & hopeless
     return Sums(v, np.where(gone, np.inf, sums.e), np.where(gone[:, None], np.nan, sums.t),
-                np.where(gone[:, None], np.inf, sums.et))  # fmt: skip
+                np.where(gone[:, None], np.inf, sums.et), gross=sums.gross)  # fmt: skip
 
 
 def _noise(work: Work, p: Pieces, errors: Array, blamed: Array) -> Bools:

@@ -32,8 +32,6 @@ if TYPE_CHECKING:
     from potto.integrate.levels import Iteration
 
 MOST_AT_ONE_PLACE = 4
-# How far beside a bound the integral further in is looked at, twice, and what part of it may be lost across the bound.
-BESIDE, DISCONTINUITY = (1e-7, 1e-9), 1e-6
 
 
 @dataclass(frozen=True)
@@ -94,6 +92,23 @@ def count_places(
             machine.note_sided(named)
 
 
+def count_slivers(
+    parent: Iteration, number: int, level: LevelPlan, cuts: Cuts, env: dict[str, Value], sides: dict[int, Mask],
+    sums: Sums, machine: Evaluator,
+) -> None:  # fmt: skip
+    """Add to the errors what may lie between surfaces that rounding does not tell apart."""
+    scene = Scene(parent, number, level, env, sides, machine)
+    for sliver in cuts.slivers:
+        if number and 2 * sliver.owner.size < cuts.sign.size:
+            continue  # single nodes of the variables further out: of measure zero
+        f = scene.flips(sliver.cuts, sliver.owner, sliver.x, not sliver.upper)
+        lost = np.abs(f - f[0]).max(axis=0) * sliver.width
+        lost = np.where(np.isfinite(lost), lost, 0.0)
+        at = (slice(None), sliver.owner)
+        sums.et[:, :, sliver.owner] += (lost * np.where(np.isfinite(sliver.speed), sliver.speed, 0.0))[:, None]
+        sums.e[at] += lost
+
+
 def note_folds(number: int, level: LevelPlan, cuts: Cuts, machine: Evaluator) -> None:
     """Say where sections of a surface appear or merge just here. At single nodes further out that is no matter."""
     for fold in cuts.folds:
@@ -102,39 +117,6 @@ def note_folds(number: int, level: LevelPlan, cuts: Cuts, machine: Evaluator) ->
         owner = None if number else tuple(map(int, fold.owner))
         named = Sided(level.variable, level.level.cuts[fold.cut].surface, fold=True)
         machine.note_fold(named, Folded(number, fold.cut, float(fold.x[0]), owner))
-
-
-def brush(
-    parent: Iteration, number: int, level: LevelPlan, cuts: Cuts, env: dict[str, Value], sides: dict[int, Mask],
-    machine: Evaluator,
-) -> None:  # fmt: skip
-    """Whether what is further in jumps at a bound on which it should only bend: a surface runs along the bound.
-
-    Looked at on both sides of the bound, with the surfaces of this variable as they are inside.
-    """
-    for edge in cuts.brushes:
-        if number and 2 * edge.owner.size < cuts.sign.size:
-            continue
-        here, inner = around(level, edge.owner, edge.x, not edge.upper, env, sides, machine)
-        frozen, size = machine.with_directions(0), edge.owner.size
-        further = parent.plan.levels[number + 1]
-        if number + 2 == len(parent.plan.levels) and not further.searched:
-            sections = frozen.evaluate(further.frame, {n: here[n] for n in further.frame.params}, None)
-            assert isinstance(sections, tuple)
-            if all(isinstance(at, Cell) and np.isfinite(at.v).all() for at in sections):
-                continue  # none of them runs along it
-        steps = []
-        with nullcontext() if machine.costs is None else machine.costs.apart():
-            for part in BESIDE:
-                aside = part * (1 + np.abs(edge.x))
-                inside, beyond = (
-                    parent.inside(number, {**here, level.variable: Cell(x)}, size, inner, frozen)[0]
-                    for x in (edge.x + aside, edge.x - aside)
-                )
-                steps.append(np.abs(inside - beyond))
-        whole = np.abs(inside) + np.abs(beyond)
-        if ((steps[1] > 0.5 * steps[0]) & (steps[1] > DISCONTINUITY * whole)).any():  # what bends would shrink
-            machine.note_degenerate(level.variable)
 
 
 def _not_known(scene: Scene, sums: Sums, owner: Ints, unknown: Bools, named: Sided) -> None:

@@ -113,15 +113,26 @@ def cut_rounding(work: Work, ends: Ends) -> Array:
     return np.stack([np.bincount(seg.owner, row, minlength=batch) for row in cost])
 
 
+def added_up(work: Work, found: Totals) -> Array:
+    """What is added up for each of the batch, without regard to sign, here and further in: (B,)."""
+    gross: Array = np.where(np.isfinite(found.size), found.size, 0.0).max(axis=(0, 1))
+    if work.gross is None:
+        return gross
+    reach = np.bincount(work.seg.owner, (work.seg.b - work.seg.a) * work.gross, minlength=work.batch)
+    return np.asarray(np.fmax(gross, np.where(np.isfinite(reach), reach, 0.0)))
+
+
 def sums(work: Work, found: Totals, ends: Ends | None) -> Sums:
     """The answer: per direction the better of the two forms."""
     v, e = found.integral[:, 0], found.error[:, 0]
     if ends is not None:
         e = e + cut_rounding(work, ends)
+    gross = added_up(work, found)
     if found.fixed is None or found.apart is None:
-        return Sums(v, e, *found.moving)
+        return Sums(v, e, *found.moving, gross=gross)
     moving, fixed = found.moving, found.fixed
     better = fixed[1] < 0.5 * moving[1]  # the moving form does not cancel: where they are alike it is the better one
     # two independent values that differ by more than they admit: neither estimate is believed
     doubt = np.where(found.apart > 4 * (moving[1] + fixed[1]), found.apart, 0.0)
-    return Sums(v, e, np.where(better, fixed[0], moving[0]), np.where(better, fixed[1], moving[1]) + doubt)
+    return Sums(v, e, np.where(better, fixed[0], moving[0]), np.where(better, fixed[1], moving[1]) + doubt,
+                gross=gross)  # fmt: skip

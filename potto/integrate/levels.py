@@ -13,11 +13,12 @@ import numpy as np
 from potto.core.terms import Term
 from potto.integrate import maps
 from potto.integrate.cuts import Cuts, as_array, frame_rows, segments, standing
-from potto.integrate.edges import brush, count_places, note_folds
+from potto.integrate.edges import count_places, count_slivers, note_folds
 from potto.integrate.maps import Segments
 from potto.integrate.pieces import Evaluator, Sums, components, gather, still, take
 from potto.integrate.plan import LevelPlan, Plan, vanishes
 from potto.integrate.roots import searched_rows
+from potto.integrate.steps import brush
 from potto.integrate.work import Work
 from potto.kernels.cells import Array, Cell, Ints, Mask, Value
 
@@ -62,6 +63,8 @@ class Iteration:
                 count_places(self, number, level, cuts, env, outer, sums, machine)
         if k and cuts.brushes and number + 1 < len(self.plan.levels):
             brush(self, number, level, cuts, env, outer, machine)
+        if cuts.slivers and not machine.frozen and not self.plan.hides:
+            count_slivers(self, number, level, cuts, env, outer, sums, machine)
         if k and cuts.folds:
             note_folds(number, level, cuts, machine)
         sums.v *= cuts.sign

@@ -69,12 +69,16 @@ class Evaluator(Protocol):
 
 @dataclass
 class Sums:
-    """Integrals of a batch: value (m, B) and tangents (m, k, B) with their error bounds; m components."""
+    """Integrals of a batch: value (m, B) and tangents (m, k, B) with their error bounds; m components.
+
+    gross: (B,) the most that is added up for each without regard to sign; None where nobody kept track.
+    """
 
     v: Array
     e: Array
     t: Array
     et: Array
+    gross: Array | None = field(default=None, kw_only=True)
 
 
 @dataclass

@@ -309,4 +309,5 @@ def _accurate(found: Totals, region: Region, machine: Evaluator, parameters: Seq
             return None
         errors.append(rounding + beyond)
     v, t = np.array(found.number[:1]), np.array(found.number[1:])
-    return Sums(v[None], np.array([errors[:1]]), t[None, :, None], np.array(errors[1:])[None, :, None])
+    e, et = np.array(errors[:1]), np.array(errors[1:])
+    return Sums(v[None], e[None], t[None, :, None], et[None, :, None], gross=np.array([max(found.gross)]))

@@ -23,9 +23,10 @@ from potto.integrate.divergence import given_up
 from potto.integrate.forms import Ends, Totals, sums, totals
 from potto.integrate.judge import doubtful, missed_peak, too_coarse
 from potto.integrate.maps import Segments
-from potto.integrate.pieces import Evaluator, Pieces, Sums, column, gather, joined, spread, still, take
+from potto.integrate.pieces import Evaluator, Pieces, Sums, column, gather, joined, spread, still
 from potto.integrate.plan import LevelPlan
 from potto.integrate.rules import EPS, Rule, gauss, truncation
+from potto.integrate.steps import look_for_steps
 from potto.integrate.tally import Tally
 from potto.integrate.undefined import mend
 from potto.kernels.cells import Array, Cell, Ints, Mask, Number, Value, pad
@@ -45,9 +46,7 @@ MORE = 6  # for graded pieces, on which what is smooth is a polynomial, whose en
 # The relative error of a piece up to which more nodes promise more than halves do.
 PROMISING = 1e-2
 DOUBTFUL_ROUNDS = 8
-# A relative jump of an inner integral where only kinks are expected: a surface there runs along the inner variable.
-DISCONTINUITY = 1e-6
-BESIDE = 1e-9
+BESIDE = 1e-9  # how far from the ends of a segment, in parts of it, it is looked at just inside
 
 
 @dataclass
@@ -67,6 +66,7 @@ class Work:
     conflict: bool = False
     width: int = 1
     ends: Ends | None = None
+    gross: Array | None = None  # per segment, of what is further in
 
     def __post_init__(self) -> None:
         self.k = self.machine.directions
@@ -88,7 +88,7 @@ class Work:
         whole = Pieces(np.arange(count), zero, one, np.zeros(count, dtype=np.int64))
         fresh = self.measure(whole, self.parent.order, True)
         if self.conflict and not self.last:
-            self.look_for_steps(fresh)
+            look_for_steps(self, fresh)
         found = totals(self, fresh, ends)
         if self.good_enough(fresh, found, ends):
             return sums(self, found, ends)
@@ -334,6 +334,9 @@ class Work:
         masks = {g: m[index[flat]] if isinstance(m, np.ndarray) else m for g, m in self.sides.items()}
         root = self.below(owner[flat])
         sums = self.parent.run(self.number + 1, env, x.size, masks, self.inner, root)
+        if sums.gross is not None:
+            self.gross = np.zeros(self.seg.a.size) if self.gross is None else self.gross
+            np.maximum.at(self.gross, index, sums.gross.reshape(x.shape).max(axis=1))
         shape = (sums.v.shape[0], *x.shape)
         t = sums.t.reshape(shape[0], -1, *x.shape)
         et = sums.et.reshape(t.shape)
@@ -375,26 +378,3 @@ class Work:
         follows = np.zeros(seg.a.size + 1, dtype=bool)
         follows[1:-1] = (seg.owner[1:] == seg.owner[:-1]) & (seg.a[1:] == seg.b[:-1])
         return bool(seg.ta[:, ~(follows[:-1] & (seg.rank == 1))].any() or seg.tb[:, ~follows[1:]].any())
-
-    def look_for_steps(self, whole: Pieces) -> None:
-        """Whether the integral further in jumps where only its kinks were expected, which move in different ways.
-
-        A surface that runs along the innermost variable leaves such a step. Looked at just beside the cut, since on
-        the cut itself the sides are a matter of rounding.
-        """
-        seg, frozen = self.seg, self.machine.with_directions(0)
-        follows = np.nonzero((seg.owner[1:] == seg.owner[:-1]) & (seg.a[1:] == seg.b[:-1]) & (seg.rank[1:] == 1))[0] + 1
-        if not follows.size:
-            return
-        width = np.minimum(np.abs(seg.b - seg.a)[follows], np.abs(seg.b - seg.a)[follows - 1])
-        values = []
-        for side, index in ((1.0, follows), (-1.0, follows - 1)):
-            here = gather({n: still(v) for n, v in self.env.items()}, seg.owner[index])
-            here[self.level.variable] = Cell(seg.a[follows] + side * BESIDE * np.minimum(width, 1e300))
-            sides = {g: take(m, index) for g, m in self.sides.items()}
-            with nullcontext() if self.machine.costs is None else self.machine.costs.apart():
-                values.append(self.parent.inside(self.number, here, index.size, sides, frozen)[0])
-        mean = whole.size.reshape(self.width, -1, seg.a.size)[:, 0] / (seg.b - seg.a)
-        size = np.abs(values[0]) + np.abs(values[1]) + mean[:, follows] + mean[:, follows - 1]
-        if (np.abs(values[0] - values[1]) > DISCONTINUITY * size).any():
-            self.machine.note_degenerate(self.level.variable)

@@ -69,7 +69,10 @@ def _begun() -> Gauge | None:
 
 @dataclass
 class Books:
-    """What one evaluation has done so far. used: answers of before that it is made of."""
+    """What one evaluation has done so far. used: answers of before that it is made of.
+
+    gross: the largest that an integral, or its derivative, adds up to without regard to sign.
+    """
 
     evaluations: int = 0
     depth: int = 0
@@ -80,6 +83,7 @@ class Books:
     methods: set[str] = field(default_factory=set)
     degenerate: set[str] = field(default_factory=set)
     second: bool = False
+    gross: float = 0.0
     members: int = 1
     integrals: int = 0
     used: dict[tuple[str, str], Value] = field(default_factory=dict)

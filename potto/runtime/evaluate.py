@@ -131,7 +131,8 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
     flat = [*_flat(numbers, bounds), *_flat(tangents, tangent_bounds)]
     scale = max((_largest(v) for v, _ in flat), default=0.0)
     drawn = not books.methods.isdisjoint(("mc", "qmc"))
-    missed = next((m for v, e in flat if (m := _missed(v, e, scale, settings, drawn))), None)
+    gross = books.gross if books.methods else 1.0
+    missed = next((m for v, e in flat if (m := _missed(v, e, scale, gross, settings, drawn))), None)
     if missed == INFINITE and not books.methods:
         missed = None  # of 1/0 no integral is to blame
     if not reasons and missed is not None:
@@ -206,11 +207,12 @@ def _largest(value: Any) -> float:
     return float(np.max(np.abs(value), initial=0.0, where=np.isfinite(value)))
 
 
-def _missed(value: Any, error: Any, scale: float, settings: Settings, drawn: bool) -> str | None:
+def _missed(value: Any, error: Any, scale: float, gross: float, settings: Settings, drawn: bool) -> str | None:
     """Why an answer is not as accurate as was asked, or None. `drawn`: it is made of samples.
 
     `scale` is the size of the whole answer: a small tangent beside a large value, or a pixel of a picture that is all
-    but zero by cancellation, is measured against its neighbours.
+    but zero by cancellation, is measured against its neighbours. `gross` is what integrals add up to without regard to
+    sign: nobody can know more digits of 0 than that has.
     """
     if isinstance(value, float) and isinstance(error, float) and error <= settings.rtol * abs(value) < np.inf:
         return None
@@ -223,11 +225,11 @@ def _missed(value: Any, error: Any, scale: float, settings: Settings, drawn: boo
         return "the error is not known"
     bad = ~(e <= np.maximum(settings.atol, settings.rtol * v)) & ~np.isinf(v)
     bad &= e > max(1e-12, settings.rtol) * max(scale, 1e-300)
-    bad &= (v > 1e3 * e) | (e > 1e-10)
+    bad &= (v > 1e3 * e) | (e > 1e-10 * gross)
     if bad.any():
         if drawn:
             return TOO_FEW
         if (e[bad] > 0.1 * v[bad]).any():
-            return "no accuracy was reached: the integral diverges, or its integrand is too rough"
+            return "no accuracy was reached: the integral diverges, its integrand is too rough, or rounding hides it"
         return "rounding limits the accuracy" if (e[bad] < 1e-6 * v[bad]).all() else "the error estimate is too large"
     return None

@@ -75,12 +75,17 @@ def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermos
     linked = link(flat)
     groups = split_by_decisions(machine, term, linked, batch)
     if groups is None:
-        return _shaped(poisoned(solve(machine, term, linked, linked.env, batch, outermost), linked.env), shape)
+        sums = solve(machine, term, linked, linked.env, batch, outermost)
+        if outermost:
+            note_gross(machine, sums)
+        return _shaped(poisoned(sums, linked.env), shape)
     result: Sums | None = None
     for index in groups:
         here = {n: map_arrays(v, lambda a, index=index: a[index]) for n, v in flat.items()}
         there = link(here)
         part = solve(machine, term, there, there.env, index.size, outermost)
+        if outermost:
+            note_gross(machine, part)
         if result is None:
             m, k = part.v.shape[0], part.t.shape[1]
             result = Sums(np.zeros((m, batch)), np.zeros((m, batch)), np.zeros((m, k, batch)), np.zeros((m, k, batch)))
@@ -88,6 +93,13 @@ def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermos
         result.t[:, :, index], result.et[:, :, index] = part.t, part.et
     assert result is not None
     return _shaped(poisoned(result, linked.env), shape)
+
+
+def note_gross(machine: Machine, sums: Sums) -> None:
+    """What is added up without regard to sign, at the least the values themselves."""
+    least = 0.0 if sums.gross is None else float(sums.gross.max(initial=0.0))
+    found = np.max(np.abs(sums.v), initial=least, where=np.isfinite(sums.v))
+    machine.books.gross = max(machine.books.gross, float(found))
 
 
 def given_up(machine: Machine, shape: tuple[int, ...]) -> Value:
@@ -264,6 +276,7 @@ def in_parts(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) ->
         part = iterated(plan, machine, here, rest.size)
         for name in ("v", "e", "t", "et"):
             getattr(sums, name)[..., rest] = getattr(part, name)
+        sums.gross = part.gross
     return sums
 
 
@@ -284,7 +297,8 @@ def iterated(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) ->
         rows = [getattr(p, name) for p in parts]
         return np.concatenate([np.broadcast_to(r, (m, *r.shape[1:])) for r in rows], axis=-1)
 
-    return Sums(joined("v"), joined("e"), joined("t"), joined("et"))
+    gross = None if any(p.gross is None for p in parts) else np.concatenate([p.gross for p in parts])
+    return Sums(joined("v"), joined("e"), joined("t"), joined("et"), gross=gross)
 
 
 def best_order(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> int:

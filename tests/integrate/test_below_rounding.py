@@ -1,0 +1,52 @@
+"""What doubles cannot tell apart: surfaces closer together than their rounding, and answers that are all rounding.
+
+The error covers what lies between, and an answer without digits is not called accurate, at any scale.
+"""
+
+from __future__ import annotations
+
+import mpmath as mp
+import pytest
+
+import potto
+
+
+@pytest.mark.parametrize("width", [1e-12, 1e-15, 1e-16, 1e-18, 1e-25])
+@pytest.mark.parametrize("body", ["[x < t + {w}]*[x > t]*exp(x)", "([x < t + {w}] - [x < t])*exp(x)"])
+def test_the_strip_between_two_surfaces(body: str, width: float) -> None:
+    f = potto.compile(f"def f(t)\n    integral [0, 1] {body.format(w=repr(width))} d(x)").f
+    answer = potto.deriv(f)((0.3, 1.0))
+    with mp.workdps(50):
+        exact = mp.exp(mp.mpf(0.3) + mp.mpf(width)) - mp.exp(mp.mpf(0.3))
+        assert abs(answer.value - exact) <= answer.error <= 1e-16
+        assert abs(answer.tangent - exact) <= answer.tangent_error <= 1e-15
+    assert not answer.converged and answer.reasons
+
+
+@pytest.mark.parametrize("width", [1e-15, 1e-18])
+def test_the_strip_between_two_lines(width: float) -> None:
+    strip = f"[x + y < t + {width!r}] - [x + y < t]"
+    f = potto.compile(f"def f(t)\n    integral ([0, 1], [0, 1]) ({strip})*exp(x) d(x, y)").f
+    answer = f(0.3)
+    with mp.workdps(50):
+        exact = mp.quad(lambda x: mp.exp(x) * mp.mpf(width), [0, 0.3])
+        assert abs(answer.value - exact) <= answer.error <= 1e-16
+    assert not answer.converged
+
+
+def test_a_surface_that_rounding_puts_on_the_bound() -> None:
+    """t + 1e-18 is the bound to rounding; what lies between is 1e-18 wide, and 10 high."""
+    f = potto.compile("def f(t)\n    integral [0.3, 1] 10*[x < t + 1e-18] d(x)").f
+    answer = f(0.3)
+    assert abs(answer.value - mp.mpf("1e-17")) <= answer.error <= 1e-15
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-30, 1e-200, 1e30])
+def test_accurate_is_what_has_digits_at_any_scale(scale: float) -> None:
+    """The corner above x + y = 2 - 1e-15, of a few units in the last place in each direction, has no digits."""
+    f = potto.compile(f"def f(t)\n    integral ([0, 1], [0, 1]) {scale!r}*[x + y > t] d(x, y)").f
+    answer = f(2 - 1e-15)
+    exact = (2 - mp.mpf(2 - 1e-15)) ** 2 / 2 * mp.mpf(scale)
+    assert abs(answer.value - exact) <= answer.error and not answer.converged
+    odd = potto.compile(f"def f(t)\n    integral [-1, 1] {scale!r}*t*x^3*cos(x) d(x)").f(1.0)
+    assert abs(odd.value) <= odd.error and odd.converged  # 0 by cancellation: that is all that can be known of it
