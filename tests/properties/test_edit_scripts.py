@@ -108,7 +108,9 @@ def test_a_body_edit_runs_no_interface_of_another_and_nothing_of_other_modules(
                 assert (where, what) == (file, defined), (query, args)
             case (str(where),) if where in everything:
                 assert where == file and query in OF_FILES, (query, args)
+            case (str(where), tuple(run)) if where in everything:  # some neighbouring definitions of one file
+                assert where == file and defined in run and query == "_mentioned", (query, args)
             case (tuple(group),):
                 assert [(target.file, target.name) for target in group] == [(file, defined)], (query, args)
             case _:
-                assert query in ("parsed", "head", "chunk_references", "occurring_names"), (query, args)
+                assert query in ("parsed", "head", "chunk_references", "occurring_names", "_words"), (query, args)
