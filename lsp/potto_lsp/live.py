@@ -80,7 +80,7 @@ class Value:
 
     @property
     def label(self) -> str:
-        text = self.result.get("text", "?")
+        text = self.result.get("text", "?") + self.result.get("bar", "")
         return f"= {text}, not {self.result['expected']}" if self.result.get("holds") is False else f"= {text}"
 
     @property

@@ -190,7 +190,9 @@ def _parameter(db: Database, chunk: ChunkAt, name: str, parameter: str) -> list[
     found = interface(db, chunk.file, name)
     parts: list[str] = []
     if parameter in found.plain:
-        parts.append("must not vary: it decides a plain condition, or jumps")
+        asked = any(p.name == parameter and p.annotation is not None for p in _written(db, chunk.file, name))
+        why = "its annotation says so" if asked else "it decides a plain condition, or jumps"
+        parts.append(f"must not vary: {why}")
     if parameter in found.varies:
         parts.append(f"the result of {code(name)} varies with it")
     moved = dict.fromkeys(i.equation for i in condition_infos(db, chunk.file, name) if parameter in i.moved_by)

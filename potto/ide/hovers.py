@@ -162,11 +162,14 @@ def builtin_parameters(primitive: Primitive) -> tuple[str, ...]:
 
 def builtin_signature(primitive: Primitive) -> str:
     """`sin : (x: Real*) -> Real`"""
+    return f"{primitive.name} : ({', '.join(typed_parameters(primitive))}) -> Real"
+
+
+def typed_parameters(primitive: Primitive) -> tuple[str, ...]:
+    """`x: Real*`, and `…` behind the last of a builtin that takes any number of arguments."""
     kind = "Real" if primitive.plain else "Real*"
-    shown = [f"{name}: {kind}" for name in builtin_parameters(primitive)]
-    if primitive.arity is None:
-        shown.append("…")
-    return f"{primitive.name} : ({', '.join(shown)}) -> Real"
+    shown = tuple(f"{name}: {kind}" for name in builtin_parameters(primitive))
+    return (*shown, "…") if primitive.arity is None else shown
 
 
 def _arguments(primitive: Primitive) -> tuple[Term, ...]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from potto.ide.documents import documentation
 from potto.ide.hover_locals import local_type
-from potto.ide.hovers import builtin_parameters, builtin_signature
+from potto.ide.hovers import typed_parameters
 from potto.ide.index import call_head
 from potto.ide.model import ParameterText, Signature, SignatureHelp
 from potto.ide.pending import PendingCall, call_at, juxtaposed_at
@@ -125,7 +125,7 @@ def _label(called: Called, groups: tuple[tuple[Parameter, ...], ...]) -> tuple[s
 
 
 def _parameter(parameter: Parameter, plain: tuple[str, ...]) -> str:
-    return "must not vary: it decides a plain condition, or jumps" if parameter.name in plain else ""
+    return "must not vary with a variable of integration" if parameter.name in plain else ""
 
 
 def active_parameter(group: tuple[Parameter, ...], call: PendingCall) -> int | None:
@@ -152,11 +152,8 @@ def _builtin(db: Database, file: str, name: str, call: PendingCall) -> Signature
     primitive = PRIMITIVES.get(name)
     if primitive is None or not primitive.surface:
         return None
-    parameters = builtin_parameters(primitive)
-    if primitive.arity is None:
-        parameters = (*parameters, "…")
-    tail = builtin_signature(primitive).rpartition(" -> ")[2]
-    return _simple(name, parameters, f" -> {tail}", primitive.doc, min(call.positional, len(parameters) - 1))
+    parameters = typed_parameters(primitive)
+    return _simple(name, parameters, " -> Real", primitive.doc, min(call.positional, len(parameters) - 1))
 
 
 def _simple(name: str, parameters: tuple[str, ...], tail: str, doc: str, active: int) -> SignatureHelp:

@@ -63,6 +63,25 @@ def format_bounds(error: Any) -> str:
     return format_error(float(error))
 
 
+def with_error(value: Any, error: Any) -> str:
+    """`0.3 ± 4e-16`; without the error where it is zero."""
+    return format_numbers(value, error) + error_bar(error)
+
+
+def error_bar(error: Any) -> str:
+    """` ± 4e-16`; nothing where the error is zero or not known."""
+    return f" ± {format_bounds(error)}" if 0 < largest(error) < math.inf else ""
+
+
+def largest(error: Any) -> float:
+    """The largest of the errors of a value."""
+    if isinstance(error, np.ndarray):
+        return float(np.max(error, initial=0.0))
+    if isinstance(error, tuple | list):
+        return max((largest(item) for item in error), default=0.0)
+    return float(error) if error is not None and error == error else math.inf
+
+
 def _numbers(value: Any, error: Any) -> str:
     if isinstance(value, np.ndarray) and value.ndim:
         flat, bounds = value.ravel(), np.broadcast_to(error, value.shape).ravel()

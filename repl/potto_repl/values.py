@@ -16,7 +16,13 @@ from potto.diagnostics import PottoError
 from potto.elaborate import elaborate_expression
 from potto.runtime.estimate import Estimate
 from potto.runtime.evaluate import Clock, report
-from potto.runtime.shown import as_dual, estimate_json, format_bounds, format_estimate, format_numbers, gives_dual
+from potto.runtime.shown import (
+    as_dual,
+    estimate_json,
+    format_estimate,
+    gives_dual,
+    with_error,
+)
 from potto.settings import Settings
 from potto.syntax import nodes
 from potto.world import World
@@ -35,19 +41,6 @@ class Parts:
     interior_error: Any
     boundary: Any
     boundary_error: Any
-
-
-def with_error(value: Any, error: Any) -> str:
-    """`0.3 ± 4e-16`; without the error where it is zero."""
-    text = format_numbers(value, error)
-    return f"{text} ± {format_bounds(error)}" if 0 < largest(error) < float("inf") else text
-
-
-def largest(error: Any) -> float:
-    """The largest of the errors of a value."""
-    if isinstance(error, tuple | list):
-        return max((largest(item) for item in error), default=0.0)
-    return float(error) if error is not None and error == error else float("inf")
 
 
 def tail(estimate: Estimate, settings: Settings) -> str:

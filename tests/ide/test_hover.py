@@ -296,3 +296,8 @@ def test_rules_read_as_they_are_meant(name, rule):
 def test_why_a_boundary_has_no_closed_form_is_said_once():
     text = fixture("def f(t)\n    integral [0, 1] [x^5 + sin(x*t) + x^2 > 0.3] d(x)\n").hover("f(")
     assert text.count("which no single inverse undoes") == 1
+
+
+def test_why_a_parameter_must_not_vary():
+    assert "must not vary: its annotation says so" in fixture("def f(k: Real) k^2\n").hover("k:")
+    assert "must not vary: it decides a plain condition" in fixture("def f(k) if k > 0 then 1 else 2\n").hover("k)")

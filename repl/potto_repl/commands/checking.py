@@ -17,7 +17,7 @@ from potto.diagnostics import PottoError
 from potto.elaborate import elaborate_expression
 from potto.runtime.evaluate import Program
 from potto.runtime.printing import format_error, format_number
-from potto.runtime.shown import as_dual
+from potto.runtime.shown import as_dual, with_error
 from potto.settings import Settings
 from potto.syntax import nodes, print_expression
 from potto_repl.discretized import dimensions, discretized, points_of
@@ -26,7 +26,6 @@ from potto_repl.registry import command
 from potto_repl.reply import Part
 from potto_repl.session import Conversation
 from potto_repl.slopes import Slope, slopes
-from potto_repl.values import with_error
 
 DIGITS = 12  # of the reference evaluator's differences
 STEPS = 7

@@ -13,7 +13,7 @@ from potto.kernels import compile as compiling
 from potto.render import Located, ProgramError
 from potto.runtime.estimate import Estimate
 from potto.runtime.printing import format_error
-from potto.runtime.shown import as_dual, format_numbers
+from potto.runtime.shown import as_dual, format_numbers, largest, with_error
 from potto.settings import Settings
 from potto.syntax import parse_expression
 from potto.types import infer_expression
@@ -23,7 +23,7 @@ from potto_repl.registry import command
 from potto_repl.reply import Part, Refusal, diagnostic
 from potto_repl.session import Conversation, plain_names
 from potto_repl.slopes import slopes
-from potto_repl.values import is_dual, largest, parts_of, seconds, tail, value_parts, with_error
+from potto_repl.values import is_dual, parts_of, seconds, tail, value_parts
 
 TOLERANCES = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 SAMPLES = (1_000, 10_000, 100_000)

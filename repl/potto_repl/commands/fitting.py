@@ -15,6 +15,7 @@ from potto.api import Function
 from potto.fitting import Fit, Step
 from potto.fitting import fit as fitted
 from potto.runtime.printing import format_number
+from potto.runtime.shown import largest, with_error
 from potto.settings import settings
 from potto_repl.drawing import braille, room_for_curves
 from potto_repl.expressions import checked, split_items
@@ -23,7 +24,7 @@ from potto_repl.registry import command
 from potto_repl.reply import Part, Refusal
 from potto_repl.sampled import free_names
 from potto_repl.session import Conversation, plain_names
-from potto_repl.values import largest, seconds, with_error
+from potto_repl.values import seconds
 
 ROUNDING = 1e-16  # of the largest value: what lies below says nothing
 FEWEST = 3  # steps that are worth a picture
