@@ -43,6 +43,7 @@ $(STAMP): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Potto needs Python 3.11 or newer; try make PYTHON=python3.11"; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[dev]'
+	$(BIN)/python -m compileall -q potto lsp/potto_lsp repl/potto_repl  # as pip does with all but what stays where it is
 	touch $(STAMP)
 
 $(VSCODE)/node_modules/.stamp: $(VSCODE)/package-lock.json

@@ -22,9 +22,8 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any
 
+from installed import as_installed
 from lsp_workspace import workspace
-
-from potto.syntax.tables import tables
 
 PUSHED = "textDocument/publishDiagnostics"
 Row = tuple[str, str, float, str, float, float]  # gate, what, value, unit, goal, stretch
@@ -213,7 +212,7 @@ def signatures(client: Client, texts: dict[str, str], rounds: int) -> Iterator[R
     client.quiet()
     near, far, used = [], [], client.processor()
     changed = texts["m0"].replace("def f1(t, k)", "def f1(t)").replace("def f0(t, k)", "def f0(t)")
-    for turn in range(max(rounds // 5, 6)):
+    for turn in range(max(rounds // 5, 24)):
         sent = client.change("m0", {"text": texts["m0"] if turn % 2 else changed})
         uris = {client.uri(name) for name in opened}
         while uris:
@@ -286,7 +285,7 @@ def main() -> None:
     texts = workspace()
     with tempfile.TemporaryDirectory(prefix="potto-bench-") as name, tempfile.TemporaryDirectory() as cache:
         os.environ["POTTO_CACHE"] = cache
-        tables()  # an installed Potto has them
+        as_installed()
         for module, text in texts.items():
             (Path(name) / f"{module}.po").write_text(text)
         lines = sum(text.count("\n") for text in texts.values())

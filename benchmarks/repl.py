@@ -23,6 +23,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from installed import as_installed
+
 RUNS = 7
 LINES = 2000
 TARGETS = {"version": 60.0, "prompt": 250.0, "first expression": 300.0, "echo p99": 10.0, "highlighting p99": 10.0,
@@ -208,6 +210,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
+    as_installed()
     figures: dict[str, Figure] = {"version": version(), **startup(), **echoes(), **keystrokes()}
     loaded = imports()
     if options.json:

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from installed import as_installed
 
 import potto
 
@@ -184,6 +185,7 @@ def process() -> None:
     import tempfile
     from pathlib import Path
 
+    as_installed()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "f.po"
         path.write_text("def f(t) integral [0, 1] [x < t]*x d(x)\n")

@@ -136,15 +136,9 @@ def _mentioned(db: Database, file: str, run: tuple[str, ...]) -> tuple[tuple[str
     found, known = [], _names_in(db, file)
     for name in run:
         text = chunk_text(db, file, name)
-        words = frozenset[str]() if text is None else _words(db, text)
+        words = () if text is None else _WORD.findall(text)
         found.append((name, tuple(sorted(known.intersection(words) - {name}))))
     return tuple(found)
-
-
-@query(keep=1024)
-def _words(db: Database, text: str) -> frozenset[str]:
-    """The words in a chunk: which of them are names of definitions changes more often than they do."""
-    return frozenset(_WORD.findall(text))
 
 
 @query

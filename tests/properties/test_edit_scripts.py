@@ -113,4 +113,4 @@ def test_a_body_edit_runs_no_interface_of_another_and_nothing_of_other_modules(
             case (tuple(group),):
                 assert [(target.file, target.name) for target in group] == [(file, defined)], (query, args)
             case _:
-                assert query in ("parsed", "head", "chunk_references", "occurring_names", "_words"), (query, args)
+                assert query in ("parsed", "head", "chunk_references", "occurring_names"), (query, args)

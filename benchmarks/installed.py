@@ -1,0 +1,21 @@
+"""What an installation leaves behind, so that processes are timed as users have them.
+
+Owns `as_installed`. pip compiles what it installs, but not a working copy that is used where it stands; and the tables
+of the grammar are made once.
+"""
+
+from __future__ import annotations
+
+import compileall
+from pathlib import Path
+
+from potto.syntax.tables import tables
+
+PACKAGES = ("potto", "lsp/potto_lsp", "repl/potto_repl")
+
+
+def as_installed() -> None:
+    """Compile the packages, as far as they are not, and make the tables of the grammar in the folder for caches."""
+    for package in PACKAGES:
+        compileall.compile_dir(Path(__file__).parent.parent / package, quiet=1)
+    tables()
