@@ -175,7 +175,7 @@ def sweep(term: Integral, found: Iterable[Finding], resolve: Resolve, decide: De
         cuts = (*(c for c in cuts if c.decides), *[c for c in cuts if not c.decides][:MOST_CUTS])
         here = [c for c in centers if variable in c.free]
         centers = {c: None for c in centers if variable not in c.free}
-        levels.append(Level(variable, lo, hi, (*hints, *_points(here, variable)[:MOST_CENTERS]), cuts))
+        levels.append(Level(variable, lo, hi, (*hints, *points_of(here, variable)[:MOST_CENTERS]), cuts))
         for surface, turning in _shadows(cuts, variable, lo, hi):
             pool.put(surface, None, turning)
         for bound in (lo, hi):
@@ -266,7 +266,7 @@ def _factored(surface: Term, orientation: int) -> tuple[tuple[Face, ...], int]:
     return (tuple(found.values()), sign) if len(found) > 1 else ((_face(surface)[0],), 1)
 
 
-def _points(centers: list[Term], variable: str) -> tuple[Term, ...]:
+def points_of(centers: Iterable[Term], variable: str) -> tuple[Term, ...]:
     """Where the centers are, if that can be said in closed form."""
     points: dict[Term, None] = {}
     for center in centers:

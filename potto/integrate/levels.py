@@ -27,13 +27,15 @@ from potto.kernels.cells import Array, Cell, Ints, Mask, Value
 class Iteration:
     """One plan being evaluated by one machine. `order` is the number of nodes per piece to start with.
 
-    still: surfaces that don't move here, since someone else counts what their motion does.
+    still: surfaces that don't move here, since someone else counts what their motion does. tracked: whether the
+    integrand brings its rounding along at every node.
     """
 
     plan: Plan
     machine: Evaluator
     order: int
     still: frozenset[Term] = frozenset()
+    tracked: bool = False
 
     def run(
         self, number: int, env: dict[str, Value], batch: int, sides: dict[int, Mask], machine: Evaluator,
@@ -130,6 +132,11 @@ class Iteration:
         mask = np.broadcast_to(np.asarray(zero), seg.a.shape)
         return np.nonzero(~mask)[0] if mask.any() else None
 
+    def body(self, env: dict[str, Value], sides: dict[int, Mask], machine: Evaluator) -> Value:
+        """The integrand itself, on the sides given."""
+        body = self.plan.body
+        return machine.evaluate(body, {n: env[n] for n in body.params}, self.plan.trace(sides))
+
     def inside(
         self, number: int, env: dict[str, Value], batch: int, sides: dict[int, Mask], machine: Evaluator
     ) -> tuple[Array, Array]:
@@ -137,9 +144,8 @@ class Iteration:
         if number + 1 < len(self.plan.levels):
             sums = self.run(number + 1, env, batch, sides, machine)
             return sums.v, sums.e
-        body = self.plan.body
         machine.count(batch)
-        value = machine.tracking().evaluate(body, {n: env[n] for n in body.params}, self.plan.trace(sides))
+        value = self.body(env, sides, machine.tracking())
         cells = components(value)
         values, errors = np.empty((len(cells), batch)), np.zeros((len(cells), batch))
         for i, cell in enumerate(cells):

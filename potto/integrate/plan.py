@@ -164,24 +164,30 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve) -> P
         hides = hidden(term, found, resolve)
     reaches = not unknown
     swept = sweep(term, found, resolve, remember)
-    groups: list[Group] = []
-    levels: list[LevelPlan] = []
-    for level in swept.levels:
-        decided = []
-        for cut in level.cuts:
-            if cut.decides:
-                decided.append(len(groups))
-                groups.append(Group(len(groups), cut))
-        levels.append(level_plan(level, tuple(decided), groups))
+    levels, groups = group_levels(swept.levels)
     numbers = {j.path: (g.number, j.orientation) for g in groups for j in g.cut.jumps}
-    vanishing = _vanishing(term.body, numbers)
+    vanishing = vanishing_of(term.body, numbers)
     kept = tuple((t, v) for t, v in decisions.items() if not isinstance(t, Const))
     body = function_of(term.body)
     box = box_of(term, found, body) if reaches and not hides else None
     surfaces = {f.surface for f in found if f.kind != "center"}
     doublings = sum(min(3, len(surface.free.intersection(term.variables))) for surface in surfaces)
     plain = straight(term, levels, inline) if reaches and not hides else None
-    return Plan(term, tuple(levels), tuple(groups), body, vanishing, kept, reaches, hides, box, doublings, plain)
+    return Plan(term, levels, groups, body, vanishing, kept, reaches, hides, box, doublings, plain)
+
+
+def group_levels(levels: Sequence[Level]) -> tuple[tuple[LevelPlan, ...], tuple[Group, ...]]:
+    """The terms of all variables, outermost first, and the surfaces with jumps that cut them."""
+    groups: list[Group] = []
+    plans: list[LevelPlan] = []
+    for level in levels:
+        decided = []
+        for cut in level.cuts:
+            if cut.decides:
+                decided.append(len(groups))
+                groups.append(Group(len(groups), cut))
+        plans.append(level_plan(level, tuple(decided), groups))
+    return tuple(plans), tuple(groups)
 
 
 def level_plan(level: Level, decided: tuple[int, ...], groups: Sequence[Group]) -> LevelPlan:
@@ -242,14 +248,16 @@ def _deciding(
 # Where the integrand is exactly zero, told from the sides alone
 
 
+def vanishing_of(body: Term, numbers: Mapping[tuple[int, ...], tuple[int, int]], part: Term | None = None) -> Any:
+    """A test on sides: True, False, or ("and" | "or", tests), or (group, orientation, then, orelse).
 
-def _vanishing(body: Term, numbers: Mapping[tuple[int, ...], tuple[int, int]]) -> Any:
-    """A test on sides: True, False, or ("and" | "or", tests), or (group, orientation, then, orelse)."""
+    part: what is tested, a part of the body that the paths of `numbers` are those of; all of it if None.
+    """
     index = layout(body).index
     memo: dict[Term, Any] = {}
     for node in postorder(body):
         memo[node] = _zero(node, memo, index, numbers)
-    return memo[body]
+    return memo[body if part is None else part]
 
 
 def _zero(node: Term, memo: dict[Term, Any], index: Mapping[tuple[Term, int], int], numbers: Any) -> Any:

@@ -249,7 +249,7 @@ class Work:
         else:
             p.most = p.ends = p.tail = np.empty((0, p.u0.size))
         p.floor = 4 * EPS * p.size + (size @ rule.slopes) * shake
-        if self.ends is not None and self.last:
+        if self.ends is not None and self.last and not self.parent.tracked:
             p.floor += self.noise(p, seg)
         if self.k:
             # speeds are rounded too, and so are the places of the cuts, which matters where they are close together
@@ -324,9 +324,7 @@ class Work:
             env[name] = Cell(x, None, tangent)
             masks = {g: m[index][:, None] if isinstance(m, np.ndarray) else m for g, m in self.sides.items()}
             self.machine.count(x.size)
-            body = self.parent.plan.body
-            value = self.inner.evaluate(body, {n: env[n] for n in body.params}, self.parent.plan.trace(masks))
-            return spread(value, x.shape, k, self.moving)
+            return spread(self.parent.body(env, masks, self.inner), x.shape, k, self.moving)
         n = x.shape[1]
         flat = np.repeat(np.arange(index.size), n)
         env = gather(here, owner[flat])

@@ -25,6 +25,7 @@ from potto.integrate.plan import Plan
 from potto.integrate.straight import certain
 from potto.kernels import errors
 from potto.kernels.cells import Array, Cell, Number, Value, all_arrays, map_arrays
+from potto.runtime.elimination import ACCURATE, WORTH, step_by_step
 from potto.runtime.one_sided import beside_axes, beside_folds, from_both_sides, one_direction
 from potto.runtime.plans import Linked, link, plan_for, split_by_decisions
 
@@ -41,6 +42,7 @@ FEW = 64  # members for which it does not pay to look for those that nothing cut
 MOST_LEVELS = 3
 PER_LEVEL, AFFORDABLE = 12, 1_000_000
 LOOSE = 1e-3
+FEW_NODES = 30_000  # up to which iterated quadrature is no slower
 # From how many errors of the value on an error of a derivative is looked at again from another side, and for how many
 # members at most.
 STEEP = 1e3
@@ -127,6 +129,11 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
     method = machine.settings.method
     if outermost:
         machine.books.members = max(machine.books.members, batch)
+    if outermost and method in ("auto", "quadrature") and many(machine, term, linked):
+        sampled = method == "auto" and too_many(machine, term, linked)
+        found = step_by_step(machine, term, linked, batch, WORTH if sampled else ACCURATE)
+        if found is not None:
+            return found
     if outermost and (method in ("mc", "qmc") or (method == "auto" and too_many(machine, term, linked))):
         from potto.integrate.sampling import sample
 
@@ -208,11 +215,19 @@ def turned_round(
 
 def too_many(machine: Machine, term: Integral, linked: Linked) -> bool:
     """Whether an integral has too many variables and surfaces for quadrature, or too few digits are asked for."""
-    count = len(term.variables)
-    if count <= MOST_LEVELS:
+    if len(term.variables) <= MOST_LEVELS:
         return False
-    doublings = plan_for(machine, term, linked).doublings
-    return machine.settings.rtol >= LOOSE or PER_LEVEL**count * 2**doublings > AFFORDABLE
+    return machine.settings.rtol >= LOOSE or expected(machine, term, linked) > AFFORDABLE
+
+
+def many(machine: Machine, term: Integral, linked: Linked) -> bool:
+    """Whether it pays to look whether the variables can be eliminated."""
+    return len(term.variables) > MOST_LEVELS and not machine.frozen and expected(machine, term, linked) > FEW_NODES
+
+
+def expected(machine: Machine, term: Integral, linked: Linked) -> int:
+    """About how many evaluations iterated quadrature takes."""
+    return PER_LEVEL ** len(term.variables) * 2 ** plan_for(machine, term, linked).doublings  # type: ignore[no-any-return]
 
 
 def counted(sums: Sums, known: bool, machine: Machine) -> Sums:

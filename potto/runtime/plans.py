@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from potto.calculus.cases import cased
 from potto.calculus.deciding import deciding
 from potto.core.terms import Deriv, Integral, Lam, Term, Var, deriv, substitute, var
 from potto.diagnostics import PottoError
+from potto.integrate.eliminated import Eliminated, eliminated
 from potto.integrate.plan import Plan, make
 from potto.kernels.cells import Cell, Value
 from potto.runtime.functions import Closure, Derivative
@@ -65,6 +67,7 @@ def link(env: dict[str, Value]) -> Linked:
 # Plans
 
 _plans: OrderedDict[Any, list[Plan]] = OrderedDict()
+_eliminated: OrderedDict[Any, Eliminated | None] = OrderedDict()
 _lock = threading.Lock()
 
 
@@ -89,6 +92,23 @@ def plan_for(machine: Machine, term: Integral, linked: Linked) -> Plan:
         if len(_plans) > MOST_PLANS:
             _plans.popitem(last=False)
     return plan
+
+
+def eliminated_for(machine: Machine, term: Integral, linked: Linked) -> Eliminated | None:
+    """The steps of an integral over many variables that each depend on one number, if it has such; found once."""
+    functions = tuple((name, f.digest) for name, f in sorted(linked.functions.items()))
+    key = (term.digest, functions, machine.linker.reached(term, *linked.functions.values()))
+    with _lock:
+        if key in _eliminated:
+            return _eliminated[key]
+    found = eliminated(
+        cased(term), lambda head: _plainly(head, linked) if isinstance(head, Var) else machine.linker.function(head)
+    )
+    with _lock:
+        _eliminated[key] = found
+        if len(_eliminated) > MOST_PLANS:
+            _eliminated.popitem(last=False)
+    return found
 
 
 def _plainly(head: Var, linked: Linked) -> Lam | Deriv | None:

@@ -1,0 +1,227 @@
+"""Integrals whose variables can be integrated out one by one, each as a function of one number.
+
+Owns `eliminate`. In an integral over x1, ..., xn what is left after some of them may depend on those further out
+through one number only: of a function of a sum it is the part of the sum that is known so far, in a chain f(x1, x2)
+f(x2, x3)... the variable before. Then
+
+    V_i(s) = integral of w_i(s, x_i) V_{i+1}(p_i(s, x_i)) dx_i,
+
+a function of one number that can be tabulated, so that n variables take n times as long as one, and not a power of it
+(variable elimination, as for discrete variables: Bertele and Brioschi, Nonserial Dynamic Programming, 1972).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from fractions import Fraction
+
+from potto.core.collecting import split
+from potto.core.polynomials import number
+from potto.core.terms import (
+    ONE,
+    App,
+    Branch,
+    Const,
+    Global,
+    If,
+    Integral,
+    Prim,
+    Term,
+    Var,
+    add,
+    branch,
+    children,
+    div,
+    mul,
+    neg,
+    postorder,
+    prim,
+    rebuild,
+    var,
+)
+
+Names = frozenset[str]
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """V(state) = integral over [lo, hi] of weight * V_next(passed) d(variable).
+
+    state: the name of the number that is handed on from further out; None where there is none. passed: the number that
+    is handed on further in; None where what is further in depends on none, and for the last variable, whose weight is
+    all that is left.
+    """
+
+    variable: str
+    lo: Term
+    hi: Term
+    state: str | None
+    weight: Term
+    passed: Term | None
+
+
+class _MoreThanOne(Exception):
+    """What is further in depends on more than one number."""
+
+
+def eliminate(term: Integral) -> tuple[Step, ...] | None:
+    """The steps, outermost first; None where more than one number would have to be handed on."""
+    everything = (term.body, *(bound for pair in term.bounds for bound in pair))
+    kinds = (Const, Var, Prim, Branch, If, App, Global)
+    if not all(isinstance(node, kinds) for part in everything for node in postorder(part)):
+        return None
+    rest, bounds, state = _bare(term.body), list(term.bounds), None
+    steps: list[Step] = []
+    for i, variable in enumerate(term.variables):
+        lo, hi = bounds[i]
+        inner = frozenset(term.variables[i + 1 :])
+        if not inner:
+            return (*steps, Step(variable, lo, hi, state, rest, None))
+        here = frozenset((variable,)) if state is None else frozenset((variable, state))
+        weight, rest = _split(rest, inner)
+        handed = _Handed(here, inner, f"{variable}@known")
+        try:
+            rest = handed.put(rest)
+            bounds[i + 1 :] = [(handed.put(a), handed.put(b)) for a, b in bounds[i + 1 :]]
+            passed = handed.passed()
+        except _MoreThanOne:
+            return None
+        steps.append(Step(variable, lo, hi, state, weight, passed))
+        state = None if passed is None else handed.name
+    return None
+
+
+def _bare(body: Term) -> Term:
+    """Conditionals with the coordinate that decides alone."""
+    memo: dict[Term, Term] = {}
+    for node in postorder(body):
+        new = rebuild(node, tuple(memo[c] for c in children(node)))
+        memo[node] = branch(new.coordinates[:1], new.strict, new.then, new.orelse) if isinstance(new, Branch) else new
+    return memo[body]
+
+
+def _split(term: Term, inner: Names) -> tuple[Term, Term]:
+    """A term as a product of what the inner variables don't occur in, and the rest."""
+    weight: list[Term] = []
+    rest: list[Term] = []
+    for factor in _factors(term):
+        if not factor.free & inner:
+            weight.append(factor)
+            continue
+        match factor:
+            case Prim(op="exp", args=(inside,)):
+                terms = _summands(inside)
+                known = [t for t in terms if not t.free & inner]
+                if known:
+                    weight.append(prim("exp", add(*known)))
+                    factor = prim("exp", add(*(t for t in terms if t.free & inner)))
+        rest.append(factor)
+    return mul(*weight) if weight else ONE, mul(*rest) if rest else ONE
+
+
+def _factors(term: Term) -> Iterable[Term]:
+    waiting = [term]
+    while waiting:
+        item = waiting.pop()
+        match item:
+            case Prim(op="mul", args=args):
+                waiting.extend(reversed(args))
+            case Prim(op="neg", args=(inside,)):
+                waiting.append(inside)
+                yield neg(ONE)
+            case Prim(op="div", args=(above, below)) if above is not ONE:
+                waiting.append(above)
+                yield from (div(ONE, factor) for factor in _factors(below))
+            case _:
+                yield item
+
+
+def _summands(term: Term) -> list[Term]:
+    found: list[Term] = []
+    waiting = [(term, False)]
+    while waiting:
+        item, turned = waiting.pop()
+        match item:
+            case Prim(op="add", args=args):
+                waiting.extend((a, turned) for a in reversed(args))
+            case Prim(op="neg", args=(inside,)):
+                waiting.append((inside, not turned))
+            case _:
+                found.append(neg(item) if turned else item)
+    return found
+
+
+@dataclass
+class _Handed:
+    """The one number that terms depend on variables `here` through, as far as they have been put.
+
+    core: that number as a sum, by what it is a sum of, with a coefficient of 1 somewhere; name: what it is called then.
+    What is multiplied or raised to powers stays as it was written: multiplied out it might lose digits.
+    """
+
+    here: Names
+    inner: Names
+    name: str
+    core: dict[Term, Fraction] | None = None
+
+    def put(self, term: Term) -> Term:
+        """The term with the number in place of what it is made of. Raises _MoreThanOne."""
+        memo: dict[Term, Term] = {}
+        for node in postorder(term):
+            if self._mixed(node):
+                memo[node] = self._rebuilt(node, memo)
+        return memo[term] if term in memo else self._single(term)
+
+    def _mixed(self, node: Term) -> bool:
+        return bool(node.free & self.here) and bool(node.free & self.inner)
+
+    def _rebuilt(self, node: Term, memo: dict[Term, Term]) -> Term:
+        if isinstance(node, Prim) and node.op in ("add", "mul"):
+            together = add if node.op == "add" else mul
+            parts = _summands(node) if node.op == "add" else list(_factors(node))
+            known = [p for p in parts if not p.free & self.inner and p.free & self.here]
+            others = [self._again(p, memo) for p in parts if p.free & self.inner or not p.free & self.here]
+            return together(*others, self._single(together(*known))) if known else together(*others)
+        return rebuild(node, tuple(self._again(c, memo) for c in children(node)))
+
+    def _again(self, part: Term, memo: dict[Term, Term]) -> Term:
+        """The same for a part of a term; also one that is not in it but for its sign, or as a divisor."""
+        if part in memo:
+            return memo[part]
+        if not self._mixed(part):
+            return self._single(part)
+        return rebuild(part, tuple(self._again(c, memo) for c in children(part)))
+
+    def _single(self, term: Term) -> Term:
+        """A term without inner variables by the number."""
+        if not term.free & self.here:
+            return term
+        varying: dict[Term, Fraction] = {}
+        constant: list[Term] = []
+        for summand in _summands(term):
+            coefficient, atom = split(summand)
+            if atom.free & self.here:
+                varying[atom] = varying.get(atom, Fraction(0)) + coefficient
+            else:
+                constant.append(summand)
+        first = varying[min(varying, key=lambda atom: atom.digest)]
+        scale = number(first)
+        if scale is None or not all(varying.values()):
+            raise _MoreThanOne
+        core = {atom: coefficient / first for atom, coefficient in varying.items()}
+        if self.core is None:
+            self.core = core
+        if self.core != core:
+            raise _MoreThanOne
+        return add(*constant, mul(scale, var(self.name)))
+
+    def passed(self) -> Term | None:
+        """The number in terms of what it is made of; None if there is none. Raises _MoreThanOne."""
+        if self.core is None:
+            return None
+        scales = {atom: number(coefficient) for atom, coefficient in self.core.items()}
+        terms = [mul(scale, atom) for atom, scale in scales.items() if scale is not None]
+        if len(terms) < len(scales):
+            raise _MoreThanOne  # a third has no decimals
+        return add(*terms)

@@ -1,0 +1,114 @@
+"""Integrals over many variables, one variable after the other: closed forms in four to ten dimensions.
+
+Where what is further in depends on one number of those further out (a sum, a product, the variable before) it is a
+table of that number, and the errors are those of quadrature. Where it is not, nothing changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import mpmath as mp
+import pytest
+
+import potto
+
+NAMES = "abcdefghij"
+Number = Callable[[Any], Any]
+
+
+def program(bounds: list[str], body: str) -> str:
+    return f"def f(t) integral ({', '.join(bounds)}) {body} d({', '.join(NAMES[: len(bounds)])})"
+
+
+def cube(n: int, body: str) -> str:
+    return program(["[0, 1]"] * n, body)
+
+
+def total(n: int, power: str = "") -> str:
+    return " + ".join(f"{name}{power}" for name in NAMES[:n])
+
+
+def density(n: int, s: Any) -> Any:
+    """Of the sum of n uniform numbers (Irwin and Hall)."""
+    return sum((-1) ** k * mp.binomial(n, k) * (s - k) ** (n - 1) for k in range(int(s) + 1)) / mp.factorial(n - 1)
+
+
+def below(n: int) -> Number:
+    """int exp(-sum) [sum < t] over the unit cube."""
+    return lambda t: mp.quad(lambda s: mp.exp(-s) * density(n, s), [0, *(k for k in range(1, n) if k < t), t])
+
+
+def corner(weights: list[float]) -> Number:
+    """The volume of the unit cube's part where the weighted sum is below t, by inclusion and exclusion."""
+
+    def volume(t: Any) -> Any:
+        n, found = len(weights), mp.mpf(0)
+        for subset in range(2**n):
+            rest = t - sum(mp.mpf(w) for i, w in enumerate(weights) if subset >> i & 1)
+            if rest > 0:
+                found += (-1) ** bin(subset).count("1") * rest**n
+        return found / mp.factorial(n) / mp.fprod(weights)
+
+    return volume
+
+
+def ball(n: int) -> Number:
+    return lambda t: mp.pi ** (mp.mpf(n) / 2) / mp.gamma(mp.mpf(n) / 2 + 1) * t**n
+
+
+WEIGHTS = [1.0, 1.25, 1.5, 1.75, 2.0, 2.25]
+WEIGHTED = " + ".join(f"{w}*{name}" for w, name in zip(WEIGHTS, NAMES, strict=False))
+
+# name, program, where, value as a function of t, the largest error that may be admitted
+CASES: list[tuple[str, str, float, Number, float]] = [
+    ("plane in 8", cube(8, f"exp(-({total(8)}))*[{total(8)} < t]"), 3.25, below(8), 1e-10),
+    ("plane in 5 through corners", cube(5, f"exp(-({total(5)}))*[{total(5)} < t]"), 2.0, below(5), 1e-10),
+    ("plane in 10", cube(10, f"exp(-({total(10)}))*[{total(10)} < t]"), 4.5, below(10), 1e-9),
+    ("tilted plane in 6", cube(6, f"[{WEIGHTED} < t]"), 4.0, corner(WEIGHTS), 1e-9),
+    ("ball in 4", program(["[-1, 1]"] * 4, f"[{total(4, '^2')} < t^2]"), 0.9, ball(4), 1e-8),
+    ("ball in 6", program(["[-1, 1]"] * 6, f"[{total(6, '^2')} < t^2]"), 0.7, ball(6), 1e-8),
+    ("by its radius", cube(5, f"[sqrt({total(5, '^2')}) < t]"), 0.8, lambda t: ball(5)(t) / 32, 1e-8),
+    ("product", cube(5, "[a*b*c*d*e < t]"), 0.1,
+     lambda t: t * sum((-mp.log(t)) ** k / mp.factorial(k) for k in range(5)), 1e-9),
+    ("in order", program(["[0, t]", "[0, a]", "[0, b]", "[0, c]", "[0, d]"], "a*b*c*d*e"), 0.9,
+     lambda t: t**10 / 3840, 1e-9),
+    ("simplex", program(["[0, t]", "[0, t - a]", "[0, t - a - b]", "[0, t - a - b - c]", "[0, t - a - b - c - d]"],
+                        f"exp({total(5)})"), 0.9,
+     lambda t: mp.quad(lambda s: mp.exp(s) * s**4 / 24, [0, t]), 1e-8),
+    ("steps", cube(6, "[a < t]*[b > t]*[c + d < t]*(c + d + e + f)"), 0.3,
+     lambda t: t * (1 - t) * (t**3 / 3 + t * t / 2), 1e-10),
+    ("peak that nodes miss", cube(6, "exp(-1e9*(a - t)^2*(1 + b))*cos(b*c)*d*e*f"), 0.37,
+     lambda t: mp.sqrt(mp.pi / mp.mpf(10)**9) / 8 * mp.quad(lambda b: mp.sinc(b) / mp.sqrt(1 + b), [0, 1]), 1e-4),
+    ("peak on the way", cube(6, "exp(-1e9*(a + b - t)^2)*c*d*e*f"), 0.7,
+     lambda t: mp.sqrt(mp.pi / mp.mpf(10)**9) / 16 * t, 1e-8),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "text", "at", "exact", "largest"), CASES, ids=[row[0] for row in CASES])
+def test_closed_forms(name: str, text: str, at: float, exact: Number, largest: float) -> None:
+    found = potto.deriv(potto.compile(text).f)((at, 1.0))
+    assert found.method == "quadrature" and found.evals < 1_000_000
+    with mp.workdps(40):
+        value, rate = exact(mp.mpf(at)), mp.diff(exact, mp.mpf(at), h=mp.mpf(10) ** -15)
+    for got, error, true in ((found.value, found.error, value), (found.tangent, found.tangent_error, rate)):
+        assert abs(got - true) <= error <= largest * max(abs(value), abs(true)), (got, error, true)
+
+
+@pytest.mark.parametrize(
+    ("body", "at"),
+    [
+        ("[a + t*b < 0.5]*(c + d + e)", 0.0),  # it runs along b
+        ("(if [a < t] then cos(b*c) else b + c)*exp(d*e)", 0.4),  # it jumps in what is passed on
+        ("1/(0.3 + (a - b)^2 + (c - d)^2 + e*t)", 0.5),  # more than one number
+    ],
+)
+def test_what_cannot_be_passed_on_by_one_number_is_integrated_as_ever(body: str, at: float) -> None:
+    f = potto.deriv(potto.compile(cube(5, body)).f)
+    with potto.settings(samples=20_000, rtol=1e-4):
+        found = f((at, 1.0))
+    with potto.settings(method="mc", samples=20_000):
+        again = f((at, 1.0))
+    assert abs(found.value - again.value) <= found.error + again.error
+    assert abs(found.tangent - again.tangent) <= found.tangent_error + again.tangent_error
