@@ -23,17 +23,17 @@ ACCURATE, WORTH = 1e-8, 1e-4
 
 
 def step_by_step(machine: Machine, term: Integral, linked: Linked, batch: int, limit: float) -> Sums | None:
-    """The integrals of a batch, where each variable hands one number on; None where they are off by more than `limit`."""
+    """The integrals of a batch, where each variable hands one number on; None where errors are larger than `limit`."""
     known = eliminated_for(machine, term, linked)
     if known is None:
         return None
-    rows = []
-    before = list(machine.books.unfinished), dict(machine.books.sided)
+    rows, books = [], machine.books
+    before = list(books.unfinished), dict(books.sided), dict(books.folds)
     for i in range(batch):
         row = one_by_one(known, machine, {n: map_arrays(v, lambda a, i=i: float(a[i])) for n, v in linked.env.items()})
-        books = machine.books
-        if row is None or (books.unfinished, books.sided) != before or not accurate(row, limit, machine):
-            books.unfinished[:], books.sided = before[0], before[1]
+        noted = books.unfinished, books.sided, books.folds
+        if row is None or noted != before or not accurate(row, limit, machine):
+            books.unfinished, books.sided, books.folds = before
             return None
         rows.append(row)
     machine.books.methods.add("quadrature")
