@@ -1,7 +1,8 @@
 """Quick fixes: what can be done about a diagnostic.
 
-Owns `fixes`. Names are in `fixing_names`, conditions in `fixing_conditions`; here is what any diagnostic may bring: a
-replacement that it asks about (did you mean `x`?), and the removal of what is not used.
+Owns `fixes`. Names are in `fixing_names`, conditions in `fixing_conditions`, texts that can't be read in
+`fixing_texts`; here is what any diagnostic may bring: a replacement that it asks about (did you mean `x`?), and the
+removal of what is not used.
 """
 
 from __future__ import annotations
@@ -13,13 +14,14 @@ from potto.diagnostics import Diagnostic
 from potto.ide.edits import one_file
 from potto.ide.fixing_conditions import bracket_fixes, inverse_fixes
 from potto.ide.fixing_names import undefined_fixes
+from potto.ide.fixing_texts import bracketed, suggested_fixes
 from potto.ide.model import Change, Edit
 from potto.ide.offers import At, Offer, diagnostics_at
 from potto.ide.places import ChunkAt, chunk_at, line_end, line_start
 from potto.modules.kinds import IMPORTED_TWICE, UNUSED_IMPORT
 from potto.source import Span
 from potto.syntax import nodes, walk
-from potto.types.kinds import NOT_DEFINED, UNUSED_LOCAL, UNUSED_VARIABLE, VARYING_CONDITION
+from potto.types.kinds import NOT_DEFINED, TRUTH_ESCAPES, UNUSED_LOCAL, UNUSED_VARIABLE, VARYING_CONDITION
 
 _MEANT = re.compile(r"did you mean `([^`]+)`(?: or `([^`]+)`)?\?")
 
@@ -28,7 +30,11 @@ def fixes(place: At) -> Iterator[Offer]:
     """What can be done about the diagnostics that the selection touches."""
     for said in diagnostics_at(place.db, place.file, place.span):
         yield from _meant(place, said)
-        if said.code == NOT_DEFINED.code:
+        if said.code.startswith("P01"):
+            yield from suggested_fixes(place, said)
+        elif said.code == TRUTH_ESCAPES.code:
+            yield from bracketed(place, said)
+        elif said.code == NOT_DEFINED.code:
             yield from undefined_fixes(place, said)
         elif said.code == VARYING_CONDITION.code:
             yield from bracket_fixes(place, said)

@@ -5,6 +5,7 @@ Owns `rewrites`. A rewrite is offered only if its text reads back as the same tr
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 from potto.ide.edits import one_file
@@ -17,6 +18,8 @@ from potto.ide.signatures import called_at
 from potto.source import Span
 from potto.syntax import nodes
 from potto.types import Function, Parameter, TupleOf, Type, groups_of
+
+_NAME_BEFORE = re.compile(r"\w+ *\(")
 
 
 def rewrites(place: At) -> Iterator[Offer]:
@@ -53,7 +56,7 @@ def _inverse(place: At) -> Iterator[Offer]:
 
 
 def _arguments(place: At) -> Iterator[Offer]:
-    call = call_at(place.db, place.file, place.span.start)
+    call = call_at(place.db, place.file, _into_call(place.text, place.span.start))
     if call is None or call.measure:
         return
     called = called_at(place.db, place.file, call)
@@ -64,6 +67,12 @@ def _arguments(place: At) -> Iterator[Offer]:
     if left:
         title = f"Complete the arguments of `{called.name}`"
         yield Offer(title, "refactor.rewrite", lambda: _completed(place, call, left))
+
+
+def _into_call(text: str, at: int) -> int:
+    """A place, or, on the name in front of the parenthesis of a call, the place behind that."""
+    open = _NAME_BEFORE.match(text, at)
+    return at if open is None else open.end()
 
 
 def _left(group: tuple[Parameter, ...], call: PendingCall) -> tuple[Parameter, ...]:

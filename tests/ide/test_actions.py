@@ -163,6 +163,8 @@ def test_complete_the_arguments_of_a_dual_call():
     text = "def g(a, b) a*b\nprint(deriv(g)(da=(0.5, $01)))\n"
     assert fixed(text, "Complete the arguments of `dg`").endswith("print(deriv(g)(da=(0.5, 1), db=(0, 1)))\n")
     assert not fixture("def g(a, b) a*b\nprint(deriv(g)(da=(0.5, $01), db=2))\n").actions()
+    text = "def g(a, b) a*b\nprint($0g(2))\n"
+    assert fixed(text, "Complete the arguments of `g`").endswith("print(g(2, b=0))\n")
 
 
 def test_imports_in_order():
@@ -171,6 +173,45 @@ def test_imports_in_order():
     after = fixed(text, "Sort the imports", ("P0620",))
     assert after == "from a import unused, x, y\nfrom b import z\nw = x + y + z\n"
     assert fixed(text, "Remove all unused imports") == "from a import x, y\nfrom b import z\nw = x + y + z\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "title", "after"),
+    [
+        ("$0f(x) = x^2", "Write `def f(x)`", "def f(x) x^2"),
+        ("def f(x) $0= x^2", "Take out `=`", "def f(x) x^2"),
+        ("def f(x) x$0**2", "Write `^`", "def f(x) x^2"),
+        ("def f(x) x$0²", "Write `^2`", "def f(x) x^2"),
+        ("def f(x) $02x", "Write `2*x`", "def f(x) 2*x"),
+        ("def f(x) $0.5*x", "Write `0.5`", "def f(x) 0.5*x"),
+        ("def f(x) if $0!(x > 0) then 1 else 2", "Write `not`", "def f(x) if not(x > 0) then 1 else 2"),
+        ("def f(x) if x $0= 1 then 2 else 3", "Write `==`", "def f(x) if x == 1 then 2 else 3"),
+        ("def f(x) if x > 0$0: 1 else 2", "Write `then`", "def f(x) if x > 0 then 1 else 2"),
+        ("def f(x) $0(x + 1", "Write `)`", "def f(x) (x + 1)"),
+        ("def f(x) x*(2 + 3)$0)", "Take out `)`", "def f(x) x*(2 + 3)"),
+        ("def f(x) $0return x", "Take out `return`", "def f(x) x"),
+        ("$0var x = 3", "Take out `var`", "x = 3"),
+        ("def f(x) $0x < 1", "Write `[x < 1]`", "def f(x) [x < 1]"),
+    ],
+)
+def test_what_the_help_says_to_write(text, title, after):
+    assert fixed(text + "\n", title) == after + "\n"
+    action = fixture(text + "\n").actions()[title]
+    assert action.kind == "quickfix" and action.preferred
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "def f(x) x $0% 2",
+        "def f(x) $0|x|",
+        "def f(x) integral $0[0 1] x d(x)",
+        "def f(x) $0integral [0, x] t^2",
+        "$0import",
+    ],
+)
+def test_what_only_the_author_knows_is_not_written(text):
+    assert not [title for title in fixture(text + "\n").actions() if title.startswith(("Write", "Take"))]
 
 
 def test_kinds_are_filtered():
