@@ -15,7 +15,6 @@ from potto.bench.problems import Problem, Quantity
 from potto.runtime.estimate import Estimate
 from potto.settings import settings
 
-MOST_QUADRATURE = 3  # dimensions in which rules that are products pay
 TOLERANCES = (1e-1, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 POINTS = tuple(2.0**k for k in range(7, 21))
 MOST_EVALUATIONS = 5_000_000
@@ -42,7 +41,7 @@ class Ours:
             return ()  # the innermost variable is integrated exactly: nothing is left to sample
         if self.random:
             return POINTS
-        return TOLERANCES if problem.dimensions <= MOST_QUADRATURE else ()
+        return TOLERANCES
 
     def prepare(self, problem: Problem, quantity: Quantity) -> Solve:
         f = Workspace().compile(problem.program).f
