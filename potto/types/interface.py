@@ -11,6 +11,7 @@ import copyreg
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
+from operator import attrgetter
 from typing import Any
 
 from potto.modules.lookup import DefinitionTarget
@@ -54,6 +55,7 @@ from potto.types.values import (
 )
 
 STARRED = Real(star=True)
+_number = attrgetter("number")
 PLAIN_KINDS: tuple[SinkKind, ...] = ("condition", "jump", "sum", "equality", "declared")
 
 
@@ -115,6 +117,12 @@ def _closed(
 ) -> Scalar:
     """A number in an interface. Most interfaces have the same few, so that each is there once."""
     return Scalar(dict.fromkeys(sources) or NONE, jumps, spikes, carriers)
+
+
+@cache
+def _demand(kind: SinkKind, number: int) -> Effect:
+    """An interface's input goes where nothing may vary."""
+    return Effect(_sink(kind, number), _closed((_source(number),)))
 
 
 VARYING = Source("variable", "", number=-2)
@@ -190,12 +198,17 @@ class Closing:
                 return Choice(tuple(map(self.value, options)))
 
     def _scalar(self, value: Scalar, variables: bool = False) -> Scalar:
-        sources = sorted({self.sources[s] for s in value.sources if s in self.sources}, key=lambda s: s.number)
+        known = self.sources
+        sources = [known[source] for source in value.sources if source in known]
+        if len(sources) > 1:
+            sources = sorted(set(sources), key=_number)
         if variables and any(source.kind == "variable" for source in value.sources):
             sources.append(VARYING)
+        if not value.jumps and not value.spikes and not value.carriers:
+            return _closed(tuple(sources))
         jumps = frozenset(filter(None, map(self._surface, value.jumps)))
         spikes = frozenset(Spike(self._surface(spike.over), "") for spike in value.spikes)
-        carriers = frozenset(self.sources[s] for s in value.carriers if s in self.sources)
+        carriers = frozenset(known[s] for s in value.carriers if s in known)
         return _closed(tuple(sources), jumps, spikes, carriers)
 
     def _surface(self, surface: Surface) -> Surface:
@@ -208,10 +221,10 @@ class Closing:
         for effect in effects:
             if isinstance(effect.to, Sink):
                 for source in flat(effect.value):
-                    if source in self.sources:
-                        own = self.sources[source]
+                    own = self.sources.get(source)
+                    if own is not None:
                         key = (effect.to.kind, own.number)
-                        sinks[key] = Effect(_sink(*key), _closed((own,)))
+                        sinks[key] = _demand(*key)
             else:
                 port = self.ports.get(effect.to)
                 if port is not None:
