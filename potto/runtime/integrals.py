@@ -99,6 +99,9 @@ def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermos
 
 def note_gross(machine: Machine, sums: Sums) -> None:
     """What is added up without regard to sign, at the least the values themselves."""
+    if sums.gross is not None and sums.v.size == 1:  # numpy takes its time over a single number
+        machine.books.gross = max(machine.books.gross, float(sums.gross[0]))
+        return
     least = 0.0 if sums.gross is None else float(sums.gross.max(initial=0.0))
     found = np.max(np.abs(sums.v), initial=least, where=np.isfinite(sums.v))
     machine.books.gross = max(machine.books.gross, float(found))
