@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from potto.integrate.levels import Iteration
 
 MOST_AT_ONE_PLACE = 4
+SURE = 1.001  # what rounding may add to a bound
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,7 @@ def count_slivers(
         if number and 2 * sliver.owner.size < cuts.sign.size:
             continue  # single nodes of the variables further out: of measure zero
         f = scene.flips(sliver.cuts, sliver.owner, sliver.x, not sliver.upper)
-        lost = np.abs(f - f[0]).max(axis=0) * sliver.width
+        lost = SURE * np.abs(f - f[0]).max(axis=0) * sliver.width
         lost = np.where(np.isfinite(lost), lost, 0.0)
         at = (slice(None), sliver.owner)
         sums.et[:, :, sliver.owner] += (lost * np.where(np.isfinite(sliver.speed), sliver.speed, 0.0))[:, None]

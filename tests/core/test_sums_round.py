@@ -1,0 +1,49 @@
+"""What a sum rounds off is part of its error, also where the terms cancel on the way; and nothing is where nothing is."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import potto
+
+M = potto.compile("""
+def lost(t) 1e16 + t - 1e16
+def kept(t) 2e8 - t - 1e8
+def three(a, b, c) a + b + c
+def four(a, b, c, d) a - b + c - d
+""")
+
+
+def test_a_number_that_is_lost_between_large_ones() -> None:
+    answer = M.lost(0.3)
+    assert answer.value == 0.0 and answer.error == 0.3 and not answer.converged
+
+
+def test_nearby_numbers_are_subtracted_exactly() -> None:
+    answer = M.kept(1e8 + 0.25)
+    assert answer.value == -0.25 and answer.error == 0.0
+
+
+@pytest.mark.parametrize("t", [float("inf"), float("-inf")])
+def test_infinite_sums_have_no_error_that_is_nan(t: float) -> None:
+    answer = M.three(t, 1.0, 2.0)
+    assert answer.value == t and not np.isnan(answer.error)
+
+
+numbers = st.floats(-1e20, 1e20) | st.floats(-1.0, 1.0)
+
+
+@settings(deadline=None, max_examples=200)
+@given(st.lists(st.tuples(numbers, numbers, numbers, numbers), min_size=1, max_size=3))
+def test_errors_cover(rows: list[tuple[float, float, float, float]]) -> None:
+    batch = M.four(*(np.array(column) for column in zip(*rows, strict=True)))
+    for i, (a, b, c, d) in enumerate(rows):
+        exact = Fraction(a) - Fraction(b) + Fraction(c) - Fraction(d)
+        alone = M.four(a, b, c, d)
+        for value, error in ((alone.value, alone.error), (batch.value[i], batch.error[i])):
+            assert abs(Fraction(float(value)) - exact) <= Fraction(float(error)) * (1 + Fraction(1, 2**40))
