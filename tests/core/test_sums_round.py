@@ -1,4 +1,4 @@
-"""What a sum rounds off is part of its error, also where the terms cancel on the way; and nothing is where nothing is."""
+"""What a sum rounds off is part of its error, also where terms cancel on the way; and nothing is where nothing is."""
 
 from __future__ import annotations
 
