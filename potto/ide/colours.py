@@ -22,7 +22,7 @@ from potto.ide.symbols import (
     owner,
     placeless,
 )
-from potto.ide.words import SPECIALS
+from potto.ide.words import SPECIALS, TYPES
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import live_expressions, tokenize
@@ -109,6 +109,8 @@ def _word(kind: str, text: str, start: int) -> Iterator[Word]:
         yield start, end, "operator", ()
     elif kind == "NUMBER":
         yield start, end, "number", ()
+    elif text in TYPES:  # a name that is called so is taken for what it means
+        yield start, end, "type", ("defaultLibrary",)
 
 
 def _name(

@@ -13,6 +13,7 @@ from potto.ide.index import Binder
 from potto.ide.model import Change, Edit
 from potto.ide.offers import At, Offer, fresh_name, reads
 from potto.ide.places import ChunkAt, line_start
+from potto.modules import is_recursive
 from potto.source import Span
 from potto.syntax import extent, node_at, nodes
 from potto.syntax.nodes import Node
@@ -90,6 +91,10 @@ class Extraction:
 
     def _places(self, name: str) -> Iterator[Edit]:
         used = self.used()
+        choice = self._choice()
+        if choice is not None:
+            yield Edit(Span(choice.start, choice.start), f"let {name} = {self.text} in ")
+            return
         if self.item.keyword and all(self._of_block(binder) for binder in used):
             yield self._line(name)
         for node in self.path[:-1]:  # outermost first
@@ -99,6 +104,22 @@ class Extraction:
             if all(binder.scope.start <= body.span.start <= binder.scope.end for binder in used):
                 yield Edit(Span(body.span.start, body.span.start), f"let {name} = {self.text} in ")
                 return
+
+    def _choice(self) -> Span | None:
+        """The side of a conditional that an expression of a recursion may not leave, for the condition ends that."""
+        calls = any(o.binder < 0 and self._inside(o.span) for o in self.chunk.index(self.place.db).occurrences)
+        if not calls or not is_recursive(self.place.db, self.place.file, self.item.name):
+            return None
+        for node in reversed(self.path[:-1]):
+            if isinstance(node, _SCOPES):
+                return None
+            if isinstance(node, nodes.If):
+                sides = (extent(side) for side in (node.then, node.orelse))
+                return next((side for side in sides if self._within(side)), None)
+        return None
+
+    def _within(self, span: Span) -> bool:
+        return span.start <= self.span.start and self.span.end <= span.end
 
     def _of_block(self, binder: Binder) -> bool:
         """Whether a name is a parameter or a line of the definition."""

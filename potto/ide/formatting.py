@@ -61,8 +61,8 @@ def _chunk(db: Database, chunk: ChunkAt) -> tuple[Edit, ...]:
 def format_on_type(db: Database, file: str, offset: int, typed: str) -> tuple[Edit, ...]:
     """What to change when a line's end or a closing bracket has just been typed in front of `offset`.
 
-    A new line gets the indentation of a block where a head or an open bracket asks for one; the lines above it are laid
-    out where their definition is whole. A closing bracket goes where the line that opened it begins.
+    A new line gets the indentation of a block where a head or an open bracket asks for one; the line above it is laid
+    out where its definition can be read. A closing bracket goes where the line that opened it begins.
     """
     text = text_of(db, file)
     offset = min(offset, len(text))
@@ -81,9 +81,13 @@ def _new_line(db: Database, file: str, text: str, offset: int) -> tuple[Edit, ..
     chunk = chunk_at(db, file, start - 1)
     if chunk is None:
         return ()
-    before = text[line_start(text, start - 1) : start].rstrip("\r\n")
+    above = Span(line_start(text, start - 1), start)
+    before = text[above.start : above.end].rstrip("\r\n")
+    edits = [e for e in _chunk(db, chunk) if above.start <= e.span.start and e.span.end < above.end]
     wanted = _indent_after(db, chunk, before, start)
-    return () if wanted is None or wanted == blanks else (Edit(Span(start, start + len(blanks)), wanted),)
+    if wanted is not None and wanted != blanks:
+        edits.append(Edit(Span(start, start + len(blanks)), wanted))
+    return tuple(edits)
 
 
 def _indent_after(db: Database, chunk: ChunkAt, line: str, start: int) -> str | None:

@@ -178,7 +178,8 @@ class _Walk:
             case nodes.Integral():
                 return self._integral(node)
             case nodes.Sum():
-                number = self.binder(node.variable.name, node.variable.span, "index", node.span)
+                scope = Span(node.body.span.start, node.span.end)
+                number = self.binder(node.variable.name, node.variable.span, "index", scope)
                 return (node.lo, node.hi, *self._scoped((number,), (node.body,)))
             case nodes.Let():
                 return self._block(node.bindings, (node.body,), node.span.end, "local")

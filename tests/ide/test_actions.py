@@ -145,6 +145,13 @@ def test_a_bracket_that_decides_stays_in_its_place():
     assert "def extracted(x)\n    [x > 0.5]\n" in fixed(text, "Extract to a definition")
 
 
+def test_what_an_index_or_a_condition_holds_is_not_carried_out_of_it():
+    text = "def f(x, n) sum k in 0..n ($<x^k$>/2)\n"
+    assert "(let value = x^k in value / 2)" in fixed(text, "Extract to a local name").replace("value/2", "value / 2")
+    text = "def fact(n) if n > 0 then n*$<fact(n - 1)$> else 1\n"
+    assert "then let value = fact(n - 1) in n*value else 1" in fixed(text, "Extract to a local name")
+
+
 def test_inline_a_local_name():
     assert fixed("def f(a)\n    $0b = a + 1\n    b*2 + b\n", "Inline `b`") == "def f(a)\n    (a + 1)*2 + (a + 1)\n"
     assert fixed("def f(a) let b = a in $0b*2\n", "Inline `b`") == "def f(a) a*2\n"

@@ -51,6 +51,12 @@ def test_tokens_say_what_words_mean():
     assert found[-6:-2] == [("#> ", "comment.documentation"), ("f", "function"), ("a", "property"), ("=", "operator")]
 
 
+def test_types_are_coloured_and_names_that_are_called_like_one_are_not():
+    assert ("Real", "type.defaultLibrary") in coloured(fixture("def f(a: Real*) -> Real a^2\n"))
+    found = coloured(fixture("def f(Dist) Dist^2\n"))
+    assert ("Dist", "parameter.declaration") in found and ("Dist", "type.defaultLibrary") not in found
+
+
 def test_tokens_of_a_range_are_those_of_the_file_there():
     f = fixture(COLOURS)
     span = Span(f.find("b = if"), f.find("df = "))
@@ -148,6 +154,9 @@ def test_formatting_a_range_leaves_the_rest():
         ("def f(x)\n    g(\n        x\n        )$0", ")", "def f(x)\n    g(\n        x\n    )"),
         ("y = (1 + 2)$0", ")", "y = (1 + 2)"),
         ("# def f(x)\n$0", "\n", "# def f(x)\n"),
+        ("def f(x)\n    s=1+x\n    $0", "\n", "def f(x)\n    s=1+x\n    "),  # nothing to read yet
+        ("def f(x)\n    s=1+x\n    $0\n    s*x", "\n", "def f(x)\n    s = 1 + x\n    \n    s*x"),
+        ("y=f( 1,2 )\n$0", "\n", "y = f(1, 2)\n"),
     ],
 )
 def test_formatting_while_typing(text, typed, after):
