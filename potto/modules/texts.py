@@ -251,7 +251,7 @@ def import_starts(db: Database, file: str) -> tuple[int, ...]:
     return tuple(chunk.start for chunk in layout(db, file).imports)
 
 
-@query
+@query(travels=True)
 def syntax_diagnostics(db: Database, file: str) -> tuple[Diagnostic, ...]:
     """What the parser has to say about a file, with absolute spans."""
     diffeo = is_diffeo(file)
