@@ -73,6 +73,7 @@ def placed(term: Integral, reach: Reach, shapes: Shapes, again: bool) -> Term:
     shapes: how the values of free variables are built. again: whether it is to be differentiated.
     Raises PottoError.
     """
+    term = _opened(term, reach)
     counted = _counted(term, reach, shapes, again)
     if not isinstance(counted, Integral):
         return counted
@@ -84,6 +85,14 @@ def placed(term: Integral, reach: Reach, shapes: Shapes, again: bool) -> Term:
         new = rebuild(node, tuple(memo[c] for c in children(node)))
         memo[node] = expanded(new, reach.resolve) if isinstance(new, Delta) else new
     return memo[term]
+
+
+def _opened(term: Integral, reach: Reach) -> Integral:
+    """With the calls carried out of functions that give deltas, `def peak(t, x) delta(x - t)`."""
+    calls = [node for node in postorder(term.body) if isinstance(node, App)]
+    if not any(reach.spikes(call.function) for call in calls):
+        return term
+    return _over(term, expanded(term.body, lambda g: reach.resolve(g) if reach.spikes(g) else None))
 
 
 def filled(term: Integral, env: dict[str, Value], reach: Reach) -> tuple[Integral, dict[str, Value]]:
@@ -127,7 +136,7 @@ def _underived(function: Closure) -> tuple[int, Closure]:
 def _matters(function: Closure, reach: Reach) -> bool:
     """Whether a function is a derivative of something that may jump, or leads to one."""
     order, primal = _underived(function)
-    if reach.deltas(primal.lam) or (order and reach.kinds(primal.lam) & {Branch, Prim}):
+    if reach.deltas(primal.lam) or reach.spikes(primal.lam) or (order and reach.kinds(primal.lam) & {Branch, Prim}):
         return True
     return any(_matters(value, reach) for value in primal.captured.values() if isinstance(value, Closure))
 

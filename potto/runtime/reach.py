@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from potto.calculus.expand import Resolve
-from potto.core.terms import Branch, Deriv, Global, Integral, Prim, Term, Var, postorder
+from potto.core.terms import Branch, Delta, Deriv, Global, Integral, Prim, Term, Var, children, postorder
 from potto.primitives import PRIMITIVES
 
 
@@ -19,6 +19,7 @@ class Reach:
         self.resolve = resolve
         self.known: dict[Term, frozenset[type]] = {}
         self.known_derived: dict[Term, frozenset[type]] = {}
+        self.known_spikes: dict[Term, bool] = {}
 
     def kinds(self, term: Term) -> frozenset[type]:
         """Deriv, Branch and Integral, where there are such terms; Prim for a builtin with a kink."""
@@ -41,6 +42,20 @@ class Reach:
         found = self.derived(term)
         return Branch in found or found >= {Deriv, Prim}
 
+    def spikes(self, function: Term) -> bool:
+        """Whether what a function gives has deltas that no integral of its own is around."""
+        found = self.known_spikes.get(function)
+        if found is None:
+            self.known_spikes[function] = False  # of a recursion: what it adds itself is found without it
+            found = self.known_spikes[function] = any(self._spiky(node) for node in outside_integrals(function))
+        return found
+
+    def _spiky(self, node: Term) -> bool:
+        if isinstance(node, Global):
+            known = self.resolve(node)
+            return known is not None and self.spikes(known)
+        return isinstance(node, Delta)
+
     def _all(self, term: Term) -> Iterator[Term]:
         seen: set[Term] = set()
         todo = [term]
@@ -58,3 +73,16 @@ class Reach:
                 yield type(node)
             elif isinstance(node, Prim) and PRIMITIVES[node.op].kinks(*node.args):
                 yield Prim
+
+
+def outside_integrals(term: Term) -> Iterator[Term]:
+    """The parts of a term that are not under an integral inside of it."""
+    waiting, seen = [term], set[Term]()
+    while waiting:
+        node = waiting.pop()
+        if node in seen:
+            continue
+        seen.add(node)
+        yield node
+        if not isinstance(node, Integral):
+            waiting.extend(children(node))
