@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import json
+import os
+import select
 import signal
 import socket
 import subprocess
@@ -85,6 +87,37 @@ def test_nothing_is_lost_at_the_end() -> None:
     outbox.put({"id": 1, "result": None})
     outbox.close()
     assert len(sent) == 1 and not held
+
+
+def test_who_writes_never_waits_for_a_client_that_does_not_read() -> None:
+    """What the pipe takes is written at once, the rest when it is read, all of it in order."""
+    from potto_lsp.wire import Outbox, messages
+
+    out, into = os.pipe()
+    with os.fdopen(out, "rb") as reader, os.fdopen(into, "wb") as writer:
+        outbox = Outbox(writer)
+        outbox.put({"id": 0})
+        assert select.select([reader], [], [], 0)[0], "a short message is there before `put` is over"
+        for number in range(1, 60):
+            outbox.put({"id": number, "result": "x" * 5000})  # four times what a pipe holds
+        read = messages(reader)
+        assert [next(read)["id"] for _ in range(60)] == list(range(60))
+        outbox.put({"id": 60})
+        assert next(read)["id"] == 60
+        outbox.close()
+
+
+def test_nothing_piles_up_for_a_client_that_is_gone() -> None:
+    from potto_lsp.wire import Outbox
+
+    out, into = os.pipe()
+    os.close(out)
+    with os.fdopen(into, "wb", buffering=0) as writer:
+        outbox = Outbox(writer)
+        for _ in range(3):
+            outbox.put({"id": 1, "result": "x" * 5000})
+            outbox._thread.join(5)
+            assert not outbox._thread.is_alive() and outbox._queue.empty()
 
 
 def test_exit_without_shutdown(server: Server) -> None:
