@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from potto_lsp.live import LiveValues
     from potto_lsp.publishing import Publisher
 
-TREES = 25  # files after whose check the trees of those that are closed are forgotten
+TREES = 50  # files after whose check the trees of those that are closed are forgotten
 Reply = Callable[[Any, Any], None]  # what a client answered, and its error; one of the two is None
 
 
