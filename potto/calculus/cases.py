@@ -1,7 +1,8 @@
 """Conditions on abs, min, max and clamp as conditions on what is inside of them.
 
-Owns `cased`. The surface of `[max(x, y) < t]` runs along x and along y, so that no variable of integration cuts all
-of it; those of `if [x >= y] then [x < t] else [y < t]` do. The condition that chooses has no jump of its own.
+Owns `cased` and `resolved`. The surface of `[max(x, y) < t]` runs along x and along y, so that no variable of
+integration cuts all of it; those of `if [x >= y] then [x < t] else [y < t]` do. The condition that chooses has no jump
+of its own.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from potto.core.terms import (
     branch,
     children,
     integral,
+    mul,
     neg,
     postorder,
     prim,
@@ -36,6 +38,46 @@ def cased(term: Integral) -> Integral:
         new = rebuild(node, tuple(memo[c] for c in children(node)))
         memo[node] = _apart(new, MOST) if isinstance(node, Branch) and _changes(node) else new
     return integral(term.variables, term.bounds, memo[term.body], term.hints)
+
+
+def resolved(term: Term) -> Term:
+    """A term whose integrals are taken apart like that, and along the factors of their conditions, too.
+
+    [x*y > 0] is [y > 0] where x > 0, and [y < 0] where it is not: a formula for its roots in y says nothing of x = 0.
+    """
+    memo: dict[Term, Term] = {}
+    for node in postorder(term):
+        new = rebuild(node, tuple(memo[c] for c in children(node)))
+        memo[node] = _by_factors(cased(new)) if isinstance(new, Integral) else new
+    return memo[term]
+
+
+def _by_factors(term: Integral) -> Integral:
+    memo: dict[Term, Term] = {}
+    for node in postorder(term.body):
+        new = rebuild(node, tuple(memo[c] for c in children(node)))
+        memo[node] = _split(new, MOST) if isinstance(new, Branch) else new
+    return integral(term.variables, term.bounds, memo[term.body], term.hints)
+
+
+def _split(node: Term, most: int) -> Term:
+    """A condition on a product as one on a factor that varies with less, and on the rest."""
+    assert isinstance(node, Branch)
+    whole = node.surface
+    if not isinstance(whole, Prim) or whole.op not in ("mul", "div") or most < 2:
+        return node
+    apart = next((f for f in whole.args if f.free and f.free != whole.free), None)
+    if apart is None:
+        return node
+    at = whole.args.index(apart)
+    others = tuple(f for place, f in enumerate(whole.args) if place != at)
+    rest = mul(*others)
+    if not rest.free:
+        return node
+    up = _split(branch((rest,), node.strict, node.then, node.orelse), most // 2)
+    down = _split(branch((neg(rest),), node.strict, node.then, node.orelse), most // 2)
+    none = node.orelse if node.strict else node.then  # a parameter may be 0 over the whole domain
+    return branch((apart,), True, up, branch((neg(apart),), True, down, none))
 
 
 def _changes(node: Branch) -> bool:

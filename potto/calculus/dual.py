@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from potto.calculus.boundary import at_bounds, at_surfaces, jumps, scaled, total, vanishes
+from potto.calculus.cases import resolved
 from potto.calculus.deltas import without_deltas
 from potto.calculus.derivative import NotSmooth, partial, zero_like
 from potto.calculus.expand import Resolve, expanded, known_function
@@ -342,6 +343,8 @@ class _Pass:
         body = function.body
         if isinstance(body, Lam):
             return self.closed(body)
+        if self.owner.singular:
+            body = resolved(body)
         value, tangent = self.run(body)
         if self.owner.singular:
             tangent = self.owner.with_deltas(body, tangent, self.tangents)
@@ -358,7 +361,7 @@ class _Pass:
         return _Pass(self.owner, {n: t for n, t in self.tangents.items() if n not in bound}).run(body)
 
     def integral(self, node: Integral) -> Dual:
-        whole = self.owner.carried_out(node)
+        whole = resolved(self.owner.carried_out(node))
         if not isinstance(whole, Integral):
             return _Pass(self.owner, self.tangents).run(whole)
         plain = _without(without_deltas(whole), Delta)

@@ -12,10 +12,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import lru_cache
 
+from potto.calculus.cases import cased
 from potto.calculus.radicals import minus
 from potto.calculus.ranges import positive
 from potto.calculus.solve import Family, Sections, Unsolvable, sections
-from potto.calculus.surfaces import Decide, Finding, Resolve, findings
+from potto.calculus.surfaces import Decide, Finding, Kind, Resolve, findings
 from potto.core.simplify import normalized_surface, simplify
 from potto.core.terms import Const, Integral, Prim, Term, postorder, prim, substitute
 
@@ -183,14 +184,21 @@ def sweep(term: Integral, found: Iterable[Finding], resolve: Resolve, decide: De
                 if f.kind != "center":
                     pool.put(f.surface, None, f.kind == "edge")
     outer = (
-        *(Finding("edge" if placed.turning else "kink", placed.face.form) for placed in pool.surfaces.values()),
+        *(Finding(_kind(placed), placed.face.form) for placed in pool.surfaces.values()),
         *(Finding("center", surface) for surface in centers),
     )
     return Sweep(tuple(reversed(levels)), outer)
 
 
+def _kind(placed: _Placed) -> Kind:
+    if placed.steps:  # of [x*y > 0] the integral over y jumps at x = 0
+        return "jump"
+    return "edge" if placed.turning else "kink"
+
+
 def outer_findings(term: Integral, resolve: Resolve, decide: Decide) -> tuple[Finding, ...]:
     """What the variables around an integral see of it: jumps that none of its variables take part in, and kinks."""
+    term = cased(term)
     found = findings(term.body, resolve, decide)
     inner = set(term.variables)
     bounds = (f for pair in term.bounds for bound in pair for f in findings(bound, resolve, decide))
