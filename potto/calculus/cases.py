@@ -14,12 +14,14 @@ from potto.core.terms import (
     Integral,
     Prim,
     Term,
+    bound_names,
     branch,
     children,
     integral,
     mul,
     neg,
     postorder,
+    postorder_by,
     prim,
     rebuild,
     sub,
@@ -82,13 +84,13 @@ def _split(node: Term, most: int) -> Term:
 
 def _changes(node: Branch) -> bool:
     """Whether one of the cases of a condition varies with less than the condition, or not at all."""
-    parts = [part for part in postorder(node.surface) if isinstance(part, Prim) and part.op in _FLAT]
+    parts = [part for part in _outside(node.surface) if isinstance(part, Prim) and part.op in _FLAT]
     return any(arg.free != part.free for part in parts if part.free for arg in part.args)
 
 
 def _apart(node: Term, most: int) -> Term:
     assert isinstance(node, Branch)
-    bent = next((part for part in postorder(node.surface) if isinstance(part, Prim) and part.op in _CASES), None)
+    bent = next((part for part in _outside(node.surface) if isinstance(part, Prim) and part.op in _CASES), None)
     if bent is None or most < 2:
         return node
     margin, first, second = _CASES[bent.op](*bent.args)
@@ -97,6 +99,11 @@ def _apart(node: Term, most: int) -> Term:
         coordinates = tuple(_put(c, bent, value) for c in node.coordinates)
         cases.append(_apart(branch(coordinates, node.strict, node.then, node.orelse), most // 2))
     return branch((margin,), False, cases[0], cases[1])
+
+
+def _outside(surface: Term) -> list[Term]:
+    """The parts of a surface that are not inside an integral or a sum of it, whose variables mean nothing outside."""
+    return postorder_by(surface, lambda node: () if bound_names(node) else children(node))
 
 
 def _put(term: Term, old: Term, new: Term) -> Term:

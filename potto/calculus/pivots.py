@@ -90,9 +90,28 @@ def _family(node: Integral, position: int, family: Family) -> Root:
     ends = [substitute(family.inner, {name: end}) for end in (lo, hi)]
     if family.stops:
         ends += [substitute(family.inner, {name: _within(stop, lo, hi)}) for stop in family.stops]
+    ends = _corners(node, position, ends)
     lowest, highest = _extreme("min", ends), _extreme("max", ends)
     counts = (_whole("ceil", lowest, 1.0), _whole("floor", highest, 0.0))
     return Root(name, family.root, family.index, counts)
+
+
+def _corners(node: Integral, position: int, ends: list[Term]) -> list[Term]:
+    """The ends at the corners of the domain of the other variables: how many terms there are must not vary with these,
+    or where each of them begins and ends would be hidden from the integral over them."""
+    own = node.variables[position]
+    for name, (lo, hi) in reversed(list(zip(node.variables, node.bounds, strict=True))):
+        if name == own or not any(name in end.free for end in ends):
+            continue
+        known = own not in lo.free | hi.free and _finite(lo) and _finite(hi)
+        if not known or any(affine(end, (name,)) is None for end in ends):
+            raise NoClosedForm(f"how many roots there are in `{own}` varies with `{name}`")
+        ends = list(dict.fromkeys(substitute(end, {name: bound}) for end in ends for bound in (lo, hi)))
+    return ends
+
+
+def _finite(bound: Term) -> bool:
+    return not (isinstance(bound, Const) and abs(bound.value) == float("inf"))
 
 
 def _whole(op: str, end: Term, otherwise: float) -> Term:

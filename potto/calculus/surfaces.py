@@ -286,7 +286,7 @@ def centers(node: Prim) -> tuple[Term, ...]:
     if node.op == "div" and isinstance(where, Prim) and where.op in ("pow", "mul"):
         return ()  # a pole there, not a center
     found: dict[Term, None] = {}
-    for part in postorder(where):
+    for part in _outside_binders(where):
         if not isinstance(part, Prim) or not part.free:
             continue
         if part.op == "pow" and isinstance(part.args[1], Const) and part.args[1].value % 2 == 0:

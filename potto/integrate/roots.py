@@ -18,7 +18,7 @@ from potto.integrate.cuts import SEARCHED, Row, as_array
 from potto.integrate.pieces import still
 from potto.integrate.plan import LevelPlan, function_of
 from potto.integrate.rules import EPS
-from potto.kernels.cells import Array, Cell, Value, pad
+from potto.kernels.cells import Array, Cell, Value, map_arrays, pad
 
 GRID = 64
 MOST_IN_FAMILY = 100_000
@@ -123,11 +123,8 @@ def _on_a_grid(
 
 
 def _columns(function: Lam, env: dict[str, Value]) -> dict[str, Value]:
-    return {
-        n: Cell(v.v[:, None] if isinstance(v.v, np.ndarray) else v.v) if isinstance(v, Cell) else v
-        for n, v in env.items()
-        if n in function.params
-    }
+    """The values that a function takes, as columns, and without tangents: duals in tuples, too."""
+    return {n: map_arrays(still(v), lambda a: a[:, None]) for n, v in env.items() if n in function.params}
 
 
 def _grid(low: Array, high: Array, s: Array) -> Array:

@@ -1,0 +1,57 @@
+"""The first derivative within the second one is a formula: it must be what the first derivative comes to by numbers.
+
+Each program was once one of which the formula missed a part.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+import potto
+
+PROGRAMS = {
+    # the surface runs along y where x is the larger one, so that no root in y tells of it
+    "max": "integral ([t^2, 1], [t, s*0.7]) [max(x, 0.7*y) >= t]*(t + y) d(x, y)",
+    # along the other variable a surface is all of an axis
+    "product": "integral [0, 1] x*(integral [0, 1] [(x + t - 0.5)*(z + s) > 0] d(z)) d(x)",
+    "inner minimum": "integral [0, 1] x*(integral [0, 1] [min(x + t, z) > s] d(z)) d(x)",
+    # how many roots there are varies with x
+    "sine": "integral ([-0.5, 1.5], [-1, 1]) [sin(2*x + y) > t*0.7] d(x, y)",
+    "sines": "integral ([-0.5, 1.5], [-1, 1]) sin(3*[sin(2*x + y) <= t*0.7] + x*s) d(x, y)",
+    # a kink of an inner integral's integrand is none of the outer one's
+    "kink inside": "integral [0, s] abs(integral [0, 1 + s] min(x - y, t) d(y)) d(x)",
+    "center inside": "integral [0, s] exp(sin(integral [0, t] 1/(1 + (x*y - s)^2) d(y))) d(x)",
+    # what a surface is given are duals
+    "searched": "integral [2, 0] abs(integral [s, 1.87 - s] [2*t*x <= 0.3 + 0.5*y]/(1 + (t - x)^2) d(y))*sin(s) d(x)",
+}
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+@pytest.mark.parametrize(("dt", "ds"), [(1.0, 0.0), (0.0, 1.0)])
+def test_the_formula_of_the_first_derivative(name: str, dt: float, ds: float) -> None:
+    t, s, h = 0.7575, 0.4892, 1e-3
+    f = potto.compile(f"def f(t, s) {PROGRAMS[name]}\n").f
+    once = potto.deriv(f)((t, dt), (s, ds))
+    twice = potto.deriv(potto.deriv(f))(((t, dt), (dt, 0.0)), ((s, ds), (ds, 0.0)))
+    assert abs(twice.value[1] - once.tangent) <= 1e-13 + once.tangent_error + twice.error[1]
+    there = [potto.deriv(f)((t + dt * k * h, dt), (s + ds * k * h, ds)).tangent for k in (-2, -1, 1, 2)]
+    slope = (there[0] - 8 * there[1] + 8 * there[2] - there[3]) / (12 * h)  # to the fourth order in h
+    assert abs(twice.tangent[1] - slope) <= 1e-7 * max(1, abs(slope)) + twice.tangent_error[1]
+
+
+def test_a_jump_of_an_inner_integral_moves() -> None:
+    """Where y is 0.5 the inner integral jumps, by 0.5 or by 1."""
+    m = potto.compile("""
+def low(y) integral [0, 1] [min(y, z) > 0.5] d(z)
+def rows(y) integral [0, 1] [(y - 0.5)*(z + 1) > 0] d(z)
+def f(t) integral [0, 1] y*low(y + t) d(y)
+def g(t) integral [0, 1] y*rows(y + t) d(y)
+def h(a) integral [0, 1] y*snd(deriv(low)((y, a))) d(y)
+def k(a) integral [0, 1] y*snd(deriv(rows)((y, a))) d(y)
+""")
+    for function, size in ((m.f, 0.5), (m.g, 1.0)):
+        got = potto.deriv(function)((0.03, 1.0))
+        assert abs(got.tangent - size * 0.47) <= 1e-13 + got.tangent_error and got.tangent_error <= 1e-11
+    for function, size in ((m.h, 0.5), (m.k, 1.0)):
+        got = function(1.0)
+        assert abs(got.value - size * 0.5) <= 1e-13 + got.error and got.error <= 1e-11
