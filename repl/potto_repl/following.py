@@ -14,9 +14,9 @@ from potto.core.terms import Global, postorder
 from potto.elaborate import core, core_term
 from potto.modules import imported_files, names
 from potto.modules.texts import chunk_text
-from potto.render import Located, display_name
+from potto.render import Located, ProgramError, display_name
 from potto.session import Imported, Said
-from potto_repl.reply import Part, diagnostic, note
+from potto_repl.reply import Part, Refusal, diagnostic, note
 from potto_repl.session import Conversation
 
 MOST_REASONS = 12  # that are listed
@@ -24,8 +24,24 @@ MOST_REASONS = 12  # that are listed
 Definition = tuple[str, str]  # its file and its name
 
 
+def _program(path: str) -> str:
+    if not os.path.isdir(os.path.expanduser(path)):
+        return path
+    from potto.cli.files import main_of
+
+    try:
+        return main_of(os.path.expanduser(path))
+    except ProgramError as error:
+        said = error.located[0].diagnostic
+        raise Refusal(said.message, said.help) from None
+
+
 def bring(session: Conversation, path: str) -> list[Part]:
-    """Load a file and say what it brought; one that was loaded before is read again."""
+    """Load a file, or the main program of a folder, and say what it brought; one that was loaded before is read again.
+
+    Raises Refusal for a folder without a main program.
+    """
+    path = _program(path)
     if session.world.key(os.path.expanduser(path)) in session.loaded:
         return refreshed(session)
     start = time.perf_counter()

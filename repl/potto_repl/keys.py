@@ -8,6 +8,7 @@ from __future__ import annotations
 from prompt_toolkit.application import get_app
 from prompt_toolkit.application.current import get_app_or_none
 from prompt_toolkit.buffer import Buffer
+from prompt_toolkit.completion import CompleteEvent, get_common_complete_suffix
 from prompt_toolkit.enums import DEFAULT_BUFFER
 from prompt_toolkit.filters import Condition, Filter, emacs_mode, has_focus, is_searching, vi_insert_mode
 from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
@@ -136,4 +137,15 @@ def complete(buffer: Buffer) -> None:
     elif buffer.complete_state is not None:
         buffer.complete_next()
     else:
-        buffer.start_completion(insert_common_part=True)
+        _offer(buffer)
+
+
+def _offer(buffer: Buffer) -> None:
+    """The only completion, or a menu and what all of them begin with: at once, for Enter may come before the menu."""
+    document = buffer.document
+    found = list(buffer.completer.get_completions(document, CompleteEvent(completion_requested=True)))
+    if len(found) == 1:
+        buffer.apply_completion(found[0])
+    elif found:
+        buffer.insert_text(get_common_complete_suffix(document, found))
+        buffer.start_completion()

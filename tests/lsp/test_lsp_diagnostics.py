@@ -175,6 +175,13 @@ def test_a_broken_project_file_is_told(server: Server, uri: Uri, tmp_path: Path)
     assert len(told) == 3
 
 
+def test_a_project_file_is_not_read_as_a_program(server: Server, uri: Uri, tmp_path: Path) -> None:
+    (tmp_path / "potto.toml").write_text('roots = "src"\n')
+    client = server(PULLS)
+    assert client.note(PUSHED, uri=uri("potto.toml"))["diagnostics"]
+    assert pull(client, uri("potto.toml"))["items"] == []
+
+
 def test_settings_are_heeded(server: Server, uri: Uri) -> None:
     client = server(a="def g(t) t\n")
     client.open(uri("main"), "from a import g\ndef f(t) t\n")

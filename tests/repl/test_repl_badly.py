@@ -308,3 +308,14 @@ def test_a_record_of_everything_is_replayed(talk):
     found = list(replayed((talk.folder / "log.txt").read_text()))
     assert len(found) == 32
     assert [(entry.text, difference.now) for entry, difference in found if difference is not None] == []
+
+
+def test_a_folder_stands_for_its_main_program(talk):
+    (talk.folder / "whole").mkdir()
+    (talk.folder / "whole" / "main.po").write_text("def cube(t) t^3\n")
+    fine(talk(":load whole"))
+    assert "8" in fine(talk("cube(2)"))
+    (talk.folder / "parts").mkdir()
+    (talk.folder / "parts" / "one.po").write_text("x = 1\n")
+    reply = talk(":load parts")
+    assert "`parts` is a folder without a `main.po`" in reply.text and "one.po" in reply.text

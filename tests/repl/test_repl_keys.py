@@ -115,6 +115,12 @@ def test_tab_completes(loader):
     assert read_slowly(loader, "expm", TAB, "(1)\r") == "expm1(1)"
 
 
+def test_enter_right_behind_tab_hands_in_what_was_completed(loader):
+    assert read(loader, "expm", TAB, "(1)\r") == "expm1(1)"
+    assert read(loader, "expm", TAB, "\r") == "expm1"
+    assert read(loader, "1 + erf", TAB, "(2)\r") == "1 + erf(2)"  # erf or erfc: what both begin with
+
+
 def test_tab_indents_on_a_blank_line(loader):
     assert read_slowly(loader, "f(1,\r", TAB, "2)\r") == "f(1,\n        2)"
 

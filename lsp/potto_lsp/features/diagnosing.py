@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import os.path
 from collections.abc import Mapping
 from typing import Any
 
+from potto.project import NAME as PROJECT
 from potto_lsp.asking import Ask
 from potto_lsp.session import TREES
 from potto_lsp.uris import to_key
 
 
 def document(ask: Ask) -> dict[str, Any]:
+    """What is wrong with a program. A project file is no program: what is wrong with it is pushed."""
+    if os.path.basename(ask.file) == PROJECT:
+        return {"kind": "full", "items": []}
     return ask.session.publisher.answer(ask.file, ask.optional("previousResultId"))
 
 
