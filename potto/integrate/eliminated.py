@@ -13,13 +13,14 @@ from typing import Any
 
 import numpy as np
 
+from potto.calculus.cases import cased
 from potto.calculus.elimination import Step, eliminate
 from potto.calculus.linear import affine
 from potto.calculus.ranges import range_of
 from potto.calculus.surfaces import Finding, Kind, Resolve, TooDeep, findings, undecided
 from potto.calculus.sweep import MOST_CENTERS, Level, cut_along, points_of, sweep
 from potto.core.simplify import simplify
-from potto.core.terms import Deriv, Integral, Lam, Term, const, integral, substitute, tuple_
+from potto.core.terms import Deriv, Integral, Lam, Term, Tuple, const, integral, substitute, tuple_
 from potto.integrate.levels import Iteration
 from potto.integrate.pieces import Evaluator, Sums, still
 from potto.integrate.plan import Plan, function_of, group_levels, level_plan, vanishing_of
@@ -34,7 +35,7 @@ FINEST = 1e-14
 AFFORDABLE = 1_000_000  # evaluations: more than that is no good use of one number
 MOST_PLACES = 64  # where the integral over one variable is not smooth in the number that it depends on
 
-# A place in the state of a step, as a surface; what is there: a kink, an edge or a center.
+# A place in the state of a step, as a surface, and what is there.
 Place = tuple[Term, Kind]
 
 
@@ -48,7 +49,7 @@ class Eliminated:
 
 
 def eliminated(term: Integral, resolve: Resolve) -> Eliminated | None:
-    """What is known of an integral's steps; None where it has none, or where one is not a continuous function."""
+    """What is known of an integral's steps; None where it has none."""
     steps = eliminate(term)
     if steps is None:
         return None
@@ -80,7 +81,9 @@ def _planned(
     further: where that of the next step is not, in terms of `state`. centers: further ones that the variable has.
     """
     body = step.weight if step.passed is None else tuple_((step.weight, step.passed))
-    term = integral((step.variable,), ((step.lo, step.hi),), body)
+    term = cased(integral((step.variable,), ((step.lo, step.hi),), body))
+    body = term.body
+    weight = body.items[0] if step.passed is not None and isinstance(body, Tuple) else body
     unknown: set[Term] = set()
 
     def known(head: Term) -> Lam | Deriv | None:
@@ -90,23 +93,23 @@ def _planned(
         return function
 
     found = [*findings(body, known), *centers]
-    for f in found:
-        within, forced = step.variable in f.surface.free, bool(f.path)
-        if f.kind == "jump" and (within or step.state in f.surface.free) and not (within and forced):
-            return None  # it jumps in its state, or where it can't be forced
-    if unknown:
+    if unknown or any(f.kind == "jump" and step.variable in f.surface.free and not f.path for f in found):
         return None
+    hides = False  # what is further in jumps in what is passed on, and can't be told which side to take
     for surface, kind in further if step.passed is not None else ():
         assert step.passed is not None
         found.append(Finding(kind, substitute(surface, {state: step.passed})))
-    swept = sweep(term, found, known, undecided)
+        hides |= kind == "jump"
+    steps = [f for f in found if f.kind == "jump" and step.variable not in f.surface.free]
+    swept = sweep(term, (f for f in found if f not in steps), known, undecided)
     for cut in swept.levels[0].cuts:
-        if cut.decides and cut.product and any(step.state in f.key.free for f in cut.product.outer):
-            return None
+        if cut.decides and cut.product:
+            steps += (Finding("jump", factor.form) for factor in cut.product.outer)
     levels, groups = group_levels(swept.levels)
     numbers = {j.path: (g.number, j.orientation) for g in groups for j in g.cut.jumps}
-    plan = Plan(term, levels, groups, function_of(body), vanishing_of(body, numbers, step.weight), ())
-    return plan, tuple((f.surface, f.kind) for f in swept.outer if step.state in f.surface.free)
+    vanishing = vanishing_of(body, numbers, weight)
+    plan = Plan(term, levels, groups, function_of(body), vanishing, (), hides=hides)
+    return plan, tuple((f.surface, f.kind) for f in (*steps, *swept.outer) if step.state in f.surface.free)
 
 
 def _centers(term: Integral, variable: str, resolve: Resolve) -> list[Finding]:
@@ -167,11 +170,12 @@ def _table(
     iteration: Iteration, state: str, places: Sequence[Place], span: tuple[float, float], machine: Any,
     env: dict[str, Value],
 ) -> Table | None:  # fmt: skip
-    cuts = tuple(replace(cut_along(at, state), turning=kind == "edge") for at, kind in places if kind != "center")
+    cuts = tuple(replace(cut_along(at, state), turning=kind == "edge", steps=kind == "jump")
+                 for at, kind in places if kind != "center")  # fmt: skip
     hints = points_of((at for at, kind in places if kind == "center"), state)[:MOST_CENTERS]
     level = level_plan(Level(state, const(span[0]), const(span[1]), hints, cuts), (), ())
-    segments = iteration.cut(level, env, 1, machine).segments
-
+    found = iteration.cut(level, env, 1, machine)
+    segments = found.segments
 
     def function(x: Array, speeds: Array) -> Sums:
         """Without speeds values alone."""
@@ -179,7 +183,7 @@ def _table(
         here = {name: pad(value, wide.directions) if len(speeds) else still(value) for name, value in env.items()}
         return iteration.run(1, {**here, state: Cell(x, None, tuple(speeds))}, x.size, {}, wide)
 
-    if not segments.a.size or not finite(segments).all():
+    if found.conflict or not segments.a.size or not finite(segments).all():
         return None
     return tabulated(segments, machine.directions, function, machine.rtol)
 

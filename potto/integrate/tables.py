@@ -21,6 +21,7 @@ ORDER = 16
 ROUNDS, MOST = 40, 2000  # of halvings; pieces
 # How far apart neighbouring pieces may be where they meet, as a part of the largest value, beyond their errors.
 GAP = 1e-9
+BESIDE = 2.0**-40  # how far from its ends a piece is looked at, as a part of it: on them it may jump
 SEEN = 0.1  # of the largest value
 
 # From places (n,) with speeds, (k + 1, n) or none, to the function there: `Sums` of one component.
@@ -155,7 +156,11 @@ def _measured(
     h = np.concatenate((sums.v, sums.t[0])).reshape(2 + k, *x.shape)
     e = np.concatenate((sums.e, sums.et[0])).reshape(2 + k, *x.shape)
     size = np.abs(h).max(axis=-1)
-    return h @ rule.transform, e.max(axis=-1) + 4 * EPS * size, size.max(axis=-1)
+    rounding = size.copy()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        carried = np.abs(h[-1] * speeds[:k] / slope).max(axis=-1)  # may have cancelled
+    rounding[1:-1] += np.where(np.isfinite(carried), carried, 0.0)
+    return h @ rule.transform, e.max(axis=-1) + 4 * EPS * rounding, size.max(axis=-1)
 
 
 def _off_at_the_ends(
@@ -163,10 +168,12 @@ def _off_at_the_ends(
 ) -> Array:
     """By how much polynomials miss the function at the ends of their pieces, where peaks are and no nodes: (P,)."""
     segment, u0, u1 = todo
-    x = maps.points(segments.pick(segment), np.stack((u0, u1), axis=1))[0]
+    inside = np.stack((u0 + BESIDE * (u1 - u0), u1 - BESIDE * (u1 - u0)), axis=1)
+    x = maps.points(segments.pick(segment), inside)[0]
     found = function(x.ravel(), np.zeros((0, x.size)))
     exact, error = found.v[0].reshape(x.shape), found.e[0].reshape(x.shape)
-    off = np.maximum(np.abs(exact - coefficients @ rule.ends) - error, 0.0)
+    near = np.polynomial.legendre.legvander(np.array([2 * BESIDE - 1, 1 - 2 * BESIDE]), rule.nodes.size - 1)
+    off = np.maximum(np.abs(exact - coefficients @ near.T) - error, 0.0)
     return np.where(np.isfinite(off), off, 0.0).max(axis=1)  # type: ignore[no-any-return]
 
 
@@ -183,9 +190,13 @@ def _cut_off(size: Array) -> Array:
 
 
 def _continuous(table: Table, inside: Array, rule: Rule, largest: float) -> bool:
-    """Whether neighbouring pieces meet: where they don't, something runs along the variable that was integrated."""
+    """Whether neighbouring pieces meet where no jump is known.
+
+    Where they don't, something runs along the variable that was integrated.
+    """
     ends = table.coefficients[0] @ rule.ends
-    gap = np.abs(ends[1:, 0] - ends[:-1, 1])
+    jumps = (table.u0 == 0) & (table.segments.rank[table.segment] == 2)
+    gap = np.where(jumps[1:], 0.0, np.abs(ends[1:, 0] - ends[:-1, 1]))
     return bool((gap <= GAP * largest + 4 * (inside[1:] + inside[:-1])).all())
 
 

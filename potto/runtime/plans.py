@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from potto.calculus.cases import cased
 from potto.calculus.deciding import deciding
 from potto.core.terms import Deriv, Integral, Lam, Term, Var, deriv, substitute, var
 from potto.diagnostics import PottoError
@@ -102,7 +101,7 @@ def eliminated_for(machine: Machine, term: Integral, linked: Linked) -> Eliminat
         if key in _eliminated:
             return _eliminated[key]
     found = eliminated(
-        cased(term), lambda head: _plainly(head, linked) if isinstance(head, Var) else machine.linker.function(head)
+        term, lambda head: _plainly(head, linked) if isinstance(head, Var) else machine.linker.function(head)
     )
     with _lock:
         _eliminated[key] = found

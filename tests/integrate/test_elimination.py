@@ -79,10 +79,14 @@ CASES: list[tuple[str, str, float, Number, float]] = [
      lambda t: mp.quad(lambda s: mp.exp(s) * s**4 / 24, [0, t]), 1e-8),
     ("steps", cube(6, "[a < t]*[b > t]*[c + d < t]*(c + d + e + f)"), 0.3,
      lambda t: t * (1 - t) * (t**3 / 3 + t * t / 2), 1e-10),
+    ("jump in what is passed on", cube(5, "(if [a < t] then cos(b) + a else b)*exp(c)*[a + b + c < 1]*d*e"), 0.4,
+     lambda t: mp.quad(lambda a: mp.quad(lambda b: ((mp.cos(b) + a) if a < t else b) * (mp.exp(1 - a - b) - 1),
+                                         [0, 1 - a]), [0, t, 1]) / 4, 1e-8),
+    ("larger one", cube(6, "[max(a, b) < t]*max(max(d, e), f)*c"), 0.7, lambda t: t**2 * mp.mpf(3) / 8, 1e-8),
     ("peak that nodes miss", cube(6, "exp(-1e9*(a - t)^2*(1 + b))*cos(b*c)*d*e*f"), 0.37,
      lambda t: mp.sqrt(mp.pi / mp.mpf(10)**9) / 8 * mp.quad(lambda b: mp.sinc(b) / mp.sqrt(1 + b), [0, 1]), 1e-4),
     ("peak on the way", cube(6, "exp(-1e9*(a + b - t)^2)*c*d*e*f"), 0.7,
-     lambda t: mp.sqrt(mp.pi / mp.mpf(10)**9) / 16 * t, 1e-8),
+     lambda t: mp.sqrt(mp.pi / mp.mpf(10)**9) / 16 * t, 1e-6),
 ]  # fmt: skip
 
 
@@ -100,7 +104,7 @@ def test_closed_forms(name: str, text: str, at: float, exact: Number, largest: f
     ("body", "at"),
     [
         ("[a + t*b < 0.5]*(c + d + e)", 0.0),  # it runs along b
-        ("(if [a < t] then cos(b*c) else b + c)*exp(d*e)", 0.4),  # it jumps in what is passed on
+        ("(if [a < t] then cos(b*c) else b + c)*exp(d*e)*[a + c < b]", 0.4),
         ("1/(0.3 + (a - b)^2 + (c - d)^2 + e*t)", 0.5),  # more than one number
     ],
 )
