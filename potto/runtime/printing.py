@@ -35,6 +35,9 @@ def _rounded(value: float, place: int) -> str:
     digits = size - place + 1  # significant ones
     if digits >= 17:
         return _shorten(repr(value))
+    if digits == 0 and abs(value) >= 0.5 * 10.0**place:  # rounds up to one unit of the last digit
+        unit = math.copysign(10.0**place, value)
+        return _exponent(f"{unit:.0e}", False) if place > 0 or place < -5 else f"{unit:.{-place}f}"
     if digits <= 0:
         return "0" if place <= -9 else _plain(0.0, place)
     if place > 0 or size < -5:
