@@ -62,7 +62,7 @@ def mutate(lib: Library, seed: int) -> float:
     read = parse_chunk(mutated, is_diffeo(name))
     seconds = time.thread_time() - started
     code = mutated.lstrip().partition("#")[0]
-    nothing = not code or (read.diagnostics and not code.strip(")] \n"))  # brackets that close nothing are all there is
+    nothing = not code or (read.diagnostics and not code.strip(")] \n𝄞"))  # all there is closes, or means, nothing
     assert read.item is not None or nothing, (seed, mutated)
     lib.put(file, text[: chunk.start] + mutated + text[chunk.start + len(chunk.text) :])
     lib.diagnostics(file)
@@ -90,6 +90,7 @@ FOUND = [
     202085,  # a diffeomorphism that is none was reported again wherever it was used
     203979,  # h(deriv(h)): a type that would be part of its own dual grew until the memory was full
     206104,  # nothing but a bracket that closes nothing, and a comment
+    1027749,  # nothing but a character that means nothing, and a comment
 ]
 
 
