@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 def call_derivative(
     machine: Machine, function: Derivative, groups: tuple[tuple[Value, ...], ...], trace: Trace | None
 ) -> Value:
+    from potto.runtime.compared import compared
     from potto.runtime.machine import fit
     from potto.runtime.second import dual_function
 
@@ -37,8 +38,8 @@ def call_derivative(
     dual_groups = tuple(
         tuple(merge(arg) for arg in fit(group, arity)) for group, arity in zip(groups, arities, strict=False)
     )
-    value = carrying.call(primal.padded(1), dual_groups, trace)
-    return split(value)
+    value = split(carrying.call(primal.padded(1), dual_groups, trace))
+    return compared(machine, function.primal, groups, value) if isinstance(function.primal, Derivative) else value
 
 
 def merge(arg: Value) -> Value:

@@ -55,3 +55,12 @@ def k(a) integral [0, 1] y*snd(deriv(rows)((y, a))) d(y)
     for function, size in ((m.h, 0.5), (m.k, 1.0)):
         got = function(1.0)
         assert abs(got.value - size * 0.5) <= 1e-13 + got.error and got.error <= 1e-11
+
+
+def test_a_formula_that_misses_a_part_is_found_out() -> None:
+    """[exp(y*z) > 1] jumps at y = 0 for all z, of which its root in z, log(1)/y, says nothing."""
+    m = potto.compile("def f(t) integral ([-1, 1], [0, 1]) (y + 2)*[exp((y + t)*z) > 1] d(y, z)")
+    got = potto.deriv(potto.deriv(m.f))(((0.03, 1.0), (1.0, 0.0)))
+    assert abs(got.value[1] - 1.97) <= 1e-12  # of y + 2 at -t
+    assert got.error[1] <= 1e-11 and got.tangent_error[1] == float("inf")
+    assert not got.converged and "disagree about the first one" in got.reasons[0]
