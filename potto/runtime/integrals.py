@@ -25,6 +25,7 @@ from potto.integrate.plan import Plan
 from potto.integrate.straight import certain
 from potto.kernels import errors
 from potto.kernels.cells import Array, Cell, Number, Value, all_arrays, map_arrays
+from potto.runtime.differences import by_differences
 from potto.runtime.elimination import ACCURATE, WORTH, step_by_step
 from potto.runtime.one_sided import beside_axes, beside_folds, from_both_sides, one_direction
 from potto.runtime.plans import Linked, link, plan_for, split_by_decisions
@@ -158,7 +159,12 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
                 from_both_sides(machine, plan, plan.environment(env, linked.env), batch, sums, iterated)
             if outermost and machine.books.folds:
                 beside_folds(machine, plan, linked, batch, sums, partial(_beside, machine, term))
-            return turned_round(machine, order, linked, env, batch, sums) if outermost else sums
+            if not outermost:
+                return sums
+            sums = turned_round(machine, order, linked, env, batch, sums)
+            if machine.directions and not (machine.books.edges or machine.side):
+                by_differences(machine, linked, batch, sums, partial(_beside, machine.with_directions(0), term))
+            return sums
     if outermost and machine.directions > 1:
         return one_by_one(machine, term, linked, batch)
     if outermost:

@@ -1,10 +1,11 @@
 """Derivatives that are not the same on the two sides of the parameters.
 
-Owns `from_both_sides`, `beside_folds`, `beside_axes` and `one_direction`. What surfaces on bounds and on one another
-contribute is known on either side (`integrate/edges`). Where sections of a surface appear or merge just at the
-parameters they move infinitely fast, and nothing at this place tells the derivative: of [x^2 < t] at t = 0 it is 0 on
-one side and infinite on the other, of [x^2 + y^2 < t] 0 and pi. It is then looked at beside the parameters, in three
-steps towards them; and so it is where surfaces run along every variable, and have sections along none.
+Owns `from_both_sides`, `beside_folds`, `beside_axes`, `one_direction`, `moved` and `apart`. What surfaces on bounds
+and on one another contribute is known on either side (`integrate/edges`). Where sections of a surface appear or merge
+just at the parameters they move infinitely fast, and nothing at this place tells the derivative: of [x^2 < t] at t =
+0 it is 0 on one side and infinite on the other, of [x^2 + y^2 < t] 0 and pi. It is then looked at beside the
+parameters, in three steps towards them; and so it is where surfaces run along every variable, and have sections along
+none.
 """
 
 from __future__ import annotations
@@ -59,7 +60,7 @@ def beside_folds(
     evaluated: the integral for other parameters, of one member.
     """
     folds = dict(machine.books.folds)
-    with _apart(machine):
+    with apart(machine):
         found = [
             (what, side)
             for what, where in folds.items()
@@ -86,7 +87,7 @@ def beside_axes(
     if batch > MOST_MEMBERS:
         return False
     machine.books.degenerate.clear()
-    with _apart(machine):
+    with apart(machine):
         found = list(_sides(machine, plan, linked, range(batch), None, evaluated))
     still_ones = batch * sum(not any(_moves(v, d) for v in linked.env.values()) for d in range(machine.directions))
     if len(found) + still_ones < batch * machine.directions:
@@ -104,7 +105,7 @@ def beside_axes(
 
 
 @contextmanager
-def _apart(machine: Machine) -> Iterator[None]:
+def apart(machine: Machine) -> Iterator[None]:
     """What is noted in this block is about other parameters, and forgotten."""
     books = machine.books
     kept = list(books.unfinished), list(books.edges), dict(books.sided), set(books.degenerate)
@@ -146,7 +147,7 @@ def _both(
     sides, off = [], np.zeros(1)
     for sign in (-1.0, 1.0):
         steps = [sign * step * CLOSER**i for i in range(3)]
-        found = [evaluated(link({n: _moved(v, h, d) for n, v in env.items()})) for h in steps]
+        found = [evaluated(link({n: moved(v, h, d) for n, v in env.items()})) for h in steps]
         values = [np.where(np.isfinite(part.et[:, d, 0]), part.t[:, d, 0], np.nan) for part in found]
         noise = np.sum([part.et[:, d, 0] for part in found], axis=0)
         sides.append(np.array([_limit(*three) for three in zip(*values, noise, strict=True)]))
@@ -157,7 +158,7 @@ def _both(
 def _step(machine: Machine, plan: Plan, env: dict[str, Value], d: int, where: Folded | None) -> float | None:
     """The largest step that moves the roots that fold, or all roots, by a small part of the range, either way."""
     both = np.concatenate(([0.0], STEPS, -STEPS))
-    here = {n: _moved(v, both, d, moving=False) for n, v in env.items()}
+    here = {n: moved(v, both, d, moving=False) for n, v in env.items()}
     quiet, size = machine.with_directions(0), both.size
     for level in plan.levels[: 1 + (0 if where is None else where.number)]:
         values = quiet.evaluate(level.frame, {n: here[n] for n in level.frame.params}, None)
@@ -196,16 +197,16 @@ def _moves(value: Value, d: int) -> bool:
     return isinstance(value, Closure) and any(_moves(inner, d) for inner in value.captured.values())
 
 
-def _moved(value: Value, step: Any, d: int, moving: bool = True) -> Value:
+def moved(value: Value, step: Any, d: int, moving: bool = True) -> Value:
     """A value after so large a step along its tangents in direction d, which it keeps if it goes on `moving`."""
     if isinstance(value, Cell):
         t = value.t[d] if d < len(value.t) else None
         v = value.v if t is None else value.v + step * t
         return Cell(v, value.e, value.t, value.et) if moving else Cell(v)
     if isinstance(value, tuple):
-        return tuple(_moved(item, step, d, moving) for item in value)
+        return tuple(moved(item, step, d, moving) for item in value)
     if isinstance(value, Closure):
-        return value.change(lambda inner: _moved(inner, step, d, moving))
+        return value.change(lambda inner: moved(inner, step, d, moving))
     return value if moving else still(value)
 
 

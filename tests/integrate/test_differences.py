@@ -1,0 +1,54 @@
+"""Derivatives by differences of values, which stand in where boundary terms have no digits; never for kinks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import potto
+from potto.integrate.pieces import Sums
+from potto.kernels.cells import Cell
+from potto.runtime.differences import _derivative
+
+FUNCTIONS: list[tuple[Callable[[float], float], float | None]] = [
+    (math.exp, math.e),
+    (lambda x: x**7, 7.0),
+    (lambda x: 1 / x, -1.0),
+    (lambda x: math.sin(20 * x), 20 * math.cos(20)),
+    (lambda x: abs(x - 1), None),
+    (lambda x: max(x, 1.0) ** 2, None),
+    (lambda x: math.sqrt(abs(x - 1)), None),
+    (lambda x: math.copysign(abs(x - 1) ** (1 / 3), x - 1), None),  # infinite on both sides alike
+]
+
+
+@pytest.mark.parametrize("number", range(len(FUNCTIONS)))
+def test_smooth_functions_have_one_and_kinks_none(number: int) -> None:
+    f, exact = FUNCTIONS[number]
+
+    def evaluated(linked: object) -> Sums:
+        x = linked.env["x"].v  # type: ignore[attr-defined]
+        v = np.array([[f(x)]])
+        return Sums(v, np.full((1, 1), 1e-15), np.zeros((1, 0, 1)), np.zeros((1, 0, 1)))
+
+    found = _derivative({"x": Cell(1.0, None, (1.0,))}, 0, 1 / 64, evaluated)
+    if exact is None:
+        assert found is None or found[1][0] > 0.1 * abs(found[0][0])
+    else:
+        assert found is not None
+        assert abs(found[0][0] - exact) <= found[1][0] <= 1e-4 * abs(exact)
+
+
+@pytest.mark.parametrize("tilt", [1e-16, -1e-16, 1e-17])
+def test_surfaces_that_are_parallel_to_both_axes_but_for_rounding(tilt: float) -> None:
+    """Along every variable one of them has a section that is steep beyond the digits of a double."""
+    f = potto.compile(f"""
+def f(t)
+    integral ([0, 1], [0, 1]) [x + ({tilt!r})*y < t]*[y - ({tilt!r})*x < t]*exp(x) d(x, y)
+""").f
+    answer = potto.deriv(f)((0.3, 1.0))
+    exact = math.expm1(0.3) + 0.3 * math.exp(0.3)  # of t (e^t - 1)
+    assert abs(answer.tangent - exact) <= answer.tangent_error + 1e-15 <= 1e-10
