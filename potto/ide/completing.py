@@ -16,7 +16,7 @@ from potto.ide.documents import definition_head, documentation, type_text, writt
 from potto.ide.explaining import fence
 from potto.ide.hover_locals import TITLES, local_type
 from potto.ide.hovers import builtin_markdown, measure_markdown, measure_signature, module_markdown
-from potto.ide.importing import import_edit, importable
+from potto.ide.importing import import_edit, importable, new_line
 from potto.ide.model import Completion, CompletionKind, Completions
 from potto.ide.pending import call_in
 from potto.ide.places import Site, chunk_at, site_after, site_at
@@ -249,6 +249,9 @@ def resolve_completion(db: Database, item: Completion) -> Completion:
         case ("import", file, target, name):
             edit = import_edit(db, file, target, name)
             return replace(_with_definition(db, item, target, name), edits=() if edit is None else (edit,))
+        case ("import", file, target, name, dotted):
+            edit = new_line(db, file, f"import {dotted}")
+            return replace(_with_definition(db, item, target, name), edits=(edit,))
         case ("module", file, dotted):
             return replace(item, documentation=module_markdown(db, file, dotted))
         case ("builtin", name):

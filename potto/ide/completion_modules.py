@@ -62,16 +62,31 @@ def member_items(db: Database, site: Site, place: Place) -> Iterator[Completion]
     """What follows `m.`: the names of the module, and the modules of a package that is imported."""
     file, chunk = site.file, site.chunk
     head = place.path.partition(".")[0]
-    if chunk is not None and any(b.name == head for _, b in chunk.index(db).visible(place.span.start - chunk.start)):
+    start = place.span.start - len(place.path) - 1  # of the path: what is being typed behind it may not be read yet
+    if chunk is not None and any(b.name == head for _, b in chunk.index(db).visible(start - chunk.start)):
         return  # a parameter, and the dot of a lambda
     module = resolve_module(db, file, place.path)
     if module is not None:
         yield from _names_of(db, module, place)
+    elif resolve(db, file, head) is None:
+        yield from _not_imported(db, file, place)
     prefix = place.path + "."
     for item in imports(db, file):
         if isinstance(item, nodes.Import) and item.alias is None and item.module.startswith(prefix):
             name = item.module[len(prefix) :].partition(".")[0]
             yield Completion(name, "module", place.span, name, name)
+
+
+def _not_imported(db: Database, file: str, place: Place) -> Iterator[Completion]:
+    """The names of a module that is written without being imported: to take one imports it."""
+    module = find_module(db, file, place.path)
+    for item in () if module is None or module == file else _names_of(db, module, place):
+        match item.data:
+            case ("definition", target, name):
+                data = ("import", file, target, name, place.path)
+                yield replace(item, description=f"import {place.path}", data=data)
+            case _:
+                pass
 
 
 def _names_of(db: Database, module: str, place: Place) -> Iterator[Completion]:

@@ -94,6 +94,17 @@ def test_auto_import_writes_the_import():
     assert text == "from other import z\nfrom shapes import disc\ny = disc\n"
 
 
+def test_members_of_a_module_that_is_not_imported_bring_the_import_of_it():
+    files = "# file: pkg/inner.po\nz = 1\n# file: shapes.po\n# A disc.\ndef disc(x, y) 1\n# file: main.po\n"
+    item, text = fixture(files + "y = shapes.$0\n").complete("disc")
+    assert text == "import shapes\n\ny = shapes.disc\n"
+    assert item.description == "import shapes" and "A disc." in item.documentation
+    _, text = fixture(files + "from shapes import disc\ny = pkg.inner.$0\n").complete("z")
+    assert text == "from shapes import disc\nimport pkg.inner\ny = pkg.inner.z\n"
+    assert fixture(files + "def f(shapes) shapes.$0\n").labels() == []
+    assert fixture(files + "shapes = 1\ny = shapes.$0\n").labels() == []
+
+
 def test_what_is_defined_here_is_not_imported():
     f = fixture("# file: shapes.po\ndisc = 1\n# file: main.po\ndisc = 2\ny = dis$0\n")
     assert f.labels().count("disc") == 1
