@@ -130,7 +130,7 @@ def _evaluate(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
 def _live(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
     """The value of a live expression, whether it is the expected one, and what there is to say about it."""
     from potto.live import DOES_NOT_HOLD, agrees, bounds
-    from potto.runtime.shown import error_bar, format_bounds, format_estimate
+    from potto.runtime.shown import error_bar, format_bounds, format_estimate, largest
 
     file, expected = task["file"], task["expected"]
     try:
@@ -147,7 +147,7 @@ def _live(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
     found = {"text": format_estimate(estimate), "holds": None, "expected": expected}
     if estimate.text is None:
         found["error"] = format_bounds(bounds(estimate))
-        found["bar"] = error_bar(bounds(estimate))
+        found["bar"], found["exact"] = error_bar(bounds(estimate)), largest(bounds(estimate)) == 0
     said = list(answer.remarks)
     if expected is not None and (wanted := _wanted(world, file, expected)) is not None:
         found["holds"] = agrees(estimate, wanted, world.parse(expected))

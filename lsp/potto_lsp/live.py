@@ -87,7 +87,8 @@ class Value:
     def tooltip(self) -> str:
         if not self.result or "tooltip" in self.result:
             return f"```text\n{self.result.get('tooltip') or self.answer.get('error', '')}\n```"
-        error = f"error at most {self.result['error']}" if "error" in self.result else ""
+        error = f"error at most {self.result['error']}" if self.result.get("bar") else ""
+        error = "exact" if self.result.get("exact") else error
         held = {True: "as expected", False: "not as expected", None: ""}[self.result["holds"]]
         return "; ".join(part for part in (error, held) if part)
 
