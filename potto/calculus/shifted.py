@@ -46,6 +46,7 @@ from potto.core.terms import (
     var,
 )
 
+STEP = "step@"  # what the names of steps begin with, as no other does
 LINEAR, BEYOND = 1, 2  # how a term depends on tangents; 0: not at all
 
 
@@ -238,7 +239,7 @@ class _Shift:
 
     def derivative(self, term: Integral, kind: int, names: set[str]) -> Term:
         """The derivative by the steps that one kind of tangent is the derivative by."""
-        steps = [fresh(f"step{place}", names) for place in range(kind.bit_length()) if kind >> place & 1]
+        steps = [fresh(f"{STEP}{place}", names) for place in range(kind.bit_length()) if kind >> place & 1]
         places = [1 << place for place in range(kind.bit_length()) if kind >> place & 1]
         alone = dict(zip(places, map(var, steps), strict=True))
         ways: list[tuple[int, Term]] = list(alone.items())

@@ -348,6 +348,7 @@ class Machine:
     def integral(self, term: Integral, env: dict[str, Value]) -> Value:
         from potto.runtime.integrals import integrate
         from potto.runtime.prepare import filled, held, placed, prepared, shape_of
+        from potto.runtime.stepped import stepped
 
         term, env = filled(term, env, self.linker.reach)
         shapes = {name: shape_of(env[name]) for name in sorted(term.free)}
@@ -356,7 +357,7 @@ class Machine:
         if known is None:
             known = self.linker.placed[key] = placed(term, self.linker.reach, shapes.get, self.directions > 0)
         if not isinstance(known, Integral):
-            return self.term(known, {n: env[n] for n in known.free})
+            return stepped(self, known, {n: env[n] for n in known.free})
         term = known
         if self.frozen:
             term, stopped = held(term)

@@ -148,3 +148,18 @@ def g(a) integral [0, 1] x*snd(deriv(G)((x, x - 0.64), (a, 1))) d(x)
     exact = mpmath.diff(lambda a: mpmath.quad(lambda y: -0.59 + 0.59*a*(y - 0.64)/y, [0.59*a, 1]), 0.3437)
     got = potto.deriv(m.g)((0.3437, 1.0))
     assert abs(got.tangent - exact) <= 1e-12 + got.tangent_error and got.tangent_error <= 1e-11
+
+
+def test_a_delta_where_its_factor_jumps_has_no_meaning() -> None:
+    m = potto.compile(PROGRAM + """
+def f(a) integral [0, 1] (if [x > a] then x else 0)*snd(deriv(mixed)((x, 0), (a, 1))) d(x)
+def bend(a) integral [0, 1] abs(x - a)*snd(deriv(mixed)((x, 0), (a, 1))) d(x)
+def rim(a) integral [0, 1] snd(deriv(mixed)((x, 0), (a, 1))) d(x)
+""")
+    with pytest.raises(potto.PottoError) as caught:
+        m.f(0.4)
+    assert [d.code for d in caught.value.diagnostics] == ["P0505"]
+    assert m.bend(0.4).value == 0  # a bend is no jump
+    (note,) = m.rim(0.0).notes  # on the very edge of the domain there is none of it, and the sides differ
+    assert m.rim(0.0).value == 0 and note.surface == "a - x = 0"
+    assert abs(note.backward) <= 1e-14 and abs(note.forward + 2) <= 1e-13
