@@ -293,7 +293,7 @@ def centers(node: Prim) -> tuple[Term, ...]:
             found[part.args[0]] = None
         elif part.op == "mul" and len(set(part.args)) < len(part.args):
             found.update((a, None) for a in part.args if part.args.count(a) > 1 and a.free)
-        elif node.op == "div" and part.op == "exp":
+        elif node.op == "div" and part.op in ("exp", "cosh"):
             found[part.args[0]] = None
     return tuple(found)
 

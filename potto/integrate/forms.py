@@ -115,11 +115,8 @@ def cut_rounding(work: Work, ends: Ends) -> Array:
 
 def added_up(work: Work, found: Totals) -> Array:
     """What is added up for each of the batch, without regard to sign, here and further in: (B,)."""
-    gross: Array = np.where(np.isfinite(found.size), found.size, 0.0).max(axis=(0, 1))
-    if work.gross is None:
-        return gross
-    reach = np.bincount(work.seg.owner, (work.seg.b - work.seg.a) * work.gross, minlength=work.batch)
-    return np.asarray(np.fmax(gross, np.where(np.isfinite(reach), reach, 0.0)))
+    gross: Array = work.cancels * np.where(np.isfinite(found.size), found.size, 0.0).max(axis=(0, 1))
+    return gross
 
 
 def sums(work: Work, found: Totals, ends: Ends | None) -> Sums:

@@ -82,7 +82,8 @@ def missed_peak(work: Work, p: Pieces, ends: Ends) -> Any:
     than the interpolant's last terms: something narrow sits at the end.
     """
     seg = work.seg
-    width = (seg.b - seg.a)[p.segment] * (p.u1 - p.u0)
+    reach = seg.b - seg.a
+    width = np.where(np.isinf(reach), 1.0, reach)[p.segment] * (p.u1 - p.u0)  # x = a + u/(1 - u) has the slope 1 at a
     plain = (seg.kind[p.segment] == maps.LINEAR) & (p.end == 0)
     bad = np.zeros(p.segment.size, dtype=bool)
     m = work.width

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 # As close as this to an end, in the coordinate, values are taken for those at this distance: the closest that will do.
 CLOSE = (1e-6, 1e-4, 1e-2)
+# As close as this to an end an integral further in, that nothing comes of there, is taken for that at this distance.
+UNREACHED = 1e-12
 
 
 def mend(work: Work, seg: Segments, index: Ints, u: Array, du: Array, h: Array, bounds: Array | None) -> None:
@@ -39,3 +41,22 @@ def mend(work: Work, seg: Segments, index: Ints, u: Array, du: Array, h: Array, 
         h[:, rows] = np.where(bad[rows], found, h[:, rows])
         if bounds is not None and errors is not None:
             bounds[:, rows] = np.where(bad[rows], errors, bounds[:, rows])
+    if bounds is not None and not np.isfinite(h).all():
+        _unreached(work, seg, index, u, du, h, bounds)
+
+
+def _unreached(work: Work, seg: Segments, index: Ints, u: Array, du: Array, h: Array, bounds: Array) -> None:
+    """Values for nodes so close to an end that integrals further in give up: of 1/(x + y) along y at x = 1e-20.
+
+    Nothing is known of them but that they count little if values grow slowly; they may be off by all that they are.
+    """
+    plain = (seg.kind == maps.LINEAR)[:, None]
+    bad = ~np.isfinite(h).all(axis=0) & plain & ((u < UNREACHED) | (u > 1 - UNREACHED))
+    rows = np.nonzero(bad.any(axis=1))[0]
+    if rows.size:
+        part, inner = seg.pick(rows), np.clip(u[rows], UNREACHED, 1 - UNREACHED)
+        x, slope, label = maps.points(part, inner)
+        found, errors = work.values(part, index[rows], x, label, slope * np.broadcast_to(du, u.shape)[rows])
+        off = np.abs(found) if errors is None else np.abs(found) + errors
+        h[:, rows] = np.where(bad[rows], found, h[:, rows])
+        bounds[:, rows] = np.where(bad[rows], off, bounds[:, rows])

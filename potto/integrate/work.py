@@ -66,7 +66,7 @@ class Work:
     conflict: bool = False
     width: int = 1
     ends: Ends | None = None
-    gross: Array | None = None  # per segment, of what is further in
+    cancels: float = 1.0  # how many times what it comes to an integral further in adds up
 
     def __post_init__(self) -> None:
         self.k = self.machine.directions
@@ -333,8 +333,8 @@ class Work:
         root = self.below(owner[flat])
         sums = self.parent.run(self.number + 1, env, x.size, masks, self.inner, root)
         if sums.gross is not None:
-            self.gross = np.zeros(self.seg.a.size) if self.gross is None else self.gross
-            np.maximum.at(self.gross, index, sums.gross.reshape(x.shape).max(axis=1))
+            share = sums.gross / np.maximum(np.abs(sums.v).max(axis=0), 1e-300)
+            self.cancels = max(self.cancels, float(np.median(share)))
         shape = (sums.v.shape[0], *x.shape)
         t = sums.t.reshape(shape[0], -1, *x.shape)
         et = sums.et.reshape(t.shape)

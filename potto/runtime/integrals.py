@@ -101,9 +101,10 @@ def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermos
 def note_gross(machine: Machine, sums: Sums) -> None:
     """What is added up without regard to sign, at the least the values themselves."""
     if sums.gross is not None and sums.v.size == 1:  # numpy takes its time over a single number
-        machine.books.gross = max(machine.books.gross, float(sums.gross[0]))
+        gross = float(sums.gross[0])
+        machine.books.gross = max(machine.books.gross, gross if gross < np.inf else 0.0)
         return
-    least = 0.0 if sums.gross is None else float(sums.gross.max(initial=0.0))
+    least = 0.0 if sums.gross is None else float(np.max(sums.gross, initial=0.0, where=np.isfinite(sums.gross)))
     found = np.max(np.abs(sums.v), initial=least, where=np.isfinite(sums.v))
     machine.books.gross = max(machine.books.gross, float(found))
 

@@ -1,0 +1,41 @@
+"""Singularities that only a corner of the domain has, and peaks far out on an infinite range. Closed forms."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+import potto
+
+CORNERS = [
+    ("1/(1 - x*y)", math.pi**2 / 6, 1e-9),
+    ("1/(x + y)", 2 * math.log(2), 1e-9),
+    ("log(x + y)", 2 * math.log(2) - 1.5, 1e-9),
+    ("1/(x + y)^1.5", 4 - 4 * (math.sqrt(2) - 1), 1.0),  # nothing is vouched for, and it is no infinity
+]
+
+
+@pytest.mark.parametrize(("body", "exact", "largest"), CORNERS, ids=[row[0] for row in CORNERS])
+def test_an_integrand_that_is_infinite_in_a_corner(body: str, exact: float, largest: float) -> None:
+    """At nodes next to it the inner integral has a pole closer than doubles can approach; they count for little."""
+    answer = potto.compile(f"def f(t)\n    integral ([0, 1], [0, 1]) t*({body}) d(x, y)").f(1.0)
+    assert abs(answer.value - exact) <= answer.error <= largest
+    assert abs(answer.value - exact) <= 1e-4
+
+
+PEAKS = [
+    ("exp(-(1e4*(x - t))^2)", math.sqrt(math.pi)),
+    ("exp(-1e8*(x - t)^2)", math.sqrt(math.pi)),
+    ("1/(1 + (1e4*(x - t))^2)", math.pi),
+    ("1/cosh(1e4*(x - t))", math.pi),
+]
+
+
+@pytest.mark.parametrize("ends", ["-inf, inf", "0, inf", "-inf, 1e5", "0, 2000"])
+@pytest.mark.parametrize(("body", "size"), PEAKS, ids=[row[0] for row in PEAKS])
+def test_a_peak_far_narrower_than_the_range(body: str, size: float, ends: str) -> None:
+    answer = potto.compile(f"def f(t)\n    integral [{ends}] {body} d(x)").f(1000.0)
+    exact = size * 1e-4
+    slack = 3e-11 if body.startswith("1/(1") and ends != "-inf, inf" else 1e-15  # what its tails lack
+    assert abs(answer.value - exact) <= answer.error + slack and answer.error <= 1e-7 * exact + slack
