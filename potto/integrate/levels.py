@@ -7,6 +7,7 @@ leaves out the segments on which the integrand vanishes, and hands the rest to `
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +22,8 @@ from potto.integrate.roots import searched_rows
 from potto.integrate.steps import brush
 from potto.integrate.work import Work
 from potto.kernels.cells import Array, Cell, Ints, Mask, Value
+
+NARROW = 1e-4  # the part of the range of a variable up to which a stretch may lie on either side of a surface
 
 
 @dataclass
@@ -49,7 +52,8 @@ class Iteration:
         k = machine.directions
         cuts = self.cut(level, env, batch, machine)
         seg = cuts.segments
-        outer, sides = sides, self.sides_of(level, env, seg, sides, machine)
+        outer = sides
+        sides, unsure = self.sides_of(level, env, seg, sides, machine)
         keep = self.alive(sides, seg)
         if machine.costs is not None and number + 1 == len(self.plan.levels):
             machine.costs.stretches(seg.a.size, seg.a.size if keep is None else keep.size)
@@ -65,6 +69,9 @@ class Iteration:
                 count_places(self, number, level, cuts, env, outer, sums, machine)
         if k and cuts.brushes and number + 1 < len(self.plan.levels):
             brush(self, number, level, cuts, env, outer, machine)
+        if unsure is not None and not number:  # single nodes of variables further out may lie on a surface
+            machine.note_unfinished(f"rounding hides on which side of a surface stretches of `{level.variable}` lie")
+            sums.e[:, unsure] = sums.et[:, :, unsure] = np.inf
         if cuts.slivers and not machine.frozen and not self.plan.hides:
             count_slivers(self, number, level, cuts, env, outer, sums, machine)
         if k and cuts.folds:
@@ -104,17 +111,21 @@ class Iteration:
 
     def sides_of(
         self, level: LevelPlan, env: dict[str, Value], seg: Segments, sides: dict[int, Mask], machine: Evaluator
-    ) -> dict[int, Mask]:
-        """The sides of all surfaces decided so far, per segment: those of this variable from the segment's middle."""
+    ) -> tuple[dict[int, Mask], Ints | None]:
+        """The sides of all surfaces decided so far, per segment: those of this variable from the segment's middle.
+
+        And the members, if any, of which that is rounding for a stretch that matters.
+        """
         sides = {g: take(mask, seg.owner) for g, mask in sides.items()}
         if not level.decided:
-            return sides
+            return sides, None
         middle, _, _ = maps.points(seg, np.full((seg.a.size, 1), 0.5))
         here = {n: v for n, v in env.items() if n in level.surfaces.params}
         at = {n: still(v) for n, v in gather(here, seg.owner).items()}
         at[level.variable] = Cell(middle[:, 0])
-        values = machine.with_directions(0).evaluate(level.surfaces, at, None)
+        values = machine.with_directions(0).tracking().evaluate(level.surfaces, at, None)
         assert isinstance(values, tuple)
+        unsure: Any = False
         for group, value, turned in zip(level.decided, values, level.turned, strict=True):
             assert isinstance(value, Cell)
             at_middle = as_array(value.v, seg.a.size)
@@ -122,7 +133,12 @@ class Iteration:
             for outer in turned:
                 side = side ^ np.logical_not(sides[outer])
             sides[group] = side
-        return sides
+            unsure = unsure | (np.abs(at_middle) < (0.0 if value.e is None else value.e))
+        if not np.any(unsure):
+            return sides, None
+        reach = np.bincount(seg.owner, seg.b - seg.a)[seg.owner]
+        members = np.unique(seg.owner[unsure & (seg.b - seg.a > NARROW * reach)])
+        return sides, members if members.size else None
 
     def alive(self, sides: dict[int, Mask], seg: Segments) -> Ints | None:
         """The segments on which the integrand is not known to vanish; None for all of them."""

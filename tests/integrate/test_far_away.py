@@ -57,3 +57,14 @@ def f(t)
         wide = mp.sqrt(mp.mpf(0.25) + mp.mpf(0.11))
         covered(answer, 1 + 20 * wide, 2 + 10 / wide)
     assert answer.error <= 1e-5
+
+
+@pytest.mark.parametrize("far", [3e7, 1e8])
+def test_a_stretch_that_is_written_multiplied_out_has_lost_its_length(far: float) -> None:
+    """Nothing can be known of it: the error says so."""
+    body = f"x^2 - {2 * far!r}*x + {far * far!r} - t^2 < 0"
+    f = potto.compile(f"def f(t)\n    integral [{far - 1!r}, {far + 1!r}] [{body}] d(x)").f
+    answer = potto.deriv(f)((0.3, 1.0))
+    assert abs(answer.value - 2 * mp.mpf(0.3)) <= answer.error
+    assert abs(answer.tangent - 2) <= answer.tangent_error
+    assert not answer.converged and "rounding" in answer.reasons[0]
