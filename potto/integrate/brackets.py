@@ -19,6 +19,7 @@ from potto.integrate.intervals import Interval, enclosure, known
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 
 FINEST = 48  # halvings of the whole
+OUTSIDE = 64  # how many of the smallest cells away from one a sign is asked for
 CELLS, CELLS_EACH = 1 << 16, 1 << 9  # at most so many open at once, or so many for each member
 
 
@@ -70,8 +71,34 @@ def isolated(surface: Term, slope: Term, variable: str, env: dict[str, Value], l
         owner, s0, s1 = np.concatenate((owner, owner)), np.concatenate((s0, middle)), np.concatenate((middle, s1))
     crossed = cells.crossed(owner, s0, s1)
     found.append((owner[crossed], s0[crossed], s1[crossed]))
+    if complete and owner.size:
+        found.append(_around_poles(cells, owner[~crossed], s0[~crossed], s1[~crossed], found))
     owners, s0, s1 = (np.concatenate(parts) for parts in zip(*found, strict=True))
     return Brackets(owners, cells.x(owners, s0), cells.x(owners, s1), complete)
+
+
+def _around_poles(
+    cells: _Cells, owner: Ints, s0: Array, s1: Array, found: list[tuple[Ints, Array, Array]]
+) -> tuple[Ints, Array, Array]:
+    """Places with a sign change among the smallest cells, next to each other, that say nothing by themselves.
+
+    So close to a pole no enclosure has a sign: it is asked for a little outside. What was found there already is left.
+    """
+    order = np.lexsort((s0, owner))
+    owner, s0, s1 = owner[order], s0[order], s1[order]
+    width = 2.0**-FINEST
+    first = np.ones(owner.size, dtype=bool)
+    first[1:] = (owner[1:] != owner[:-1]) | (s0[1:] > s1[:-1] + width)
+    starts = np.nonzero(first)[0]
+    if not starts.size:
+        return owner, s0, s1
+    owner, s0, s1 = owner[starts], s0[starts], np.maximum.reduceat(s1, starts)
+    s0, s1 = np.maximum(s0 - OUTSIDE * width, 0.0), np.minimum(s1 + OUTSIDE * width, 1.0)
+    crossed = cells.crossed(owner, s0, s1)
+    for o, a, b in found:
+        for i in np.nonzero(crossed)[0]:
+            crossed[i] = not ((o == owner[i]) & (b >= s0[i]) & (a <= s1[i])).any()
+    return owner[crossed], s0[crossed], s1[crossed]
 
 
 @dataclass

@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from potto.calculus.sweep import Face, Product
-from potto.core.terms import Term, const, mul, sub, var
+from potto.core.terms import App, Prim, Term, const, mul, postorder, sub, var
 from potto.integrate.chart import Chart, Point, label_of
 from potto.integrate.cuts import Row, as_array, frame_rows
 from potto.integrate.lines import End, Line, label_name, leaving, line, offset
@@ -203,7 +203,7 @@ class Surface:
         off: how far from the surface the points may be, by rounding. root: the pivot there, where it has a closed form.
         """
         k, n = self.machine.directions, off.size
-        axes = self.axes if len(self.pivots) > 1 else (pivot,)
+        axes = self.pivots
         marked = {axis: k + i for i, axis in enumerate(axes)}
         wide = k + len(axes)
         point = self.placed(labels, pivot, marked, n)
@@ -213,6 +213,9 @@ class Surface:
             steep = np.abs(slopes[j])
             smooth = np.isfinite(slopes).all(axis=0) & (steep > 0) & (np.abs(phi) <= OFF * steep)
             rates = slopes[:k] / (steep * ((slopes[k:] / steep) ** 2).sum(axis=0))
+            if self.breaks:  # at a pole its slope has the sign of neither side
+                low, high, _ = self.around(labels, pivot, marked)
+                smooth &= np.sign(high) - np.sign(low) == 2 * np.sign(slopes[j])
         odd = inside & ~smooth
         if odd.any():
             rates[:, odd] = self.beside(labels, pivot, marked, point, root)[:, odd]
@@ -305,13 +308,7 @@ class Surface:
         unless it jumps there from one finite value to another. nan where that is not known.
         """
         wide = self.machine.directions + len(marked)
-        u = labels[pivot]
-        assert u is not None
-        found = []
-        for side in (-ASIDE, ASIDE):
-            moved = self.placed([*labels[:pivot], u + side, *labels[pivot + 1 :]], pivot, marked, u.size)
-            found.append(self.slopes(self.term, moved, wide, u.size))
-        (below, _), (above, slopes) = found
+        below, above, slopes = self.around(labels, pivot, marked)
         change = (np.sign(above) - np.sign(below)) / 2
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             if root is None:
@@ -319,14 +316,37 @@ class Surface:
             else:
                 env = {**point.env, **self.labelled(labels, pivot, marked)}
                 psi = sub(var(self.chart.plan.levels[pivot].variable), root)
-                _, slopes = self.slopes(psi, Point(env, point.volume), wide, u.size)
-                far = np.zeros(u.size, dtype=bool)
+                _, slopes = self.slopes(psi, Point(env, point.volume), wide, change.size)
+                far = np.zeros(change.size, dtype=bool)
             steep = slopes[marked[pivot]]
             rates = slopes[: self.machine.directions] / (
                 steep * ((slopes[self.machine.directions :] / steep) ** 2).sum(axis=0)
             )
         rates = np.where(far, np.nan, np.where(np.isfinite(rates), rates, 0.0))
         return np.where(change == 0, 0.0, rates * change)
+
+    def around(
+        self, labels: list[Array | None], pivot: int, marked: dict[int, int]
+    ) -> tuple[Array, Array, Array]:
+        """phi just below and just above points along the pivot, and its tangents just above."""
+        u = labels[pivot]
+        assert u is not None
+        found = []
+        for side in (-ASIDE, ASIDE):
+            moved = self.placed([*labels[:pivot], u + side, *labels[pivot + 1 :]], pivot, marked, u.size)
+            found.append(self.slopes(self.term, moved, self.machine.directions + len(marked), u.size))
+        return found[0][0], found[1][0], found[1][1]
+
+    @cached_property
+    def breaks(self) -> bool:
+        """Whether it may have poles, or jump by itself."""
+        for node in postorder(self.term):
+            match node:
+                case App() | Prim(op="pow" | "tan" | "atan2" | "log"):
+                    return True
+                case Prim(op="div", args=(_, below)) if below.free:
+                    return True
+        return False
 
     def labelled(self, labels: list[Array | None], pivot: int, marked: dict[int, int]) -> dict[str, Value]:
         """What roots along the pivot are written in where bounds follow it."""

@@ -23,6 +23,7 @@ from potto.kernels.cells import Array, Cell, Value, map_arrays, pad
 GRID = 64
 MOST_IN_FAMILY = 100_000
 BISECTIONS = 64
+BESIDE = 2.0**-27  # how far from a pole, as a part of where it is, it is asked how it moves
 
 
 def searched_rows(level: LevelPlan, env: dict[str, Value], lo: Cell, hi: Cell, batch: int, machine: Any) -> list[Row]:
@@ -214,4 +215,23 @@ def _moving(cut: int, function: Lam, variable: str, env: dict[str, Value], root:
         off = np.where(np.isfinite(off), off, 0.0) + SEARCHED * EPS * np.abs(root)
         # What stands still does so also where the surface is flat, and 0/0 would say nothing.
         t = tuple(None if x is None else np.where(np.asarray(x) == 0, 0.0, -np.asarray(x) / slope) for x in value.t[:k])
+    poles = np.isfinite(root) & ~np.isfinite(np.broadcast_to(value.v, root.shape))
+    if k and poles.any():
+        near = _beside_poles(function, variable, here, root, machine.with_directions(k + 1))
+        t = tuple(np.where(poles, x, 0.0 if y is None else y) for x, y in zip(near, t, strict=True))
     return Row(root, t, cut, False, off)
+
+
+def _beside_poles(function: Lam, variable: str, env: dict[str, Value], root: Array, machine: Any) -> list[Array]:
+    """How poles move: like the lines along which psi is constant beside them, in the mean of their two sides."""
+    k = machine.directions - 1
+    found = np.zeros((k, *root.shape))
+    for side in (-BESIDE, BESIDE):
+        at = {**env, variable: Cell(root + side * np.maximum(np.abs(root), BESIDE), None, (None,) * k + (1.0,))}
+        value = _call(function, at, machine)
+        slope = 0.0 if value.t[k] is None else value.t[k]
+        for d, x in enumerate(value.t[:k]):
+            with np.errstate(all="ignore"):
+                speed = 0.0 if x is None else -np.asarray(x) / slope
+            found[d] += np.where(np.isfinite(speed), speed, 0.0) / 2
+    return list(found)
