@@ -20,7 +20,6 @@ from potto.syntax.type_nodes import TupleType as TupleType
 from potto.syntax.type_nodes import TypeExpr as TypeExpr
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Number:
     span: Span
@@ -28,14 +27,12 @@ class Number:
     value: float
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Name:
     span: Span
     id: str
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Member:
     """`module.name`, written without blanks; `path` is the dotted module (`pkg.m`), `path_span` its place."""
@@ -47,7 +44,6 @@ class Member:
     name_span: Span
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Unary:
     span: Span
@@ -55,7 +51,6 @@ class Unary:
     operand: Expr
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Operand:
     """One further operand of a chain, with the operator in front of it."""
@@ -65,7 +60,6 @@ class Operand:
     value: Expr
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Chain:
     """`a + b - c` or `a * b / c`: left-associative operators of one precedence (`rest` is never empty)."""
@@ -75,7 +69,6 @@ class Chain:
     rest: tuple[Operand, ...]
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Power:
     span: Span
@@ -83,7 +76,6 @@ class Power:
     exponent: Expr
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Compare:
     """`a <= x < b`: a chained comparison (`rest` is never empty; ops: < <= > >= == !=)."""
@@ -93,7 +85,6 @@ class Compare:
     rest: tuple[Operand, ...]
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Logic:
     """`p and q and r` or `p or q`, flat."""
@@ -103,7 +94,6 @@ class Logic:
     operands: tuple[Expr, ...]
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Bracket:
     """The Iverson bracket `[p]`: 1 where p holds, else 0. p is a Compare, a Logic or a `not`."""
@@ -112,14 +102,12 @@ class Bracket:
     condition: Expr
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class ListLiteral:
     span: Span
     items: tuple[Expr, ...]
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Tuple:
     """`(a, b)`, two items or more."""
@@ -128,7 +116,6 @@ class Tuple:
     items: tuple[Expr, ...]
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Paren:
     """`(e)`: kept so that the formatter prints what was written."""
@@ -137,7 +124,6 @@ class Paren:
     inner: Expr
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class If:
     """`if p then a else b` or `p ? a : b`."""
@@ -149,7 +135,6 @@ class If:
     style: Literal["if", "?:"]
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Lambda:
     """`\\(x, y) . \\c . e` is two Lambdas; `\\(x, y) . c . e` is one with two groups. Each group is one call."""
@@ -159,7 +144,6 @@ class Lambda:
     body: Expr
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Argument:
     span: Span
@@ -168,7 +152,6 @@ class Argument:
     value: Expr
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Apply:
     """One group of arguments given to a function: `f(a, b)`, `f (a, b)`, `f x`. `f x y` is two Applys."""
@@ -179,7 +162,6 @@ class Apply:
     parenthesized: bool
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Interval:
     """`[lo, hi]` as the bounds of one variable of integration."""
@@ -189,7 +171,6 @@ class Interval:
     hi: Expr
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class MeasureBound:
     """`x ~ normal(m, s)` among the bounds of an integral."""
@@ -202,7 +183,6 @@ class MeasureBound:
     arguments: tuple[Expr, ...]
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Binder:
     """A variable where it is bound, here after `d`."""
@@ -211,7 +191,6 @@ class Binder:
     name: str
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Integral:
     """`integral (bounds) body d(variables)`: the first variable is the outermost."""
@@ -222,7 +201,6 @@ class Integral:
     variables: tuple[Binder, ...]
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Sum:
     """`sum i in lo..hi (body)`."""
@@ -234,7 +212,6 @@ class Sum:
     body: Expr
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Binding:
     """`name = e` or `(a, b) = e`; in a definition's block or in a `let`."""
@@ -244,7 +221,6 @@ class Binding:
     value: Expr
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Let:
     """`let a = e; (b, c) = f in body`."""
@@ -254,7 +230,6 @@ class Let:
     body: Expr
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class InlineDiffeo:
     """`diffeo(e, f)`: the condition holds where the first component is >= 0."""
@@ -263,7 +238,6 @@ class InlineDiffeo:
     components: tuple[Expr, ...]
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class ErrorExpr:
     """A place where the text could not be read as an expression. A diagnostic has said why."""
@@ -299,7 +273,6 @@ Expr = (
 # Top-level items: one per chunk
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class ImportedName:
     span: Span
@@ -309,7 +282,6 @@ class ImportedName:
     alias_span: Span | None
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class FromImport:
     """`from pkg.m import a, b as c`."""
@@ -320,7 +292,6 @@ class FromImport:
     names: tuple[ImportedName, ...]
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Import:
     """`import pkg.m` or `import pkg.m as k`."""
@@ -332,7 +303,6 @@ class Import:
     alias_span: Span | None
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Definition:
     """`def f(a, b)(c) body` (groups not empty) or `name = e` (groups empty).
@@ -350,7 +320,6 @@ class Definition:
     keyword: bool
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Inverse:
     """`inverse (u, v) . (x, y)`: the author's inverse of a diffeomorphism."""
@@ -360,7 +329,6 @@ class Inverse:
     components: tuple[Expr, ...]
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class DiffeoDefinition:
     """`diffeo name(x, y; c) = (u, v)` in a .po, or `name = \\(x, y) . \\c . (u, v)` in a .diffeo file.
@@ -382,14 +350,12 @@ class DiffeoDefinition:
     keyword: bool
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Print:
     span: Span
     arguments: tuple[Expr, ...]
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class For:
     """`for v in list: statements`."""
@@ -400,14 +366,12 @@ class For:
     body: tuple[Statement, ...]
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class ExpressionStatement:
     span: Span
     value: Expr
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class BrokenItem:
     """A chunk whose head could not be read. `name` is the best guess at what it was to define."""
@@ -419,3 +383,6 @@ class BrokenItem:
 Statement = Print | For | ExpressionStatement | Binding
 Item = FromImport | Import | Definition | DiffeoDefinition | Print | For | ExpressionStatement | BrokenItem
 Node = Expr | TypeExpr | Item | Binding | Binder | Argument | Parameter | Operand | Interval | MeasureBound | Inverse
+
+for _kind in [kind for kind in globals().values() if isinstance(kind, type) and kind.__module__ == __name__]:
+    quick(_kind)
