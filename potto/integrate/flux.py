@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from potto.calculus.sweep import Face, Product
-from potto.core.terms import App, Prim, Term, const, mul, postorder, sub, var
+from potto.core.terms import App, Const, Prim, Term, const, mul, postorder, sub, var
 from potto.integrate.chart import Chart, Point, label_of
 from potto.integrate.cuts import Row, as_array, frame_rows
 from potto.integrate.lines import End, Line, label_name, leaving, line, offset
@@ -342,6 +342,8 @@ class Surface:
         """Whether it may have poles, or jump by itself."""
         for node in postorder(self.term):
             match node:
+                case Prim(op="pow", args=(_, Const(value=value))) if value > 0:
+                    continue
                 case App() | Prim(op="pow" | "tan" | "atan2" | "log"):
                     return True
                 case Prim(op="div", args=(_, below)) if below.free:
