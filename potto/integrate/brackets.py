@@ -19,6 +19,7 @@ from potto.integrate.intervals import Interval, enclosure, known
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 
 FINEST = 48  # halvings of the whole
+FAR = (2.0**100, 2.0**30, 2.0**9)  # where signs are looked at that infinity does not tell
 OUTSIDE = 64  # how many of the smallest cells away from one a sign is asked for
 CELLS, CELLS_EACH = 1 << 16, 1 << 9  # at most so many open at once, or so many for each member
 
@@ -143,12 +144,23 @@ class _Cells:
         index = np.nonzero(settled)[0]
         return index, self.crossed(owner[index], s0[index], s1[index]), np.nonzero(~free & ~settled)[0]
 
+    def value(self, owner: Ints, x: Array) -> Array:
+        """The surface at places, nan where nothing is known of it."""
+        lo, hi = enclosure((self.surface,), {**self.at(owner), self.variable: (x, x)})[0]
+        with np.errstate(invalid="ignore"):
+            return np.broadcast_to(np.where((lo == -np.inf) & (hi == np.inf), np.nan, 0.5 * (lo + hi)), x.shape)
+
     def crossed(self, owner: Ints, s0: Array, s1: Array) -> Bools:
         """Whether the surface's sign changes over cells. A root on an end belongs to the cell on its right."""
         values = []
         for s in (s0, s1):
             x = self.x(owner, s)
-            lo, hi = enclosure((self.surface,), {**self.at(owner), self.variable: (x, x)})[0]
-            values.append(np.broadcast_to(np.where((lo == -np.inf) & (hi == np.inf), np.nan, 0.5 * (lo + hi)), x.shape))
+            value = self.value(owner, x)
+            for size in FAR:  # at infinity the terms of a sum may have no sum
+                lost = np.isnan(value) & np.isinf(x)
+                if not lost.any():
+                    break
+                value = np.where(lost, self.value(owner, np.where(lost, np.copysign(size, x), x)), value)
+            values.append(value)
         left, right = values
         return np.asarray((left * np.sign(right) < 0) | ((left == 0) & (right != 0)) | ((right == 0) & (s1 == 1)))

@@ -16,8 +16,10 @@ import pytest
 from scipy import special
 
 import potto
-from potto.core.terms import const, mul, prim, var
+from potto.core.terms import add, const, mul, prim, sub, var
+from potto.integrate.brackets import isolated, slope_of
 from potto.integrate.intervals import enclosure
+from potto.kernels.cells import Cell
 
 # a, w, p, b, t
 KEPT = [
@@ -127,3 +129,19 @@ def test_an_enclosure_holds_what_its_term_takes() -> None:
     for term, (lo, hi), value in zip(terms, found, values, strict=True):
         known = ~np.isnan(value)
         assert np.all((value >= lo) | ~known) and np.all((value <= hi) | ~known), term
+
+
+def test_roots_between_infinite_bounds_where_terms_of_the_surface_have_no_sum() -> None:
+    """a^3 - a at infinity is no number; the cubic a^3 - a = c has its three roots all the same."""
+    a = var("a")
+    surface = sub(prim("pow", a, const(3.0)), add(var("a"), var("c")))
+    slope = slope_of(surface, "a")
+    assert slope is not None
+    c = np.array([0.225, -0.225, 0.405])
+    found = isolated(surface, slope, "a", {"c": Cell(c)}, np.full(3, -np.inf), np.full(3, np.inf))
+    assert found.complete
+    for i, at in enumerate(c):
+        roots = sorted(x.real for x in np.roots([1.0, 0.0, -1.0, -at]) if abs(x.imag) < 1e-12)
+        cells = sorted(zip(found.a[found.owner == i], found.b[found.owner == i], strict=True))
+        assert len(cells) == len(roots)
+        assert all(a <= root <= b for (a, b), root in zip(cells, roots, strict=True))
