@@ -24,16 +24,23 @@ def _whole(*numbers: Any) -> bool:
 
 
 def add(value: Any, *args: Any) -> Any:
-    """The sum of what each addition rounds off, from left to right."""
+    """The sum of what each addition rounds off, from left to right.
+
+    Of a batch the last one counts as half a unit in the last place, which takes two passes and not six: only what was
+    lost on the way may be more than the value tells.
+    """
+    batch = isinstance(value, np.ndarray)
+    off: Any = UNIT_ROUNDOFF * abs(value) if batch else 0.0
     total: Any = args[0]
-    off: Any = None
-    for arg in args[1:]:
-        longer = value if len(args) == 2 else total + arg
+    for number, arg in enumerate(args[1:], 2):
+        if number == len(args) and batch:
+            break
+        longer = value if number == len(args) else total + arg
         part = longer - total
-        lost = abs((total - (longer - part)) + (arg - part))
-        total, off = longer, lost if off is None else off + lost
-    if isinstance(off, np.ndarray):
-        known = np.add.reduce(off, None) < math.inf
+        off = off + abs((total - (longer - part)) + (arg - part))
+        total = longer
+    if batch:
+        known = len(args) == 2 or np.add.reduce(off, None) < math.inf
         return off if known else np.where(np.isfinite(off), off, UNIT_ROUNDOFF * abs(value))
     return off if off < math.inf else UNIT_ROUNDOFF * abs(value)  # an infinite sum rounds off nan
 

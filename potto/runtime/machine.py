@@ -351,10 +351,11 @@ class Machine:
         from potto.runtime.stepped import stepped
 
         term, env = filled(term, env, self.linker.reach)
-        shapes = {name: shape_of(env[name]) for name in sorted(term.free)}
-        key = (term, tuple(shapes.values()), self.directions > 0)
+        names = term.free
+        key = (term, tuple([shape_of(env[name]) for name in names]), self.directions > 0)
         known = self.linker.placed.get(key)
         if known is None:
+            shapes = dict(zip(names, key[1]))
             known = self.linker.placed[key] = placed(term, self.linker.reach, shapes.get, self.directions > 0)
         if not isinstance(known, Integral):
             return stepped(self, known, {n: env[n] for n in known.free})
