@@ -78,17 +78,13 @@ def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermos
     linked = link(flat)
     groups = split_by_decisions(machine, term, linked, batch)
     if groups is None:
-        sums = solve(machine, term, linked, linked.env, batch, outermost)
-        if outermost:
-            note_gross(machine, sums)
+        sums = _vouched(machine, term, linked, batch, outermost)
         return _shaped(poisoned(sums, linked.env), shape)
     result: Sums | None = None
     for index in groups:
         here = {n: map_arrays(v, lambda a, index=index: a[index]) for n, v in flat.items()}
         there = link(here)
-        part = solve(machine, term, there, there.env, index.size, outermost)
-        if outermost:
-            note_gross(machine, part)
+        part = _vouched(machine, term, there, index.size, outermost)
         if result is None:
             m, k = part.v.shape[0], part.t.shape[1]
             result = Sums(np.zeros((m, batch)), np.zeros((m, batch)), np.zeros((m, k, batch)), np.zeros((m, k, batch)))
@@ -96,6 +92,21 @@ def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermos
         result.t[:, :, index], result.et[:, :, index] = part.t, part.et
     assert result is not None
     return _shaped(poisoned(result, linked.env), shape)
+
+
+def _vouched(machine: Machine, term: Integral, linked: Linked, batch: int, outermost: bool) -> Sums:
+    """What an integral amounts to. Rules on pieces that should have been cut further are good for nothing."""
+    sums = solve(machine, term, linked, linked.env, batch, outermost)
+    if outermost:
+        note_gross(machine, sums)
+        if "quadrature" in machine.books.methods and _left_out(machine):
+            sums.e, sums.et = np.full_like(sums.e, np.inf), np.full_like(sums.et, np.inf)
+    return sums
+
+
+def _left_out(machine: Machine) -> bool:
+    """Whether roots were left out, because they are too many."""
+    return any("too many roots" in reason for reason in machine.books.unfinished)
 
 
 def note_gross(machine: Machine, sums: Sums) -> None:
@@ -145,7 +156,7 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
         plan = plan_for(machine, term, linked)
         sums = counted(sample(plan, machine, plan.environment(env, linked.env), batch, method), plan.reaches, machine)
         machine.books.methods.add("mc" if method == "mc" else "qmc")
-        if any("too many roots" in reason for reason in machine.books.unfinished):
+        if _left_out(machine):
             sums.et = np.full_like(sums.et, np.inf)  # what crosses those that were left out is not known
         return sums
     machine.books.methods.add("quadrature")

@@ -7,6 +7,7 @@ known in closed form, it crosses 0 and 1 once at most, so that bisection by mpma
 from __future__ import annotations
 
 import itertools
+import math
 import random
 from typing import Any
 
@@ -145,3 +146,13 @@ def test_roots_between_infinite_bounds_where_terms_of_the_surface_have_no_sum() 
         cells = sorted(zip(found.a[found.owner == i], found.b[found.owner == i], strict=True))
         assert len(cells) == len(roots)
         assert all(a <= root <= b for (a, b), root in zip(cells, roots, strict=True))
+
+
+@pytest.mark.parametrize(
+    "integrand, at", [("[tan(x) < t]*exp(-x)", 0.5), ("[sin(x) < t]*exp(-x)", 0.5), ("[cos(x^2) < t]*exp(-x)", 0.3)]
+)
+def test_roots_without_end_leave_nothing_to_vouch_for(integrand: str, at: float) -> None:
+    """They can't all be cut at: what the pieces add up to is told with no digit, and why."""
+    found = potto.deriv(potto.compile(f"def f(t) integral [0, inf] {integrand} d(x)").f)((at, 1.0))
+    assert not found.converged and found.error == found.tangent_error == math.inf
+    assert any("too many roots" in reason for reason in found.reasons)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from pathlib import Path
 from typing import Any
 
@@ -59,10 +60,19 @@ class Session:
         for message in self.messages:
             if "method" not in message or message["method"] == "exit":
                 continue  # answers are given as they are asked for; `exit` comes last
+            if message["method"] == "shutdown" and not can(self.capabilities, "textDocument.diagnostic"):
+                self._wait_for_diagnostics(client)
             client.send(message)
             if "id" in message and message["id"] not in self.cancelled:
                 client.answer(message["id"], 60)
         client.tell("exit", None)
+
+    def _wait_for_diagnostics(self, client: Client) -> None:
+        """They are pushed when nothing else is to be done: an editor leaves that time, whoever plays it must."""
+        until = time.monotonic() + 60
+        while not any(note["method"] == "textDocument/publishDiagnostics" for note in list(client.notes.queue)):
+            assert time.monotonic() < until, client.stderr.decode()
+            time.sleep(0.01)
 
 
 @pytest.fixture(params=SESSIONS, ids=lambda path: path.stem)
