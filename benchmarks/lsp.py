@@ -212,7 +212,7 @@ def signatures(client: Client, texts: dict[str, str], rounds: int) -> Iterator[R
     client.quiet()
     near, far, used = [], [], client.processor()
     changed = texts["m0"].replace("def f1(t, k)", "def f1(t)").replace("def f0(t, k)", "def f0(t)")
-    for turn in range(max(rounds // 5, 24)):
+    for turn in range(max(rounds // 2, 24)):
         sent = client.change("m0", {"text": texts["m0"] if turn % 2 else changed})
         uris = {client.uri(name) for name in opened}
         while uris:

@@ -51,8 +51,8 @@ class Session:
         self.put(name, text)
         self.check(set())
         key = str(self.folder / f"{name}.po")
-        self.analysis.parse(key)
-        self.analysis.parse_users(key)
+        self.analysis.prepare(key)
+        self.analysis.prepare_users(key)
 
     def check(self, wanted: set[str]) -> float:
         """Check all that there is; when the last of the wanted files was told of."""

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from potto.diagnostics import Diagnostic
-from potto.modules import chunk_start, definition, module_diagnostics, names, open_files, source, statements
+from potto.modules import chunk_start, module_diagnostics, names, open_files, source, statements
 from potto.modules.graph import dependencies, imported_files
 from potto.modules.lookup import bindings
 from potto.modules.texts import chunk_text, chunks, imports, is_diffeo, parsed, syntax_diagnostics
@@ -32,7 +32,7 @@ logger = logging.getLogger(__name__)
 OF_TEXTS = frozenset({"parsed", "head", "chunk_references", "occurring_names"})
 OF_FILES = frozenset({"definition", "core", "core_term"})
 OF_GROUPS = frozenset({"_analyses"})
-MOST_USERS = 50  # files whose trees are made because a file that they import was opened
+MOST_USERS = 50  # files that are looked at because a file that they import was opened
 
 
 class Analysis:
@@ -155,14 +155,17 @@ class Analysis:
 
         self.db.forget(is_closed, OF_TEXTS | OF_FILES | OF_GROUPS)
 
-    def parse(self, key: str) -> None:
-        """Make the trees of a file that was opened, before the first keystroke asks for them."""
+    def prepare(self, key: str) -> None:
+        """Read and analyse a file that was opened, if others have found out what is wrong with it, before the first
+        keystroke asks for it."""
         for chunk in chunks(self.db, key):
             parsed(self.db, chunk.text, is_diffeo(key))
+        for name in names(self.db, key):
+            self._analyse(key, name)
 
-    def parse_users(self, key: str) -> None:
-        """Make the trees of what uses a file's definitions elsewhere, before the first edit of one of their heads asks
-        for them all at once."""
+    def prepare_users(self, key: str) -> None:
+        """The same of what uses a file's definitions elsewhere, before the first edit of one of their heads asks for
+        them all at once."""
         users = [file for file in self.programs() if file != key and key in imported_files(self.db, file)]
         for file in users[:MOST_USERS]:
             bound = {name.partition(".")[0] for item in imports(self.db, file) for name, _ in bindings(item)}
@@ -171,7 +174,15 @@ class Analysis:
                 if not any(word in text for word in bound):
                     continue  # what uses nothing from elsewhere needs no tree to say so
                 if any(target.file == key for target in dependencies(self.db, file, name)):
-                    definition(self.db, file, name)
+                    self._analyse(file, name)
+
+    def _analyse(self, key: str, name: str) -> None:
+        from potto.types import check_definition
+
+        try:
+            check_definition(self.db, key, name)
+        except Exception as error:
+            self.failed(key, name, error)
 
     # What there is to say
 

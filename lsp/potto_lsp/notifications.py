@@ -78,7 +78,7 @@ def did_open(server: Server, params: Any) -> None:
     def opened() -> None:
         session = _session(server)
         key = session.analysis.put(document)
-        session.to_parse.add(key)
+        session.to_prepare.add(key)
         if session.analysis.finds_project(key):
             session.projects_changed()
 

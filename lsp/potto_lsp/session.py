@@ -48,7 +48,7 @@ class Session:
         self.presenter = Presenter(self)
         self.tokens: dict[str, tuple[str, list[int]]] = {}
         self.checked = False
-        self.to_parse: set[str] = set()  # files that were opened
+        self.to_prepare: set[str] = set()  # files that were opened
         self.to_keep: set[str] = set()  # saved files, of which it is to be kept what was found out about them
         self._progress = Progress(self, "Potto: checking the workspace")
 
@@ -99,8 +99,8 @@ class Session:
             yield from self.publisher.steps_again()
         else:
             yield from self._first_check()
-        for key in [key for key in self.to_parse if key in self.analysis.documents]:
-            yield lambda key=key: self._parse(key)  # type: ignore[misc]
+        for key in [key for key in self.to_prepare if key in self.analysis.documents]:
+            yield lambda key=key: self._prepare(key)  # type: ignore[misc]
         for key in [key for key in self.to_keep if key in self.analysis.documents]:
             yield lambda key=key: self._keep(key)  # type: ignore[misc]
         yield self.live.refresh
@@ -126,10 +126,10 @@ class Session:
         for key in self.analysis.documents:
             yield lambda key=key: self._keep(key)  # type: ignore[misc]
 
-    def _parse(self, key: str) -> None:
-        self.analysis.parse(key)
-        self.analysis.parse_users(key)
-        self.to_parse.discard(key)
+    def _prepare(self, key: str) -> None:
+        self.analysis.prepare(key)
+        self.analysis.prepare_users(key)
+        self.to_prepare.discard(key)
 
     def _keep(self, key: str) -> None:
         self.to_keep.discard(key)

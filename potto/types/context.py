@@ -132,7 +132,9 @@ class Inference:
 
     def number(self, expr: nodes.Expr, where: str) -> None:
         """Infer an expression that must be a number; `where` says what needs it ("the left of `+`")."""
-        self.need_number(self.infer(expr), expr, where)
+        found = self.types[id(expr)] = RULES[expr.__class__](self, expr)
+        if found is not REAL:  # as it is mostly
+            self.need_number(found, expr, where)
 
     def need_number(self, type: Type, expr: nodes.Expr, where: str) -> None:
         found = resolve(type)

@@ -78,6 +78,8 @@ def _chain(walk: Walk, node: nodes.Chain) -> Value:
     first = _scalar(walk.value(node.first))
     sources, jumps, spikes = first.sources, first.jumps, first.spikes
     for operand in node.rest:
+        if isinstance(operand.value, nodes.Number):
+            continue
         value = _scalar(walk.value(operand.value))
         sources = merge(sources, value.sources)
         jumps = jumps | value.jumps if value.jumps else jumps

@@ -58,7 +58,7 @@ def strip(expr: nodes.Expr) -> nodes.Expr:
 
 @rule(nodes.Name)
 def _name(inference: Inference, node: nodes.Name) -> Type:
-    meaning = inference.scope.find(node.id) or inference.outside.find(None, node.id)
+    meaning = inference.scope.names.get(node.id) or inference.outside.find(None, node.id)
     if meaning is None:
         inference.say(undefined(inference.outside, inference.scope, node))
         return UNKNOWN
@@ -80,7 +80,8 @@ def _member(inference: Inference, node: nodes.Member) -> Type:
 def _meant(inference: Inference, node: nodes.Name | nodes.Member, meaning: Meaning) -> Type:
     if isinstance(meaning, Local):
         meaning.used = True
-        return instantiate(meaning.type, meaning.generic, inference.level)
+        known = meaning.type = resolve(meaning.type)
+        return instantiate(known, meaning.generic, inference.level) if meaning.generic else known
     if isinstance(meaning, Builtin):
         return _builtin(inference, node, meaning.name)
     match meaning:

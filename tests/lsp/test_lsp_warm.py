@@ -84,8 +84,8 @@ def test_what_nobody_reads_is_looked_at_by_nobody(session: Session) -> None:
 
 
 def test_trees_of_users_are_made_before_the_first_edit_of_a_signature_needs_them(session: Session) -> None:
-    session.analysis.parse(session.key("leaf"))
-    session.analysis.parse_users(session.key("leaf"))
+    session.analysis.prepare(session.key("leaf"))
+    session.analysis.prepare_users(session.key("leaf"))
     ran = session.ran("leaf", LEAF.replace("used(t, k)", "used(t)"))
     assert ran["_analyses"] == 1 + 2 * USES and ran["parsed"] <= 1, ran
 
