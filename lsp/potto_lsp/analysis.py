@@ -156,16 +156,13 @@ class Analysis:
         self.db.forget(is_closed, OF_TEXTS | OF_FILES | OF_GROUPS)
 
     def prepare(self, key: str) -> None:
-        """Read and analyse a file that was opened, if others have found out what is wrong with it, before the first
-        keystroke asks for it."""
+        """Make the trees of a file that was opened, before the first keystroke asks for them."""
         for chunk in chunks(self.db, key):
             parsed(self.db, chunk.text, is_diffeo(key))
-        for name in names(self.db, key):
-            self._analyse(key, name)
 
     def prepare_users(self, key: str) -> None:
-        """The same of what uses a file's definitions elsewhere, before the first edit of one of their heads asks for
-        them all at once."""
+        """Read and analyse what uses a file's definitions elsewhere, before the first edit of one of their heads asks
+        for all of it at once."""
         users = [file for file in self.programs() if file != key and key in imported_files(self.db, file)]
         for file in users[:MOST_USERS]:
             bound = {name.partition(".")[0] for item in imports(self.db, file) for name, _ in bindings(item)}
