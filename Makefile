@@ -7,7 +7,7 @@ VSCODE := editors/vscode
 
 TESTS := $(BIN)/python -m pytest -n auto --maxprocesses 8 --dist worksteal --durations 20
 
-.PHONY: demo test quick fuzz check format clean vsix e2e
+.PHONY: demo test quick fuzz check format clean native vsix e2e
 
 demo: $(STAMP)  ## the paper's programs, evaluated and differentiated
 	@PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python examples/demo.py
@@ -26,6 +26,10 @@ check: $(STAMP)  ## lints, types, floors
 	$(BIN)/mypy
 	$(BIN)/python -m pytest tests/test_architecture.py
 
+native:  ## .venv-native: the packages as they stand, with the front end as machine code (needs a C compiler)
+	test -x .venv-native/bin/python || $(PYTHON) -m venv .venv-native
+	HATCH_BUILD_HOOKS_ENABLE=1 .venv-native/bin/python -m pip install -qq --disable-pip-version-check '.[dev]'
+
 vsix: $(VSCODE)/node_modules/.stamp  ## the extension for Visual Studio Code, checked, tested and packaged
 	cd $(VSCODE) && npm run --silent check && npm run --silent test && npm run --silent package
 
@@ -37,7 +41,7 @@ format: $(STAMP)  ## what ruff can put right by itself
 
 clean:  ## start over
 	rm -rf $(VSCODE)/node_modules $(VSCODE)/e2e/node_modules $(VSCODE)/dist
-	rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) .venv-native .mypy_cache .pytest_cache .ruff_cache .hypothesis
 
 $(STAMP): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Potto needs Python 3.11 or newer; try make PYTHON=python3.11"; exit 1; }

@@ -35,7 +35,7 @@ class Client:
     def __init__(self, folder: Path) -> None:
         self.started = time.perf_counter()
         pipe = subprocess.PIPE
-        self.process = subprocess.Popen([sys.executable, "-m", "potto", "lsp"], stdin=pipe, stdout=pipe)
+        self.process = subprocess.Popen([sys.executable, "-P", "-m", "potto", "lsp"], stdin=pipe, stdout=pipe)
         self.inbox: SimpleQueue[tuple[float, dict[str, Any]]] = SimpleQueue()
         threading.Thread(target=self._read, daemon=True).start()
         self.folder, self._last, self.versions = folder, 0, dict[str, int]()

@@ -61,7 +61,7 @@ def version() -> Figure:
     times, ours = [], []
     for _ in range(RUNS):
         start, before = time.perf_counter(), os.times()
-        subprocess.run([sys.executable, "-m", "potto", "--version"], check=True, capture_output=True)
+        subprocess.run([sys.executable, "-P", "-m", "potto", "--version"], check=True, capture_output=True)
         times.append(time.perf_counter() - start)
         after = os.times()
         ours.append(after.children_user - before.children_user + after.children_system - before.children_system)
@@ -87,7 +87,7 @@ def opened(folder: str, *arguments: str) -> Any:
     import pexpect
 
     environment = {**os.environ, "TERM": "xterm", "PROMPT_TOOLKIT_NO_CPR": "1", "POTTO_HISTORY": f"{folder}/h"}
-    process = pexpect.spawn(sys.executable, ["-m", "potto", "repl", *arguments], env=environment, encoding="utf-8",
+    process = pexpect.spawn(sys.executable, ["-P", "-m", "potto", "repl", *arguments], env=environment, encoding="utf-8",
                             timeout=60, dimensions=(40, 120))  # fmt: skip
     process.delaybeforesend = None
     return process

@@ -190,7 +190,7 @@ def process() -> None:
         path = Path(folder) / "f.po"
         path.write_text("def f(t) integral [0, 1] [x < t]*x d(x)\n")
         for words in (["eval", str(path), "deriv(f)((0.5, 1))"], ["--version"]):
-            command = [sys.executable, "-m", "potto", *words]
+            command = [sys.executable, "-P", "-m", "potto", *words]
             seconds = best(lambda c=command: subprocess.run(c, check=True, capture_output=True), 10)
             print(f"potto {words[0]:10} {seconds * 1e3:6.0f} ms")
         empty = best(lambda: subprocess.run([sys.executable, "-c", "pass"], check=True), 10)

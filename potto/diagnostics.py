@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from potto.quick import quick
 from potto.source import Span
 
 Severity = Literal["error", "warning", "info", "hint"]
@@ -87,3 +88,6 @@ class PottoError(Exception):
     def __init__(self, diagnostics: tuple[Diagnostic, ...] | list[Diagnostic]) -> None:
         self.diagnostics = tuple(diagnostics)
         super().__init__("; ".join(f"{d.code}: {d.message}" for d in self.diagnostics))
+
+
+quick(Related, Diagnostic, Kind)

@@ -6,29 +6,50 @@ through the descriptors of the slots takes half as long, and everything else sta
 
 from __future__ import annotations
 
+import copyreg
 from collections.abc import Callable
 from dataclasses import MISSING, fields
 from functools import cache
-from typing import Any, TypeVar
-
-T = TypeVar("T")
+from typing import Any
 
 
-def quick(cls: type[T]) -> type[T]:
-    """Give a class under `@dataclass(frozen=True, slots=True)` a faster `__init__` with the same signature.
+def quick(*classes: type) -> None:
+    """Give classes under `@dataclass(frozen=True, slots=True)` a faster `__init__` with the same signature.
 
-    Raises TypeError for what it does not know: fields without slots, with factories or not in the signature.
+    It stands behind the classes and is no decorator: the compiler leaves decorated classes to the interpreter. Those
+    that are machine code are fast already; they learn how to be pickled, for what the compiler gives them for that
+    writes into fields, which are frozen.
+
+    A class with more to its signature than fields and defaults keeps its own.
     """
-    found = fields(cls)  # type: ignore[arg-type]
-    if hasattr(cls, "__post_init__") or any(f.default_factory is not MISSING or f.kw_only or not f.init for f in found):
-        raise TypeError(f"{cls.__name__} has more to its signature than fields and defaults")
+    for cls in classes:
+        if is_compiled(cls):
+            copyreg.pickle(cls, _parts)
+        else:
+            _quicken(cls)
+
+
+def is_compiled(cls: type) -> bool:
+    """Whether a class is machine code."""
+    return hasattr(cls, "__mypyc_attrs__")
+
+
+def _parts(value: Any) -> tuple[Any, ...]:
+    """What a value is made from anew."""
+    return type(value), tuple([getattr(value, f.name) for f in fields(value)])
+
+
+def _quicken(cls: type) -> None:
+    found = fields(cls)
+    more = any(f.default_factory is not MISSING or f.kw_only or not f.init for f in found)
+    if not found or more or hasattr(cls, "__post_init__"):
+        return
     writers = [getattr(cls, f.name).__set__ for f in found]
     init = _template(len(found))(*writers)
     init.__code__ = init.__code__.replace(co_varnames=("self", *(f.name for f in found)))
     init.__defaults__ = tuple(f.default for f in found if f.default is not MISSING)
     init.__qualname__ = f"{cls.__qualname__}.__init__"
-    cls.__init__ = init  # type: ignore[method-assign]
-    return cls
+    cls.__init__ = init  # type: ignore[misc]
 
 
 @cache

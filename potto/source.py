@@ -14,7 +14,6 @@ from functools import cached_property
 from potto.quick import quick
 
 
-@quick
 @dataclass(frozen=True, slots=True, order=True)
 class Span:
     """A half-open range `[start, end)` of code points."""
@@ -82,3 +81,6 @@ class SourceText:
         """The column in UTF-16 code units, which editors count in."""
         head = self.line(position.line)[: position.column]
         return len(head) + sum(1 for char in head if ord(char) > 0xFFFF)
+
+
+quick(Span, Position)

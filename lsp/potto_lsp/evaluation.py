@@ -165,7 +165,7 @@ class Evaluator:
         if self._process is not None and self._process.poll() is None:
             return self._process
         self._sent, self._said = {}, SimpleQueue()
-        command = [sys.executable, "-m", "potto_lsp.evaluator"]
+        command = [sys.executable, "-P", "-m", "potto_lsp.evaluator"]
         pipe = subprocess.PIPE
         self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=None, text=True, encoding="utf-8")
         Thread(target=_listen, args=(self._process, self._said), name="potto-listener", daemon=True).start()

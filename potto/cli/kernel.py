@@ -28,7 +28,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
             console.complain("potto kernel: ipykernel is not installed\ntry `pip install 'potto[jupyter]'`")
             return 1
         folder.mkdir(parents=True, exist_ok=True)
-        command = [sys.executable, "-m", "potto_repl.kernel", "-f", "{connection_file}"]
+        command = [sys.executable, "-P", "-m", "potto_repl.kernel", "-f", "{connection_file}"]
         spec = {"argv": command, "display_name": "Potto", "language": "potto", "interrupt_mode": "signal"}
         place.write_text(json.dumps(spec, indent=1) + "\n", encoding="utf-8")
     elif options.action == "remove":

@@ -20,6 +20,7 @@ from potto.modules.folders import Programs, list_folder
 from potto.modules.lookup import SUFFIXES
 from potto.modules.texts import Unreadable
 from potto.query import Database
+from potto.quick import quick
 
 MAX_BYTES = 16_000_000
 DISK, OPEN = 1, 0
@@ -200,3 +201,6 @@ def load_file(db: Database, path: str | os.PathLike[str]) -> str:
 
 def _reason(error: Exception) -> str:
     return error.strerror or str(error) if isinstance(error, OSError) else str(error)
+
+
+quick(Loaded)

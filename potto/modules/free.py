@@ -15,13 +15,11 @@ from potto.syntax import nodes
 from potto.syntax.nodes import Expr, Item, Node, Statement
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class _Bind:
     names: tuple[str, ...]
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class _Unbind:
     names: tuple[str, ...]
@@ -168,3 +166,6 @@ _STEPS: dict[type, Callable[[Any], Sequence[_Step]]] = {
     nodes.ExpressionStatement: lambda node: (node.value,),
     nodes.For: lambda node: (node.iterable, *_scoped((node.variable.name,), _statements(node.body))),
 }
+
+
+quick(_Bind, _Unbind)

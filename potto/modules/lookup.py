@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 from potto.modules.texts import exists, imports, names
 from potto.query import Database, query
+from potto.quick import quick
 from potto.syntax import nodes
 
 SUFFIXES = (".po", ".diffeo")
@@ -219,3 +220,6 @@ def resolve_module(db: Database, file: str, path: str) -> str | None:
         else:
             return None
     return at
+
+
+quick(ModuleTarget, Imported, Defined, Found, Trail)

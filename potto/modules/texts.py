@@ -41,7 +41,6 @@ class StatementRef:
     statement: nodes.Print | nodes.For | nodes.ExpressionStatement
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Head:
     """What others need to know of a chunk without its tree. `importing` has spans relative to the chunk."""
@@ -52,7 +51,6 @@ class Head:
     importing: Importing | None = None
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Place:
     """The chunk that defines a name; `span` is the name's, relative to the chunk."""
@@ -269,3 +267,6 @@ def shift(diagnostic: Diagnostic, start: int) -> Diagnostic:
         for place in diagnostic.related
     )
     return replace(diagnostic, span=diagnostic.span.shift(start), related=related)
+
+
+quick(Head, Place, Unreadable, StatementRef, Layout, Outline)

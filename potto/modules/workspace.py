@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from potto.modules.lookup import SUFFIXES, bindings, find_module, folders
 from potto.modules.texts import chunk_references, chunks, content, imports, is_diffeo, names
 from potto.query import Database, query
+from potto.quick import quick
 from potto.syntax import nodes
 
 _HEADS = re.compile(
@@ -121,3 +122,6 @@ def _members(db: Database, file: str) -> frozenset[tuple[str, str]]:
     diffeo = is_diffeo(file)
     found = (reference for chunk in chunks(db, file) for reference in chunk_references(db, chunk.text, diffeo))
     return frozenset((path, name) for path, name in found if path is not None)
+
+
+quick(_Words)

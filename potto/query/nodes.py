@@ -7,6 +7,8 @@ from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
+from potto.quick import quick
+
 DURABILITIES: Final = 3  # of inputs: 0, 1, 2; a memo that reads no input has this one
 FOREVER: Final = sys.maxsize  # the revision up to which such a memo is verified
 GONE: Final[Any] = object()  # the value of a memo that was forgotten, or that failed
@@ -153,3 +155,6 @@ def short(value: object) -> str:
     """A value for a log."""
     text = repr(value)
     return text if len(text) <= 60 else f"{text[:40]}...{text[-16:]}"
+
+
+quick(Event)

@@ -19,6 +19,7 @@ from typing import Any
 
 from potto.query.database import Database
 from potto.query.nodes import Entry, Input, Memo, Node, Query, entry_of
+from potto.quick import quick
 
 Args = tuple[Hashable, ...]
 # Everything is called by its number in the order of sending. What was read: an input and the digest of its value; an
@@ -201,3 +202,6 @@ class Receiver:
         if known is None or known[0] != node.changed_at:
             known = self._digests[key] = (node.changed_at, digest(node.value))
         return known[1]
+
+
+quick(Parcel)

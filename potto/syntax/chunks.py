@@ -26,7 +26,6 @@ _INDENTED = re.compile(r"\n[^\S\n]+[^\s]")
 MOST_WASTED = 200_000
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Chunk:
     """`text` from the offset `start` of the file, without the blank lines after it."""
@@ -106,3 +105,6 @@ class _Lookahead:
                 break
         self.wasted += at - start
         return 0
+
+
+quick(Chunk)

@@ -11,6 +11,7 @@ import re
 from dataclasses import dataclass, field
 
 from potto.diagnostics import Diagnostic
+from potto.quick import quick
 from potto.source import Span
 from potto.syntax import kinds
 from potto.syntax.head import BlockTracker
@@ -323,3 +324,6 @@ def _read(text: str, diffeo: bool, alone: bool, unclosed: frozenset[int]) -> _Le
     lexer = _Lexer(text, diffeo, alone, nesting, nesting.tokens)
     lexer.run()
     return lexer
+
+
+quick(Lexed)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from potto.quick import quick
 from potto.source import Span
 from potto.syntax.tokens import normalized
 
@@ -42,3 +43,6 @@ def _trimmed(found: re.Match[str], group: str) -> tuple[str, Span]:
     text = found[group]
     start = found.start(group) + len(text) - len(text.lstrip())
     return text.strip(), Span(start, start + len(text.strip()))
+
+
+quick(Live)

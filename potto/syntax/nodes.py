@@ -382,7 +382,7 @@ class BrokenItem:
 
 Statement = Print | For | ExpressionStatement | Binding
 Item = FromImport | Import | Definition | DiffeoDefinition | Print | For | ExpressionStatement | BrokenItem
-Node = Expr | TypeExpr | Item | Binding | Binder | Argument | Parameter | Operand | Interval | MeasureBound | Inverse
+Part = Binding | Binder | Argument | Parameter | Operand | Interval | MeasureBound | Inverse | ImportedName
+Node = Expr | TypeExpr | Item | Part
 
-for _kind in [kind for kind in globals().values() if isinstance(kind, type) and kind.__module__ == __name__]:
-    quick(_kind)
+quick(*(kind for kind in globals().values() if isinstance(kind, type) and kind.__module__ == __name__))

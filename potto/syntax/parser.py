@@ -33,7 +33,6 @@ LONG = 20_000
 """Tokens beyond which a chunk is not read again to find a better repair."""
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class ParsedChunk:
     """The item of a chunk (None if it has only comments), with spans and diagnostics relative to the chunk."""
@@ -299,3 +298,6 @@ def guess_name(text: str) -> str | None:
         return None
     name = found.group(1) or found.group(2)
     return name if name not in RESERVED else None
+
+
+quick(ParsedChunk, ParsedExpression)

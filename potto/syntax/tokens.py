@@ -26,7 +26,6 @@ class Token(NamedTuple):
         return Span(self.start, self.end)
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Comment:
     """A comment from its `#` to the end of its line; `own_line` when nothing else stands on the line."""
@@ -124,3 +123,6 @@ def normalized(text: str) -> str:
     if "\r" not in text:
         return text
     return text.replace("\r\n", " \n").replace("\r", "\n")
+
+
+quick(Comment)

@@ -9,7 +9,6 @@ from potto.quick import quick
 from potto.source import Span
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Parameter:
     span: Span
@@ -17,7 +16,6 @@ class Parameter:
     annotation: TypeExpr | None = None
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class RealType:
     """`Real`, `Real*` (accepts what varies) or `Real[x, y]`, `Dist[x]`."""
@@ -28,21 +26,18 @@ class RealType:
     variables: tuple[str, ...]
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class TupleType:
     span: Span
     items: tuple[TypeExpr, ...]
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class ListType:
     span: Span
     item: TypeExpr
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class FunctionType:
     """`(A, name: B) -> C`; parameters in one group."""
@@ -52,7 +47,6 @@ class FunctionType:
     result: TypeExpr
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class DiffeoType:
     """`Diffeo[2]`."""
@@ -62,3 +56,6 @@ class DiffeoType:
 
 
 TypeExpr = RealType | TupleType | ListType | FunctionType | DiffeoType
+
+
+quick(Parameter, RealType, TupleType, ListType, FunctionType, DiffeoType)

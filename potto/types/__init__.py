@@ -7,7 +7,7 @@ no core terms. See docs/types.md.
 
 from potto.types.analysis import Typed
 from potto.types.format import format_type
-from potto.types.interface import Interface
+from potto.types.interfaces import Interface
 from potto.types.queries import (
     Inferred,
     check_definition,

@@ -22,7 +22,7 @@ from potto.types.closing import declared, reasons_of
 from potto.types.context import Inference, ensure_stack, mismatch
 from potto.types.flow import Walk
 from potto.types.infer import bindings, returned
-from potto.types.interface import Closing, Decorating, Interface, chain_of
+from potto.types.interfaces import Closing, Decorating, Interface, chain_of
 from potto.types.lints import lints
 from potto.types.reasons import NO_REASONS, Reasons
 from potto.types.recursion import endless
@@ -36,7 +36,6 @@ MAX_ROUNDS = 20
 Written = nodes.Definition | nodes.DiffeoDefinition
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Typed:
     """A name where it is bound or used inside a definition, with its type there."""
@@ -46,7 +45,6 @@ class Typed:
     type: Type
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Analysis:
     """What is known about one definition. Its parts are read through queries, which stand still when they do."""
@@ -246,3 +244,6 @@ def local_type(type: Type, value: Value | None) -> Type:
     if isinstance(value, Closure):
         return Decorating(value).type(close_type(type), value)
     return close_type(type)
+
+
+quick(Typed, Analysis)

@@ -10,7 +10,7 @@ from potto.syntax import nodes
 from potto.types import kinds
 from potto.types.algebra import flat, steps
 from potto.types.flow import Walk
-from potto.types.interface import PLAIN_KINDS, Closing, Decorating, chain_of
+from potto.types.interfaces import PLAIN_KINDS, Closing, Decorating, chain_of
 from potto.types.reasons import Given, Reason, Reasons
 from potto.types.rules import REASON_TEXT
 from potto.types.values import (

@@ -67,7 +67,6 @@ def ensure_stack() -> None:
         sys.setrecursionlimit(STACK)
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Plan:
     """Which arguments fill which parameters. Per group of the function: its slots, or None if it stays open.
@@ -398,3 +397,6 @@ def _shadowing(local: Local, before: Local) -> Diagnostic:
         related=(Related(before.span, f"the {what} `{before.name}` is bound here"),),
         help="give one of them another name",
     )
+
+
+quick(Plan, _Pending)

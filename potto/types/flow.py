@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 
 from potto.diagnostics import Diagnostic
 from potto.modules.lookup import DefinitionTarget
+from potto.quick import quick
 from potto.source import Span
 from potto.syntax import nodes
 from potto.types.algebra import (
@@ -24,7 +25,7 @@ from potto.types.algebra import (
     symbolic,
 )
 from potto.types.context import Inference
-from potto.types.interface import localized
+from potto.types.interfaces import localized
 from potto.types.rules import Violation, violation
 from potto.types.scope import Local
 from potto.types.values import (
@@ -207,3 +208,6 @@ def _split(effect: Effect, frame: Frame) -> tuple[Effect | None, Effect | None]:
     outer = {source: trail for source, trail in sources.items() if source not in frame.inputs}
     mine = Scalar(own, effect.value.jumps, effect.value.spikes, effect.value.carriers & frame.inputs)
     return Effect(effect.to, mine), Effect(effect.to, Scalar(outer)) if outer else None
+
+
+quick(Surfaces)

@@ -17,6 +17,7 @@ from potto.modules.graph import refer, references, strongly_connected
 from potto.modules.lookup import DefinitionTarget, ModuleTarget
 from potto.modules.texts import chunk_text, definition, is_diffeo, parsed
 from potto.query import Database, query
+from potto.quick import quick
 from potto.syntax import nodes
 from potto.types.algebra import symbolic
 from potto.types.analysis import Analysis, Typed, analyse, local_type, typed
@@ -24,7 +25,7 @@ from potto.types.context import Inference, ensure_stack
 from potto.types.flow import Walk
 from potto.types.flow_binders import walk_statement
 from potto.types.integrals import statement as infer_statement
-from potto.types.interface import Interface, unknown_interface
+from potto.types.interfaces import Interface, unknown_interface
 from potto.types.lints import lints
 from potto.types.reasons import Reasons
 from potto.types.scope import Global, Local, Meaning, Member, Module, Outside
@@ -181,3 +182,6 @@ def _inferred(
     found = (*inference.diagnostics, *walk.diagnostics)
     answer = Inferred(local_type(type, value), tuple(sorted(found, key=lambda d: (d.span, d.code))))
     return answer, typed(inference, walk)
+
+
+quick(Inferred)

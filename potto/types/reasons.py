@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from potto.modules.lookup import DefinitionTarget
+from potto.quick import quick
 from potto.source import Span
 from potto.types.values import SinkKind, Step
 
@@ -53,3 +54,6 @@ class Reasons:
 
 
 NO_REASONS = Reasons()
+
+
+quick(Reason, Given, Reasons)

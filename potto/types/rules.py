@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from potto.diagnostics import Diagnostic, Kind, Related
 from potto.modules.lookup import DefinitionTarget
+from potto.quick import quick
 from potto.source import Span
 from potto.syntax import nodes
 from potto.syntax.printer import print_expression
@@ -239,3 +240,6 @@ def shown_delta(expr: nodes.Expr) -> Diagnostic:
         label="outside of an integral",
         help="integrate it over the variables of its deltas",
     )
+
+
+quick(Violation)

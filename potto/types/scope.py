@@ -21,7 +21,7 @@ from potto.query import Database, query
 from potto.quick import quick
 from potto.source import Span
 from potto.syntax import nodes
-from potto.types.interface import Interface
+from potto.types.interfaces import Interface
 from potto.types.kinds import NOT_DEFINED
 from potto.types.reasons import Reasons
 from potto.types.types import Meta, Type
@@ -44,7 +44,6 @@ class Local:
     used: bool = False
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Global:
     """Another definition, through its interface."""
@@ -53,7 +52,6 @@ class Global:
     interface: Interface
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Member:
     """A definition of the group that is inferred right now: recursion."""
@@ -61,7 +59,6 @@ class Member:
     target: DefinitionTarget
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Builtin:
     """A builtin, a constant or one of the special forms."""
@@ -69,7 +66,6 @@ class Builtin:
     name: str
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Module:
     """A module's name, which is no value."""
@@ -209,3 +205,5 @@ def _file_names(db: Database, top: str) -> tuple[str, ...]:
                 found.extend(imported.alias or imported.name for imported in item.names)
     return tuple(found)
 
+
+quick(Global, Member, Builtin, Module)

@@ -14,7 +14,6 @@ from typing import assert_never
 from potto.quick import quick
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Real:
     """A number. `star`: a parameter that accepts what varies. `variables`: the variables of integration it varies with.
@@ -28,7 +27,6 @@ class Real:
     jumps: tuple[str, ...] = ()
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Dist:
     """A distribution over variables (or parameters): only an integral over them makes a number of it."""
@@ -36,7 +34,6 @@ class Dist:
     variables: tuple[str, ...] = ()
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class TupleOf:
     """A tuple. `dual`: a value and its tangent, for which a plain number may be given."""
@@ -45,13 +42,11 @@ class TupleOf:
     dual: bool = False
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class ListOf:
     item: Type
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Parameter:
     """A parameter of a function type; the name is None where it is not known (a function that is a parameter)."""
@@ -60,7 +55,6 @@ class Parameter:
     type: Type
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Function:
     """A function of one group of parameters. A group of n also accepts one tuple of n, and back."""
@@ -69,7 +63,6 @@ class Function:
     result: Type
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Diffeo:
     """What a diffeomorphism gives: a tuple of `dims` numbers that may stand as a condition. None: any number."""
@@ -199,3 +192,6 @@ def _derivative(type: Type, parameters: frozenset[str]) -> Type:
             return UNKNOWN
         case _:
             assert_never(type)
+
+
+quick(Real, Dist, TupleOf, ListOf, Parameter, Function, Diffeo, Truth, Var, Unknown)

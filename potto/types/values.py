@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 from potto.quick import quick
 from potto.source import Span
@@ -33,13 +33,12 @@ class Source:
     name: str
     span: Span = NOWHERE
     number: int = -1
-    origin: object = None
+    origin: Any = None
 
     def __repr__(self) -> str:
         return f"<{self.kind} {self.name}>"
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Step:
     """One step on the way of a dependence: a place and what happens there."""
@@ -49,7 +48,6 @@ class Step:
     argument: bool = False
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Joined:
     """A way made of two ways."""
@@ -63,7 +61,6 @@ Sources = Mapping[Source, Trail]
 Surface = frozenset[Source]
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Spike:
     """A delta: what its surface varies with, and a key that is the same for the same surface."""
@@ -72,7 +69,6 @@ class Spike:
     key: str
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Scalar:
     """A number, a truth value or anything whose inside is not known.
@@ -88,13 +84,11 @@ class Scalar:
     carriers: frozenset[Source] = frozenset()
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class TupleValue:
     items: tuple[Value, ...]
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class ListValue:
     item: Value
@@ -106,16 +100,14 @@ class Port:
 
     name: str
     number: int = -1
-    origin: object = None
+    origin: Any = None
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class PortTuple:
     items: tuple[PortTree, ...]
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class PortFunction:
     """A function is given: `inputs` is what it will be called with, `result` gets what it gives."""
@@ -139,11 +131,10 @@ class Sink:
     kind: SinkKind
     span: Span = NOWHERE
     number: int = -1
-    origin: object = None
-    node: object = None
+    origin: Any = None
+    node: Any = None
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Effect:
     """`value` goes to `to` when the function is called."""
@@ -152,7 +143,6 @@ class Effect:
     value: Value
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Closure:
     inputs: tuple[Value, ...]
@@ -169,7 +159,6 @@ class Abstract:
     taint: Sources = field(default_factory=dict)
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Choice:
     """One of several functions (the items of a list)."""
@@ -183,3 +172,9 @@ NONE: Sources = {}
 STILL = Scalar(NONE)
 HAZE = Source("other", "?")
 HAZY = Scalar({HAZE: None})  # what is wrong: varies with it knows what, and breaks no rule
+
+
+quick(
+    Step, Joined, Spike, Scalar, TupleValue, ListValue, PortTuple, PortFunction, Effect, Closure, Choice, NoPort,
+    Abstract,
+)

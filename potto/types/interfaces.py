@@ -59,7 +59,6 @@ _number = attrgetter("number")
 PLAIN_KINDS: tuple[SinkKind, ...] = ("condition", "jump", "sum", "equality", "declared")
 
 
-@quick
 @dataclass(frozen=True, slots=True)
 class Interface:
     """A definition as others see it.
@@ -386,3 +385,6 @@ class Decorating:
 
     def _varies(self, source: Source) -> bool:
         return source.kind == "variable" or (source in self.inputs and source not in self.settled)
+
+
+quick(Interface)
