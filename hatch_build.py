@@ -3,10 +3,14 @@
 Owns the hook that `pyproject.toml` names, with the list of modules beside it. mypyc makes an extension of each module
 and puts it next to its source, so that the same package works with and without; only the time differs. Wheels without
 it are pure Python, and so are editable installations: machine code of an older text would hide the text.
+
+mypyc leaves the `__init__` of dataclasses to the interpreter. They are written out for it, which makes values in a
+tenth of the time; no line moves, so that tracebacks still name the right ones.
 """
 
 from __future__ import annotations
 
+import ast
 import shutil
 import subprocess
 import sys
@@ -41,6 +45,9 @@ class FrontEndHook(BuildHookInterface[Any]):
         self._folder = Path(tempfile.mkdtemp())
         for package in self.build_config.packages:
             shutil.copytree(Path(self.root, package), self._folder / Path(package).name)
+        for module in self._modules():
+            path = self._folder / module
+            path.write_text(with_inits(path.read_text("utf-8")), "utf-8")
         (self._folder / "setup.py").write_text(SETUP.format(modules=self._modules()))
         (self._folder / "mypy.ini").write_text(MYPY)
         command = [sys.executable, "setup.py", "build_ext", "--inplace"]
@@ -63,3 +70,30 @@ class FrontEndHook(BuildHookInterface[Any]):
         found = {path for pattern in self.config["compiled"] for path in self._folder.glob(pattern)}
         found -= {path for pattern in self.config["interpreted"] for path in self._folder.glob(pattern)}
         return sorted(str(path.relative_to(self._folder)) for path in found)
+
+
+def with_inits(text: str) -> str:
+    """A module whose dataclasses write out their `__init__`, as far as it does no more than take the fields."""
+    lines = text.split("\n")
+    for node in ast.parse(text).body:
+        if isinstance(node, ast.ClassDef):
+            _write_init(node, lines)
+    return "\n".join(lines)
+
+
+def _write_init(node: ast.ClassDef, lines: list[str]) -> None:
+    """Write it into the empty line behind the fields."""
+    fields = [statement for statement in node.body if isinstance(statement, ast.AnnAssign)]
+    own = {statement.name for statement in node.body if isinstance(statement, ast.FunctionDef)}
+    dataclass = next((d for d in node.decorator_list if ast.unparse(d).startswith("dataclass(")), None)
+    more = node.bases or own & {"__init__", "__post_init__"} or any("field(" in ast.unparse(field) for field in fields)
+    if dataclass is None or not fields or more:
+        return
+    place = fields[-1].end_lineno or 0
+    if place < len(lines) and not lines[place].strip():
+        names = [ast.unparse(field.target) for field in fields]
+        head = ", ".join(ast.unparse(field) for field in fields)
+        body = "; ".join(f"self.{name} = {name}" for name in names)
+        lines[place] = f"    def __init__(self, {head}) -> None: {body}  # type: ignore"
+        line = dataclass.lineno - 1
+        lines[line] = lines[line].replace("dataclass(", "dataclass(init=False, ", 1)
