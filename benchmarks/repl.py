@@ -87,8 +87,10 @@ def opened(folder: str, *arguments: str) -> Any:
     import pexpect
 
     environment = {**os.environ, "TERM": "xterm", "PROMPT_TOOLKIT_NO_CPR": "1", "POTTO_HISTORY": f"{folder}/h"}
-    process = pexpect.spawn(sys.executable, ["-P", "-m", "potto", "repl", *arguments], env=environment, encoding="utf-8",
-                            timeout=60, dimensions=(40, 120))  # fmt: skip
+    command = ["-P", "-m", "potto", "repl", *arguments]
+    process = pexpect.spawn(
+        sys.executable, command, env=environment, encoding="utf-8", timeout=60, dimensions=(40, 120)
+    )
     process.delaybeforesend = None
     return process
 

@@ -11,7 +11,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from potto.quick import quick
 from potto_lsp import convert, protocol
+from potto_lsp.text import Text
 from potto_lsp.uris import to_uri
 
 if TYPE_CHECKING:
@@ -20,7 +22,6 @@ if TYPE_CHECKING:
     from potto_lsp.analysis import Analysis
     from potto_lsp.client import Client
     from potto_lsp.documents import Document
-    from potto_lsp.text import Text
 
 TOGETHER = 20  # closed files that are looked at in one step
 Notify = Callable[[str, Any], None]
@@ -182,3 +183,6 @@ class Publisher:
             if items or project.folder in self._wrong_projects:
                 self._publish(to_uri(project.path), items, None)
         self._wrong_projects = {project.folder for project in projects if project.problems}
+
+
+quick(Report)
