@@ -43,6 +43,10 @@ class Task:
     urgency: int = COMMAND
 
 
+class Ended(Exception):
+    """The process has ended before it has answered."""
+
+
 class GivesWay(Exception):
     """A task has been stopped in favour of one that is more urgent."""
 
@@ -91,7 +95,7 @@ class Evaluator:
                 task.done({"error": "cancelled"})
                 continue
             try:
-                answer = self._answer(task)
+                answer = self._answered(task)
             except GivesWay:
                 self._add(task)
                 continue
@@ -100,6 +104,16 @@ class Evaluator:
                 self._end()
                 answer = {"error": "the evaluation process failed"}
             task.done(answer)
+
+    def _answered(self, task: Task) -> Mapping[str, Any]:
+        """An answer. A process that ended may have been killed by others, so that a new one is asked; if that ends too,
+        it is the question that kills them."""
+        for _ in range(2):
+            try:
+                return self._answer(task)
+            except Ended:
+                self._end()
+        return {"error": "the evaluation process ended unexpectedly"}
 
     def _answer(self, task: Task) -> Mapping[str, Any]:
         process = self._running()
@@ -111,8 +125,11 @@ class Evaluator:
         self._sent = dict(task.texts)
         message = {"id": id, "do": task.do, "file": task.file, "text": task.text, "roots": task.roots, **task.more}
         assert process.stdin is not None
-        process.stdin.write(json.dumps({**message, "texts": {**texts, **closed}}) + "\n")
-        process.stdin.flush()
+        try:
+            process.stdin.write(json.dumps({**message, "texts": {**texts, **closed}}) + "\n")
+            process.stdin.flush()
+        except OSError as error:
+            raise Ended from error
         return self._await(id, task)
 
     def _await(self, id: int, task: Task) -> Mapping[str, Any]:
@@ -132,8 +149,7 @@ class Evaluator:
             except Empty:
                 continue
             if said is None:
-                self._end()
-                return {"error": "the evaluation process ended unexpectedly"}
+                raise Ended
             if said.get("id") == id:
                 return said
 

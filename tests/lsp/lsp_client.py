@@ -39,7 +39,7 @@ class Client:
     @property
     def command(self) -> list[str]:
         """How the server is started."""
-        return [sys.executable, "-m", "potto", "lsp", "--stdio"]
+        return [sys.executable, "-P", "-m", "potto", "lsp", "--stdio"]
 
     def start(self) -> dict[str, Any]:
         """`initialize` and `initialized`; the result of the first."""

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from queue import SimpleQueue
-from threading import Event, Timer
+from threading import Event
 from typing import Any
 from urllib.parse import unquote, urlparse
 
@@ -290,13 +290,34 @@ def test_an_evaluation_that_dies_is_started_again() -> None:
     evaluator.close()
 
 
-def test_an_evaluation_that_dies_at_work_costs_one_answer() -> None:
+def kill_at_work(evaluator: Evaluator, monkeypatch: pytest.MonkeyPatch, times: int) -> list[int]:
+    """End the process of an evaluator when it has been asked something, and then those that follow; their ids."""
+    waits, killed = evaluator._await, list[int]()
+
+    def kill(id: int, task: Task) -> Any:
+        process = evaluator._process
+        if process is not None and len(killed) < times:
+            killed.append(process.pid)
+            process.kill()
+        return waits(id, task)
+
+    monkeypatch.setattr(evaluator, "_await", kill)
+    return killed
+
+
+def test_an_evaluation_that_dies_at_work_is_asked_once_more(monkeypatch: pytest.MonkeyPatch) -> None:
     evaluator = Evaluator(Analysis("utf-16"))
-    assert ask(evaluator, "1 + 1") == {"text": "2"}
-    process = evaluator._process
-    assert process is not None
-    Timer(0.3, process.kill).start()
+    killed = kill_at_work(evaluator, monkeypatch, 1)
+    assert ask(evaluator, "2 + 3") == {"text": "5"}
+    assert len(killed) == 1
+    evaluator.close()
+
+
+def test_a_question_that_ends_two_processes_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    evaluator = Evaluator(Analysis("utf-16"))
+    killed = kill_at_work(evaluator, monkeypatch, 2)
     assert "ended unexpectedly" in ask(evaluator, HEAVY)["error"]
+    assert len(set(killed)) == 2
     assert ask(evaluator, "2 + 3") == {"text": "5"}
     evaluator.close()
 
