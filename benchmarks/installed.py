@@ -1,7 +1,7 @@
 """What an installation leaves behind, so that processes are timed as users have them.
 
-Owns `as_installed`. pip compiles what it installs, but not a working copy that is used where it stands; and the tables
-of the grammar are made once.
+Owns `as_installed` and `front_end`. pip compiles what it installs, but not a working copy that is used where it stands;
+and the tables of the grammar are made once.
 """
 
 from __future__ import annotations
@@ -9,6 +9,8 @@ from __future__ import annotations
 import compileall
 from pathlib import Path
 
+from potto.query import Database
+from potto.quick import is_compiled
 from potto.syntax.tables import tables
 
 PACKAGES = ("potto", "lsp/potto_lsp", "repl/potto_repl")
@@ -19,3 +21,8 @@ def as_installed() -> None:
     for package in PACKAGES:
         compileall.compile_dir(Path(__file__).parent.parent / package, quiet=1)
     tables()
+
+
+def front_end() -> str:
+    """What the front end that is measured is made of."""
+    return "machine code" if is_compiled(Database) else "interpreted (`make native` compiles it)"

@@ -22,7 +22,7 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from installed import as_installed
+from installed import as_installed, front_end
 from lsp_workspace import workspace
 
 PUSHED = "textDocument/publishDiagnostics"
@@ -291,6 +291,7 @@ def main() -> None:
             (Path(name) / f"{module}.po").write_text(text)
         lines = sum(text.count("\n") for text in texts.values())
         print(f"{len(texts)} modules, {lines:,} lines, one of {texts['large'].count(chr(10)):,}", file=sys.stderr)
+        print(f"front end: {front_end()}", file=sys.stderr)
         print(f"load {os.getloadavg()[0]:.1f} of {os.cpu_count()} processors", file=sys.stderr)
         for row in measure(Path(name), texts, 20 if arguments.quick else 200):
             show(row, arguments.json)

@@ -14,6 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from installed import front_end
 from lsp_workspace import workspace
 from potto_lsp import memory
 from potto_lsp.analysis import Analysis
@@ -103,7 +104,7 @@ def main() -> None:
         show("a line at its top", lambda n: session.edit("large", moved[n % 2], {"large"}))
         heads = [changed, leaf]
         show("signature in a leaf, to its open importers", lambda n: session.edit("m0", heads[n % 2], set(users)))
-        print(f"load {os.getloadavg()[0]:.1f} of {os.cpu_count()} processors")
+        print(f"front end: {front_end()}; load {os.getloadavg()[0]:.1f} of {os.cpu_count()} processors")
 
 
 if __name__ == "__main__":
