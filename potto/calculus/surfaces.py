@@ -31,6 +31,7 @@ from potto.core.terms import (
     Tuple,
     children,
     const,
+    outside,
     postorder,
     proj,
     rebuild,
@@ -242,25 +243,12 @@ def pieces(surface: Term) -> tuple[Term, ...]:
     waiting = [surface]
     while waiting:
         term = waiting.pop()
-        inner = next((node for node in _outside_binders(term) if isinstance(node, Branch | If)), None)
+        inner = next((node for node in outside(term, _BINDERS) if isinstance(node, Branch | If)), None)
         if inner is None or len(done) + len(waiting) >= _MOST_PIECES:
             done[term] = None
         else:
             waiting.extend(_in_place(term, inner, case) for case in (inner.orelse, inner.then))
     return tuple(done)
-
-
-def _outside_binders(root: Term) -> Iterator[Term]:
-    """The parts of a term that are not inside an integral, a sum or a function."""
-    waiting, seen = [root], set[Term]()
-    while waiting:
-        node = waiting.pop()
-        if node in seen:
-            continue
-        seen.add(node)
-        yield node
-        if not isinstance(node, Integral | Sum | Lam):
-            waiting.extend(children(node))
 
 
 def _in_place(term: Term, old: Term, new: Term) -> Term:
@@ -270,6 +258,8 @@ def _in_place(term: Term, old: Term, new: Term) -> Term:
             memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
     return memo[term]
 
+
+_BINDERS = (Integral, Sum, Lam)
 
 # Builtins whose values change fast where a part of their argument is near 0, if that part is steep.
 _CONCENTRATING = frozenset({"exp", "div", "tanh", "erf", "erfc", "atan"})
@@ -286,7 +276,7 @@ def centers(node: Prim) -> tuple[Term, ...]:
     if node.op == "div" and isinstance(where, Prim) and where.op in ("pow", "mul"):
         return ()  # a pole there, not a center
     found: dict[Term, None] = {}
-    for part in _outside_binders(where):
+    for part in outside(where, _BINDERS):
         if not isinstance(part, Prim) or not part.free:
             continue
         if part.op == "pow" and isinstance(part.args[1], Const) and part.args[1].value % 2 == 0:

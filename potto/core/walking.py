@@ -5,7 +5,7 @@ Owns what every pass is made of. Only binders recurse, and they nest no deeper t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from operator import attrgetter, is_
 from typing import Any
 
@@ -140,6 +140,18 @@ def postorder(*roots: Term) -> list[Term]:
                 if child not in seen:
                     push(child)
     return order
+
+
+def outside(root: Term, binders: tuple[type[Term], ...]) -> Iterator[Term]:
+    """The parts of a term that are not inside a binder of these kinds, each once; the outermost binders are parts too."""
+    waiting, seen = [root], set[Term]()
+    while waiting:
+        node = waiting.pop()
+        if node not in seen:
+            seen.add(node)
+            yield node
+            if not isinstance(node, binders):
+                waiting.extend(children(node))
 
 
 def bound_names(term: Term) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from potto.calculus.expand import Resolve
-from potto.core.terms import Branch, Delta, Deriv, Global, Integral, Prim, Term, Var, children, postorder
+from potto.core.terms import Branch, Delta, Deriv, Global, Integral, Prim, Term, Var, outside, postorder
 from potto.primitives import PRIMITIVES
 
 
@@ -47,7 +47,7 @@ class Reach:
         found = self.known_spikes.get(function)
         if found is None:
             self.known_spikes[function] = False  # of a recursion: what it adds itself is found without it
-            found = self.known_spikes[function] = any(self._spiky(node) for node in outside_integrals(function))
+            found = self.known_spikes[function] = any(self._spiky(node) for node in outside(function, (Integral,)))
         return found
 
     def _spiky(self, node: Term) -> bool:
@@ -73,16 +73,3 @@ class Reach:
                 yield type(node)
             elif isinstance(node, Prim) and PRIMITIVES[node.op].kinks(*node.args):
                 yield Prim
-
-
-def outside_integrals(term: Term) -> Iterator[Term]:
-    """The parts of a term that are not under an integral inside of it."""
-    waiting, seen = [term], set[Term]()
-    while waiting:
-        node = waiting.pop()
-        if node in seen:
-            continue
-        seen.add(node)
-        yield node
-        if not isinstance(node, Integral):
-            waiting.extend(children(node))
