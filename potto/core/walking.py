@@ -143,7 +143,7 @@ def postorder(*roots: Term) -> list[Term]:
 
 
 def outside(root: Term, binders: tuple[type[Term], ...]) -> Iterator[Term]:
-    """The parts of a term that are not inside a binder of these kinds, each once; the outermost binders are parts too."""
+    """The parts of a term that are not inside a binder of these kinds, each once; the outermost binders are parts."""
     waiting, seen = [root], set[Term]()
     while waiting:
         node = waiting.pop()

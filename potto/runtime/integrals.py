@@ -151,14 +151,7 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
         if found is not None:
             return found
     if outermost and (method in ("mc", "qmc") or (method == "auto" and too_many(machine, term, linked))):
-        from potto.integrate.sampling import sample
-
-        plan = plan_for(machine, term, linked)
-        sums = counted(sample(plan, machine, plan.environment(env, linked.env), batch, method), plan.reaches, machine)
-        machine.books.methods.add("mc" if method == "mc" else "qmc")
-        if _left_out(machine):
-            sums.et = np.full_like(sums.et, np.inf)  # what crosses those that were left out is not known
-        return sums
+        return _sampled(machine, term, linked, env, batch)
     machine.books.methods.add("quadrature")
     for order in preferred(machine, term, linked):
         machine.books.degenerate.clear()
@@ -193,6 +186,18 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
         "their boundary terms are not all counted"
     )
     sums.et = np.full_like(sums.et, np.inf)
+    return sums
+
+
+def _sampled(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value], batch: int) -> Sums:
+    """The sums from samples of all variables at once."""
+    from potto.integrate.sampling import sample
+
+    plan, method = plan_for(machine, term, linked), machine.settings.method
+    sums = counted(sample(plan, machine, plan.environment(env, linked.env), batch, method), plan.reaches, machine)
+    machine.books.methods.add("mc" if method == "mc" else "qmc")
+    if _left_out(machine):
+        sums.et = np.full_like(sums.et, np.inf)  # what crosses those that were left out is not known
     return sums
 
 
