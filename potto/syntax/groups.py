@@ -104,9 +104,11 @@ def plain(context: Context, written: Written) -> Expr:
 
 def _semicolon(context: Context, written: Written) -> None:
     value = written.name if written.name is not None else written.value
+    at = context.text.rfind(";", 0, value.span.start)
+    near = not context.text[at + 1 : value.span.start].strip()  # else a comment lies between
     context.report(
         kinds.UNEXPECTED(
-            value.span,
+            Span(at, at + 1) if near else value.span,
             "a `;` separates bindings of a `let`, or the variables of a `diffeo` from its parameters",
             help="write `,` here",
         )

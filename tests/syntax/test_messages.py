@@ -77,7 +77,7 @@ def test_what_does_not_belong() -> None:
         x = a, b
         #    ^ error[P0103]: unexpected `,`
         x = (a; b)
-        #       ^ error[P0103]: a `;` separates
+        #     ^ error[P0103]: a `;` separates
     """)
 
 
