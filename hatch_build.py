@@ -43,6 +43,16 @@ class FrontEndHook(BuildHookInterface[Any]):
         if version == "editable":
             return
         self._folder = Path(tempfile.mkdtemp())
+        try:
+            made = self._compiled()
+        except BaseException:
+            shutil.rmtree(self._folder)
+            raise
+        build_data["force_include"] |= {str(path): str(path.relative_to(self._folder)) for path in made}
+        build_data["pure_python"], build_data["infer_tag"] = False, True
+
+    def _compiled(self) -> list[Path]:
+        """The extensions, each in its package."""
         for package in self.build_config.packages:
             shutil.copytree(Path(self.root, package), self._folder / Path(package).name)
         for module in self._modules():
@@ -54,12 +64,8 @@ class FrontEndHook(BuildHookInterface[Any]):
         done = subprocess.run(command, cwd=self._folder, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
         if done.returncode:
             raise RuntimeError(f"the front end could not be compiled:\n{done.stdout[-4000:]}")
-        for suffix in ("so", "pyd"):
-            for made in self._folder.rglob(f"*.{suffix}"):
-                path = made.relative_to(self._folder)
-                if path.parts[0] != "build":
-                    build_data["force_include"][str(made)] = str(path)
-        build_data["pure_python"], build_data["infer_tag"] = False, True
+        shutil.rmtree(self._folder / "build")
+        return [path for path in self._folder.rglob("*") if path.suffix in (".so", ".pyd")]
 
     def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
         if version != "editable":
