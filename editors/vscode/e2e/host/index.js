@@ -231,10 +231,16 @@ const TESTS = {
     const end = document.positionAt(document.getText().length);
     await editor.edit((edit) => edit.insert(end, "def g(x)"));
     const last = document.positionAt(document.getText().length);
-    editor.selection = new vscode.Selection(last, last);
-    await vscode.commands.executeCommand("type", { text: "\n" });
-    await vscode.commands.executeCommand("type", { text: "x" });
-    await eventually(() => document.getText(), (text) => /def g\(x\)\n {4}x$/.test(text));
+    const typed = async () => {
+      const typedBefore = new vscode.Range(last, document.positionAt(document.getText().length));
+      if (!typedBefore.isEmpty) await editor.edit((edit) => edit.delete(typedBefore));
+      editor.selection = new vscode.Selection(last, last);
+      await vscode.commands.executeCommand("type", { text: "\n" });
+      await vscode.commands.executeCommand("type", { text: "x" });
+      return eventually(() => document.getText(), (text) => text.endsWith("x"));
+    };
+    // Typed again until the editor has coloured the line that it indents by, which nothing tells.
+    await eventually(typed, (text) => /def g\(x\)\n {4}x$/.test(text));
     await vscode.commands.executeCommand("editor.action.commentLine");
     await eventually(() => document.getText(), (text) => /\n {4}# x$/.test(text));
   },
