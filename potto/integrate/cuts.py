@@ -130,8 +130,11 @@ def frame_rows(plan: LevelPlan, values: tuple[Value, ...]) -> tuple[Cell, Cell, 
     return cells[0], cells[1], rows
 
 
-def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, directions: int, nested: bool) -> Cuts:
-    """Cut [lo, hi] at the rows; reversed bounds are turned round and counted negative."""
+_End = tuple[Any, Any, Any]  # values (batch), tangents (directions, batch), errors
+
+
+def _ends(lo: Cell, hi: Cell, batch: int, directions: int) -> tuple[_End, _End, Array]:
+    """The lower and the upper end, each with its tangents and its error, and the sign that turning them round costs."""
     low, high = as_array(lo.v, batch), as_array(hi.v, batch)
     tl, th = _tangents(lo.t, batch, directions), _tangents(hi.t, batch, directions)
     el, eh = (0.0 if bound.e is None else bound.e for bound in (lo, hi))
@@ -142,6 +145,12 @@ def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, d
         low, high = np.where(turn, high, low), np.where(turn, low, high)
         tl, th = np.where(turn, th, tl), np.where(turn, tl, th)
         el, eh = np.where(turn, eh, el), np.where(turn, el, eh)
+    return (low, tl, el), (high, th, eh), sign
+
+
+def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, directions: int, nested: bool) -> Cuts:
+    """Cut [lo, hi] at the rows; reversed bounds are turned round and counted negative."""
+    (low, tl, el), (high, th, eh), sign = _ends(lo, hi, batch, directions)
     count = len(rows)
     x = np.empty((count + 2, batch))
     t = np.zeros((directions, count + 2, batch))

@@ -69,11 +69,8 @@ def ensure_stack() -> None:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Which arguments fill which parameters. Per group of the function: its slots, or None if it stays open.
-
-    A slot lists the arguments that fill the parameter: one, or several that make up its tuple. `spread`: the only
-    argument is a tuple that fills the whole group.
-    """
+    """Which arguments fill which parameters: per group its slots, or None if it stays open. A slot lists the arguments
+    that fill the parameter (several make up its tuple). `spread`: the only argument is a tuple for the whole group."""
 
     groups: tuple[tuple[tuple[int, ...], ...] | None, ...]
     spread: bool = False

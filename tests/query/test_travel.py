@@ -137,6 +137,25 @@ def test_taking_over_can_be_cancelled_and_goes_on() -> None:
     assert ran(here, *NAMES) == (total(there, *NAMES), [])
 
 
+def test_taking_over_goes_on_after_each_input_whose_reading_was_cancelled() -> None:
+    class Impatient(str):
+        def __repr__(self) -> str:  # asked for where the digests of inputs are compared
+            here.cancel()
+            return str.__repr__(self)
+
+    texts = {name: f"our {name}" for name in NAMES}
+    there, here = database(**texts), database(**{name: Impatient(written) for name, written in texts.items()})
+    parcel, receiver, cancelled = Sender(there).pack(total, *NAMES), Receiver(here), 0
+    while True:
+        try:
+            assert receiver.take(parcel)
+            break
+        except Cancelled:
+            cancelled += 1
+    assert cancelled == len(NAMES)
+    assert ran(here, *NAMES) == (total(there, *NAMES), [])
+
+
 def test_what_cannot_be_found_raises_and_sends_nothing() -> None:
     @query(travels=True)
     def wrong(db: Database) -> int:
