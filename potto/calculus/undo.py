@@ -214,7 +214,7 @@ def _registered(op: str, args: tuple[Term, ...], value: Term) -> Steps:
     one_to_one = entry.increasing != 0
     if one_to_one and isinstance(value, Prim) and value.op == op and not entry.edges(inner):
         return (Step(inner, value.args[0]),)
-    if value is ZERO and op in _ODD:
+    if value is ZERO and op in _ZERO_AT_ZERO:
         return (Step(inner, ZERO, (), entry.period(value)[0] if entry.period else None),)
     if entry.inverse is None:
         return Stuck(f"`{op}` has no inverse in closed form")
@@ -250,7 +250,7 @@ def _turn(start: Term) -> Callable[[tuple[Term, ...], int, Term], Steps]:
 
 
 # Builtins with f(0) = 0, and nowhere else within a period.
-_ODD = frozenset(("erf", "sinh", "tanh", "asinh", "atanh", "atan", "asin", "tan", "expm1", "log1p"))
+_ZERO_AT_ZERO = frozenset(("erf", "sinh", "tanh", "asinh", "atanh", "atan", "asin", "tan", "expm1", "log1p"))
 
 _SPECIAL: dict[str, Callable[[tuple[Term, ...], int, Term], Steps]] = {
     "add": _add,
