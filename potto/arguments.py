@@ -48,7 +48,19 @@ class Batch:
             return estimate
         parts = (estimate.value, estimate.error, estimate.tangent, estimate.tangent_error)
         value, error, tangent, tangent_error = map(self._restored, parts)
-        return replace(estimate, value=value, error=error, tangent=tangent, tangent_error=tangent_error)
+        shaped = replace(estimate, value=value, error=error, tangent=tangent, tangent_error=tangent_error)
+        if self.shape is None:
+            return replace(shaped, member_converged=None, reason_members={})
+        masks = estimate.reason_members or dict.fromkeys(estimate.reasons, True)
+        missed = {why: self._mask(where) for why, where in masks.items()}
+        converged = ~np.logical_or.reduce([np.zeros(self.shape, dtype=bool), *missed.values()])
+        return replace(shaped, member_converged=converged, reason_members=missed)
+
+    def _mask(self, mask: Any) -> Any:
+        """A mask of the batch's members in its shape."""
+        assert self.shape is not None
+        count = int(np.prod(self.shape))
+        return np.broadcast_to(np.asarray(mask).reshape(-1)[:count], (count,)).reshape(self.shape)
 
     def _restored(self, part: Any) -> Any:
         if part is None:

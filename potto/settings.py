@@ -22,24 +22,40 @@ BAD_SETTING = declare("P0520", "a setting that does not exist or cannot have thi
 Method = Literal["auto", "quadrature", "mc", "qmc"]
 METHODS: tuple[str, ...] = get_args(Method)
 
+# The relative accuracy that samples are held against where nobody asked for another one: an error of 4 standard errors
+# of 10,000 samples of a condition that holds half of the time is 4 % of the answer.
+SAMPLED = 0.05
+
+
+class Unasked(float):
+    """A tolerance that nobody asked for."""
+
 
 @dataclass(frozen=True, slots=True)
 class Settings:
     """What an evaluation is asked for.
 
     method: how integrals are estimated; "auto" cuts and integrates by quadrature where the dimension allows it.
-    rtol, atol: the accuracy asked for; an estimate converged when its error is within `max(atol, rtol * |value|)`.
+    rtol, atol: the accuracy asked for; an estimate converged when its error is within `max(atol, rtol * |value|)`. Where
+    nobody asked, `mc` and `qmc` are held against SAMPLED, which is within the reach of `samples`. What cancels to 0 has
+    converged when its error is within 1e-12 of what cancels (`runtime/convergence.py`).
     samples: points of a Monte Carlo estimate.
     seed: where its random numbers start; equal seeds give equal answers.
     max_evals: the most evaluations of an integrand before the answer comes as it is, marked as not converged.
     """
 
     method: Method = "auto"
-    rtol: float = 1e-10
+    rtol: float = Unasked(1e-10)  # noqa: RUF009 - a number, and as little to be changed
     atol: float = 0.0
     samples: int = 100_000
     seed: int = 0
     max_evals: int = 20_000_000
+
+    def asked(self, drawn: bool) -> float:
+        """The relative accuracy that an answer is held against; `drawn` if it is made of samples."""
+        if drawn and self.method in ("mc", "qmc") and isinstance(self.rtol, Unasked):
+            return SAMPLED
+        return self.rtol
 
 
 DEFAULTS = Settings()

@@ -104,13 +104,14 @@ def uncut(box: Box, machine: Evaluator, env: dict[str, Value], batch: int) -> tu
                 sums = _empty(part, batch)
             taken = index[good]
             done[taken] = True
-            for name in ("v", "e", "t", "et"):
+            for name in ("v", "e", "t", "et", "gross"):
                 getattr(sums, name)[..., taken] = getattr(part, name)[..., good]
     return (done, sums) if sums is not None and done.any() else None
 
 
 def _empty(like: Sums, batch: int) -> Sums:
-    return Sums(*(np.zeros((*getattr(like, name).shape[:-1], batch)) for name in ("v", "e", "t", "et")))
+    parts = (np.zeros((*getattr(like, name).shape[:-1], batch)) for name in ("v", "e", "t", "et"))
+    return Sums(*parts, gross=np.zeros((2, batch)))
 
 
 def _free_of_surfaces(box: Box, machine: Evaluator, env: dict[str, Value], low: Array, high: Array) -> Bools:
@@ -168,7 +169,9 @@ def _product(
     good: Bools = (error <= np.maximum(asked, 8 * floor)).all(axis=0)
     shape = (len(cells), 1 + k, low.shape[1])
     total, bound = (integral * volume).reshape(shape), ((error + floor) * volume).reshape(shape)
-    return Sums(total[:, 0], bound[:, 0], total[:, 1:], bound[:, 1:]), good
+    most = (weights[-1] @ np.abs(h)).max(axis=0) * volume
+    gross = np.stack((most[0], most[1:].max(axis=0, initial=0.0)))
+    return Sums(total[:, 0], bound[:, 0], total[:, 1:], bound[:, 1:], gross=gross), good
 
 
 def _estimated(h: Array, order: int, far: Array, weights: tuple[Array, ...]) -> tuple[Array, Array, Array]:

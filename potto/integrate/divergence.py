@@ -1,9 +1,12 @@
 """Integrals that have no value, or none that refinement comes near to.
 
-Owns `given_up`. Where pieces at an end of a segment are as small as they get and still err, the integrand grows there
+Owns `given_up` and `endless`. Where pieces at an end of a segment are as small as they get and still err, the integrand grows there
 like a power of the distance, u^-a. From a = 1 on its integral is infinite: the answer is inf or -inf, or nan where both
 come together. Where a is less, so that there is a value which is out of reach, or where such a piece lies elsewhere, at
 a pole, the answer is nan. It is never a number.
+
+A derivative is infinite where what it is the integral of grows so, in both of its forms (`forms`), down to the smallest
+distances from the end that doubles have: of the area of x*y < t at t = 0, where sections move at the speed 1/x.
 """
 
 from __future__ import annotations
@@ -21,6 +24,7 @@ from potto.kernels.cells import Array, Bools, Ints
 if TYPE_CHECKING:
     from potto.integrate.work import Work
 
+BOUNDLESS = "the derivative is infinite: there is a surface that moves infinitely fast"
 # The error of a value, as a part of what is added up, from which on it is no value; that of a piece which is to blame.
 HOPELESS, BLAMED = 1e-2, 1e-3
 # How many times the errors of integrals further in an error may be that is nothing else.
@@ -31,6 +35,10 @@ NEAR, NEAR_TURNING = (1e-9, 1e-10, 1e-11, 0.3, 0.5, 0.8), (1e-4, 1e-5, 1e-6, 0.3
 POWER = 1e-5
 # Pieces that lie so close to an end are at it.
 AT = 1e-6
+# Up to which error, as a part of a derivative or of its integral, a derivative is not looked at; from how far from an
+# end on, in lengths of the segment, and down to how far, in them and in units of the last place, it is; how many times.
+SETTLED = 1e-2
+NEAREST, LEAST, STEPS_OFF, LOOKS = 1e-9, 1e-200, 8, 5
 # A piece within a segment that is as small as this and still errs lies at a pole.
 SMALLEST = 1e-12
 
@@ -72,6 +80,54 @@ def given_up(work: Work, p: Pieces, found: Totals, sums: Sums) -> Sums:
     gone = ~np.isfinite(v) & hopeless
     return Sums(v, np.where(gone, np.inf, sums.e), np.where(gone[:, None], np.nan, sums.t),
                 np.where(gone[:, None], np.inf, sums.et), gross=sums.gross)  # fmt: skip
+
+
+def endless(work: Work, found: Totals) -> Array | None:
+    """To which infinity derivatives go whose integrals are finite, 0 for others, nan for both at once: (k, B).
+
+    None where all are finite, as far as can be told.
+    """
+    if work.number or not work.k:
+        return None
+    error = found.moving[1] if found.fixed is None else np.minimum(found.moving[1], found.fixed[1])
+    rough = ~(error <= SETTLED * np.abs(found.moving[0])) & ~(error <= SETTLED * found.size[:, :1])
+    index = np.nonzero(rough.any(axis=(0, 1))[work.seg.owner] & np.isfinite(work.seg.a + work.seg.b))[0]
+    if not index.size:
+        return None
+    up, down = np.zeros((2, work.k, work.batch), dtype=bool)
+    for upper in (False, True):
+        for d, sign in enumerate(_without_end(work, index, upper)):
+            up[d, work.seg.owner[index[sign > 0]]] = True
+            down[d, work.seg.owner[index[sign < 0]]] = True
+    up, down = up & rough.any(axis=0), down & rough.any(axis=0)
+    if not (up | down).any():
+        return None
+    work.machine.note_unfinished(BOUNDLESS)
+    return np.where(up & down, np.nan, np.where(up, np.inf, np.where(down, -np.inf, 0.0)))
+
+
+def _without_end(work: Work, index: Ints, high: bool) -> list[Array]:
+    """Of each direction the sign of what is integrated where it grows like 1/u, or faster, down to the smallest
+    distances u from one end of a segment, in both forms of the derivative; else 0: (S,) each."""
+    seg = work.seg.pick(index)
+    end, reach = (seg.b if high else seg.a)[:, None], (seg.b - seg.a)[:, None]
+    least = np.maximum(STEPS_OFF * EPS * np.abs(end), LEAST * reach)
+    x = end + (-1 if high else 1) * NEAREST * reach * (least / (NEAREST * reach)) ** np.linspace(0, 1, LOOKS)
+    u = np.abs(x - end)
+    f, fx, ft, _, _ = work.integrand(index, x)
+    label = 1 - u / reach if high else u / reach
+    signs = []
+    for d in range(work.k):
+        v, dv = maps.velocity(seg, label, d)
+        forms = [ft[:, d]] if fx is None else [ft[:, d], ft[:, d] + fx * v + f * dv]
+        with np.errstate(all="ignore"):
+            power = [np.log(np.abs(g[..., 1:] / g[..., :-1])) / np.log(u[:, :-1] / u[:, 1:]) for g in forms]
+            off = POWER + 4 * EPS * np.abs(end) / u[:, 1:]
+        steady = [((p >= 1 - off) & (g[..., 1:] * g[..., :1] > 0)).all(axis=-1)
+                  for p, g in zip(power, forms, strict=True)]  # fmt: skip
+        sign = np.where(np.logical_and.reduce(steady), np.sign(forms[0][..., -1]), 0.0)
+        signs.append(sign[np.abs(sign).argmax(axis=0), np.arange(index.size)])
+    return signs
 
 
 def _noise(work: Work, p: Pieces, errors: Array, blamed: Array) -> Bools:

@@ -114,22 +114,25 @@ def cut_rounding(work: Work, ends: Ends) -> Array:
 
 
 def added_up(work: Work, found: Totals) -> Array:
-    """What is added up for each of the batch, without regard to sign, here and further in: (B,)."""
-    gross: Array = work.cancels * np.where(np.isfinite(found.size), found.size, 0.0).max(axis=(0, 1))
+    """What is added up for each of the batch, without regard to sign, here and further in: (2, B)."""
+    size = np.where(np.isfinite(found.size), found.size, 0.0).max(axis=0)
+    gross: Array = work.cancels[:, None] * np.stack((size[0], size[1:].max(axis=0, initial=0.0)))
     return gross
 
 
 def sums(work: Work, found: Totals, ends: Ends | None) -> Sums:
-    """The answer: per direction the better of the two forms."""
+    """The answer: per direction the better of the two forms, or the infinity that it is."""
     v, e = found.integral[:, 0], found.error[:, 0]
     if ends is not None:
         e = e + cut_rounding(work, ends)
-    gross = added_up(work, found)
-    if found.fixed is None or found.apart is None:
-        return Sums(v, e, *found.moving, gross=gross)
     moving, fixed = found.moving, found.fixed
-    better = fixed[1] < 0.5 * moving[1]  # the moving form does not cancel: where they are alike it is the better one
-    # two independent values that differ by more than they admit: neither estimate is believed
-    doubt = np.where(found.apart > 4 * (moving[1] + fixed[1]), found.apart, 0.0)
-    return Sums(v, e, np.where(better, fixed[0], moving[0]), np.where(better, fixed[1], moving[1]) + doubt,
-                gross=gross)  # fmt: skip
+    if fixed is None or found.apart is None:
+        t, et = moving
+    else:
+        better = fixed[1] < 0.5 * moving[1]  # the moving form does not cancel: where they are alike it is the better one
+        # two independent values that differ by more than they admit: neither estimate is believed
+        doubt = np.where(found.apart > 4 * (moving[1] + fixed[1]), found.apart, 0.0)
+        t, et = np.where(better, fixed[0], moving[0]), np.where(better, fixed[1], moving[1]) + doubt
+    if work.endless is not None:
+        t, et = np.where(work.endless == 0, t, work.endless), np.where(work.endless == 0, et, np.inf)
+    return Sums(v, e, t, et, gross=added_up(work, found))

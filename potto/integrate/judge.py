@@ -45,6 +45,9 @@ def too_coarse(work: Work, p: Pieces, ends: Any, tally: Tally) -> Any:
         better = np.minimum(error[:, 1 : 1 + k], error[:, 1 + k :])
         error = np.concatenate((error[:, :1], better), axis=1)
         floor = floor[:, : 1 + k]
+    if work.endless is not None:
+        error = error.copy()
+        error[:, 1 : 1 + k] = np.where(work.endless[:, owner] == 0, error[:, 1 : 1 + k], 0.0)
     off, rounding = error.reshape(-1, p.segment.size), floor.reshape(-1, p.segment.size)
     bad = (off > tally.shares(work, owner)) & (off > 8 * rounding)
     bad = bad.any(axis=0) & ~noisy(p, np.where(bad, off, 0.0), tally.gross[owner], tally.whole(work)[owner])
@@ -102,6 +105,8 @@ def doubtful(work: Work, p: Pieces, found: Totals) -> Any:
     if found.fixed is None or found.apart is None:
         return None
     doubt = found.apart > 4 * (found.moving[1] + found.fixed[1])
+    if work.endless is not None:
+        doubt &= work.endless == 0
     if not doubt.any():
         return None
     doubt &= found.apart > 1e-9 * (np.abs(found.moving[0]) + 1e-3 * found.size[:, 1 : 1 + work.k])

@@ -71,7 +71,8 @@ class Evaluator(Protocol):
 class Sums:
     """Integrals of a batch: value (m, B) and tangents (m, k, B) with their error bounds; m components.
 
-    gross: (B,) the most that is added up for each without regard to sign; None where nobody kept track.
+    gross: (2, B) the most that is added up for each without regard to sign, for values and for tangents; None where
+    nobody kept track.
     """
 
     v: Array

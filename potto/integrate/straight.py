@@ -310,4 +310,4 @@ def _accurate(found: Totals, region: Region, machine: Evaluator, parameters: Seq
         errors.append(rounding + beyond)
     v, t = np.array(found.number[:1]), np.array(found.number[1:])
     e, et = np.array(errors[:1]), np.array(errors[1:])
-    return Sums(v[None], e[None], t[None, :, None], et[None, :, None], gross=np.array([max(found.gross)]))
+    return Sums(v[None], e[None], t[None, :, None], et[None, :, None], gross=np.array([found.gross[:1], [max(found.gross[1:], default=0.0)]]))

@@ -13,13 +13,13 @@ in one go. For a derivative two forms are computed from the same values:
 from __future__ import annotations
 
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from potto.integrate import maps
-from potto.integrate.divergence import given_up
+from potto.integrate.divergence import endless, given_up
 from potto.integrate.forms import Ends, Totals, sums, totals
 from potto.integrate.judge import doubtful, missed_peak, too_coarse
 from potto.integrate.maps import Segments
@@ -66,7 +66,9 @@ class Work:
     conflict: bool = False
     width: int = 1
     ends: Ends | None = None
-    cancels: float = 1.0  # how many times what it comes to an integral further in adds up
+    # How many times what it comes to an integral further in adds up: for values, for tangents.
+    cancels: Array = field(default_factory=lambda: np.ones(2))
+    endless: Array | None = None  # (k, B) the tangents that are infinite, with their signs; 0 for others
 
     def __post_init__(self) -> None:
         self.k = self.machine.directions
@@ -92,6 +94,7 @@ class Work:
         found = totals(self, fresh, ends)
         if self.good_enough(fresh, found, ends):
             return sums(self, found, ends)
+        self.endless = endless(self, found)
         tally = Tally(self, fresh)
         done = self.refine(fresh, ends, tally)
         for _ in range(DOUBTFUL_ROUNDS):
@@ -333,8 +336,9 @@ class Work:
         root = self.below(owner[flat])
         sums = self.parent.run(self.number + 1, env, x.size, masks, self.inner, root)
         if sums.gross is not None:
-            share = sums.gross / np.maximum(np.abs(sums.v).max(axis=0), 1e-300)
-            self.cancels = max(self.cancels, float(np.median(share)))
+            most = np.abs(sums.v).max(axis=0), np.abs(sums.t).max(axis=(0, 1), initial=0.0)
+            share = sums.gross / np.maximum(np.stack(most), 1e-300)
+            self.cancels = np.maximum(self.cancels, np.median(share, axis=-1))
         shape = (sums.v.shape[0], *x.shape)
         t = sums.t.reshape(shape[0], -1, *x.shape)
         et = sums.et.reshape(t.shape)

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from potto.integrate.divergence import BOUNDLESS
+
 INFINITE = "the integral is infinite, or beyond what numbers can hold"
 NO_VALUE = "the integral has no value, or none within reach"
 DIVERGENT = {INFINITE, NO_VALUE}
@@ -31,6 +33,7 @@ _ADVICE: tuple[tuple[str, str], ...] = (
         "lies on a bound",
         "more evaluations change nothing: ask at parameters beside these, where the surface lies inside or outside",
     ),
+    (BOUNDLESS, "more evaluations change nothing: ask at parameters beside these"),
     ("along the axes", "turn the variables of integration, so that no surface runs along several of their axes"),
     ("no sample fell", "sample more (`--samples`), or integrate by `--method quadrature`"),
     ("too many roots", "shorten the domain, or sample (`--method mc`)"),

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
+from typing import Any
 
 from potto.integrate import costs
 from potto.integrate.costs import Costs
@@ -71,19 +72,20 @@ def _begun() -> Gauge | None:
 class Books:
     """What one evaluation has done so far. used: answers of before that it is made of.
 
-    gross: the largest that an integral, or its derivative, adds up to without regard to sign.
+    unfinished: why answers are not what was asked for, and of which members of the batch, or True.
+    within: the error up to which what cancels is 0 as accurately as asked for, of all or of each of the batch.
     """
 
     evaluations: int = 0
     depth: int = 0
-    unfinished: list[str] = field(default_factory=list)
+    unfinished: dict[str, Any] = field(default_factory=dict)
     edges: list[tuple[Sided, Array, Array]] = field(default_factory=list)
     sided: dict[Sided, None] = field(default_factory=dict)
     folds: dict[Sided, Folded] = field(default_factory=dict)
     methods: set[str] = field(default_factory=set)
     degenerate: set[str] = field(default_factory=set)
     second: bool = False
-    gross: float = 0.0
+    within: Any = 0.0
     members: int = 1
     integrals: int = 0
     used: dict[tuple[str, str], Value] = field(default_factory=dict)

@@ -28,7 +28,7 @@ def step_by_step(machine: Machine, term: Integral, linked: Linked, batch: int, l
     if known is None:
         return None
     rows, books = [], machine.books
-    before = list(books.unfinished), dict(books.sided), dict(books.folds)
+    before = dict(books.unfinished), dict(books.sided), dict(books.folds)
     for i in range(batch):
         row = one_by_one(known, machine, {n: map_arrays(v, lambda a, i=i: float(a[i])) for n, v in linked.env.items()})
         noted = books.unfinished, books.sided, books.folds

@@ -6,6 +6,7 @@ None with its text in `text`.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -55,7 +56,9 @@ class Estimate:
 
     value, error: the number and a bound of its absolute error; arrays for a batch, tuples for tuples.
     tangent, tangent_error: the same of the derivative, where a dual was asked for; else None.
-    converged: whether the accuracy asked for was reached; `reasons` says why not.
+    converged: whether the accuracy asked for was reached, by all members of a batch; `reasons` says why not.
+    member_converged: the same of each member, an array of the batch's shape; None for a single answer.
+    reason_members: of which members of a batch each reason is true, as a mask of its shape.
     evals: evaluations of integrands. seconds, compile_seconds: time in all, and the part spent on making kernels.
     notes: what a careful reader should know (one-sided derivatives).
     """
@@ -73,6 +76,12 @@ class Estimate:
     notes: tuple[OneSided, ...] = ()
     stats: dict[str, Any] = field(default_factory=dict)
     text: str | None = None
+    member_converged: Any = None
+    reason_members: Mapping[str, Any] = field(default_factory=dict)
+
+    def reasons_of(self, index: Any) -> tuple[str, ...]:
+        """Why one member of a batch is not as accurate as was asked: none, if it is."""
+        return tuple(why for why, where in self.reason_members.items() if where[index])
 
     def __float__(self) -> float:
         return float(self.value)

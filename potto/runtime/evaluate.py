@@ -6,7 +6,6 @@ once; every evaluation has books of its own.
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -21,7 +20,8 @@ from potto.diagnostics import PottoError
 from potto.kernels import compile as compiling
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Value
-from potto.runtime.advice import INFINITE, NO_VALUE, ROUGH, TOO_FEW
+from potto.runtime.advice import INFINITE, ROUGH
+from potto.runtime.convergence import CANCELS, Reasons, converged_members, members_of, merged, missed
 from potto.runtime.estimate import Estimate, OneSided
 from potto.runtime.functions import Closure, Derivative
 from potto.runtime.inherited import rough, widened
@@ -124,29 +124,42 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
         return Estimate(None, None, text=f"<{kind}>", **common)  # type: ignore[arg-type]
     if isinstance(value, list):
         parts = [report(item, machine, clock) for item in value]
-        return Estimate([p.value for p in parts], [p.error for p in parts], **common)  # type: ignore[arg-type]
+        reasons = dict.fromkeys(reason for part in parts for reason in part.reasons)
+        return Estimate([p.value for p in parts], [p.error for p in parts], converged=not reasons,
+                        reasons=tuple(reasons), **common)  # type: ignore[arg-type]  # fmt: skip
     numbers, bounds = numbers_of(value), bounds_of(value)
     tangents, tangent_bounds = tangents_of(value)
-    reasons = list(books.unfinished)
-    flat = [*_flat(numbers, bounds), *_flat(tangents, tangent_bounds)]
-    scale = max((_largest(v) for v, _ in flat), default=0.0)
-    drawn = not books.methods.isdisjoint(("mc", "qmc"))
-    gross = books.gross if books.methods else 1.0
-    missed = next((m for v, e in flat if (m := _missed(v, e, scale, gross, settings, drawn))), None)
-    if missed == INFINITE and not books.methods:
-        missed = None  # of 1/0 no integral is to blame
-    if not reasons and missed is not None:
-        used = any(rough(value, settings.rtol, settings.atol) for value in books.used.values())
-        reasons.append(ROUGH if used else missed)
+    missing = _reasons([*_flat(numbers, bounds), *_flat(tangents, tangent_bounds)], books, settings)
+    shape = np.broadcast_shapes(*(np.shape(n) for n, _ in _flat(numbers, bounds)))
     return Estimate(
         numbers,
         bounds,
         tangents,
         tangent_bounds,
-        converged=not reasons,
-        reasons=tuple(reasons),
+        converged=not missing,
+        reasons=tuple(missing),
+        member_converged=converged_members(missing, shape) if shape else None,
+        reason_members={why: members_of(where, shape) for why, where in missing.items()} if shape else {},
         **common,  # type: ignore[arg-type]
     )
+
+
+def _reasons(flat: list[tuple[Any, Any]], books: Books, settings: Settings) -> Reasons:
+    """Why the numbers are not as accurate as was asked for: as the books say, and for other members by their errors."""
+    reasons = dict(books.unfinished)
+    drawn = not books.methods.isdisjoint(("mc", "qmc"))
+    within = books.within if books.methods else CANCELS
+    for number, error in flat:
+        found = missed(number, error, within, settings, drawn)
+        if not found or any(where is True for where in books.unfinished.values()):
+            continue
+        if not books.methods:
+            found.pop(INFINITE, None)  # of 1/0 no integral is to blame
+        elif found and any(rough(answer, settings.rtol, settings.atol) for answer in books.used.values()):
+            found = {ROUGH: np.logical_or.reduce(list(found.values()))}
+        told = converged_members(books.unfinished, np.shape(number))
+        merged(reasons, {why: where & told if np.ndim(where) else where for why, where in found.items()})
+    return {why: where for why, where in reasons.items() if np.any(where)}
 
 
 def _notes(books: Books) -> list[OneSided]:
@@ -198,38 +211,3 @@ def _flat(numbers: Any, bounds: Any) -> list[tuple[Any, Any]]:
     if isinstance(numbers, tuple | list):
         return [pair for n, b in zip(numbers, bounds, strict=True) for pair in _flat(n, b)]
     return [(numbers, bounds)]
-
-
-def _largest(value: Any) -> float:
-    """The largest finite magnitude."""
-    if isinstance(value, float):
-        return abs(value) if math.isfinite(value) else 0.0
-    return float(np.max(np.abs(value), initial=0.0, where=np.isfinite(value)))
-
-
-def _missed(value: Any, error: Any, scale: float, gross: float, settings: Settings, drawn: bool) -> str | None:
-    """Why an answer is not as accurate as was asked, or None. `drawn`: it is made of samples.
-
-    `scale` is the size of the whole answer: a small tangent beside a large value, or a pixel of a picture that is all
-    but zero by cancellation, is measured against its neighbours. `gross` is what integrals add up to without regard to
-    sign: nobody can know more digits of 0 than that has.
-    """
-    if isinstance(value, float) and isinstance(error, float) and error <= settings.rtol * abs(value) < np.inf:
-        return None
-    v, e = np.abs(np.asarray(value, dtype=float)), np.asarray(error, dtype=float)
-    if np.isnan(v).any():
-        return NO_VALUE if np.isinf(e).any() else "the value is not a number"
-    if (np.isinf(v) & np.isinf(e)).any():
-        return INFINITE
-    if np.isnan(e).any() or (np.isinf(e) & ~np.isinf(v)).any():
-        return "the error is not known"
-    bad = ~(e <= np.maximum(settings.atol, settings.rtol * v)) & ~np.isinf(v)
-    bad &= e > max(1e-12, settings.rtol) * max(scale, 1e-300)
-    bad &= (v > 1e3 * e) | (e > 1e-10 * gross)
-    if bad.any():
-        if drawn:
-            return TOO_FEW
-        if (e[bad] > 0.1 * v[bad]).any():
-            return "no accuracy was reached: the integral diverges, its integrand is too rough, or rounding hides it"
-        return "rounding limits the accuracy" if (e[bad] < 1e-6 * v[bad]).all() else "the error estimate is too large"
-    return None

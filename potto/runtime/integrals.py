@@ -25,6 +25,7 @@ from potto.integrate.plan import Plan
 from potto.integrate.straight import certain
 from potto.kernels import errors
 from potto.kernels.cells import Array, Cell, Number, Value, all_arrays, map_arrays
+from potto.runtime.convergence import allowance, widest
 from potto.runtime.differences import by_differences
 from potto.runtime.elimination import ACCURATE, WORTH, step_by_step
 from potto.runtime.one_sided import beside_axes, beside_folds, from_both_sides, one_direction
@@ -98,7 +99,7 @@ def _vouched(machine: Machine, term: Integral, linked: Linked, batch: int, outer
     """What an integral amounts to. Rules on pieces that should have been cut further are good for nothing."""
     sums = solve(machine, term, linked, linked.env, batch, outermost)
     if outermost:
-        note_gross(machine, sums)
+        machine.books.within = widest(machine.books.within, allowance(term, sums, machine.rtol))
         if "quadrature" in machine.books.methods and _left_out(machine):
             sums.e, sums.et = np.full_like(sums.e, np.inf), np.full_like(sums.et, np.inf)
     return sums
@@ -107,17 +108,6 @@ def _vouched(machine: Machine, term: Integral, linked: Linked, batch: int, outer
 def _left_out(machine: Machine) -> bool:
     """Whether roots were left out, because they are too many."""
     return any("too many roots" in reason for reason in machine.books.unfinished)
-
-
-def note_gross(machine: Machine, sums: Sums) -> None:
-    """What is added up without regard to sign, at the least the values themselves."""
-    if sums.gross is not None and sums.v.size == 1:  # numpy takes its time over a single number
-        gross = float(sums.gross[0])
-        machine.books.gross = max(machine.books.gross, gross if gross < np.inf else 0.0)
-        return
-    least = 0.0 if sums.gross is None else float(np.max(sums.gross, initial=0.0, where=np.isfinite(sums.gross)))
-    found = np.max(np.abs(sums.v), initial=least, where=np.isfinite(sums.v))
-    machine.books.gross = max(machine.books.gross, float(found))
 
 
 def given_up(machine: Machine, shape: tuple[int, ...]) -> Value:
@@ -319,7 +309,10 @@ def in_parts(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) ->
         part = iterated(plan, machine, here, rest.size)
         for name in ("v", "e", "t", "et"):
             getattr(sums, name)[..., rest] = getattr(part, name)
-        sums.gross = part.gross
+        if part.gross is None or sums.gross is None:
+            sums.gross = None
+        else:
+            sums.gross[:, rest] = part.gross
     return sums
 
 
@@ -340,7 +333,7 @@ def iterated(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) ->
         rows = [getattr(p, name) for p in parts]
         return np.concatenate([np.broadcast_to(r, (m, *r.shape[1:])) for r in rows], axis=-1)
 
-    gross = None if any(p.gross is None for p in parts) else np.concatenate([p.gross for p in parts])
+    gross = None if any(p.gross is None for p in parts) else np.concatenate([p.gross for p in parts], axis=-1)
     return Sums(joined("v"), joined("e"), joined("t"), joined("et"), gross=gross)
 
 

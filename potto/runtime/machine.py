@@ -195,8 +195,7 @@ class Machine:
         self.books.folds.setdefault(what, where)
 
     def note_unfinished(self, reason: str) -> None:
-        if reason not in self.books.unfinished:
-            self.books.unfinished.append(reason)
+        self.books.unfinished[reason] = True
 
     def note_degenerate(self, variable: str) -> None:
         self.books.degenerate.add(variable)

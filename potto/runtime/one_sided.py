@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from potto.integrate.cuts import frame_rows
+from potto.integrate.divergence import BOUNDLESS
 from potto.integrate.pieces import Folded, Sided, Sums, still
 from potto.integrate.plan import Plan
 from potto.integrate.roots import searched_rows
@@ -74,6 +75,7 @@ def beside_folds(
             continue
         t[:] = np.where(np.isfinite(t), t, np.where(np.isfinite(backward), backward, forward))
         et[:] = np.where(np.isfinite(t), np.where(np.isfinite(et), et, 0.0), np.inf)
+        _endless(machine, backward, forward, t, et)
         machine.note_edge(what, backward, forward)
     machine.books.folds.clear()
 
@@ -100,20 +102,29 @@ def beside_axes(
             t[:], et[:] = 0.5 * (backward + forward), np.abs(forward - backward) + off
         else:
             et[:] = np.abs(t)
+            _endless(machine, backward, forward, t, et)
             machine.note_edge(what, backward, forward)
     return True
+
+
+def _endless(machine: Machine, backward: Array, forward: Array, t: Array, et: Array) -> None:
+    """Put the infinity that is the derivative on both sides."""
+    both = np.isinf(forward) & (forward == backward)
+    t[:], et[:] = np.where(both, forward, t), np.where(both, np.inf, et)
+    if both.any():
+        machine.note_unfinished(BOUNDLESS)
 
 
 @contextmanager
 def apart(machine: Machine) -> Iterator[None]:
     """What is noted in this block is about other parameters, and forgotten."""
     books = machine.books
-    kept = list(books.unfinished), list(books.edges), dict(books.sided), set(books.degenerate)
+    kept = dict(books.unfinished), list(books.edges), dict(books.sided), set(books.degenerate)
     books.folds.clear()
     try:
         yield
     finally:
-        books.unfinished[:], books.edges[:], books.sided, books.degenerate = kept
+        books.unfinished, books.edges[:], books.sided, books.degenerate = kept
 
 
 def _same(backward: Array, forward: Array, off: Array) -> bool:
