@@ -36,16 +36,16 @@ class Settings:
     """What an evaluation is asked for.
 
     method: how integrals are estimated; "auto" cuts and integrates by quadrature where the dimension allows it.
-    rtol, atol: the accuracy asked for; an estimate converged when its error is within `max(atol, rtol * |value|)`. Where
-    nobody asked, `mc` and `qmc` are held against SAMPLED, which is within the reach of `samples`. What cancels to 0 has
-    converged when its error is within 1e-12 of what cancels (`runtime/convergence.py`).
+    rtol, atol: the accuracy asked for; an estimate converged when its error is within `max(atol, rtol * |value|)`.
+    Where nobody asked, `mc` and `qmc` are held against SAMPLED, which is within the reach of `samples`. What cancels to
+    0 has converged when its error is within 1e-12 of what cancels (`runtime/convergence.py`).
     samples: points of a Monte Carlo estimate.
     seed: where its random numbers start; equal seeds give equal answers.
     max_evals: the most evaluations of an integrand before the answer comes as it is, marked as not converged.
     """
 
     method: Method = "auto"
-    rtol: float = Unasked(1e-10)  # noqa: RUF009 - a number, and as little to be changed
+    rtol: float = Unasked(1e-10)
     atol: float = 0.0
     samples: int = 100_000
     seed: int = 0

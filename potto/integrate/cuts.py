@@ -65,6 +65,9 @@ class Meeting:
     speeds: Array
     merged_t: Array
 
+    def pick(self, index: Any) -> Meeting:
+        return Meeting(self.cuts, self.owner[index], self.x[index], self.speeds[:, :, index], self.merged_t[:, index])
+
 
 @dataclass
 class Sliver:
@@ -80,6 +83,9 @@ class Sliver:
     width: Array
     speed: Array
     upper: bool
+
+    def pick(self, index: Any) -> Sliver:
+        return Sliver(self.cuts, self.owner[index], self.x[index], self.width[index], self.speed[index], self.upper)
 
 
 @dataclass

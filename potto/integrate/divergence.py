@@ -94,15 +94,17 @@ def endless(work: Work, found: Totals) -> Array | None:
     index = np.nonzero(rough.any(axis=(0, 1))[work.seg.owner] & np.isfinite(work.seg.a + work.seg.b))[0]
     if not index.size:
         return None
-    up, down = np.zeros((2, work.k, work.batch), dtype=bool)
+    up: Bools = np.zeros((work.k, work.batch), dtype=bool)
+    down: Bools = np.zeros_like(up)
     for upper in (False, True):
         for d, sign in enumerate(_without_end(work, index, upper)):
             up[d, work.seg.owner[index[sign > 0]]] = True
             down[d, work.seg.owner[index[sign < 0]]] = True
-    up, down = up & rough.any(axis=0), down & rough.any(axis=0)
+    for mask in (up, down):
+        mask &= rough.any(axis=0)
     if not (up | down).any():
         return None
-    work.machine.note_unfinished(BOUNDLESS)
+    work.machine.note_unfinished(BOUNDLESS, work.below(np.nonzero(np.any(up | down, axis=0))[0]))
     return np.where(up & down, np.nan, np.where(up, np.inf, np.where(down, -np.inf, 0.0)))
 
 

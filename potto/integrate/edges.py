@@ -24,12 +24,13 @@ import numpy as np
 from potto.core.printer import format_term
 from potto.core.terms import Term
 from potto.integrate.cuts import Cuts, Edge, Meeting, as_array
-from potto.integrate.pieces import Evaluator, Folded, Sided, Sums, gather, still, take
+from potto.integrate.pieces import Evaluator, Folded, Sided, Sums, gather, mostly, still, take
 from potto.integrate.plan import LevelPlan
+from potto.integrate.rules import EPS
 from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value
 
 if TYPE_CHECKING:
-    from potto.integrate.levels import Iteration
+    from potto.integrate.work import Work
 
 MOST_AT_ONE_PLACE = 4
 SURE = 1.001  # what rounding may add to a bound
@@ -39,45 +40,53 @@ SURE = 1.001  # what rounding may add to a bound
 class Scene:
     """One variable of an iteration as it is being integrated: everything that is needed to evaluate its integrand."""
 
-    parent: Iteration
-    number: int
-    level: LevelPlan
-    env: dict[str, Value]
+    work: Work
     sides: dict[int, Mask]
-    machine: Evaluator
+
+    @property
+    def level(self) -> LevelPlan:
+        return self.work.level
+
+    @property
+    def machine(self) -> Evaluator:
+        return self.work.machine
+
+    def counted(self, owner: Ints) -> Ints:
+        """Those of a batch for which what is met counts: not at single nodes further out, a set of measure zero."""
+        return mostly(owner, self.work.root, self.work.batch) if self.work.number else owner
 
     def flips(self, cuts: Sequence[int], owner: Ints, x: Array, above: bool) -> Array:
         """F just beside x with every subset of some cuts' surfaces flipped: (2^n, m, B); bit i stands for cut i."""
-        here, inner = around(self.level, owner, x, above, self.env, self.sides, self.machine)
+        here, inner = around(self.level, owner, x, above, self.work.env, self.sides, self.machine)
         groups = [group_of(self.level, cut) for cut in cuts]
-        frozen = self.machine.with_directions(0)
+        frozen, root = self.machine.with_directions(0), self.work.below(owner)
         found = []
         with nullcontext() if self.machine.costs is None else self.machine.costs.apart():
             for bits in range(1 << len(groups)):
                 way = {g: ~np.asarray(inner[g]) for i, g in enumerate(groups) if bits >> i & 1}
-                found.append(self.parent.inside(self.number, here, owner.size, {**inner, **way}, frozen)[0])
+                both = {**inner, **way}
+                found.append(self.work.parent.inside(self.work.number, here, owner.size, both, frozen, root)[0])
         return np.stack(found)
 
     def surface(self, cut: int) -> Term:
         return self.level.level.cuts[cut].surface
 
 
-def count_places(
-    parent: Iteration, number: int, level: LevelPlan, cuts: Cuts, env: dict[str, Value], sides: dict[int, Mask],
-    sums: Sums, machine: Evaluator,
-) -> None:  # fmt: skip
+def count_places(work: Work, cuts: Cuts, sides: dict[int, Mask], sums: Sums) -> None:
     """Add to the tangents what surfaces on bounds and on one another contribute; say where they have two sides."""
-    scene = Scene(parent, number, level, env, sides, machine)
+    scene, machine, level = Scene(work, sides), work.machine, work.level
     places: list[tuple[Ints, Callable[[], tuple[Array, Array, Array]], bool, Sided]] = []
     for meeting in cuts.meetings:
         named = Sided(level.variable, scene.surface(meeting.cuts[0]), scene.surface(meeting.cuts[1]))
+        meeting = meeting.pick(np.isin(meeting.owner, scene.counted(meeting.owner)))
         places.append((meeting.owner, lambda m=meeting: at_one_place(scene, m), True, named))  # type: ignore[misc]
     for group in _on_one_bound(cuts.edges, cuts.sign.size):
         named = Sided(level.variable, scene.surface(group[0].cut))
+        group = [edge.pick(np.isin(edge.owner, scene.counted(edge.owner))) for edge in group]
         places.append((group[0].owner, lambda g=group: at_a_bound(scene, g), False, named))  # type: ignore[misc]
     for owner, changes, counts, named in places:
-        if number and 2 * owner.size < cuts.sign.size:
-            continue  # single nodes of the variables further out: of measure zero
+        if not owner.size:
+            continue
         forward, backward, scale = changes()
         unknown = ~(np.isfinite(forward) & np.isfinite(backward))
         if unknown.any():
@@ -89,46 +98,52 @@ def count_places(
             sums.t[:, :, owner] = base + (forward if machine.side > 0 else backward)
             continue
         sums.t[:, :, owner] = base + (forward if counts else np.where(differ, 0.0, forward))
-        if differ.any():
-            machine.note_sided(named)
+        two = differ.any(axis=(0, 1))
+        if two.any():
+            machine.note_sided(named, work.below(owner[two]))
 
 
-def count_slivers(
-    parent: Iteration, number: int, level: LevelPlan, cuts: Cuts, env: dict[str, Value], sides: dict[int, Mask],
-    sums: Sums, machine: Evaluator,
-) -> None:  # fmt: skip
+def count_slivers(work: Work, cuts: Cuts, sides: dict[int, Mask], sums: Sums) -> None:
     """Add to the errors what may lie between surfaces that rounding does not tell apart."""
-    scene = Scene(parent, number, level, env, sides, machine)
+    scene = Scene(work, sides)
     for sliver in cuts.slivers:
-        if number and 2 * sliver.owner.size < cuts.sign.size:
-            continue  # single nodes of the variables further out: of measure zero
+        sliver = sliver.pick(np.isin(sliver.owner, scene.counted(sliver.owner)))
+        if not sliver.owner.size:
+            continue
         f = scene.flips(sliver.cuts, sliver.owner, sliver.x, not sliver.upper)
         lost = SURE * np.abs(f - f[0]).max(axis=0) * sliver.width
         lost = np.where(np.isfinite(lost), lost, 0.0)
         at = (slice(None), sliver.owner)
-        sums.et[:, :, sliver.owner] += (lost * np.where(np.isfinite(sliver.speed), sliver.speed, 0.0))[:, None]
+        swept = lost * np.where(np.isfinite(sliver.speed), sliver.speed, 0.0)
+        sums.et[:, :, sliver.owner] += swept[:, None]
         sums.e[at] += lost
+        if len(sliver.cuts) == 1 and sums.gross is not None:  # nothing but what lies between two roundings of a bound
+            added = np.stack((lost.max(axis=0), swept.max(axis=0))) / EPS
+            sums.gross[:, sliver.owner] += np.where((sums.v[at] == 0).all(axis=0), added, 0.0)
 
 
-def note_folds(number: int, level: LevelPlan, cuts: Cuts, machine: Evaluator) -> None:
+def note_folds(work: Work, cuts: Cuts) -> None:
     """Say where sections of a surface appear or merge just here. At single nodes further out that is no matter."""
+    level, number = work.level, work.number
     for fold in cuts.folds:
-        if number and 2 * fold.owner.size < cuts.sign.size:
+        owner = mostly(fold.owner, work.root, work.batch) if number else fold.owner
+        if not owner.size:
             continue
-        owner = None if number else tuple(map(int, fold.owner))
         named = Sided(level.variable, level.level.cuts[fold.cut].surface, fold=True)
-        machine.note_fold(named, Folded(number, fold.cut, float(fold.x[0]), owner))
+        place = Folded(number, fold.cut, float(fold.x[0]), None if number else tuple(map(int, owner)))
+        work.machine.note_fold(named, place, work.below(owner))
 
 
 def _not_known(scene: Scene, sums: Sums, owner: Ints, unknown: Bools, named: Sided) -> None:
     sums.et[:, :, owner] = np.where(unknown, np.inf, sums.et[:, :, owner])
     assert named.surface is not None
+    members = scene.work.below(owner[unknown.any(axis=(0, 1))])
     if named.other is None:
         where = f"{format_term(named.surface)} = 0 lies on a bound of `{scene.level.variable}`"
-        scene.machine.note_unfinished(f"{where}, and beyond it the integrand is not finite")
+        scene.machine.note_unfinished(f"{where}, and beyond it the integrand is not finite", members)
     else:
         where = f"{format_term(named.surface)} = 0 and {format_term(named.other)} = 0 coincide"
-        scene.machine.note_unfinished(f"{where}, and what lies between them is not known")
+        scene.machine.note_unfinished(f"{where}, and what lies between them is not known", members)
 
 
 def at_one_place(scene: Scene, meeting: Meeting) -> tuple[Array, Array, Array]:

@@ -116,7 +116,10 @@ def cut_rounding(work: Work, ends: Ends) -> Array:
 def added_up(work: Work, found: Totals) -> Array:
     """What is added up for each of the batch, without regard to sign, here and further in: (2, B)."""
     size = np.where(np.isfinite(found.size), found.size, 0.0).max(axis=0)
-    gross: Array = work.cancels[:, None] * np.stack((size[0], size[1:].max(axis=0, initial=0.0)))
+    gross: Array = work.cancels * np.stack((size[0], size[1:].max(axis=0, initial=0.0)))
+    if work.hidden.any():
+        reach = np.bincount(work.seg.owner, work.seg.b - work.seg.a, minlength=work.batch)
+        gross += work.hidden * np.where(np.isfinite(reach), reach, 0.0)
     return gross
 
 
@@ -129,7 +132,8 @@ def sums(work: Work, found: Totals, ends: Ends | None) -> Sums:
     if fixed is None or found.apart is None:
         t, et = moving
     else:
-        better = fixed[1] < 0.5 * moving[1]  # the moving form does not cancel: where they are alike it is the better one
+        # The moving form does not cancel: where they are alike it is the better one.
+        better = fixed[1] < 0.5 * moving[1]
         # two independent values that differ by more than they admit: neither estimate is believed
         doubt = np.where(found.apart > 4 * (moving[1] + fixed[1]), found.apart, 0.0)
         t, et = np.where(better, fixed[0], moving[0]), np.where(better, fixed[1], moving[1]) + doubt

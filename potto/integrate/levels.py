@@ -63,19 +63,24 @@ class Iteration:
         sums = work.integrate()
         if k and (cuts.meetings or cuts.edges):
             if self.plan.hides:
-                machine.note_unfinished("surfaces meet, or lie on a bound, that an inner integral jumps at")
-                sums.et = np.full_like(sums.et, np.inf)
+                places = [*(place.owner for place in cuts.meetings), *(place.owner for place in cuts.edges)]
+                met = np.unique(np.concatenate(places))
+                machine.note_unfinished(
+                    "surfaces meet, or lie on a bound, that an inner integral jumps at", work.below(met)
+                )
+                sums.et[:, :, met] = np.inf
             else:
-                count_places(self, number, level, cuts, env, outer, sums, machine)
+                count_places(work, cuts, outer, sums)
         if k and cuts.brushes and number + 1 < len(self.plan.levels):
-            brush(self, number, level, cuts, env, outer, machine)
+            brush(work, cuts, outer)
         if unsure is not None and not number:  # single nodes of variables further out may lie on a surface
-            machine.note_unfinished(f"rounding hides on which side of a surface stretches of `{level.variable}` lie")
+            reason = f"rounding hides on which side of a surface stretches of `{level.variable}` lie"
+            machine.note_unfinished(reason, work.below(unsure))
             sums.e[:, unsure] = sums.et[:, :, unsure] = np.inf
         if cuts.slivers and not machine.frozen and not self.plan.hides:
-            count_slivers(self, number, level, cuts, env, outer, sums, machine)
+            count_slivers(work, cuts, outer, sums)
         if k and cuts.folds:
-            note_folds(number, level, cuts, machine)
+            note_folds(work, cuts)
         sums.v *= cuts.sign
         sums.t *= cuts.sign
         if cuts.bound_nan is not None:
@@ -154,11 +159,12 @@ class Iteration:
         return machine.evaluate(body, {n: env[n] for n in body.params}, self.plan.trace(sides))
 
     def inside(
-        self, number: int, env: dict[str, Value], batch: int, sides: dict[int, Mask], machine: Evaluator
-    ) -> tuple[Array, Array]:
+        self, number: int, env: dict[str, Value], batch: int, sides: dict[int, Mask], machine: Evaluator,
+        root: Ints | None = None,
+    ) -> tuple[Array, Array]:  # fmt: skip
         """The integrand of variable `number` (with the variables further in integrated out) and its errors: (m, B)."""
         if number + 1 < len(self.plan.levels):
-            sums = self.run(number + 1, env, batch, sides, machine)
+            sums = self.run(number + 1, env, batch, sides, machine, root)
             return sums.v, sums.e
         machine.count(batch)
         value = self.body(env, sides, machine.tracking())

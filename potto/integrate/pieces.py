@@ -42,7 +42,10 @@ class Folded:
 
 
 class Evaluator(Protocol):
-    """What integration asks of the machine: terms evaluated over batches, and the books."""
+    """What integration asks of the machine: terms evaluated over batches, and the books.
+
+    What is noted is true of `members` of the outermost batch; of all that there are, or of nobody knows which, if None.
+    """
 
     @property
     def rtol(self) -> float: ...
@@ -61,10 +64,10 @@ class Evaluator(Protocol):
     def exhausted(self) -> bool: ...
     @property
     def side(self) -> int: ...
-    def note_sided(self, what: Sided) -> None: ...
-    def note_fold(self, what: Sided, where: Folded) -> None: ...
-    def note_unfinished(self, reason: str) -> None: ...
-    def note_degenerate(self, variable: str) -> None: ...
+    def note_sided(self, what: Sided, members: Ints | None = None) -> None: ...
+    def note_fold(self, what: Sided, where: Folded, members: Ints | None = None) -> None: ...
+    def note_unfinished(self, reason: str, members: Ints | None = None) -> None: ...
+    def note_degenerate(self, variable: str, members: Ints | None = None) -> None: ...
 
 
 @dataclass
@@ -168,6 +171,17 @@ def joined(parts: list[Pieces]) -> Pieces:
              "excess", "stuck")  # fmt: skip
     axes = (0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0)
     return Pieces(*(np.concatenate([getattr(p, n) for p in parts], axis=a) for n, a in zip(names, axes, strict=True)))
+
+
+def mostly(owner: Ints, root: Ints | None, size: int) -> Ints:
+    """Those of `owner`, nodes of a batch of `size`, whose member of the outermost batch has most of its nodes there.
+
+    A surface that is met at single nodes of the variables further out is met on a set of measure zero.
+    """
+    if root is None:
+        return owner if 2 * owner.size >= size else owner[:0]
+    counts = np.bincount(root)
+    return owner[(2 * np.bincount(root[owner], minlength=counts.size) >= counts)[root[owner]]]
 
 
 def gather(env: dict[str, Value], index: Ints) -> dict[str, Value]:

@@ -63,8 +63,10 @@ def sample(plan: Plan, machine: Any, env: dict[str, Value], batch: int, method: 
 
     for i in range(batch):
         member = {n: map_arrays(v, _member(i)) for n, v in env.items()}
-        rows.append(_plain(plan, machine, member, told) if method == "mc"
-                    else _quasi(plan, machine, member, method, told))  # fmt: skip
+        with machine.books.among(np.array([i])) as met:
+            rows.append(_plain(plan, machine, member, told) if method == "mc"
+                        else _quasi(plan, machine, member, method, told))  # fmt: skip
+        machine.books.met.take(met, np.array([i]))
     return Sums(*(np.stack([getattr(r, name) for r in rows], axis=-1) for name in ("v", "e", "t", "et")))
 
 

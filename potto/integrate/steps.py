@@ -13,12 +13,10 @@ import numpy as np
 
 from potto.integrate.cuts import Cuts
 from potto.integrate.edges import around
-from potto.integrate.pieces import Evaluator, Pieces, gather, still, take
-from potto.integrate.plan import LevelPlan
-from potto.kernels.cells import Cell, Mask, Value
+from potto.integrate.pieces import Pieces, gather, mostly, still, take
+from potto.kernels.cells import Cell, Mask
 
 if TYPE_CHECKING:
-    from potto.integrate.levels import Iteration
     from potto.integrate.work import Work
 
 # How far beside a place it is looked at (beside a bound twice), and what part may be lost across it.
@@ -42,23 +40,24 @@ def look_for_steps(work: Work, whole: Pieces) -> None:
         here[work.level.variable] = Cell(seg.a[follows] + side * BESIDE[1] * np.minimum(width, 1e300))
         sides = {g: take(m, index) for g, m in work.sides.items()}
         with nullcontext() if work.machine.costs is None else work.machine.costs.apart():
-            values.append(work.parent.inside(work.number, here, index.size, sides, frozen)[0])
+            root = work.below(seg.owner[index])
+            values.append(work.parent.inside(work.number, here, index.size, sides, frozen, root)[0])
     mean = whole.size.reshape(work.width, -1, seg.a.size)[:, 0] / (seg.b - seg.a)
     size = np.abs(values[0]) + np.abs(values[1]) + mean[:, follows] + mean[:, follows - 1]
-    if (np.abs(values[0] - values[1]) > DISCONTINUITY * size).any():
-        work.machine.note_degenerate(work.level.variable)
+    jumps = (np.abs(values[0] - values[1]) > DISCONTINUITY * size).any(axis=0)
+    if jumps.any():
+        work.machine.note_degenerate(work.level.variable, work.below(np.unique(seg.owner[follows[jumps]])))
 
 
-def brush(
-    parent: Iteration, number: int, level: LevelPlan, cuts: Cuts, env: dict[str, Value], sides: dict[int, Mask],
-    machine: Evaluator,
-) -> None:  # fmt: skip
+def brush(work: Work, cuts: Cuts, sides: dict[int, Mask]) -> None:
     """Whether what is further in jumps at a bound on which it should only bend: a surface runs along the bound.
 
     Looked at on both sides of the bound, with the surfaces of this variable as they are inside.
     """
-    for edge in cuts.brushes:
-        if number and 2 * edge.owner.size < cuts.sign.size:
+    parent, number, level, env, machine = work.parent, work.number, work.level, work.env, work.machine
+    for found in cuts.brushes:
+        edge = found.pick(np.isin(found.owner, mostly(found.owner, work.root, work.batch) if number else found.owner))
+        if not edge.owner.size:
             continue
         here, inner = around(level, edge.owner, edge.x, not edge.upper, env, sides, machine)
         frozen, size = machine.with_directions(0), edge.owner.size
@@ -68,15 +67,16 @@ def brush(
             assert isinstance(sections, tuple)
             if all(isinstance(at, Cell) and np.isfinite(at.v).all() for at in sections):
                 continue  # none of them runs along it
-        steps = []
+        steps, root = [], work.below(edge.owner)
         with nullcontext() if machine.costs is None else machine.costs.apart():
             for part in BESIDE:
                 aside = part * (1 + np.abs(edge.x))
                 inside, beyond = (
-                    parent.inside(number, {**here, level.variable: Cell(x)}, size, inner, frozen)[0]
+                    parent.inside(number, {**here, level.variable: Cell(x)}, size, inner, frozen, root)[0]
                     for x in (edge.x + aside, edge.x - aside)
                 )
                 steps.append(np.abs(inside - beyond))
         whole = np.abs(inside) + np.abs(beyond)
-        if ((steps[1] > 0.5 * steps[0]) & (steps[1] > DISCONTINUITY * whole)).any():  # what bends would shrink
-            machine.note_degenerate(level.variable)
+        jumps = ((steps[1] > 0.5 * steps[0]) & (steps[1] > DISCONTINUITY * whole)).any(axis=0)  # what bends would shrink
+        if jumps.any():
+            machine.note_degenerate(level.variable, work.below(edge.owner[jumps]))

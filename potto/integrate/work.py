@@ -67,11 +67,13 @@ class Work:
     width: int = 1
     ends: Ends | None = None
     # How many times what it comes to an integral further in adds up: for values, for tangents.
-    cancels: Array = field(default_factory=lambda: np.ones(2))
+    cancels: Array = field(init=False)
+    hidden: Array = field(init=False)  # what is added up further in, on the average, where it comes to nothing
     endless: Array | None = None  # (k, B) the tangents that are infinite, with their signs; 0 for others
 
     def __post_init__(self) -> None:
         self.k = self.machine.directions
+        self.cancels, self.hidden = np.ones((2, self.batch)), np.zeros((2, self.batch))
         self.last = self.number + 1 == len(self.parent.plan.levels)
         # Without forced sides there are no values on a surface: only the moving form does without them.
         self.both = self.moving and not self.parent.plan.hides
@@ -83,8 +85,8 @@ class Work:
         count = self.seg.a.size
         if count == 0:
             shape = (1, self.batch)
-            return Sums(np.zeros(shape), np.zeros(shape), np.zeros((1, self.k, self.batch)),
-                        np.zeros((1, self.k, self.batch)))  # fmt: skip
+            t, et = np.zeros((2, 1, self.k, self.batch))
+            return Sums(np.zeros(shape), np.zeros(shape), t, et, gross=np.zeros((2, self.batch)))
         zero, one = np.zeros(count), np.ones(count)
         ends = self.ends = self.end_values()
         whole = Pieces(np.arange(count), zero, one, np.zeros(count, dtype=np.int64))
@@ -133,7 +135,8 @@ class Work:
             if found is None:
                 break
             if self.machine.exhausted():
-                self.machine.note_unfinished("the budget of evaluations is spent")
+                owners = self.seg.owner[fresh.segment[found[0] | found[1]]]
+                self.machine.note_unfinished("the budget of evaluations is spent", self.below(np.unique(owners)))
                 break
             bad, waiting = found
             accepted.append(fresh.pick(~bad & ~waiting))
@@ -336,13 +339,23 @@ class Work:
         root = self.below(owner[flat])
         sums = self.parent.run(self.number + 1, env, x.size, masks, self.inner, root)
         if sums.gross is not None:
-            most = np.abs(sums.v).max(axis=0), np.abs(sums.t).max(axis=(0, 1), initial=0.0)
-            share = sums.gross / np.maximum(np.stack(most), 1e-300)
-            self.cancels = np.maximum(self.cancels, np.median(share, axis=-1))
+            self.note_cancelling(sums, sums.gross, owner[flat])
         shape = (sums.v.shape[0], *x.shape)
         t = sums.t.reshape(shape[0], -1, *x.shape)
         et = sums.et.reshape(t.shape)
         return sums.v.reshape(shape), t[:, k] if self.moving else None, t[:, :k], sums.e.reshape(shape), et
+
+    def note_cancelling(self, sums: Sums, added: Array, owner: Ints) -> None:
+        """Keep how many times what they come to integrals further in add up, on the whole, for each of this batch."""
+        most = np.abs(sums.v).max(axis=0), np.abs(sums.t).max(axis=(0, 1), initial=0.0)
+        for row, (gross, size) in enumerate(zip(added, most, strict=True)):
+            fine = np.isfinite(gross) & np.isfinite(size)
+            up, down = (np.bincount(owner[fine], x[fine], minlength=self.batch) for x in (gross, size))
+            times = np.divide(up, down, out=np.ones(self.batch), where=down > 0)
+            self.cancels[row] = np.maximum(self.cancels[row], times)
+            if (all_of_it := (down == 0) & (up > 0)).any():
+                mean = up / np.maximum(np.bincount(owner, minlength=self.batch), 1)
+                self.hidden[row] = np.maximum(self.hidden[row], np.where(all_of_it, mean, 0.0))
 
     def below(self, owner: Ints) -> Ints | None:
         """For members of the next batch, the members of the outermost one."""
@@ -363,7 +376,7 @@ class Work:
         sides = {g: np.concatenate((m, m)) if isinstance(m, np.ndarray) else m for g, m in self.sides.items()}
         costs = self.machine.costs
         with nullcontext() if costs is None else costs.ends(seg.ta, seg.tb, self.parent.machine.directions):
-            f, e = self.parent.inside(self.number, here, both.size, sides, frozen)
+            f, e = self.parent.inside(self.number, here, both.size, sides, frozen, self.below(both))
         count = seg.a.size
         e = np.where(np.isfinite(e), e, 0.0)  # where F is infinite
         return Ends(f[:, :count], f[:, count:], e[:, :count], e[:, count:])

@@ -1,6 +1,6 @@
 """The books of one evaluation: what it has done so far, and how far it has come, for whoever watches.
 
-Owns `Books`, `Gauge` and `watching`. Without a watcher no gauge is kept.
+Owns `Books`, `Met`, `Gauge` and `watching`. Without a watcher no gauge is kept.
 """
 
 from __future__ import annotations
@@ -12,10 +12,13 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from potto.integrate import costs
 from potto.integrate.costs import Costs
 from potto.integrate.pieces import Folded, Sided
-from potto.kernels.cells import Array, Value
+from potto.kernels.cells import Array, Bools, Ints, Value
+from potto.runtime.convergence import merged
 
 
 @dataclass(slots=True)
@@ -69,28 +72,146 @@ def _begun() -> Gauge | None:
 
 
 @dataclass
+class Met:
+    """What integrals have met, and which members of the batch did; None: nobody knows which, so any of them may have.
+
+    edges: one-sided derivatives, (..., members) each. sided, folds, degenerate: what is still to be looked into.
+    """
+
+    unfinished: dict[str, Ints | None] = field(default_factory=dict)
+    edges: list[tuple[Sided, Array, Array, Ints | None]] = field(default_factory=list)
+    sided: dict[Sided, Ints | None] = field(default_factory=dict)
+    folds: dict[Sided, tuple[Folded, Ints | None]] = field(default_factory=dict)
+    degenerate: dict[str, Ints | None] = field(default_factory=dict)
+
+    def nothing(self, size: int) -> Bools:
+        """The members of a batch that have met nothing."""
+        mask = np.ones(size, dtype=bool)
+        folds = {what: members for what, (_, members) in self.folds.items()}
+        for event in (self.unfinished, self.degenerate, self.sided, folds):
+            for members in event.values():
+                mask[slice(None) if members is None else members] = False
+        return mask
+
+    def note_fold(self, what: Sided, where: Folded, members: Ints | None) -> None:
+        """Add a fold; where it is for the first member that has it stands for all."""
+        known = {what: self.folds[what][1]} if what in self.folds else {}
+        note(known, what, members)
+        self.folds[what] = self.folds.get(what, (where, members))[0], known[what]
+
+    def take(self, other: Met, index: Ints | None) -> None:
+        """Add what a part of the batch has met, whose members are those of `index` here."""
+
+        def here(members: Ints | None) -> Ints | None:
+            return index if members is None or index is None else index[members]
+
+        for mine, theirs in ((self.unfinished, other.unfinished), (self.degenerate, other.degenerate)):
+            for name, members in theirs.items():
+                note(mine, name, here(members))
+        for what, members in other.sided.items():
+            note(self.sided, what, here(members))
+        for what, (fold, members) in other.folds.items():
+            self.note_fold(what, fold, here(members))
+        self.edges += [(what, back, forth, here(members)) for what, back, forth, members in other.edges]
+
+
+    def of(self, index: Ints) -> Met:
+        """What some members have met, who are numbered anew; what is known of nobody is true of all."""
+        found = Met()
+
+        def own(members: Ints | None) -> Ints | None:
+            return None if members is None else np.searchsorted(index, members[np.isin(members, index)])
+
+        for name, members in self.unfinished.items():
+            there = own(members)
+            if there is None or there.size:
+                found.unfinished[name] = there
+        for what, backward, forward, members in self.edges:
+            if members is None:
+                found.edges.append((what, backward, forward, None))
+            elif (kept := np.isin(members, index)).any():
+                found.edges.append((what, backward[..., kept], forward[..., kept], own(members)))
+        return found
+
+
+def note(where: dict[Any, Ints | None], what: Any, members: Ints | None) -> None:
+    """Add the members that something is true of."""
+    if what not in where:
+        where[what] = members
+    elif where[what] is not None:
+        before = where[what]
+        where[what] = None if members is None or before is None else np.union1d(before, members)
+
+
+@dataclass
 class Books:
     """What one evaluation has done so far. used: answers of before that it is made of.
 
-    unfinished: why answers are not what was asked for, and of which members of the batch, or True.
+    met: what the integrals of the present batch have met. reasons, edges: why answers are not what was asked for, and
+    where they are one-sided, as masks and numbers over the whole of what was asked for, or True and numbers for one.
     within: the error up to which what cancels is 0 as accurately as asked for, of all or of each of the batch.
+    start, members: how many evaluations had been done before those that count, and for how many members these are.
     """
 
     evaluations: int = 0
     depth: int = 0
-    unfinished: dict[str, Any] = field(default_factory=dict)
+    met: Met = field(default_factory=Met)
+    reasons: dict[str, Any] = field(default_factory=dict)
     edges: list[tuple[Sided, Array, Array]] = field(default_factory=list)
-    sided: dict[Sided, None] = field(default_factory=dict)
-    folds: dict[Sided, Folded] = field(default_factory=dict)
     methods: set[str] = field(default_factory=set)
-    degenerate: set[str] = field(default_factory=set)
     second: bool = False
     within: Any = 0.0
+    start: int = 0
     members: int = 1
     integrals: int = 0
     used: dict[tuple[str, str], Value] = field(default_factory=dict)
     costs: Costs | None = field(default_factory=costs.books)
     gauge: Gauge | None = field(default_factory=_begun)
+
+    @property
+    def spent(self) -> float:
+        """The evaluations that count, of one member."""
+        return (self.evaluations - self.start) / self.members
+
+    def tell(self, met: Met, batch: int, shape: tuple[int, ...]) -> None:
+        """Add what the integrals of a whole batch have met to what the answer says, in the batch's shape."""
+        for reason, members in met.unfinished.items():
+            where: Any = True
+            if shape:
+                where = np.full(batch, members is None)
+                where[[] if members is None else members] = True
+                where = where.reshape(shape)
+            merged(self.reasons, {reason: where})
+        edges: dict[Sided, list[Array]] = {}
+        for what, *sides, members in met.edges:
+            count = batch if members is None else members.size
+            for number, side in enumerate(sides):
+                rows = side.reshape(-1, count)
+                known = edges.setdefault(what, [np.full((rows.shape[0], batch), np.nan) for _ in sides])[number]
+                if known.shape[0] == rows.shape[0]:
+                    known[:, slice(None) if members is None else members] = rows
+        for what, (backward, forward) in edges.items():
+            self.edges.append((what, backward.reshape(-1, *shape), forward.reshape(-1, *shape)))
+
+    @contextmanager
+    def apart(self) -> Iterator[Met]:
+        """What is met in this block is noted by itself, and forgotten unless somebody takes it."""
+        kept, self.met = self.met, Met()
+        try:
+            yield self.met
+        finally:
+            self.met = kept
+
+    @contextmanager
+    def among(self, index: Ints) -> Iterator[Met]:
+        """In this block these members of the batch are all that there are, with a budget of their own."""
+        kept = self.start, self.members, self.evaluations
+        self.start, self.members = self.evaluations - round(self.spent * index.size), index.size
+        try:
+            with self.apart() as met:
+                yield met
+        finally:
+            self.start, self.members = kept[0] + self.evaluations - kept[2], kept[1]
 
     def count(self, evaluations: int, most: int) -> None:
         """Note evaluations of integrands, of which so many are allowed for each member of the batch."""

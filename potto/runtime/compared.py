@@ -44,7 +44,7 @@ def compared(machine: Machine, inner: Derivative, groups: Groups, value: Value) 
         return value
     finally:
         machine.books.evaluations += other.books.evaluations
-    if other.books.unfinished or _agree(value[0], first, SLACK * _largest(first)):
+    if other.books.reasons or _agree(value[0], first, SLACK * _largest(first)):
         return value
     machine.note_unfinished(DISAGREE)
     return first, _unknown(value[1])

@@ -17,13 +17,15 @@ import numpy as np
 
 from potto.core.terms import Branch, Const, Integral, Prim, Proj, Term, Tuple, Var, children
 from potto.integrate.pieces import Sums
-from potto.kernels.cells import Array
+from potto.kernels.cells import Array, Bools
 from potto.runtime.advice import INFINITE, NO_VALUE, TOO_FEW
 from potto.settings import Settings
 
 CANCELS = 1e-12
 # What is added up counts as so much at most, where something small could be lost in it.
 UNIT = 1.0
+# What is a speck, beside the largest of a batch.
+SPECK = 1e-15
 # From which part of a value on an error is more than rounding, and up to which it is nothing else.
 LOST, ROUNDED = 0.1, 1e-6
 
@@ -53,15 +55,27 @@ def allowance(term: Integral, sums: Sums, rtol: float) -> Any:
     """The error of each of a batch of integrals up to which it, or its derivative, is 0 as accurately as asked for."""
     most = np.inf if adds_nothing(term.body) else UNIT
     share = min(rtol, CANCELS)
-    if sums.gross is None:
-        value, rate = np.abs(sums.v).max(axis=0), np.abs(sums.t).max(axis=(0, 1), initial=0.0)
-    elif sums.v.size == 1:  # numpy takes its time over a single number
-        gross, rates = float(sums.gross[0, 0]), float(sums.gross[1, 0])
-        return share * max(min(gross, most) if gross < np.inf else 0.0, min(rates, UNIT))
-    else:
-        value, rate = sums.gross
+    if sums.v.size == 1 and sums.gross is not None:  # numpy takes its time over a single number
+        gross, rates = float(sums.gross[0, 0]), float(max(sums.gross[1, 0], *np.abs(sums.t).flat, 0.0))
+        return share * max(min(gross, most) if gross < np.inf else 0.0, min(rates, UNIT) if rates < np.inf else 0.0)
+    value, rate = np.abs(sums.v).max(axis=0), np.abs(sums.t).max(axis=(0, 1), initial=0.0)
+    if sums.gross is not None:
+        value, rate = np.maximum(sums.gross[0], value), np.maximum(sums.gross[1], rate)
     value = np.where(np.isfinite(value), np.minimum(value, most), 0.0)
     return share * np.maximum(value, np.where(np.isfinite(rate), np.minimum(rate, UNIT), 0.0))
+
+
+def missing(term: Integral, sums: Sums, settings: Settings) -> Bools:
+    """The members of a batch of integrals for which it pays to look further: values or derivatives are not as accurate
+    as was asked for, and what is off is no speck beside what the others come to."""
+    within = allowance(term, sums, settings.rtol)
+    out: Bools = np.zeros(sums.v.shape[-1], dtype=bool)
+    for number, error in ((sums.v, sums.e), (sums.t, sums.et)):
+        size = np.abs(number)
+        speck = SPECK * np.max(size, axis=-1, keepdims=True, initial=0.0, where=np.isfinite(size))
+        fine = error <= np.maximum(np.maximum(settings.atol, settings.rtol * size), np.maximum(within, speck))
+        out |= ~fine.reshape(-1, out.size).all(axis=0)
+    return out
 
 
 def widest(before: Any, after: Any) -> Any:

@@ -16,7 +16,7 @@ import numpy as np
 from potto.integrate.pieces import Sums, still
 from potto.kernels.cells import Array, Cell, Value, map_arrays
 from potto.runtime.functions import Closure
-from potto.runtime.one_sided import apart, moved
+from potto.runtime.one_sided import moved
 from potto.runtime.plans import Linked, link
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def by_differences(
             step = min(_reaches(env.values(), int(d)), default=0.0) * REACH / 4
             if not 0 < step < np.inf:
                 continue
-            with apart(machine):
+            with machine.books.apart():
                 found = _derivative(env, int(d), step, evaluated)
             if found is None:
                 continue

@@ -13,6 +13,7 @@ from potto.core.terms import Integral
 from potto.integrate.eliminated import one_by_one
 from potto.integrate.pieces import Sums
 from potto.kernels.cells import map_arrays
+from potto.runtime.books import Met
 from potto.runtime.plans import Linked, eliminated_for
 
 if TYPE_CHECKING:
@@ -28,12 +29,11 @@ def step_by_step(machine: Machine, term: Integral, linked: Linked, batch: int, l
     if known is None:
         return None
     rows, books = [], machine.books
-    before = dict(books.unfinished), dict(books.sided), dict(books.folds)
     for i in range(batch):
-        row = one_by_one(known, machine, {n: map_arrays(v, lambda a, i=i: float(a[i])) for n, v in linked.env.items()})
-        noted = books.unfinished, books.sided, books.folds
-        if row is None or noted != before or not accurate(row, limit, machine):
-            books.unfinished, books.sided, books.folds = before
+        with books.apart() as met:
+            env = {n: map_arrays(v, lambda a, i=i: float(a[i])) for n, v in linked.env.items()}
+            row = one_by_one(known, machine, env)
+        if row is None or met != Met() or not accurate(row, limit, machine):
             return None
         rows.append(row)
     machine.books.methods.add("quadrature")

@@ -45,7 +45,8 @@ class OneSided:
 
 def _number(x: Any) -> str:
     flat = np.asarray(x, dtype=float).ravel()
-    if np.isnan(flat[:1]).any():
+    flat = flat[~np.isnan(flat)]  # members of a batch that have no such sides
+    if not flat.size:
         return "not known"
     return f"{flat[0]:.12g}" if flat.size == 1 else f"{flat[0]:.12g}, ..."
 

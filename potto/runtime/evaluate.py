@@ -146,18 +146,20 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
 
 def _reasons(flat: list[tuple[Any, Any]], books: Books, settings: Settings) -> Reasons:
     """Why the numbers are not as accurate as was asked for: as the books say, and for other members by their errors."""
-    reasons = dict(books.unfinished)
+    reasons = dict(books.reasons)
+    merged(reasons, dict.fromkeys(books.met.unfinished, True))
+    before = dict(reasons)
     drawn = not books.methods.isdisjoint(("mc", "qmc"))
     within = books.within if books.methods else CANCELS
     for number, error in flat:
         found = missed(number, error, within, settings, drawn)
-        if not found or any(where is True for where in books.unfinished.values()):
+        if not found or any(where is True for where in before.values()):
             continue
         if not books.methods:
             found.pop(INFINITE, None)  # of 1/0 no integral is to blame
         elif found and any(rough(answer, settings.rtol, settings.atol) for answer in books.used.values()):
             found = {ROUGH: np.logical_or.reduce(list(found.values()))}
-        told = converged_members(books.unfinished, np.shape(number))
+        told = converged_members(before, np.shape(number))
         merged(reasons, {why: where & told if np.ndim(where) else where for why, where in found.items()})
     return {why: where for why, where in reasons.items() if np.any(where)}
 

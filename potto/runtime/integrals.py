@@ -24,10 +24,11 @@ from potto.integrate.pieces import Sums, still
 from potto.integrate.plan import Plan
 from potto.integrate.straight import certain
 from potto.kernels import errors
-from potto.kernels.cells import Array, Cell, Number, Value, all_arrays, map_arrays
-from potto.runtime.convergence import allowance, widest
+from potto.kernels.cells import Array, Cell, Ints, Number, Value, all_arrays, map_arrays
+from potto.runtime.convergence import allowance, missing, widest
 from potto.runtime.differences import by_differences
 from potto.runtime.elimination import ACCURATE, WORTH, step_by_step
+from potto.runtime.members import Ways, Whole, by_members
 from potto.runtime.one_sided import beside_axes, beside_folds, from_both_sides, one_direction
 from potto.runtime.plans import Linked, link, plan_for, split_by_decisions
 
@@ -77,37 +78,49 @@ def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermos
     if machine.overdrawn() and not outermost:
         return given_up(machine, shape)
     linked = link(flat)
+    with machine.books.apart() as met:
+        sums = poisoned(_grouped(machine, term, linked, flat, batch, outermost), linked.env)
+        if outermost:
+            within = allowance(term, sums, machine.rtol)
+    if outermost:
+        machine.books.tell(met, batch, shape)
+        within = within.reshape(shape) if np.ndim(within) and shape else float(np.max(within))
+        machine.books.within = widest(machine.books.within, within)
+    else:
+        machine.books.met.take(met, None)
+    return _shaped(sums, shape)
+
+
+def _grouped(
+    machine: Machine, term: Integral, linked: Linked, flat: dict[str, Value], batch: int, outermost: bool
+) -> Sums:
+    """What an integral amounts to; members for which recursions take different courses apart from one another."""
     groups = split_by_decisions(machine, term, linked, batch)
     if groups is None:
-        sums = _vouched(machine, term, linked, batch, outermost)
-        return _shaped(poisoned(sums, linked.env), shape)
-    result: Sums | None = None
+        return _vouched(machine, term, linked, batch, outermost)
+    found = Whole(batch)
     for index in groups:
-        here = {n: map_arrays(v, lambda a, index=index: a[index]) for n, v in flat.items()}
-        there = link(here)
-        part = _vouched(machine, term, there, index.size, outermost)
-        if result is None:
-            m, k = part.v.shape[0], part.t.shape[1]
-            result = Sums(np.zeros((m, batch)), np.zeros((m, batch)), np.zeros((m, k, batch)), np.zeros((m, k, batch)))
-        result.v[:, index], result.e[:, index] = part.v, part.e
-        result.t[:, :, index], result.et[:, :, index] = part.t, part.et
-    assert result is not None
-    return _shaped(poisoned(result, linked.env), shape)
+        there = link({n: map_arrays(v, operator.itemgetter(index)) for n, v in flat.items()})
+        with machine.books.among(index) as met:
+            found.put(index, _vouched(machine, term, there, index.size, outermost))
+        machine.books.met.take(met, index)
+    return found.sums
 
 
 def _vouched(machine: Machine, term: Integral, linked: Linked, batch: int, outermost: bool) -> Sums:
     """What an integral amounts to. Rules on pieces that should have been cut further are good for nothing."""
     sums = solve(machine, term, linked, linked.env, batch, outermost)
-    if outermost:
-        machine.books.within = widest(machine.books.within, allowance(term, sums, machine.rtol))
-        if "quadrature" in machine.books.methods and _left_out(machine):
-            sums.e, sums.et = np.full_like(sums.e, np.inf), np.full_like(sums.et, np.inf)
+    if outermost and "quadrature" in machine.books.methods:
+        left = _left_out(machine, batch)
+        sums.e[:, left], sums.et[:, :, left] = np.inf, np.inf
     return sums
 
 
-def _left_out(machine: Machine) -> bool:
-    """Whether roots were left out, because they are too many."""
-    return any("too many roots" in reason for reason in machine.books.unfinished)
+def _left_out(machine: Machine, batch: int) -> Ints:
+    """The members whose roots were left out, because they are too many."""
+    reasons = machine.books.met.unfinished.items()
+    found = [np.arange(batch) if members is None else members for why, members in reasons if "too many roots" in why]
+    return np.unique(np.concatenate(found)) if found else np.zeros(0, dtype=np.int64)
 
 
 def given_up(machine: Machine, shape: tuple[int, ...]) -> Value:
@@ -132,40 +145,45 @@ def poisoned(sums: Sums, env: dict[str, Value]) -> Sums:
 
 
 def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value], batch: int, outermost: bool) -> Sums:
-    method = machine.settings.method
     if outermost:
         machine.books.members = max(machine.books.members, batch)
-    if outermost and method in ("auto", "quadrature") and many(machine, term, linked):
-        sampled = method == "auto" and too_many(machine, term, linked)
-        found = step_by_step(machine, term, linked, batch, WORTH if sampled else ACCURATE)
-        if found is not None:
-            return found
-    if outermost and (method in ("mc", "qmc") or (method == "auto" and too_many(machine, term, linked))):
-        return _sampled(machine, term, linked, env, batch)
+        sampled = machine.settings.method in ("mc", "qmc")
+        if not sampled and many(machine, term, linked):
+            sampled = machine.settings.method == "auto" and too_many(machine, term, linked)
+            found = step_by_step(machine, term, linked, batch, WORTH if sampled else ACCURATE)
+            if found is not None:
+                return found
+        elif machine.settings.method == "auto":
+            sampled = too_many(machine, term, linked)
+        if sampled:
+            return _sampled(machine, term, linked, env, batch)
+        if batch > 1:
+            return _batch(machine, term, linked, batch)
     machine.books.methods.add("quadrature")
+    met = machine.books.met
     for order in preferred(machine, term, linked):
-        machine.books.degenerate.clear()
+        met.degenerate.clear()
         plan = plan_for(machine, order, linked)
         if batch == 1 and plan.straight is not None:
             plain = certain(plan.straight, machine, linked.env)
             if plain is not None:
                 return plain
         sums = counted(in_parts(plan, machine, plan.environment(env, linked.env), batch), plan.reaches, machine)
-        if not machine.books.degenerate:
-            if outermost and machine.books.sided and not machine.side:
+        if not met.degenerate:
+            if outermost and met.sided and not machine.side:
                 from_both_sides(machine, plan, plan.environment(env, linked.env), batch, sums, iterated)
-            if outermost and machine.books.folds:
+            if outermost and met.folds:
                 beside_folds(machine, plan, linked, batch, sums, partial(_beside, machine, term))
             if not outermost:
                 return sums
             sums = turned_round(machine, order, linked, env, batch, sums)
-            if machine.directions and not (machine.books.edges or machine.side):
+            if machine.directions and not (met.edges or machine.side):
                 by_differences(machine, linked, batch, sums, partial(_beside, machine.with_directions(0), term))
             return sums
     if outermost and machine.directions > 1:
         return one_by_one(machine, term, linked, batch)
     if outermost:
-        variable = min(machine.books.degenerate)
+        variable = min(met.degenerate)
         resting = link({n: still(v) for n, v in linked.env.items()})
         values = solve(machine.with_directions(0), term, resting, resting.env, batch, False)
         sums.v, sums.e = values.v, values.e
@@ -179,6 +197,31 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
     return sums
 
 
+def _batch(machine: Machine, term: Integral, linked: Linked, batch: int) -> Sums:
+    """The sums of a batch, member by member where they meet something."""
+
+    def whole(order: Integral, here: Linked, size: int) -> Sums:
+        plan = plan_for(machine, order, here)
+        return in_parts(plan, machine, plan.environment(here.env, here.env), size)
+
+    def settled(order: Integral, here: Linked, size: int, sums: Sums) -> Sums:
+        plan = plan_for(machine, order, here)
+        sums = counted(sums, plan.reaches, machine)
+        if machine.books.met.sided and not machine.side:
+            from_both_sides(machine, plan, plan.environment(here.env, here.env), size, sums, iterated)
+        return turned_round(machine, order, here, here.env, size, sums)
+
+    machine.books.methods.add("quadrature")
+    ways = Ways(
+        lambda: preferred(machine, term, linked),
+        whole,
+        settled,
+        partial(one_by_one, machine, term),
+        lambda one: solve(machine, term, one, one.env, 1, True),
+    )
+    return by_members(machine, linked, batch, ways, lambda sums: missing(term, sums, machine.settings))
+
+
 def _sampled(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value], batch: int) -> Sums:
     """The sums from samples of all variables at once."""
     from potto.integrate.sampling import sample
@@ -186,8 +229,7 @@ def _sampled(machine: Machine, term: Integral, linked: Linked, env: dict[str, Va
     plan, method = plan_for(machine, term, linked), machine.settings.method
     sums = counted(sample(plan, machine, plan.environment(env, linked.env), batch, method), plan.reaches, machine)
     machine.books.methods.add("mc" if method == "mc" else "qmc")
-    if _left_out(machine):
-        sums.et = np.full_like(sums.et, np.inf)  # what crosses those that were left out is not known
+    sums.et[:, :, _left_out(machine, batch)] = np.inf  # what crosses those that were left out is not known
     return sums
 
 
@@ -214,18 +256,16 @@ def turned_round(
     node further out misplaces it; along another variable it is flat.
     """
     spoilt = ((sums.et > machine.rtol * np.abs(sums.t)) & (sums.et > STEEP * sums.e[:, None])).any(axis=(0, 1))
-    if machine.books.unfinished or not spoilt.any() or np.isinf(sums.et).any() or spoilt.sum() > MOST_SPOILT:
+    spoilt &= ~np.isinf(sums.et).any(axis=(0, 1))
+    if machine.books.met.unfinished or not spoilt.any() or spoilt.sum() > MOST_SPOILT:
         return sums
     index = np.nonzero(spoilt)[0]
     here = {n: map_arrays(v, operator.itemgetter(index)) for n, v in env.items()}
     for order in itertools.islice(orders(term), 1, None):
         plan = plan_for(machine, order, linked)
-        other = iterated(plan, machine, plan.environment(here, linked.env), index.size)
-        if machine.books.degenerate or machine.books.unfinished:
-            machine.books.degenerate.clear()
-            machine.books.unfinished.clear()
-            continue
-        better = other.et < sums.et[:, :, index]
+        with machine.books.apart() as met:
+            other = iterated(plan, machine, plan.environment(here, linked.env), index.size)
+        better = (other.et < sums.et[:, :, index]) & met.nothing(index.size)
         sums.t[:, :, index] = np.where(better, other.t, sums.t[:, :, index])
         sums.et[:, :, index] = np.where(better, other.et, sums.et[:, :, index])
     return sums
@@ -306,7 +346,9 @@ def in_parts(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) ->
         machine.costs.whole += batch - rest.size
     if rest.size:
         here = {n: map_arrays(v, operator.itemgetter(rest)) for n, v in env.items()}
-        part = iterated(plan, machine, here, rest.size)
+        with machine.books.apart() as met:
+            part = iterated(plan, machine, here, rest.size)
+        machine.books.met.take(met, rest)
         for name in ("v", "e", "t", "et"):
             getattr(sums, name)[..., rest] = getattr(part, name)
         if part.gross is None or sums.gross is None:
@@ -326,7 +368,9 @@ def iterated(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) ->
         for start in range(0, batch, BATCH):
             index = slice(start, min(start + BATCH, batch))
             here = {n: map_arrays(v, operator.itemgetter(index)) for n, v in env.items()}
-            parts.append(Iteration(plan, machine, order).run(0, here, index.stop - start, {}, machine))
+            with machine.books.apart() as met:
+                parts.append(Iteration(plan, machine, order).run(0, here, index.stop - start, {}, machine))
+            machine.books.met.take(met, np.arange(index.start, index.stop))
     m = max(p.v.shape[0] for p in parts)
 
     def joined(name: str) -> Array:
@@ -344,7 +388,8 @@ def best_order(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) 
     costs = []
     for order in ORDERS:
         before = machine.books.evaluations
-        Iteration(plan, machine, order).run(0, here, PILOTS, {}, machine)
+        with machine.books.apart():
+            Iteration(plan, machine, order).run(0, here, PILOTS, {}, machine)
         costs.append(machine.books.evaluations - before)
     return ORDERS[costs.index(min(costs))]
 

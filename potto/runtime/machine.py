@@ -35,9 +35,9 @@ from potto.diagnostics import PottoError
 from potto.integrate.costs import Costs
 from potto.integrate.pieces import Folded, Sided, still
 from potto.kernels import errors
-from potto.kernels.cells import Array, Cell, Number, Pattern, Trace, Value, pad, pattern
+from potto.kernels.cells import Array, Cell, Ints, Number, Pattern, Trace, Value, pad, pattern
 from potto.kernels.compile import Kernel, counts, kernel
-from potto.runtime.books import Books
+from potto.runtime.books import Books, note
 from potto.runtime.functions import Closure, Derivative, Paired
 from potto.runtime.reach import Reach
 from potto.settings import Settings
@@ -177,28 +177,28 @@ class Machine:
             gauge.sampled(share, limit)
 
     def exhausted(self) -> bool:
-        return self.books.evaluations > self.settings.max_evals * self.books.members
+        return self.books.spent > self.settings.max_evals
 
     def overdrawn(self) -> bool:
         """Whether integrals inside of integrals have spent far more than the budget: what is left is given up."""
-        return self.books.evaluations > OVERDRAFT * self.settings.max_evals * self.books.members
+        return self.books.spent > OVERDRAFT * self.settings.max_evals
 
-    def note_edge(self, what: Sided, backward: Array, forward: Array) -> None:
-        self.books.edges.append((what, backward, forward))
+    def note_edge(self, what: Sided, backward: Array, forward: Array, members: Ints | None = None) -> None:
+        self.books.met.edges.append((what, backward, forward, members))
 
-    def note_sided(self, what: Sided) -> None:
+    def note_sided(self, what: Sided, members: Ints | None = None) -> None:
         """What an integral finds that stands in another one: how much it comes to, that one will say."""
-        self.books.sided[what] = None
+        note(self.books.met.sided, what, members)
 
-    def note_fold(self, what: Sided, where: Folded) -> None:
+    def note_fold(self, what: Sided, where: Folded, members: Ints | None = None) -> None:
         """Where sections of a surface appear or merge: only what is beside the parameters tells about derivatives."""
-        self.books.folds.setdefault(what, where)
+        self.books.met.note_fold(what, where, members)
 
-    def note_unfinished(self, reason: str) -> None:
-        self.books.unfinished[reason] = True
+    def note_unfinished(self, reason: str, members: Ints | None = None) -> None:
+        note(self.books.met.unfinished, reason, members)
 
-    def note_degenerate(self, variable: str) -> None:
-        self.books.degenerate.add(variable)
+    def note_degenerate(self, variable: str, members: Ints | None = None) -> None:
+        note(self.books.met.degenerate, variable, members)
 
     # Terms over batches
 

@@ -1,6 +1,6 @@
 """Derivatives that are not the same on the two sides of the parameters.
 
-Owns `from_both_sides`, `beside_folds`, `beside_axes`, `one_direction`, `moved` and `apart`. What surfaces on bounds
+Owns `from_both_sides`, `beside_folds`, `beside_axes`, `one_direction` and `moved`. What surfaces on bounds
 and on one another contribute is known on either side (`integrate/edges`). Where sections of a surface appear or merge
 just at the parameters they move infinitely fast, and nothing at this place tells the derivative: of [x^2 < t] at t =
 0 it is 0 on one side and infinite on the other, of [x^2 + y^2 < t] 0 and pi. It is then looked at beside the
@@ -11,7 +11,6 @@ none.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -43,14 +42,18 @@ def from_both_sides(
     iterated: Callable[[Plan, Machine, dict[str, Value], int], Sums],
 ) -> None:  # fmt: skip
     """Note the one-sided derivatives of an integral in which a part has two; where the whole has one, that is it."""
-    reasons = tuple(machine.books.sided)
-    machine.books.sided.clear()
-    found = [iterated(plan, replace(machine, side=side), env, batch) for side in (-1, 1)]
+    reasons = dict(machine.books.met.sided)
+    machine.books.met.sided.clear()
+    with machine.books.apart():
+        found = [iterated(plan, replace(machine, side=side), env, batch) for side in (-1, 1)]
     backward, forward = (np.where(np.isfinite(part.et), part.t, np.nan) for part in found)
     same = np.abs(forward - backward) <= 1e-12 * (np.abs(forward) + np.abs(backward))
     sums.t = np.where(same, forward, sums.t)
-    for what in () if same.all() else reasons:
-        machine.note_edge(what, backward, forward)
+    differ = np.nonzero(~same.all(axis=(0, 1)))[0]
+    for what, members in reasons.items():
+        there = differ if members is None else np.intersect1d(differ, members)
+        if there.size:
+            machine.note_edge(what, backward[..., there], forward[..., there], there)
 
 
 def beside_folds(
@@ -60,8 +63,8 @@ def beside_folds(
 
     evaluated: the integral for other parameters, of one member.
     """
-    folds = dict(machine.books.folds)
-    with apart(machine):
+    folds = {what: where for what, (where, _) in machine.books.met.folds.items()}
+    with machine.books.apart():
         found = [
             (what, side)
             for what, where in folds.items()
@@ -77,7 +80,7 @@ def beside_folds(
         et[:] = np.where(np.isfinite(t), np.where(np.isfinite(et), et, 0.0), np.inf)
         _endless(machine, backward, forward, t, et)
         machine.note_edge(what, backward, forward)
-    machine.books.folds.clear()
+    machine.books.met.folds.clear()
 
 
 def beside_axes(
@@ -88,8 +91,8 @@ def beside_axes(
     what = Sided(variable)
     if batch > MOST_MEMBERS:
         return False
-    machine.books.degenerate.clear()
-    with apart(machine):
+    machine.books.met.degenerate.clear()
+    with machine.books.apart():
         found = list(_sides(machine, plan, linked, range(batch), None, evaluated))
     still_ones = batch * sum(not any(_moves(v, d) for v in linked.env.values()) for d in range(machine.directions))
     if len(found) + still_ones < batch * machine.directions:
@@ -113,18 +116,6 @@ def _endless(machine: Machine, backward: Array, forward: Array, t: Array, et: Ar
     t[:], et[:] = np.where(both, forward, t), np.where(both, np.inf, et)
     if both.any():
         machine.note_unfinished(BOUNDLESS)
-
-
-@contextmanager
-def apart(machine: Machine) -> Iterator[None]:
-    """What is noted in this block is about other parameters, and forgotten."""
-    books = machine.books
-    kept = dict(books.unfinished), list(books.edges), dict(books.sided), set(books.degenerate)
-    books.folds.clear()
-    try:
-        yield
-    finally:
-        books.unfinished, books.edges[:], books.sided, books.degenerate = kept
 
 
 def _same(backward: Array, forward: Array, off: Array) -> bool:
