@@ -10,15 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-import numpy as np
-
 from potto.arguments import Batch
 from potto.core.terms import Lam, Term
 from potto.elaborate import elaborate_expression
 from potto.kernels.cells import Cell, Value, pad
 from potto.kernels.errors import wrong_call
 from potto.render import Located, ProgramError
-from potto.runtime.convergence import merged
+from potto.runtime.convergence import Reasons, converged_members, merged
 from potto.runtime.estimate import Estimate
 from potto.runtime.evaluate import Clock, report
 from potto.runtime.functions import Closure
@@ -172,10 +170,10 @@ def _gathered(parts: list[Estimate], wrt: tuple[str, ...], given: dict[str, Valu
     common["reasons"] = tuple(dict.fromkeys(reason for part in parts for reason in part.reasons))
     common["converged"] = all(part.converged for part in parts)
     if first.member_converged is not None:
-        common["member_converged"] = np.logical_and.reduce([part.member_converged for part in parts])
-        reasons: dict[str, Any] = {}
+        reasons: Reasons = {}
         for part in parts:
             merged(reasons, part.reason_members)
+        common["member_converged"] = converged_members(reasons, first.member_converged.shape)
         common["reason_members"] = reasons
     return Gradient(**common, wrt=wrt)
 

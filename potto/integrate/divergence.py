@@ -1,9 +1,9 @@
 """Integrals that have no value, or none that refinement comes near to.
 
-Owns `given_up` and `endless`. Where pieces at an end of a segment are as small as they get and still err, the integrand grows there
-like a power of the distance, u^-a. From a = 1 on its integral is infinite: the answer is inf or -inf, or nan where both
-come together. Where a is less, so that there is a value which is out of reach, or where such a piece lies elsewhere, at
-a pole, the answer is nan. It is never a number.
+Owns `given_up` and `endless`. Where pieces at an end of a segment are as small as they get and still err, the integrand
+grows there like a power of the distance, u^-a. From a = 1 on its integral is infinite: the answer is inf or -inf, or
+nan where both come together. Where a is less, so that there is a value which is out of reach, or where such a piece
+lies elsewhere, at a pole, the answer is nan. It is never a number.
 
 A derivative is infinite where what it is the integral of grows so, in both of its forms (`forms`), down to the smallest
 distances from the end that doubles have: of the area of x*y < t at t = 0, where sections move at the speed 1/x.
@@ -90,21 +90,19 @@ def endless(work: Work, found: Totals) -> Array | None:
     if work.number or not work.k:
         return None
     error = found.moving[1] if found.fixed is None else np.minimum(found.moving[1], found.fixed[1])
-    rough = ~(error <= SETTLED * np.abs(found.moving[0])) & ~(error <= SETTLED * found.size[:, :1])
+    rough: Any = ~(error <= SETTLED * np.abs(found.moving[0])) & ~(error <= SETTLED * found.size[:, :1])
     index = np.nonzero(rough.any(axis=(0, 1))[work.seg.owner] & np.isfinite(work.seg.a + work.seg.b))[0]
     if not index.size:
         return None
-    up: Bools = np.zeros((work.k, work.batch), dtype=bool)
-    down: Bools = np.zeros_like(up)
+    goes: Any = np.zeros((2, work.k, work.batch), dtype=bool)  # up, down
     for upper in (False, True):
         for d, sign in enumerate(_without_end(work, index, upper)):
-            up[d, work.seg.owner[index[sign > 0]]] = True
-            down[d, work.seg.owner[index[sign < 0]]] = True
-    for mask in (up, down):
-        mask &= rough.any(axis=0)
-    if not (up | down).any():
+            goes[0, d, work.seg.owner[index[sign > 0]]] = True
+            goes[1, d, work.seg.owner[index[sign < 0]]] = True
+    up, down = goes & rough.any(axis=0)
+    if not goes.any():
         return None
-    work.machine.note_unfinished(BOUNDLESS, work.below(np.nonzero(np.any(up | down, axis=0))[0]))
+    work.machine.note_unfinished(BOUNDLESS, work.below(np.nonzero((up | down).any(axis=0))[0]))
     return np.where(up & down, np.nan, np.where(up, np.inf, np.where(down, -np.inf, 0.0)))
 
 

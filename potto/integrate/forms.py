@@ -13,7 +13,7 @@ import numpy as np
 
 from potto.integrate.pieces import Pieces, Sums
 from potto.integrate.rules import EPS
-from potto.kernels.cells import Array
+from potto.kernels.cells import Array, Ints
 
 if TYPE_CHECKING:
     from potto.integrate.work import Work
@@ -121,6 +121,22 @@ def added_up(work: Work, found: Totals) -> Array:
         reach = np.bincount(work.seg.owner, work.seg.b - work.seg.a, minlength=work.batch)
         gross += work.hidden * np.where(np.isfinite(reach), reach, 0.0)
     return gross
+
+
+def note_cancelling(work: Work, inner: Sums, added: Array, owner: Ints) -> None:
+    """Keep how many times what they come to integrals further in add up, on the whole, for each of the batch.
+
+    added: (2, N) what they add up; owner: (N,) whose they are.
+    """
+    most = np.abs(inner.v).max(axis=0), np.abs(inner.t).max(axis=(0, 1), initial=0.0)
+    for row, (gross, size) in enumerate(zip(added, most, strict=True)):
+        fine = np.isfinite(gross) & np.isfinite(size)
+        up, down = (np.bincount(owner[fine], x[fine], minlength=work.batch) for x in (gross, size))
+        times = np.divide(up, down, out=np.ones(work.batch), where=down > 0)
+        work.cancels[row] = np.maximum(work.cancels[row], times)
+        if (nothing := (down == 0) & (up > 0)).any():
+            mean = up / np.maximum(np.bincount(owner, minlength=work.batch), 1)
+            work.hidden[row] = np.maximum(work.hidden[row], np.where(nothing, mean, 0.0))
 
 
 def sums(work: Work, found: Totals, ends: Ends | None) -> Sums:

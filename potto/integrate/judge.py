@@ -1,8 +1,8 @@
 """Which pieces are not accurate enough, and which are as accurate as they can be.
 
-Owns `too_coarse`, `missed_peak` and `doubtful`. A piece is refined until its error is a small enough part of what it is
-added to, or until what is left of it is rounding. Estimates see only what the nodes see, so the ends of segments and
-the agreement of two forms of each derivative are looked at besides.
+Owns `too_coarse`, `stragglers`, `missed_peak` and `doubtful`. A piece is refined until its error is a small enough part
+of what it is added to, or until what is left of it is rounding. Estimates see only what the nodes see, so the ends of
+segments and the agreement of two forms of each derivative are looked at besides.
 """
 
 from __future__ import annotations
@@ -29,6 +29,8 @@ MISLED = 200.0
 # answer, which may be far smaller.
 STUCK = 0.35
 NOISE = (1e-12, 1e-9)
+# Members that take longer than the others are left to be done by themselves if they are one in so many.
+STRAGGLERS = 16
 
 
 def too_coarse(work: Work, p: Pieces, ends: Any, tally: Tally) -> Any:
@@ -62,6 +64,19 @@ def too_coarse(work: Work, p: Pieces, ends: Any, tally: Tally) -> Any:
             bad = (bad & ~blind[owner]) | peak
     bad &= wide
     return (bad, waiting) if bad.any() else None
+
+
+def stragglers(work: Work, p: Pieces, bad: Bools) -> Bools:
+    """The pieces of the few members that are still refined when all others are done: they go on by themselves."""
+    late: Bools = np.zeros(bad.size, dtype=bool)
+    members = work.below(work.seg.owner[p.segment])
+    if members is None:
+        return late
+    few = np.unique(members[bad])
+    if STRAGGLERS * few.size <= int(members.max()) + 1:
+        work.machine.note_unfinished("it takes longer than others that are evaluated with it", few)
+        late |= np.isin(members, few)
+    return late
 
 
 def noisy(p: Pieces, off: Array, gross: Array, whole: Array) -> Bools:

@@ -77,6 +77,7 @@ def brush(work: Work, cuts: Cuts, sides: dict[int, Mask]) -> None:
                 )
                 steps.append(np.abs(inside - beyond))
         whole = np.abs(inside) + np.abs(beyond)
-        jumps = ((steps[1] > 0.5 * steps[0]) & (steps[1] > DISCONTINUITY * whole)).any(axis=0)  # what bends would shrink
+        # What bends would shrink.
+        jumps = ((steps[1] > 0.5 * steps[0]) & (steps[1] > DISCONTINUITY * whole)).any(axis=0)
         if jumps.any():
             machine.note_degenerate(level.variable, work.below(edge.owner[jumps]))

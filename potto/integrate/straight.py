@@ -280,7 +280,8 @@ def certain(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Sums |
         return None
     k = machine.directions
     if not cells:
-        return Sums(np.zeros((1, 1)), np.zeros((1, 1)), np.zeros((1, k, 1)), np.zeros((1, k, 1)))
+        v, e, gross = np.zeros((1, 1)), np.zeros((1, 1)), np.zeros((2, 1))
+        return Sums(v, e, np.zeros((1, k, 1)), np.zeros((1, k, 1)), gross=gross)
     region = None
     if len(cells) <= MOST_CELLS:
         reach = float(frame[1].v - frame[0].v)
@@ -310,4 +311,5 @@ def _accurate(found: Totals, region: Region, machine: Evaluator, parameters: Seq
         errors.append(rounding + beyond)
     v, t = np.array(found.number[:1]), np.array(found.number[1:])
     e, et = np.array(errors[:1]), np.array(errors[1:])
-    return Sums(v[None], e[None], t[None, :, None], et[None, :, None], gross=np.array([found.gross[:1], [max(found.gross[1:], default=0.0)]]))
+    added = np.array([[found.gross[0]], [max(found.gross[1:], default=0.0)]])
+    return Sums(v[None], e[None], t[None, :, None], et[None, :, None], gross=added)

@@ -20,8 +20,8 @@ import numpy as np
 
 from potto.integrate import maps
 from potto.integrate.divergence import endless, given_up
-from potto.integrate.forms import Ends, Totals, sums, totals
-from potto.integrate.judge import doubtful, missed_peak, too_coarse
+from potto.integrate.forms import Ends, Totals, note_cancelling, sums, totals
+from potto.integrate.judge import doubtful, missed_peak, stragglers, too_coarse
 from potto.integrate.maps import Segments
 from potto.integrate.pieces import Evaluator, Pieces, Sums, column, gather, joined, spread, still
 from potto.integrate.plan import LevelPlan
@@ -46,6 +46,7 @@ MORE = 6  # for graded pieces, on which what is smooth is a polynomial, whose en
 # The relative error of a piece up to which more nodes promise more than halves do.
 PROMISING = 1e-2
 DOUBTFUL_ROUNDS = 8
+LONG = 8  # after how many halvings it is looked for members that take longer than the others
 BESIDE = 1e-9  # how far from the ends of a segment, in parts of it, it is looked at just inside
 
 
@@ -137,8 +138,14 @@ class Work:
             if self.machine.exhausted():
                 owners = self.seg.owner[fresh.segment[found[0] | found[1]]]
                 self.machine.note_unfinished("the budget of evaluations is spent", self.below(np.unique(owners)))
+                if ends is not None:  # what is known to be missing
+                    fresh.error[:, missed_peak(self, fresh, ends)] = np.inf
                 break
             bad, waiting = found
+            if turn >= LONG and (late := stragglers(self, fresh, bad)).any():
+                bad, waiting = bad & ~late, waiting & ~late
+                if not bad.any():
+                    break
             accepted.append(fresh.pick(~bad & ~waiting))
             coarse, later = fresh.pick(bad), fresh.pick(waiting)
             later.excess[:] = 0.0
@@ -339,23 +346,11 @@ class Work:
         root = self.below(owner[flat])
         sums = self.parent.run(self.number + 1, env, x.size, masks, self.inner, root)
         if sums.gross is not None:
-            self.note_cancelling(sums, sums.gross, owner[flat])
+            note_cancelling(self, sums, sums.gross, owner[flat])
         shape = (sums.v.shape[0], *x.shape)
         t = sums.t.reshape(shape[0], -1, *x.shape)
         et = sums.et.reshape(t.shape)
         return sums.v.reshape(shape), t[:, k] if self.moving else None, t[:, :k], sums.e.reshape(shape), et
-
-    def note_cancelling(self, sums: Sums, added: Array, owner: Ints) -> None:
-        """Keep how many times what they come to integrals further in add up, on the whole, for each of this batch."""
-        most = np.abs(sums.v).max(axis=0), np.abs(sums.t).max(axis=(0, 1), initial=0.0)
-        for row, (gross, size) in enumerate(zip(added, most, strict=True)):
-            fine = np.isfinite(gross) & np.isfinite(size)
-            up, down = (np.bincount(owner[fine], x[fine], minlength=self.batch) for x in (gross, size))
-            times = np.divide(up, down, out=np.ones(self.batch), where=down > 0)
-            self.cancels[row] = np.maximum(self.cancels[row], times)
-            if (all_of_it := (down == 0) & (up > 0)).any():
-                mean = up / np.maximum(np.bincount(owner, minlength=self.batch), 1)
-                self.hidden[row] = np.maximum(self.hidden[row], np.where(all_of_it, mean, 0.0))
 
     def below(self, owner: Ints) -> Ints | None:
         """For members of the next batch, the members of the outermost one."""

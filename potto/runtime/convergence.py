@@ -1,10 +1,10 @@
 """Whether an answer is as accurate as was asked for; and if not, why, member by member.
 
-Owns `Reasons`, `missed`, `allowance`. Converged means: the error is within `rtol * |value|`, or within `atol`. An answer
-that is 0 because its parts cancel has no digits that could be relative to it. It is accurate enough if it is relative to
-what is added up without regard to sign: there its error is within `rtol`, and within CANCELS, which is what rounding
-leaves. That is no licence to lose a small summand beside large ones (1e16 - 1e16 + 1): where the integrand adds
-anything, what is added up counts as 1 at most, so that CANCELS is an absolute bound.
+Owns `Reasons`, `missed`, `missing` and `allowance`. Converged means: the error is within `rtol * |value|`, or within
+`atol`. An answer that is 0 because its parts cancel has no digits that could be relative to it. It is accurate enough
+if it is relative to what is added up without regard to sign: there its error is within `rtol`, and within CANCELS,
+which is what rounding leaves. That is no licence to lose a small summand beside large ones (1e16 - 1e16 + 1): where the
+integrand adds anything, what is added up counts as 1 at most, so that CANCELS is an absolute bound.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def missing(term: Integral, sums: Sums, settings: Settings) -> Bools:
 
 
 def widest(before: Any, after: Any) -> Any:
-    """Two allowances, each a number or an array over a batch, as one; the least of a batch that is a part of another."""
+    """Two allowances, numbers or arrays over batches, as one; of batches that do not go together the least."""
     try:
         return np.maximum(before, after)
     except ValueError:

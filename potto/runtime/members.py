@@ -1,9 +1,10 @@
 """A batch of integrals in which each member gets the answer, the cost and the reasons that it gets by itself.
 
 Owns `by_members`, `Whole` and `picked`. A batch is integrated at once. Members that meet something (a surface that runs
-along a variable, roots that merge, a bound that rounding hides, a budget that is spent) are taken out, since what helps
-them costs the others time and tells nothing of them: those that another order of the variables may help are done so
-together, those with two sides together, those that none of them helps in each direction by itself, all others one by one.
+along a variable, roots that merge, a bound that rounding hides, a budget that is spent) are taken out, since what
+helps them costs the others time and tells nothing of them: those that another order of the variables may help are
+done so together, those with two sides together, those that no order helps in each direction by itself, all others one
+by one.
 """
 
 from __future__ import annotations
@@ -91,7 +92,8 @@ def some(sums: Sums, index: Ints) -> Sums:
 def by_members(machine: Machine, linked: Linked, batch: int, ways: Ways, bad: Callable[[Sums], Bools]) -> Sums:
     """The sums of a batch. bad: the members that are not as accurate as was asked for."""
     found = Whole(batch)
-    alone = [np.arange(batch)] if batch <= FEW_MEMBERS else _together(machine, linked, np.arange(batch), ways, bad, found)
+    everybody = np.arange(batch)
+    alone = [everybody] if batch <= FEW_MEMBERS else _together(machine, linked, everybody, ways, bad, found)
     for i in map(int, np.concatenate(alone)):
         one = np.array([i])
         with machine.books.among(one) as met:

@@ -1,0 +1,190 @@
+"""Members of an array get the answer, the cost and the reasons that they get by themselves.
+
+The meshes are triangles over pixels, each pixel's covered area with its derivative by the vertices, which are held
+against the clipped polygon: its area, and the lengths of its edges' pieces by the chain rule (`mpmath` nowhere needed:
+areas of polygons are finite sums).
+"""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+
+import potto
+
+TRIANGLE = """
+def covered(x0, y0, ax, ay, bx, by, cx, cy)
+    integral ([x0, x0 + 1/16], [y0, y0 + 1/16])
+        [(bx - ax)*(y - ay) - (by - ay)*(x - ax) >= 0]
+        *[(cx - bx)*(y - by) - (cy - by)*(x - bx) >= 0]
+        *[(ax - cx)*(y - cy) - (ay - cy)*(x - cx) >= 0] d(x, y)
+"""
+NAMES = ["x0", "y0", "ax", "ay", "bx", "by", "cx", "cy"]
+WRT = NAMES[2:]
+MODULE = potto.compile(TRIANGLE)
+
+
+def mesh(kind: str, count: int) -> Any:
+    """Pairs of a pixel and a triangle of a mesh that it may meet: (count, 8)."""
+    random = np.random.default_rng(3)
+    g = np.arange(9) / 8
+    x, y = np.meshgrid(g, g, indexing="ij")
+    if kind == "diagonal":
+        x = x + y / 2
+    if kind == "nearly":
+        x = x + 2.0**-20 * y
+    if kind == "warped":
+        x, y = x + 0.02 * random.normal(size=x.shape), y + 0.02 * random.normal(size=y.shape)
+    rows = []
+    for i in range(8):
+        for j in range(8):
+            a, b, c, d = [(x[p], y[p]) for p in ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1))]
+            for corners in ((a, b, c), (a, c, d)):
+                xs, ys = zip(*corners, strict=True)
+                for p in range(math.floor(min(xs) * 16), math.ceil(max(xs) * 16)):
+                    for q in range(math.floor(min(ys) * 16), math.ceil(max(ys) * 16)):
+                        rows.append([p / 16, q / 16, *(z for corner in corners for z in corner)])
+    return np.array(rows)[random.permutation(len(rows))[:count]]
+
+
+def area(row: Any) -> float:
+    """Of the triangle clipped to the pixel, in fractions."""
+    x0, y0, *rest = (Fraction(float(z)) for z in row)
+    polygon = [(rest[i], rest[i + 1]) for i in (0, 2, 4)]
+    w = Fraction(1, 16)
+    sides = [((1, 0), x0), ((-1, 0), -x0 - w), ((0, 1), y0), ((0, -1), -y0 - w)]
+    for (u, v), least in sides:
+        kept = []
+        for p, q in zip(polygon, polygon[1:] + polygon[:1], strict=True):
+            f, g = u * p[0] + v * p[1] - least, u * q[0] + v * q[1] - least
+            if f >= 0:
+                kept.append(p)
+            if f * g < 0:
+                s = f / (f - g)
+                kept.append((p[0] + s * (q[0] - p[0]), p[1] + s * (q[1] - p[1])))
+        polygon = kept
+        if not polygon:
+            return 0.0
+    closed = polygon[1:] + polygon[:1]
+    return float(sum(p[0] * q[1] - q[0] * p[1] for p, q in zip(polygon, closed, strict=True)) / 2)
+
+
+def both(rows: Any) -> tuple[Any, list[Any]]:
+    f = potto.grad(MODULE.covered, WRT)
+    columns = dict(zip(NAMES, rows.T, strict=True))
+    return f(**columns), [f(**dict(zip(NAMES, map(float, row), strict=True))) for row in rows]
+
+
+@pytest.mark.parametrize("kind", ["axes", "nearly", "diagonal", "warped"])
+def test_a_mesh_as_an_array_is_what_its_pairs_are(kind: str) -> None:
+    rows = mesh(kind, 40)
+    together, single = both(rows)
+    exact = np.array([area(row) for row in rows])
+    assert (np.abs(together.value - exact) <= together.error + 1e-17).all()
+    tangents, errors = np.array(together.tangent), np.array(together.tangent_error)
+    assert np.isfinite(tangents).all() and (errors <= 1e-6).all()
+    for i, one in enumerate(single):
+        assert abs(one.value - together.value[i]) <= one.error + together.error[i]
+        off = np.abs(np.array(one.tangent) - tangents[:, i])
+        assert (off <= np.array(one.tangent_error) + errors[:, i]).all()
+        # of the same size: within 8 times, or both rounding
+        assert (errors[:, i] <= 8 * np.array(one.tangent_error) + 1e-13).all()
+        assert one.converged == together.member_converged[i]
+        assert set(one.reasons) == set(together.reasons_of(i))
+    # those without the accuracy asked for (rounding) are tried once more by themselves
+    assert together.evals <= 2.2 * sum(one.evals for one in single) + 1000
+
+
+def test_an_interior_derivative_of_a_warped_mesh_by_differences() -> None:
+    """Steps of 1e-6 in exact areas: good to 1e-7 of the pixel's width where no corner is crossed."""
+    rows = mesh("warped", 60)
+    answer = potto.grad(MODULE.covered, WRT)(**dict(zip(NAMES, rows.T, strict=True)))
+    assert answer.converged and answer.member_converged.all()
+    for i, row in enumerate(rows):
+        for d in range(6):
+            up, down = row.copy(), row.copy()
+            up[2 + d] += 1e-6
+            down[2 + d] -= 1e-6
+            slope = (area(up) - area(down)) / (up[2 + d] - down[2 + d])
+            assert abs(answer.tangent[d][i] - slope) <= 1e-6
+
+
+T = np.linspace(0.1, 0.9, 30)
+HARD = [  # one or two members that meet something, at the end
+    ("integral [0, 1] x^(-t) d(x)", [1.0, 1.5]),  # diverges
+    ("integral ([-1, 1], [-1, 1]) [x*y < t] d(x, y)", [0.0]),  # an infinite derivative
+    ("integral [-1, 1] exp(-(x/t)^2) d(x)", [1e-7]),  # a peak
+    ("integral [-1, 1] [x^2 < t - 1/2]*exp(x) d(x)", [0.5]),  # a fold
+    ("integral ([0, 1], [0, 1]) [x > (t - 1/2)*y]*exp(x) d(x, y)", [0.5]),  # along a bound
+    ("integral ([0, 1], [0, 1]) [x < t]*[y < t]*[x + y < 1] d(x, y)", [0.5, 1.0, 0.0]),  # corners and bounds
+    ("integral [0, 2] [x < t]*[x < 2*t - 1/2] d(x)", [0.5]),  # surfaces that meet
+    ("integral ([-1, 1], [-1, 1]) [x > y*(t - 1/2)] d(y, x)", [0.5]),  # along a variable, further in
+]
+
+
+@pytest.mark.parametrize(("body", "hard"), HARD, ids=[row[0] for row in HARD])
+@pytest.mark.parametrize("place", ["last", "first"])
+def test_a_hard_member_costs_the_others_nothing(body: str, hard: list[float], place: str) -> None:
+    f = potto.deriv(potto.compile(f"def f(t)\n    {body}").f)
+    t = np.append(T, hard) if place == "last" else np.append(hard, T)
+    together = f((t, np.ones(t.size)))
+    single = [f((float(x), 1.0)) for x in t]
+    for i, one in enumerate(single):
+        for a, b, slack in (
+            (one.value, together.value[i], one.error + together.error[i]),
+            (one.tangent, together.tangent[i], one.tangent_error + together.tangent_error[i]),
+        ):
+            assert np.array_equal(a, b, equal_nan=True) or abs(a - b) <= slack
+        assert one.converged == together.member_converged[i] and set(one.reasons) == set(together.reasons_of(i))
+        assert math.isinf(one.tangent_error) == math.isinf(together.tangent_error[i])
+    # what is hard is met once in the batch and once by itself
+    assert together.evals <= 1.7 * sum(one.evals for one in single) + 400
+    assert {note.surface for one in single for note in one.notes} == {note.surface for note in together.notes}
+
+
+def test_sides_are_those_of_the_member() -> None:
+    f = potto.deriv(potto.compile("def f(t)\n    integral [0, 1] [x < t]*(1 + x) d(x)").f)
+    t = np.append(T, [0.0, 1.0])
+    answer = f((t, np.ones(t.size)))
+    assert len(answer.notes) == 1
+    (note,) = answer.notes
+    assert np.isnan(note.forward[:-2]).all() and list(note.forward[-2:]) == [1.0, 0.0]
+    assert list(note.backward[-2:]) == [0.0, 2.0] and "not known" not in str(note)
+    assert (np.abs(answer.tangent[:-2] - (1 + T)) <= answer.tangent_error[:-2]).all()
+
+
+def test_roots_left_out_are_the_members_own() -> None:
+    """sin(1/x) < c has too many roots where the domain reaches 0."""
+    f = potto.compile("def f(t)\n    integral [t, 1] [sin(1/x) < 0.3] d(x)").f
+    t = np.append(T, [0.0])
+    answer = f(t)
+    assert np.isinf(answer.error[-1]) and not answer.member_converged[-1]
+    assert answer.member_converged[:-1].all() and (answer.error[:-1] <= 1e-12).all()
+
+
+@pytest.mark.parametrize("method", ["quadrature", "mc"])
+def test_a_budget_is_each_members(method: Any) -> None:
+    f = potto.compile("def f(t)\n    integral ([0, 1], [0, 1]) exp(-((x - 1/3)/t)^2 - ((y - 1/3)/t)^2) d(x, y)").f
+    t = np.append(np.linspace(0.5, 2.0, 20), [1e-3])
+    with potto.settings(method=method, max_evals=2000, samples=1500, rtol=1e-6):
+        answer = f(t)
+    assert answer.evals <= 2 * 2000 * t.size + 40_000
+    if method == "quadrature":
+        assert answer.member_converged[:-1].all() and not answer.member_converged[-1]
+    erf = np.array([math.erf(2 / 3 / x) + math.erf(1 / 3 / x) for x in t])
+    exact = np.pi / 4 * (t * erf) ** 2
+    assert (np.abs(answer.value - exact) <= answer.error).all()
+
+
+def test_members_of_any_shape() -> None:
+    f = potto.compile("def f(t, s)\n    integral [0, 1] s*x^(-t) d(x)").f
+    answer = f(np.array([[0.5], [1.0]]), np.linspace(1.0, 2.0, 12))
+    assert answer.member_converged.shape == (2, 12)
+    assert answer.member_converged[0].all() and not answer.member_converged[1].any()
+    assert answer.reasons_of((1, 3)) and not answer.reasons_of((0, 3))
+    (mask,) = answer.reason_members.values()
+    assert mask[1].all() and not mask[0].any()
