@@ -140,7 +140,7 @@ class _Tabled(Iteration):
 def one_by_one(known: Eliminated, machine: Any, env: dict[str, Value]) -> Sums | None:
     """The integral, each step from the table of the next; None where one can't be made."""
     settings = machine.settings
-    most = min(settings.max_evals, machine.books.evaluations + AFFORDABLE)
+    most = min(settings.max_evals, int(machine.books.spent) + AFFORDABLE)
     finer = replace(settings, rtol=max(SHARE * settings.rtol, FINEST), atol=0.0, max_evals=most)
     fine = replace(machine, settings=finer)
     spans = _spans(known.steps, env)

@@ -33,6 +33,9 @@ REPLICATES = 16
 STUDENT = 5.48
 CHUNK = 1 << 15
 FIRST = 1 << 5  # points of each scrambling before the first look at the error
+# Evaluations of a sample of a surface, which has two sides, and of a line that quadrature takes, at the most or about; and how many
+# samples are taken at least, however few evaluations are allowed.
+SIDES, NODES, LEAST = 2, 64, 16
 EXACT = 1  # variables left to quadrature: two are no better for the time they take
 # The quadrature of the innermost variable, below sampling errors that are larger.
 INNER_ORDER = 6
@@ -79,7 +82,10 @@ def _plain(plan: Plan, machine: Any, env: dict[str, Value], told: Told) -> Sums:
     generator = np.random.default_rng(machine.settings.seed)
     run = _Run(plan, machine, env, 0)
     found: list[Moments] = []
-    count, means = machine.settings.samples, list(run.means())
+    means = list(run.means())
+    each = 1 + SIDES * (len(means) - 1)
+    afforded = int((machine.settings.max_evals - machine.books.spent) / each)
+    count = min(machine.settings.samples, max(afforded, LEAST))
     for dims, f in means:
         moments, largest, done = Moments(), Largest(), 0
         for u in _random(generator, count if dims else 1, dims):
@@ -88,13 +94,22 @@ def _plain(plan: Plan, machine: Any, env: dict[str, Value], told: Told) -> Sums:
             largest.add(samples)
             done += len(u)
             told((len(found) + (done / count if dims else 1)) / len(means))
+            if machine.exhausted():  # points may cost more than one evaluation each
+                break
         found.append(moments)
         run.largest.append(largest)
     mean, variance = added([m.mean for m in found]), added([m.variance for m in found])
     mean.e, mean.et = mean.e + SIGMAS * np.sqrt(variance.v), mean.et + SIGMAS * np.sqrt(variance.t)
     mean = run.widened(mean, count)
     run.look(mean)
+    _say_if_cut(mean, machine, count < machine.settings.samples)
     return mean
+
+
+def _say_if_cut(sums: Sums, machine: Any, cut: bool) -> None:
+    """Say that more samples were asked for than evaluations allowed, where they would be wanted."""
+    if (cut or machine.exhausted()) and not _enough(sums, machine.settings, machine.settings.asked(True)):
+        machine.note_unfinished("the budget of evaluations is spent")
 
 
 def _random(generator: np.random.Generator, count: int, dims: int) -> Iterator[Array]:
@@ -112,7 +127,9 @@ def _quasi(plan: Plan, machine: Any, env: dict[str, Value], method: str, told: T
     found = Replicates(REPLICATES, STUDENT)
     count = 1 << min(max(4, int(np.log2(max(settings.samples // REPLICATES, 16)))), MOST)
     run.largest = [Largest() for _ in means]
-    done, size = 0, min(FIRST, count)
+    done, size, before, cut = 0, min(FIRST, count), machine.books.spent, False
+    while size > 1 and size * REPLICATES * NODES * len(means) > settings.max_evals - before:
+        size //= 2
     while done < count:
         for number, (sequence, (dims, f), largest) in enumerate(zip(points, means, run.largest, strict=True)):
             if dims:
@@ -131,15 +148,18 @@ def _quasi(plan: Plan, machine: Any, env: dict[str, Value], method: str, told: T
                 found.fix(f(np.zeros((1, 0))))
         done, size = size, 2 * size
         sums = run.widened(found.estimate(done), REPLICATES * done)
-        if machine.exhausted() or (method == "auto" and _enough(sums, settings)):
+        if method == "auto" and _enough(sums, settings, settings.rtol):
+            break
+        if cut := done < count and 2 * machine.books.spent - before > settings.max_evals:
             break
     run.look(sums)
+    _say_if_cut(sums, machine, cut)
     return sums
 
 
-def _enough(sums: Sums, settings: Any) -> bool:
+def _enough(sums: Sums, settings: Any, rtol: float) -> bool:
     return all(
-        bool((e <= np.maximum(settings.atol, settings.rtol * np.abs(x))).all())
+        bool((e <= np.maximum(settings.atol, rtol * np.abs(x))).all())
         for x, e in ((sums.v, sums.e), (sums.t, sums.et))
     )
 

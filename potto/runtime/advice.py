@@ -35,6 +35,7 @@ _ADVICE: tuple[tuple[str, str], ...] = (
     ),
     (BOUNDLESS, "more evaluations change nothing: ask at parameters beside these"),
     ("along the axes", "turn the variables of integration, so that no surface runs along several of their axes"),
+    (TOO_FEW, "sample more (`--samples`) or " + _LESS),
     ("no sample fell", "sample more (`--samples`), or integrate by `--method quadrature`"),
     ("too many roots", "shorten the domain, or sample (`--method mc`)"),
     ("inside an inner integral", "write both integrals as one: `integral ([..], [..]) .. d(x, y)`"),

@@ -1,0 +1,89 @@
+"""`max_evals` limits every method, and the advice names the setting whose change helps: following it does."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+import potto
+from potto.runtime.advice import advice
+
+WAVES = "integral [0, 1] sin(1e4*t*x) d(x)"
+SURFACE = "integral ([0, 1], [0, 1]) [x*y < t]*exp(x + y) d(x, y)"
+BALL = "integral ([0, 1], [0, 1], [0, 1]) [x*x + y*y + z*z < t] d(x, y, z)"
+MANY = "integral ([0,1],[0,1],[0,1],[0,1],[0,1]) [x*y + y*z + z*u + u*v + v*x < t] d(x, y, z, u, v)"
+RIDGE = "integral ([-1, 1], [-1, 1]) exp(-1000*(x^2 + y^2 - t)^2) d(x, y)"
+
+
+@pytest.mark.parametrize("body", [WAVES, SURFACE, BALL, MANY, RIDGE])
+@pytest.mark.parametrize("method", ["auto", "mc", "qmc"])
+@pytest.mark.parametrize("most", [20_000, 100_000])
+def test_evaluations_stay_within_their_limit(body: str, method: Any, most: int) -> None:
+    """But for what a round of refinement takes that began within it: no more than as much again."""
+    f = potto.compile(f"def f(t) {body}").f
+    with potto.settings(method=method, max_evals=most, samples=10_000_000):
+        for answer in (f(0.7), potto.deriv(f)((0.7, 1.0))):
+            assert 0 < answer.evals <= 2 * most
+            assert answer.converged or answer.reasons
+
+
+@pytest.mark.parametrize("method", ["mc", "qmc"])
+@pytest.mark.parametrize("body", [SURFACE, BALL, MANY])
+def test_more_evaluations_help_where_they_are_what_is_missing(body: str, method: Any) -> None:
+    f = potto.compile(f"def f(t) {body}").f
+    with potto.settings(method=method, max_evals=4_000, samples=1_000_000, rtol=2e-3):
+        short = f(0.7)
+    assert not short.converged and "--max-evals" in advice(short.reasons) and "--samples" not in advice(short.reasons)
+    with potto.settings(method=method, max_evals=1_000_000, samples=1_000_000, rtol=2e-3):
+        longer = f(0.7)
+    assert longer.evals > 20 * short.evals and longer.error < 0.5 * short.error
+
+
+@pytest.mark.parametrize("method", ["mc", "qmc"])
+@pytest.mark.parametrize("body", [SURFACE, BALL, MANY])
+def test_more_samples_help_where_they_are_what_is_missing(body: str, method: Any) -> None:
+    f = potto.compile(f"def f(t) {body}").f
+    with potto.settings(method=method, samples=2_000, rtol=1e-9):
+        short = f(0.7)
+        more = f"{advice(short.reasons)}"
+    assert not short.converged and "--samples" in more and "--max-evals" not in more
+    with potto.settings(method=method, samples=200_000, rtol=1e-9):
+        longer = f(0.7)
+    assert longer.evals > 20 * short.evals and longer.error < 0.5 * short.error
+    with potto.settings(method=method, samples=2_000, rtol=1e-9, max_evals=1_000_000_000):
+        assert f(0.7).error == short.error  # as the advice says: these are of no use here
+
+
+def test_more_evaluations_help_quadrature() -> None:
+    f = potto.compile(f"def f(t) {WAVES}").f
+    exact = (1 - math.cos(1e4)) / 1e4
+    with potto.settings(max_evals=2_000, rtol=1e-7):
+        short = f(1.0)
+    assert not short.converged and "--max-evals" in advice(short.reasons)
+    with potto.settings(max_evals=2_000_000, rtol=1e-7):
+        longer = f(1.0)
+    assert longer.converged and abs(longer.value - exact) <= longer.error <= 1e-10
+
+
+def test_sampling_that_is_chosen_says_what_it_lacks() -> None:
+    """In many variables `auto` samples; what it lacks at first are samples, then evaluations."""
+    f = potto.compile(f"def f(t) {MANY}").f
+    with potto.settings(rtol=1e-5, samples=5_000):
+        first = f(0.7)
+    assert first.method == "qmc" and "--samples" in advice(first.reasons)
+    with potto.settings(rtol=1e-5, samples=10_000_000, max_evals=100_000):
+        second = f(0.7)
+    assert "--max-evals" in advice(second.reasons) and "--samples" not in advice(second.reasons)
+    with potto.settings(rtol=1e-5, samples=10_000_000, max_evals=1_500_000):
+        third = f(0.7)
+    assert first.error > 2 * second.error > 4 * third.error
+
+
+def test_a_peak_that_the_budget_does_not_reach_has_no_bound() -> None:
+    """0.25*pi*1e-6*(1 + erf...)... of it nothing is seen but that it is there: the error says that nothing is known."""
+    f = potto.compile("def f(t) integral ([0, 1], [0, 1]) exp(-((x - 1/3)/t)^2 - ((y - 1/3)/t)^2) d(x, y)").f
+    with potto.settings(max_evals=2_000):
+        answer = f(1e-3)
+    assert not answer.converged and abs(answer.value - math.pi * 1e-6) <= answer.error
