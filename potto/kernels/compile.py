@@ -64,11 +64,15 @@ class Runtime(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Kernel:
-    """A compiled kernel: its function, its text (for `potto dump kernel`), and the parameters that it takes."""
+    """A compiled kernel: its function, its text (for `potto dump kernel`), and the parameters that it takes.
+
+    plain: whether it works point by point, without asking anything of the runtime but how conditions fall.
+    """
 
     run: Callable[..., Value]
     text: str
     params: tuple[str, ...]
+    plain: bool = False
 
 
 @dataclass(slots=True)
@@ -158,7 +162,8 @@ class _Compiler:
         scope: dict[str, Any] = {name: support.function(path) for name, path in self.out.functions.items()}
         scope.update(Cell=Cell, parts=scalar_parts, **self.objects)
         exec(compile(text, "<kernel>", "exec"), scope)
-        return Kernel(scope["kernel"], text, self.lam.params)
+        plain = "rt." not in text.replace("rt.falls(", "") and not any(isinstance(o, Dynamic) for o in self.env.values())
+        return Kernel(scope["kernel"], text, self.lam.params, plain)
 
     # Arguments in, results out
 

@@ -68,6 +68,8 @@ def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermos
         return Cell(np.zeros(shape))
     flat = {n: map_arrays(v, lambda a: np.ascontiguousarray(np.broadcast_to(a, shape)).reshape(-1))
             for n, v in env.items()}  # fmt: skip
+    if batch == 1 and shape:
+        flat = {n: map_arrays(v, lambda a: float(a[0])) for n, v in flat.items()}
     machine.books.integrals += 1
     if machine.overdrawn() and not outermost:
         return given_up(machine, shape)

@@ -36,6 +36,7 @@ from potto.integrate.costs import Costs
 from potto.integrate.pieces import Folded, Sided, still
 from potto.kernels import errors
 from potto.kernels.cells import Array, Cell, Ints, Number, Pattern, Trace, Value, pad, pattern
+from potto.kernels.chunks import in_chunks, many
 from potto.kernels.compile import Kernel, counts, kernel
 from potto.runtime.books import Books, note
 from potto.runtime.functions import Closure, Derivative, Paired
@@ -214,6 +215,8 @@ class Machine:
             found = self.linker.kernels[key] = kernel(function, key[1], k, self.rounding, self)
         else:
             counts.reused += 1
+        if found.plain and many(args):
+            return in_chunks(found, self, trace, args)
         return found.run(self, trace, *args)
 
     def term(self, term: Term, env: dict[str, Value]) -> Value:

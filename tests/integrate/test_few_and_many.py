@@ -1,0 +1,96 @@
+"""Arrays of a few members are as cheap as their numbers, and arrays of very many are what small ones are.
+
+Evaluations are counted; nothing is timed.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import potto
+
+M = potto.compile("""
+def plane(c) integral ([0, 1], [0, 1]) [x + y + c >= 0]/(sqrt(2)*(x + y + c) + 2)^2 d(x, y)
+def jump(c) integral [0, 1] [x < c]*exp(x*c) d(x)
+def disc(c) integral ([-1, 1], [-1, 1]) [x^2 + y^2 < c] d(x, y)
+def pair(c) integral [0, 1] ([x < c], x*c) d(x)
+def nested(c) integral [0, 1] (integral [0, x + c] exp(y) d(y)) d(x)
+""")
+AT = {"plane": -0.7, "jump": 0.3, "disc": 0.5, "pair": 0.3, "nested": 0.4}
+
+
+@pytest.mark.parametrize("name", list(AT))
+@pytest.mark.parametrize("count", [1, 2, 5, 10])
+def test_a_few_members_cost_what_their_numbers_do(name: str, count: int) -> None:
+    f = getattr(M, name)
+    c = AT[name] + np.linspace(0.0, 0.1, count)
+    for call in (f, potto.grad(f, ["c"])):
+        together, single = call(c=c), [call(c=float(x)) for x in c]
+        assert together.evals <= sum(one.evals for one in single)
+        values = np.array([one.value for one in single]).T
+        assert (np.array(together.value) == values).all()  # the same way, the same digits
+        assert np.shape(together.value) == values.shape
+    dual = potto.deriv(f)((c, np.ones(count)))
+    assert dual.evals <= sum(potto.deriv(f)((float(x), 1.0)).evals for x in c)
+
+
+def test_an_array_of_one_in_any_shape() -> None:
+    one = potto.grad(M.plane, ["c"])(c=-0.7)
+    for shape in ((1,), (1, 1), (1, 1, 1)):
+        found = potto.grad(M.plane, ["c"])(c=np.full(shape, -0.7))
+        assert found.value.shape == found.tangent.shape == found.error.shape == found.member_converged.shape == shape
+        assert found.value.flat[0] == one.value and found.tangent.flat[0] == one.tangent and found.evals == one.evals
+
+
+POINTS = potto.compile("""
+def f(x, y, c) [x + y + c >= 0]/(sqrt(2)*(x + y + c) + 2)^2*exp(x*y - c)*(1 + x*x + y*y*c)
+def g(x, y, c) if x < y then (sin(x*c), 1) else (x - y, y*c)
+def h(x, y, c) (max(x, y), c)
+def k(x, y, c) exp(-abs(x - c))*erf(y)
+def other(x, c) x^2 - c
+def through(x, y, c) other(x, c)*other(y, x)
+""")
+
+
+@pytest.mark.parametrize("name", ["f", "g", "h", "k", "through"])
+@pytest.mark.parametrize("shape", [(50_000,), (200, 300), (3, 40_000), (20_001, 3)])
+def test_many_points_are_what_few_are(name: str, shape: tuple[int, ...]) -> None:
+    """Kernels take them in parts, which nobody sees: values, errors and derivatives to the last digit."""
+    f = potto.grad(getattr(POINTS, name), ["c"])
+    random = np.random.default_rng(5)
+    x, y = random.normal(size=shape), random.normal(size=shape)
+    whole = f(x=x, y=y, c=0.7)
+
+    def numbers(found: Any) -> list[Any]:
+        parts = [found.value, found.error, found.tangent, found.tangent_error]
+        return [item for part in parts for item in (part if isinstance(part, tuple) else (part,))]
+
+    flat = [np.asarray(item).reshape(-1) for item in numbers(whole)]
+    size = x.size
+    for start in (0, 16_000, size - 1000):
+        part = slice(start, start + 1000)
+        few = f(x=x.reshape(-1)[part], y=y.reshape(-1)[part], c=0.7)
+        for a, b in zip(flat, numbers(few), strict=True):
+            assert np.array_equal(a[part], b)
+
+
+def test_one_number_beside_many() -> None:
+    """Arrays of unlike shapes, a row and a column: parts of the first axis."""
+    f = potto.compile("def f(x, y) x*exp(y) + [x > y]").f
+    x, y = np.linspace(0, 1, 400)[:, None], np.linspace(0, 1, 300)[None]
+    assert np.abs(f(x, y).value - (x * np.exp(y) + (x > y))).max() <= 1e-15
+
+
+def test_integrals_of_many_nodes() -> None:
+    """A sharp peak at 400 places takes more nodes at once than kernels do; its answer is a product of erfs."""
+    f = potto.compile("def f(t) integral ([0, 1], [0, 1]) exp(-(200*(x - t))^2 - (300*(y - t))^2) d(x, y)").f
+    t = np.linspace(0.2, 0.8, 400)
+    with potto.settings(rtol=1e-8):
+        answer = f(t)
+    erf = np.vectorize(math.erf)
+    exact = math.pi / 4 / 200 / 300 * (erf(200 * t) + erf(200 * (1 - t))) * (erf(300 * t) + erf(300 * (1 - t)))
+    assert (np.abs(answer.value - exact) <= answer.error + 1e-19).all() and answer.converged
