@@ -33,7 +33,7 @@ REPLICATES = 16
 STUDENT = 5.48
 CHUNK = 1 << 15
 FIRST = 1 << 5  # points of each scrambling before the first look at the error
-# Evaluations of a sample of a surface, which has two sides, and of a line that quadrature takes, at the most or about; and how many
+# Evaluations of a sample of a surface, which has two sides, and of a line that quadrature takes, about; how many
 # samples are taken at least, however few evaluations are allowed.
 SIDES, NODES, LEAST = 2, 64, 16
 EXACT = 1  # variables left to quadrature: two are no better for the time they take

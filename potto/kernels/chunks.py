@@ -20,7 +20,7 @@ POINTS = 1 << 14
 
 def many(args: list[Value]) -> bool:
     """Whether there are more points than are taken at once."""
-    for arg in args:  # runs with every kernel: no comprehension, no call
+    for arg in args:  # noqa: SIM110 - runs with every kernel: no generator
         if arg.__class__ is Cell and arg.v.__class__ is np.ndarray and arg.v.size > POINTS:
             return True
     return False
