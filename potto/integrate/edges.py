@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 MOST_AT_ONE_PLACE = 4
 SURE = 1.001  # what rounding may add to a bound
+# Beside a place, in its own size: where surfaces that are 0 at it, to so many times their rounding, have a side.
+BESIDE, CLEAR = 1e-7, 4.0
 
 
 @dataclass(frozen=True)
@@ -46,8 +48,11 @@ class Scene:
     sides: dict[int, Mask]
     machine: Evaluator
 
-    def flips(self, cuts: Sequence[int], owner: Ints, x: Array, above: bool) -> Array:
-        """F just beside x with every subset of some cuts' surfaces flipped: (2^n, m, B); bit i stands for cut i."""
+    def flips(self, cuts: Sequence[int], owner: Ints, x: Array, above: bool) -> tuple[Array, Array]:
+        """F just beside x with every subset of some cuts' surfaces flipped: (2^n, m, B); bit i stands for cut i.
+
+        And the errors of that.
+        """
         here, inner = around(self.level, owner, x, above, self.env, self.sides, self.machine)
         groups = [group_of(self.level, cut) for cut in cuts]
         frozen = self.machine.with_directions(0)
@@ -55,8 +60,18 @@ class Scene:
         with nullcontext() if self.machine.costs is None else self.machine.costs.apart():
             for bits in range(1 << len(groups)):
                 way = {g: ~np.asarray(inner[g]) for i, g in enumerate(groups) if bits >> i & 1}
-                found.append(self.parent.inside(self.number, here, owner.size, {**inner, **way}, frozen)[0])
-        return np.stack(found)
+                found.append(self.parent.inside(self.number, here, owner.size, {**inner, **way}, frozen))
+        return np.stack([f for f, _ in found]), np.stack([e for _, e in found])
+
+    def as_it_falls(self, owner: Ints, x: Array) -> Array:
+        """F at x itself, (m, B): a surface that is 0 there is on the side that its comparison says."""
+        here, sides = placed(self.level, owner, x, self.env, self.sides)
+        if self.level.decided:
+            groups = self.parent.plan.groups
+            values = zip(self.level.decided, surfaces_at(self.level, here, owner.size, self.machine), strict=True)
+            up = [v >= 0 if groups[g].up_at_zero else v > 0 for g, (v, _) in values]
+            sides = decided(self.level, sides, up)
+        return self.parent.inside(self.number, here, owner.size, sides, self.machine.with_directions(0))[0]
 
     def surface(self, cut: int) -> Term:
         return self.level.level.cuts[cut].surface
@@ -102,7 +117,7 @@ def count_slivers(
     for sliver in cuts.slivers:
         if number and 2 * sliver.owner.size < cuts.sign.size:
             continue  # single nodes of the variables further out: of measure zero
-        f = scene.flips(sliver.cuts, sliver.owner, sliver.x, not sliver.upper)
+        f, _ = scene.flips(sliver.cuts, sliver.owner, sliver.x, not sliver.upper)
         lost = SURE * np.abs(f - f[0]).max(axis=0) * sliver.width
         lost = np.where(np.isfinite(lost), lost, 0.0)
         at = (slice(None), sliver.owner)
@@ -137,14 +152,14 @@ def at_one_place(scene: Scene, meeting: Meeting) -> tuple[Array, Array, Array]:
     if count > MOST_AT_ONE_PLACE:
         nothing = np.full((1, *v.shape[1:]), np.nan)
         return nothing, nothing, np.zeros_like(nothing)
-    f = scene.flips(meeting.cuts, meeting.owner, meeting.x, False)
+    f, _ = scene.flips(meeting.cuts, meeting.owner, meeting.x, False)
     merged = (f[0] - f[-1])[:, None] * meeting.merged_t
     found = []
     for sign in (1, -1):
         order = np.argsort(sign * v, axis=0, kind="stable")
         after = np.cumsum(1 << order, axis=0)
         speed = np.take_along_axis(v, order, axis=0)
-        crossed = [(_picked(f, a - (1 << o)) - _picked(f, a)) * s for a, o, s in zip(after, order, speed, strict=True)]
+        crossed = [(picked(f, a - (1 << o)) - picked(f, a)) * s for a, o, s in zip(after, order, speed, strict=True)]
         found.append(np.sum(crossed, axis=0) - merged)
     scale = np.abs(f).max(axis=0)[:, None] * np.abs(v).max(axis=0)
     return found[0], found[1], scale
@@ -157,7 +172,7 @@ def at_a_bound(scene: Scene, edges: Sequence[Edge]) -> tuple[Array, Array, Array
     if len(edges) > MOST_AT_ONE_PLACE:
         nothing = np.full((1, *inward.shape[1:]), np.nan)
         return nothing, nothing, np.zeros_like(nothing)
-    f = scene.flips([e.cut for e in edges], first.owner, first.x, not first.upper)
+    f, _ = scene.flips([e.cut for e in edges], first.owner, first.x, not first.upper)
     found = []
     for sign in (1, -1):
         speed = np.maximum(sign * inward, 0.0)
@@ -165,13 +180,13 @@ def at_a_bound(scene: Scene, edges: Sequence[Edge]) -> tuple[Array, Array, Array
         after, speed = np.cumsum(1 << order, axis=0), np.take_along_axis(speed, order, axis=0)
         growth = speed - np.append(speed[1:], np.zeros((1, *speed.shape[1:])), axis=0)
         gained = [
-            np.where(g > 0, (_picked(f, a) - f[0][:, None]) * g, 0.0) for a, g in zip(after, growth, strict=True)
+            np.where(g > 0, (picked(f, a) - f[0][:, None]) * g, 0.0) for a, g in zip(after, growth, strict=True)
         ]
         found.append(sign * np.sum(gained, axis=0))
     return found[0], found[1], np.abs(f[0])[:, None] + np.abs(f[-1])[:, None]
 
 
-def _picked(f: Array, bits: Ints) -> Array:
+def picked(f: Array, bits: Ints) -> Array:
     """Of F by subsets (2^n, m, B) the one for each direction and member (k, B): (m, k, B)."""
     return np.moveaxis(f[bits, :, np.arange(bits.shape[1])], -1, 0)
 
@@ -202,19 +217,44 @@ def around(
     machine: Evaluator,
 ) -> tuple[dict[str, Value], dict[int, Mask]]:  # fmt: skip
     """The environment of some members at x, and the sides of all surfaces just above or just below it."""
+    here, inner = placed(level, owner, x, env, sides)
+    if not level.decided:
+        return here, inner
+    step = BESIDE * (1 + np.abs(x)) * (1 if above else -1)
+    at, beside = (surfaces_at(level, {**here, level.variable: Cell(place)}, owner.size, machine)
+                  for place in (x, x + step))  # fmt: skip
+    up = [np.where(np.abs(v) > CLEAR * e, v, w) >= 0 for (v, e), (w, _) in zip(at, beside, strict=True)]
+    return here, decided(level, inner, up)
+
+
+def placed(
+    level: LevelPlan, owner: Ints, x: Array, env: dict[str, Value], sides: dict[int, Mask]
+) -> tuple[dict[str, Value], dict[int, Mask]]:
+    """The environment of some members at x, where nothing moves, and the sides that were decided further out."""
     here = gather({n: still(v) for n, v in env.items()}, owner)
     here[level.variable] = Cell(x)
-    step = 1e-7 * (1 + np.abs(x)) * (1 if above else -1)
-    beside = {**here, level.variable: Cell(x + step)}
-    inner: dict[int, Mask] = {g: take(m, owner) for g, m in sides.items()}
-    if level.decided:
-        at = {n: beside[n] for n in level.surfaces.params}
-        values = machine.with_directions(0).evaluate(level.surfaces, at, None)
-        assert isinstance(values, tuple)
-        for g, value, turned in zip(level.decided, values, level.turned, strict=True):
-            assert isinstance(value, Cell)
-            side = as_array(value.v, owner.size) >= 0
-            for outer in turned:
-                side = side ^ np.logical_not(inner[outer])
-            inner[g] = side
-    return here, inner
+    return here, {g: take(m, owner) for g, m in sides.items()}
+
+
+def surfaces_at(
+    level: LevelPlan, here: dict[str, Value], count: int, machine: Evaluator
+) -> list[tuple[Array, Array]]:
+    """The surfaces that a level decides the sides of, with their rounding, (B,) each."""
+    env = {n: here[n] for n in level.surfaces.params}
+    values = machine.with_directions(0).tracking().evaluate(level.surfaces, env, None)
+    assert isinstance(values, tuple)
+    found = []
+    for value in values:
+        assert isinstance(value, Cell)
+        found.append((as_array(value.v, count), as_array(0.0 if value.e is None else value.e, count)))
+    return found
+
+
+def decided(level: LevelPlan, sides: dict[int, Mask], up: Sequence[Bools]) -> dict[int, Mask]:
+    """The sides of all surfaces so far, with those of this level as their own terms say."""
+    sides = dict(sides)
+    for g, side, turned in zip(level.decided, up, level.turned, strict=True):
+        for outer in turned:
+            side = side ^ np.logical_not(sides[outer])
+        sides[g] = side
+    return sides

@@ -13,8 +13,9 @@ import numpy as np
 
 from potto.core.terms import Term
 from potto.integrate import maps
+from potto.integrate.collapsed import Collapsed, collapsed_ranges, count_collapsed
 from potto.integrate.cuts import Cuts, as_array, frame_rows, segments, standing
-from potto.integrate.edges import count_places, count_slivers, note_folds
+from potto.integrate.edges import Scene, count_places, count_slivers, note_folds
 from potto.integrate.maps import Segments
 from potto.integrate.pieces import Evaluator, Sums, components, gather, still, take
 from potto.integrate.plan import LevelPlan, Plan, vanishes
@@ -50,7 +51,7 @@ class Iteration:
         """
         level = self.plan.levels[number]
         k = machine.directions
-        cuts = self.cut(level, env, batch, machine)
+        cuts, collapsed = self.cut(level, env, batch, machine)
         seg = cuts.segments
         outer = sides
         sides, unsure = self.sides_of(level, env, seg, sides, machine)
@@ -61,6 +62,8 @@ class Iteration:
             seg, sides = seg.pick(keep), {g: take(m, keep) for g, m in sides.items()}
         work = Work(self, number, level, env, seg, sides, machine, cuts.moving and k > 0, batch, root, cuts.conflict)
         sums = work.integrate()
+        if collapsed:
+            sums = count_collapsed(Scene(self, number, level, env, outer, machine), collapsed, sums)
         if k and (cuts.meetings or cuts.edges):
             if self.plan.hides:
                 machine.note_unfinished("surfaces meet, or lie on a bound, that an inner integral jumps at")
@@ -92,7 +95,10 @@ class Iteration:
         np.maximum.at(most, root, scale)
         return most[root]
 
-    def cut(self, level: LevelPlan, env: dict[str, Value], batch: int, machine: Evaluator) -> Cuts:
+    def cut(
+        self, level: LevelPlan, env: dict[str, Value], batch: int, machine: Evaluator
+    ) -> tuple[Cuts, list[Collapsed]]:
+        """Where the members are cut, and which of them have a range of length zero."""
         values = machine.tracking().evaluate(level.frame, env, None)
         assert isinstance(values, tuple)
         lo, hi, rows = frame_rows(level, values)
@@ -107,7 +113,10 @@ class Iteration:
             if row.cut >= 0 and level.level.cuts[row.cut].surface in self.still:
                 row.t = ()
         cuts = segments(level, lo, hi, rows, batch, machine.directions, level is not self.plan.levels[0])
-        return standing(cuts) if machine.frozen else cuts
+        collapsed = collapsed_ranges(level, lo, hi, rows, batch, machine.directions)
+        if machine.frozen:
+            return standing(cuts), [ranges.at_rest() for ranges in collapsed]
+        return cuts, collapsed
 
     def sides_of(
         self, level: LevelPlan, env: dict[str, Value], seg: Segments, sides: dict[int, Mask], machine: Evaluator
