@@ -24,6 +24,7 @@ from potto.integrate.pieces import Sums, components, still
 from potto.integrate.plan import Plan, function_of
 from potto.integrate.rules import EPS
 from potto.integrate.sobol import MOST, Sobol
+from potto.integrate.undefined import guarded_samples
 from potto.integrate.unseen import MISSED, Largest, peaks
 from potto.kernels.cells import Array, Cell, Mask, Value, map_arrays
 
@@ -259,6 +260,12 @@ class _Run:
             for d in range(k):
                 ft[i, d] = 0.0 if not cell.t or cell.t[d] is None else cell.t[d]
                 et[i, d] = 0.0 if not cell.et or cell.et[d] is None else cell.et[d]
+        bad = np.nonzero(np.isnan(f).any(axis=0))[0]
+        if bad.size:
+            zero = guarded_samples(self.plan, point.env, sides, bad, self.machine)
+            f, ft[:, :, bad] = f.copy(), np.nan
+            for part in (f, ft, et):
+                part[..., bad[zero]] = 0.0
         return self.weighted(Sums(f, e, ft, et), point.volume, n)
 
     def weighted(self, sums: Sums, volume: Cell, n: int) -> Sums:

@@ -137,7 +137,10 @@ def poisoned(sums: Sums, env: dict[str, Value]) -> Sums:
     if np.any(bad):
         where = np.broadcast_to(bad, sums.v.shape[-1:])
         sums.v[:, where] = np.nan
-        sums.t[:, :, where] = np.nan
+    undefined = np.isnan(sums.v)
+    if undefined.any():  # nor is its derivative one
+        sums.t = np.where(undefined[:, None], np.nan, sums.t)
+        sums.e, sums.et = np.where(undefined, np.inf, sums.e), np.where(undefined[:, None], np.inf, sums.et)
     return sums
 
 

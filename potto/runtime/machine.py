@@ -194,8 +194,9 @@ class Machine:
         """Where sections of a surface appear or merge: only what is beside the parameters tells about derivatives."""
         self.books.folds.setdefault(what, where)
 
-    def note_unfinished(self, reason: str) -> None:
-        if reason not in self.books.unfinished:
+    def note_unfinished(self, reason: str, once: str = "") -> None:
+        """Why the answer is not as accurate as was asked; of reasons that begin with `once`, the first will do."""
+        if not any(said == reason or (once and said.startswith(once)) for said in self.books.unfinished):
             self.books.unfinished.append(reason)
 
     def note_degenerate(self, variable: str) -> None:
