@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from potto.integrate.levels import Iteration
 
 MOST_AT_ONE_PLACE = 4
+STRAY = 8
 SURE = 1.001  # what rounding may add to a bound
 # Beside a place, in its own size: where surfaces that are 0 at it, to so many times their rounding, have a side.
 BESIDE, CLEAR = 1e-7, 4.0
@@ -91,7 +92,7 @@ def count_places(
         named = Sided(level.variable, scene.surface(group[0].cut))
         places.append((group[0].owner, lambda g=group: at_a_bound(scene, g), False, named))  # type: ignore[misc]
     for owner, changes, counts, named in places:
-        if number and 2 * owner.size < cuts.sign.size:
+        if number and stray(owner, cuts):
             continue  # single nodes of the variables further out: of measure zero
         forward, backward, scale = changes()
         unknown = ~(np.isfinite(forward) & np.isfinite(backward))
@@ -115,7 +116,7 @@ def count_slivers(
     """Add to the errors what may lie between surfaces that rounding does not tell apart."""
     scene = Scene(parent, number, level, env, sides, machine)
     for sliver in cuts.slivers:
-        if number and 2 * sliver.owner.size < cuts.sign.size:
+        if number and stray(sliver.owner, cuts):
             continue  # single nodes of the variables further out: of measure zero
         f, _ = scene.flips(sliver.cuts, sliver.owner, sliver.x, not sliver.upper)
         lost = SURE * np.abs(f - f[0]).max(axis=0) * sliver.width
@@ -125,14 +126,17 @@ def count_slivers(
         sums.e[at] += lost
 
 
-def note_folds(number: int, level: LevelPlan, cuts: Cuts, machine: Evaluator) -> None:
+def note_folds(parent: Iteration, number: int, cuts: Cuts, env: dict[str, Value], machine: Evaluator) -> None:
     """Say where sections of a surface appear or merge just here. At single nodes further out that is no matter."""
+    levels = parent.plan.levels
     for fold in cuts.folds:
-        if number and 2 * fold.owner.size < cuts.sign.size:
+        if number and stray(fold.owner, cuts):
             continue
         owner = None if number else tuple(map(int, fold.owner))
-        named = Sided(level.variable, level.level.cuts[fold.cut].surface, fold=True)
-        machine.note_fold(named, Folded(number, fold.cut, float(fold.x[0]), owner))
+        here = [env[level.variable] for level in levels[:number]]
+        outer = [as_array(cell.v, cuts.sign.size)[fold.owner[0]] for cell in here if isinstance(cell, Cell)]
+        named = Sided(levels[number].variable, levels[number].level.cuts[fold.cut].surface, fold=True)
+        machine.note_fold(named, Folded(number, fold.cut, float(fold.x[0]), owner, tuple(map(float, outer))))
 
 
 def _not_known(scene: Scene, sums: Sums, owner: Ints, unknown: Bools, named: Sided) -> None:
@@ -205,6 +209,14 @@ def _on_one_bound(edges: Sequence[Edge], batch: int) -> list[list[Edge]]:
             owner = np.nonzero((on == pattern[:, None]).all(axis=0))[0]
             out.append([e.pick(np.isin(e.owner, owner)) for e, there in zip(here, pattern, strict=True) if there])
     return out
+
+
+def stray(owner: Ints, cuts: Cuts) -> bool:
+    """Whether so few members of a batch can only be single nodes of the variables further out, of measure zero.
+
+    A rule has a node in the middle of its panel, where by symmetry things meet: one of eleven.
+    """
+    return STRAY * owner.size < cuts.sign.size
 
 
 def group_of(level: LevelPlan, cut: int) -> int:

@@ -83,7 +83,7 @@ class Iteration:
         if cuts.slivers and not machine.frozen and not self.plan.hides:
             count_slivers(self, number, level, cuts, env, outer, sums, machine)
         if k and cuts.folds:
-            note_folds(number, level, cuts, machine)
+            note_folds(self, number, cuts, env, machine)
         sums.v *= cuts.sign
         sums.t *= cuts.sign
         for gone in (cuts.bound_nan, lost):

@@ -31,14 +31,22 @@ class Sided:
     fold: bool = False
 
 
+INNER = -1
+
+
 @dataclass(frozen=True)
 class Folded:
-    """A fold: at which variable, of which of its cuts, where, and for which of the batch; None where for all."""
+    """A fold: at which variable, of which of its cuts, where, and for which of the batch; None where for all.
+
+    outer: where that is in the variables further out. Of an integral inside of another one only that there is one: its
+    variables and its batch mean nothing outside, and the number is INNER.
+    """
 
     number: int
     cut: int
     place: float
     owner: tuple[int, ...] | None
+    outer: tuple[float, ...] = ()
 
 
 class Evaluator(Protocol):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from potto.integrate.cuts import Cuts
-from potto.integrate.edges import around
+from potto.integrate.edges import around, stray
 from potto.integrate.pieces import Evaluator, Pieces, gather, still, take
 from potto.integrate.plan import LevelPlan
 from potto.kernels.cells import Cell, Mask, Value
@@ -58,7 +58,7 @@ def brush(
     Looked at on both sides of the bound, with the surfaces of this variable as they are inside.
     """
     for edge in cuts.brushes:
-        if number and 2 * edge.owner.size < cuts.sign.size:
+        if number and stray(edge.owner, cuts):
             continue
         here, inner = around(level, edge.owner, edge.x, not edge.upper, env, sides, machine)
         frozen, size = machine.with_directions(0), edge.owner.size

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 from potto.integrate import costs
 from potto.integrate.costs import Costs
-from potto.integrate.pieces import Folded, Sided
+from potto.integrate.pieces import INNER, Folded, Sided
 from potto.kernels.cells import Array, Value
 
 
@@ -89,6 +89,11 @@ class Books:
     used: dict[tuple[str, str], Value] = field(default_factory=dict)
     costs: Costs | None = field(default_factory=costs.books)
     gauge: Gauge | None = field(default_factory=_begun)
+
+    def forget_places_of_folds(self) -> None:
+        """Of folds that an inner integral met, keep that there are any."""
+        for what in self.folds:
+            self.folds[what] = Folded(INNER, 0, 0.0, None)
 
     def count(self, evaluations: int, most: int) -> None:
         """Note evaluations of integrands, of which so many are allowed for each member of the batch."""

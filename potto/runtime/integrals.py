@@ -170,6 +170,7 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
             if outermost and machine.books.folds:
                 beside_folds(machine, plan, linked, batch, sums, partial(_beside, machine, term))
             if not outermost:
+                machine.books.forget_places_of_folds()
                 return sums
             sums = turned_round(machine, order, linked, env, batch, sums)
             if machine.directions and not (machine.books.edges or machine.side):

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from potto.integrate.cuts import frame_rows
-from potto.integrate.pieces import Folded, Sided, Sums, still
+from potto.integrate.pieces import INNER, Folded, Sided, Sums, still
 from potto.integrate.plan import Plan
 from potto.integrate.roots import searched_rows
 from potto.kernels.cells import Array, Cell, Value, map_arrays
@@ -89,7 +89,8 @@ def beside_axes(
     machine.books.degenerate.clear()
     with apart(machine):
         found = list(_sides(machine, plan, linked, range(batch), None, evaluated))
-    still_ones = batch * sum(not any(_moves(v, d) for v in linked.env.values()) for d in range(machine.directions))
+    moving = [any(any(_moving(v, d)) for v in linked.env.values()) for d in range(machine.directions)]
+    still_ones = batch * moving.count(False)
     if len(found) + still_ones < batch * machine.directions:
         return False
     for member, d, backward, forward, off in found:
@@ -156,25 +157,34 @@ def _both(
 
 
 def _step(machine: Machine, plan: Plan, env: dict[str, Value], d: int, where: Folded | None) -> float | None:
-    """The largest step that moves the roots that fold, or all roots, by a small part of the range, either way."""
+    """The largest step that moves the roots that fold, or all roots, by a small part of the range, either way.
+
+    Where nobody knows the roots, since an integral further in has them, a small part of the parameters.
+    """
+    if where is not None and where.number == INNER:
+        sizes = [float(np.abs(cell.v)) for value in env.values() for cell in _moving(value, d)]
+        return APART**2 * max([1.0, *sizes]) if sizes else None
     both = np.concatenate(([0.0], STEPS, -STEPS))
     here = {n: moved(v, both, d, moving=False) for n, v in env.items()}
     quiet, size = machine.with_directions(0), both.size
-    for level in plan.levels[: 1 + (0 if where is None else where.number)]:
+    outer = () if where is None else where.outer
+    for number, level in enumerate(plan.levels[: 1 + (0 if where is None else where.number)]):
         values = quiet.evaluate(level.frame, {n: here[n] for n in level.frame.params}, None)
         assert isinstance(values, tuple)
         lo, hi, rows = frame_rows(level, values)
         rows += searched_rows(replace(level, searched=()), here, lo, hi, size, quiet)
         low, high = (np.broadcast_to(np.nan_to_num(end.v, posinf=1e300, neginf=-1e300), (size,)) for end in (lo, hi))
-        here[level.variable] = Cell(0.5 * low + 0.5 * high)
+        middle = 0.5 * low + 0.5 * high
+        here[level.variable] = Cell(np.full(size, outer[number]) if number < len(outer) else middle)
     off = np.zeros(size)
     for row in rows:
         if where is None or row.cut == where.cut:
             x = np.broadcast_to(row.x, (size,))
             if where is None:
-                x = np.where((x >= low) & (x <= high), x, np.nan)
-            off = np.fmax(off, np.abs(x - (_near(x) if where is None else where.place)))
-    reach = high - low
+                x = np.where((x >= np.minimum(low, high)) & (x <= np.maximum(low, high)), x, np.nan)
+            start = x[0] if np.isfinite(x[0]) else _near(x) if where is None else where.place
+            off = np.fmax(off, np.abs(x - start))
+    reach = np.abs(high - low)
     reach = np.where(reach < 1e300, reach, 1.0 + abs(0.0 if where is None else where.place))
     fits = (off <= APART * reach)[1:].reshape(2, -1).all(axis=0)
     moves = (off > 0)[1:].reshape(2, -1).any(axis=0)
@@ -188,13 +198,18 @@ def _near(x: Array) -> Array:
     return np.concatenate(([np.nan], *(np.full(STEPS.size, place) for place in found)))
 
 
-def _moves(value: Value, d: int) -> bool:
+def _moving(value: Value, d: int) -> Iterator[Cell]:
+    """The numbers in a value that move in a direction."""
     if isinstance(value, Cell):
         t = value.t[d] if d < len(value.t) else None
-        return t is not None and bool(np.any(t))
-    if isinstance(value, tuple):
-        return any(_moves(item, d) for item in value)
-    return isinstance(value, Closure) and any(_moves(inner, d) for inner in value.captured.values())
+        if t is not None and np.any(t):
+            yield value
+    elif isinstance(value, tuple):
+        for item in value:
+            yield from _moving(item, d)
+    elif isinstance(value, Closure):
+        for inner in value.captured.values():
+            yield from _moving(inner, d)
 
 
 def moved(value: Value, step: Any, d: int, moving: bool = True) -> Value:
