@@ -1,6 +1,6 @@
 """Places at which the integrand is not defined: nodes that rounding puts there, and conditions that have no value.
 
-Owns `mend`, `sides_at`, `lost_members` and `guarded_samples`.
+Owns `mend`, `sides_at`, `lost_members`, `fallen` and `guarded_samples`.
 
 Close to an end of a segment where roots merge an integrand like 1/sqrt(r^2 - x^2 - y^2) has a radicand of the size of
 its rounding, and may come out as nan. There, in the coordinate that the segment is run through by, it is smooth: its
@@ -12,6 +12,7 @@ integral is not a number, and it is told where.
 
 from __future__ import annotations
 
+from collections.abc import Container, Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -120,6 +121,19 @@ def lost_members(scene: Scene, seg: Segments, undefined: dict[int, Bools], alive
     return np.unique(np.concatenate(lost)) if lost else np.zeros(0, dtype=np.int64)
 
 
+def fallen(
+    plan: Plan, env: dict[str, Value], n: int, machine: Evaluator, groups: Container[int]
+) -> Iterator[tuple[int, Bools, Bools]]:
+    """The sides on which samples fall of the surfaces of some groups, and where a surface is not defined, (n,) each."""
+    for group in plan.groups:
+        if group.number in groups:
+            function = function_of(group.cut.surface)
+            value = machine.with_directions(0).evaluate(function, {p: still(env[p]) for p in function.params}, None)
+            assert isinstance(value, Cell)
+            at = np.broadcast_to(value.v, (n,))
+            yield group.number, at >= 0 if group.up_at_zero else at > 0, np.isnan(at)
+
+
 def guarded_samples(
     plan: Plan, env: dict[str, Value], sides: dict[int, Mask], index: Ints, machine: Evaluator
 ) -> Bools:
@@ -127,25 +141,18 @@ def guarded_samples(
 
     Of the others it is told where the first is, if it is a condition that has no value there. sides: those forced.
     """
-    below, above = dict[int, Mask](), dict[int, Mask]()
+    below: dict[int, Mask] = {g: take(mask, index) for g, mask in sides.items()}
+    above = dict(below)
     undefined: list[tuple[int, Bools]] = []
-    for group in plan.groups:
-        if group.number in sides:
-            below[group.number] = above[group.number] = take(sides[group.number], index)
-            continue
-        function = function_of(group.cut.surface)
-        here = {n: still(v) for n, v in gather({n: env[n] for n in function.params}, index).items()}
-        value = machine.with_directions(0).evaluate(function, here, None)
-        assert isinstance(value, Cell)
-        at = np.broadcast_to(value.v, index.shape)
-        side = at >= 0 if group.up_at_zero else at > 0
-        below[group.number], above[group.number] = side, side | np.isnan(at)
-        if np.isnan(at).any():
-            undefined.append((group.number, np.isnan(at)))
+    here = gather(env, index)
+    free = {group.number for group in plan.groups} - sides.keys()
+    for number, side, lost in fallen(plan, here, index.size, machine, free):
+        below[number], above[number] = side, side | lost
+        undefined.append((number, lost))
     zero = np.broadcast_to(vanishes(plan.vanishing, below) & vanishes(plan.vanishing, above), index.shape)
-    for number, where in undefined:
-        if (where & ~zero).any():
-            _tell(plan, number, gather(env, index), int(np.nonzero(where & ~zero)[0][0]), machine)
+    for number, lost in undefined:
+        if (lost & ~zero).any():
+            _tell(plan, number, here, int(np.nonzero(lost & ~zero)[0][0]), machine)
             break
     return zero
 
