@@ -93,7 +93,8 @@ def count_collapsed(scene: Scene, found: list[Collapsed], sums: Sums) -> Sums:
             continue
         f, e = scene.flips(ranges.cuts, ranges.owner, ranges.x, False)
         sums = _with_components(sums, f.shape[1])
-        backward, forward = (_growth(f, ranges, sign) for sign in (-1, 1))
+        folds = len(set(ranges.cuts)) < len(ranges.cuts)  # what that comes to is known from beside the parameters alone
+        backward, forward = (np.zeros(1) if folds else _growth(f, ranges, sign) for sign in (-1, 1))
         size, at = np.abs(f).max(axis=0), (slice(None), slice(None), ranges.owner)
         rates = np.abs(ranges.low) + np.abs(ranges.high)
         differ = np.abs(forward - backward) > 1e-12 * size[:, None] * rates
@@ -101,7 +102,7 @@ def count_collapsed(scene: Scene, found: list[Collapsed], sums: Sums) -> Sums:
             growth = forward if scene.machine.side > 0 else backward
         else:
             as_it_falls = scene.as_it_falls(ranges.owner, ranges.x)[:, None] * (ranges.high - ranges.low)
-            growth = np.where(differ, as_it_falls, forward)
+            growth = np.where(differ | folds, as_it_falls, forward)
             if differ.any():
                 scene.machine.note_sided(Sided(scene.level.variable, scene.surface(ranges.cuts[0])))
         sums.t[at] = growth

@@ -196,7 +196,10 @@ def picked(f: Array, bits: Ints) -> Array:
 
 
 def _on_one_bound(edges: Sequence[Edge], batch: int) -> list[list[Edge]]:
-    """Edges with those others that lie on the same bound of the same members, members with the same ones together."""
+    """Edges with those others that lie on the same bound of the same members, members with the same ones together.
+
+    Where two sections of one surface meet on a bound it folds there, and which of them come in is not known.
+    """
     out: list[list[Edge]] = []
     for upper in (False, True):
         here = [e for e in edges if e.upper == upper]
@@ -207,7 +210,9 @@ def _on_one_bound(edges: Sequence[Edge], batch: int) -> list[list[Edge]]:
             on[n, edge.owner] = True
         for pattern in np.unique(on[:, on.any(axis=0)], axis=1).T:
             owner = np.nonzero((on == pattern[:, None]).all(axis=0))[0]
-            out.append([e.pick(np.isin(e.owner, owner)) for e, there in zip(here, pattern, strict=True) if there])
+            group = [e.pick(np.isin(e.owner, owner)) for e, there in zip(here, pattern, strict=True) if there]
+            if len({e.cut for e in group}) == len(group):
+                out.append(group)
     return out
 
 

@@ -10,6 +10,7 @@ none.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -17,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from potto.integrate.cuts import frame_rows
+from potto.integrate.cuts import Row, frame_rows
 from potto.integrate.pieces import INNER, Folded, Sided, Sums, still
 from potto.integrate.plan import Plan
 from potto.integrate.roots import searched_rows
@@ -34,6 +35,8 @@ APART = 2.0**-8
 CLOSER = 2.0**-8  # each step by this part of the one before
 # What successive differences may be of the one before where there is a limit, and what is no difference at all.
 SETTLING, SAME = 0.75, 1e-6
+# What is nearer to a fold than this lies at it, as far as steps that parameters notice can tell.
+TOGETHER = 1e-9
 MOST_MEMBERS = 16  # of a batch that are looked at
 
 
@@ -57,7 +60,7 @@ def beside_folds(
 ) -> None:
     """Put the one-sided derivatives of integrals at whose parameters a surface folds in their place, or note both.
 
-    evaluated: the integral for other parameters, of one member.
+    evaluated: the integral for other parameters, of one member. What was noted of other surfaces lacks what folds.
     """
     folds = dict(machine.books.folds)
     with apart(machine):
@@ -68,6 +71,9 @@ def beside_folds(
         ]
     for what, (member, d, backward, forward, off) in found:
         t, et = sums.t[:, d, member], sums.et[:, d, member]
+        for _, before, beyond in machine.books.edges:
+            if np.shape(before) == sums.t.shape:
+                before[:, d, member], beyond[:, d, member] = backward, forward
         if _same(backward, forward, off) and np.isfinite(forward).all():
             known = np.isfinite(t) & (np.abs(t - forward) <= SAME * np.abs(forward) + et)
             t[:], et[:] = np.where(known, t, forward), np.where(known, et, off)
@@ -184,12 +190,22 @@ def _step(machine: Machine, plan: Plan, env: dict[str, Value], d: int, where: Fo
                 x = np.where((x >= np.minimum(low, high)) & (x <= np.maximum(low, high)), x, np.nan)
             start = x[0] if np.isfinite(x[0]) else _near(x) if where is None else where.place
             off = np.fmax(off, np.abs(x - start))
-    reach = np.abs(high - low)
-    reach = np.where(reach < 1e300, reach, 1.0 + abs(0.0 if where is None else where.place))
-    fits = (off <= APART * reach)[1:].reshape(2, -1).all(axis=0)
+    fits = (off <= APART * _room(low, high, rows, where))[1:].reshape(2, -1).all(axis=0)
     moves = (off > 0)[1:].reshape(2, -1).any(axis=0)
     fits = np.logical_and.accumulate(fits) & moves
     return float(STEPS[np.nonzero(fits)[0][-1]]) if fits.any() else None
+
+
+def _room(low: Array, high: Array, rows: Sequence[Row], where: Folded | None) -> Array:
+    """How far it is from one end of the range to the other, or from what folds to what else lies in it."""
+    reach = np.abs(high - low)
+    place = 0.0 if where is None else where.place
+    room = np.where((reach < 1e300) & (reach[0] > 0), reach, 1.0 + abs(place))
+    if where is None:
+        return room
+    gaps = [abs(float(np.broadcast_to(row.x, reach.shape)[0]) - place) for row in rows]
+    near = [gap for gap in gaps if gap > TOGETHER * (1.0 + abs(place))]
+    return np.minimum(room, min(near, default=np.inf))
 
 
 def _near(x: Array) -> Array:
@@ -244,4 +260,5 @@ def _limit(far: float, nearer: float, nearest: float, noise: float) -> float:
     if abs(second) <= SETTLING * abs(first):
         limit = nearest + second * second / (first - second)
         return limit if abs(limit) > SAME * (abs(far) + abs(nearer)) else 0.0
-    return float("inf") if second > 0 and nearest > 0 else float("-inf") if second < 0 and nearest < 0 else float("nan")
+    grows = first * second > 0 and nearest * second > 0
+    return math.copysign(math.inf, nearest) if grows else math.nan
