@@ -52,15 +52,21 @@ class Scene:
     def flips(self, cuts: Sequence[int], owner: Ints, x: Array, above: bool) -> tuple[Array, Array]:
         """F just beside x with every subset of some cuts' surfaces flipped: (2^n, m, B); bit i stands for cut i.
 
-        And the errors of that.
+        And the errors of that. Two sections of one surface flip it twice, one at which it only touches 0 not at all.
         """
         here, inner = around(self.level, owner, x, above, self.env, self.sides, self.machine)
+        _, beyond = around(self.level, owner, x, not above, self.env, self.sides, self.machine)
         groups = [group_of(self.level, cut) for cut in cuts]
         frozen = self.machine.with_directions(0)
         found = []
         with nullcontext() if self.machine.costs is None else self.machine.costs.apart():
             for bits in range(1 << len(groups)):
-                way = {g: ~np.asarray(inner[g]) for i, g in enumerate(groups) if bits >> i & 1}
+                flipped = [g for i, g in enumerate(groups) if bits >> i & 1]
+                way = {
+                    g: np.asarray(beyond[g]) if groups.count(g) == 1 else ~np.asarray(inner[g])
+                    for g in flipped
+                    if flipped.count(g) % 2
+                }
                 found.append(self.parent.inside(self.number, here, owner.size, {**inner, **way}, frozen))
         return np.stack([f for f, _ in found]), np.stack([e for _, e in found])
 
