@@ -261,14 +261,15 @@ def _min(term: Prim, value: Term) -> Steps:
 
 
 def _pieces(term: Prim, value: Term, sign: int, level: Term | None = None) -> tuple[Step, ...]:
-    """One step for each argument of min or max, where it is the one that counts (and so equal to `level`)."""
+    """One step for each argument of min or max, where it is the one that counts (and so equal to `level`).
+
+    Where two of them are equal both count: a root at the kink is two roots that meet there.
+    """
     steps: list[Step] = []
     for i, piece in enumerate(term.args):
         here = piece if level is None else level
         guards = tuple(
-            Guard(sub(here, other) if sign > 0 else sub(other, here), strict=j < i)
-            for j, other in enumerate(term.args)
-            if j != i
+            Guard(sub(here, other) if sign > 0 else sub(other, here)) for j, other in enumerate(term.args) if j != i
         )
         steps.append(Step(piece, value, guards))
     return tuple(steps)
@@ -278,8 +279,8 @@ def _clamp(term: Prim, value: Term) -> tuple[Step, ...]:
     x, lo, hi = term.args
     return (
         Step(x, value, (Guard(sub(x, lo)), Guard(sub(hi, x)))),
-        Step(lo, value, (Guard(sub(lo, x), True),)),
-        Step(hi, value, (Guard(sub(x, hi), True),)),
+        Step(lo, value, (Guard(sub(lo, x)),)),
+        Step(hi, value, (Guard(sub(x, hi)),)),
     )
 
 
@@ -319,7 +320,7 @@ def _pieces_of(node: Prim) -> list[tuple[Term, tuple[Guard, ...]]] | None:
     match node.op:
         case "abs":
             (inner,) = node.args
-            return [(inner, (Guard(inner),)), (neg(inner), (Guard(neg(inner), True),))]
+            return [(inner, (Guard(inner),)), (neg(inner), (Guard(neg(inner)),))]
         case "max" | "min":
             steps = _pieces(node, ZERO, 1 if node.op == "max" else -1)
         case "clamp":

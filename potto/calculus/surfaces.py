@@ -14,6 +14,7 @@ from functools import lru_cache
 from typing import Literal
 
 from potto.calculus.currying import arguments_of, groups_of, sizes_of, uncurry
+from potto.calculus.ranges import nonnegative
 from potto.calculus.trace import CallSite, Part, Side, layout, spine
 from potto.core.terms import (
     App,
@@ -89,8 +90,23 @@ def underlying(head: Term, resolve: Resolve) -> tuple[Lam | None, int]:
 
 def findings(term: Term, resolve: Resolve, decide: Decide = undecided) -> tuple[Finding, ...]:
     """All surfaces of a term, jumps with the trace that forces them. Raises TooDeep."""
-    found = _Search(resolve, decide).term(term, {}, (), (), 0)
-    return tuple(replace(f, surface=carried_out(f.surface, resolve)) for f in found)
+    searched = _Search(resolve, decide).term(term, {}, (), (), 0)
+    found = tuple(replace(f, surface=carried_out(f.surface, resolve)) for f in searched)
+    ends = {end: None for f in found if f.kind == "jump" for end in _ends_of_domain(f.surface)}
+    return (*found, *(Finding("kink", end) for end in ends))
+
+
+def _ends_of_domain(surface: Term) -> Iterator[Term]:
+    """Where a condition stops being defined, if it does: on what lies beyond it has no side.
+
+    An edge that is a period's is a pole, on both sides of which there is a value.
+    """
+    for node in outside(surface, _BINDERS):
+        if isinstance(node, Prim) and node.free and node.op != "div":
+            entry = PRIMITIVES[node.op]
+            for end in () if entry.period else entry.edges(*node.args):
+                if not nonnegative(end):
+                    yield from (piece for piece in pieces(end) if piece.free)
 
 
 def carried_out(surface: Term, resolve: Resolve, depth: int = 0) -> Term:

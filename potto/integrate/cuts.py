@@ -142,7 +142,7 @@ _End = tuple[Any, Any, Any]  # values (batch), tangents (directions, batch), err
 def _ends(lo: Cell, hi: Cell, batch: int, directions: int) -> tuple[_End, _End, Array]:
     """The lower and the upper end, each with its tangents and its error, and the sign that turning them round costs."""
     low, high = as_array(lo.v, batch), as_array(hi.v, batch)
-    tl, th = _tangents(lo.t, batch, directions), _tangents(hi.t, batch, directions)
+    tl, th = tangents(lo.t, batch, directions), tangents(hi.t, batch, directions)
     el, eh = (0.0 if bound.e is None else bound.e for bound in (lo, hi))
     sign = np.ones(batch)
     turn = high < low
@@ -208,7 +208,7 @@ def _meetings(plan: LevelPlan, rows: list[Row], inside: Bools, batch: int, direc
     jumps = [i for i, row in enumerate(rows) if row.cut >= 0 and plan.level.cuts[row.cut].decides]
     x = np.stack([as_array(rows[i].x, batch) for i in jumps]) if jumps else np.zeros((0, batch))
     e = np.stack([as_array(0.0 if rows[i].e is None else rows[i].e, batch) for i in jumps]) if jumps else x
-    t = np.stack([_tangents(rows[i].t, batch, directions) for i in jumps]) if jumps else np.zeros((0, 0, batch))
+    t = np.stack([tangents(rows[i].t, batch, directions) for i in jumps]) if jumps else np.zeros((0, 0, batch))
     there = inside[[i + 1 for i in jumps]] & np.isfinite(t).all(axis=1)
     out: list[Meeting] = []
     for n, i in enumerate(jumps):
@@ -233,7 +233,7 @@ def _slivers(
     places = [as_array(row.x, batch) for row in jumps]
     off = [SEARCHED * EPS * np.abs(x) if row.e is None else row.e for row, x in zip(jumps, places, strict=True)]
     off = [np.where(np.isfinite(e), e, 0.0) for e in off]
-    fast = [np.abs(_tangents(row.t, batch, directions)).max(axis=0, initial=0.0) / (high - low) for row in jumps]
+    fast = [np.abs(tangents(row.t, batch, directions)).max(axis=0, initial=0.0) / (high - low) for row in jumps]
     out: list[Sliver] = []
 
     def put(cuts: tuple[int, ...], x: Array, gap: Any, width: Any, speed: Array, upper: bool) -> None:
@@ -260,7 +260,7 @@ def _folds(plan: LevelPlan, rows: list[Row], low: Array, high: Array, directions
         x = as_array(row.x, batch)
         folded: Any = np.zeros(batch, dtype=bool)
         if plan.level.cuts[row.cut].decides and any(not np.isfinite(t).all() for t in row.t if t is not None):
-            folded = ~np.isfinite(_tangents(row.t, batch, directions)).all(axis=0)
+            folded = ~np.isfinite(tangents(row.t, batch, directions)).all(axis=0)
         for other in rows[:i]:
             if other.cut == row.cut:
                 folded = folded | (x == other.x)
@@ -281,7 +281,7 @@ def _any_turning(plan: LevelPlan, row: Row) -> bool:
     return plan.level.cuts[row.cut].turning
 
 
-def _tangents(t: tuple[Any, ...], batch: int, directions: int) -> Array:
+def tangents(t: tuple[Any, ...], batch: int, directions: int) -> Array:
     out = np.zeros((directions, batch))
     for d, x in enumerate(t):
         if x is not None:
@@ -299,7 +299,7 @@ def _edges(
         if not on.any():
             continue
         on = on & np.isfinite(bound) & (low < high)
-        speed = _tangents(row.t, batch, directions)
+        speed = tangents(row.t, batch, directions)
         moves = np.abs(speed - tb) > 64 * EPS * np.maximum(np.abs(speed), np.abs(tb))
         owner = np.nonzero(on & moves.any(axis=0))[0]
         if owner.size:

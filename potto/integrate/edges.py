@@ -30,60 +30,86 @@ from potto.integrate.rules import EPS
 from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value
 
 if TYPE_CHECKING:
-    from potto.integrate.work import Work
+    from potto.integrate.levels import Iteration
 
 MOST_AT_ONE_PLACE = 4
 SURE = 1.001  # what rounding may add to a bound
+# Beside a place, in its own size: where surfaces that are 0 at it, to so many times their rounding, have a side.
+BESIDE, CLEAR = 1e-7, 4.0
 
 
 @dataclass(frozen=True)
 class Scene:
     """One variable of an iteration as it is being integrated: everything that is needed to evaluate its integrand."""
 
-    work: Work
+    parent: Iteration
+    number: int
+    level: LevelPlan
+    env: dict[str, Value]
     sides: dict[int, Mask]
+    machine: Evaluator
+    batch: int = 1
+    root: Ints | None = None
 
-    @property
-    def level(self) -> LevelPlan:
-        return self.work.level
+    def below(self, owner: Ints) -> Ints | None:
+        """The members of the outermost batch that some of this one belong to; None if there is but one."""
+        if self.number == 0:
+            return owner if self.batch > 1 else None
+        return None if self.root is None else self.root[owner]
 
-    @property
-    def machine(self) -> Evaluator:
-        return self.work.machine
+    def counted(self, owner: Ints) -> Bools:
+        """Which of a batch count: not single nodes of the variables further out."""
+        return np.isin(owner, mostly(owner, self.root, self.batch)) if self.number else np.ones(owner.size, dtype=bool)
 
-    def counted(self, owner: Ints) -> Ints:
-        """Those of a batch for which what is met counts: not at single nodes further out, a set of measure zero."""
-        return mostly(owner, self.work.root, self.work.batch) if self.work.number else owner
+    def flips(self, cuts: Sequence[int], owner: Ints, x: Array, above: bool) -> tuple[Array, Array]:
+        """F just beside x with every subset of some cuts' surfaces flipped: (2^n, m, B); bit i stands for cut i.
 
-    def flips(self, cuts: Sequence[int], owner: Ints, x: Array, above: bool) -> Array:
-        """F just beside x with every subset of some cuts' surfaces flipped: (2^n, m, B); bit i stands for cut i."""
-        here, inner = around(self.level, owner, x, above, self.work.env, self.sides, self.machine)
+        And the errors of that. Two sections of one surface flip it twice, one at which it only touches 0 not at all.
+        """
+        here, inner = around(self.level, owner, x, above, self.env, self.sides, self.machine)
+        _, beyond = around(self.level, owner, x, not above, self.env, self.sides, self.machine)
         groups = [group_of(self.level, cut) for cut in cuts]
-        frozen, root = self.machine.with_directions(0), self.work.below(owner)
+        frozen = self.machine.with_directions(0)
         found = []
         with nullcontext() if self.machine.costs is None else self.machine.costs.apart():
             for bits in range(1 << len(groups)):
-                way = {g: ~np.asarray(inner[g]) for i, g in enumerate(groups) if bits >> i & 1}
+                flipped = [g for i, g in enumerate(groups) if bits >> i & 1]
+                way = {
+                    g: np.asarray(beyond[g]) if groups.count(g) == 1 else ~np.asarray(inner[g])
+                    for g in flipped
+                    if flipped.count(g) % 2
+                }
                 both = {**inner, **way}
-                found.append(self.work.parent.inside(self.work.number, here, owner.size, both, frozen, root)[0])
-        return np.stack(found)
+                found.append(self.parent.inside(self.number, here, owner.size, both, frozen, self.below(owner)))
+        return np.stack([f for f, _ in found]), np.stack([e for _, e in found])
+
+    def as_it_falls(self, owner: Ints, x: Array) -> Array:
+        """F at x itself, (m, B): a surface that is 0 there is on the side that its comparison says."""
+        here, sides = placed(self.level, owner, x, self.env, self.sides)
+        if self.level.decided:
+            groups = self.parent.plan.groups
+            values = zip(self.level.decided, surfaces_at(self.level, here, owner.size, self.machine), strict=True)
+            up = [v >= 0 if groups[g].up_at_zero else v > 0 for g, (v, _) in values]
+            sides = decided(self.level, sides, up)
+        frozen, root = self.machine.with_directions(0), self.below(owner)
+        return self.parent.inside(self.number, here, owner.size, sides, frozen, root)[0]
 
     def surface(self, cut: int) -> Term:
         return self.level.level.cuts[cut].surface
 
 
-def count_places(work: Work, cuts: Cuts, sides: dict[int, Mask], sums: Sums) -> None:
+def count_places(scene: Scene, cuts: Cuts, sums: Sums) -> None:
     """Add to the tangents what surfaces on bounds and on one another contribute; say where they have two sides."""
-    scene, machine, level = Scene(work, sides), work.machine, work.level
+    level, machine = scene.level, scene.machine
     places: list[tuple[Ints, Callable[[], tuple[Array, Array, Array]], bool, Sided]] = []
     for meeting in cuts.meetings:
         named = Sided(level.variable, scene.surface(meeting.cuts[0]), scene.surface(meeting.cuts[1]))
-        meeting = meeting.pick(np.isin(meeting.owner, scene.counted(meeting.owner)))
-        places.append((meeting.owner, lambda m=meeting: at_one_place(scene, m), True, named))  # type: ignore[misc]
+        met = meeting.pick(scene.counted(meeting.owner))
+        places.append((met.owner, lambda m=met: at_one_place(scene, m), True, named))  # type: ignore[misc]
     for group in _on_one_bound(cuts.edges, cuts.sign.size):
         named = Sided(level.variable, scene.surface(group[0].cut))
-        group = [edge.pick(np.isin(edge.owner, scene.counted(edge.owner))) for edge in group]
-        places.append((group[0].owner, lambda g=group: at_a_bound(scene, g), False, named))  # type: ignore[misc]
+        on = [edge.pick(scene.counted(edge.owner)) for edge in group]
+        places.append((on[0].owner, lambda g=on: at_a_bound(scene, g), False, named))  # type: ignore[misc]
     for owner, changes, counts, named in places:
         if not owner.size:
             continue
@@ -100,17 +126,16 @@ def count_places(work: Work, cuts: Cuts, sides: dict[int, Mask], sums: Sums) -> 
         sums.t[:, :, owner] = base + (forward if counts else np.where(differ, 0.0, forward))
         two = differ.any(axis=(0, 1))
         if two.any():
-            machine.note_sided(named, work.below(owner[two]))
+            machine.note_sided(named, scene.below(owner[two]))
 
 
-def count_slivers(work: Work, cuts: Cuts, sides: dict[int, Mask], sums: Sums) -> None:
+def count_slivers(scene: Scene, cuts: Cuts, sums: Sums) -> None:
     """Add to the errors what may lie between surfaces that rounding does not tell apart."""
-    scene = Scene(work, sides)
-    for sliver in cuts.slivers:
-        sliver = sliver.pick(np.isin(sliver.owner, scene.counted(sliver.owner)))
+    for found in cuts.slivers:
+        sliver = found.pick(scene.counted(found.owner))
         if not sliver.owner.size:
             continue
-        f = scene.flips(sliver.cuts, sliver.owner, sliver.x, not sliver.upper)
+        f, _ = scene.flips(sliver.cuts, sliver.owner, sliver.x, not sliver.upper)
         lost = SURE * np.abs(f - f[0]).max(axis=0) * sliver.width
         lost = np.where(np.isfinite(lost), lost, 0.0)
         at = (slice(None), sliver.owner)
@@ -122,22 +147,26 @@ def count_slivers(work: Work, cuts: Cuts, sides: dict[int, Mask], sums: Sums) ->
             sums.gross[:, sliver.owner] += np.where((sums.v[at] == 0).all(axis=0), added, 0.0)
 
 
-def note_folds(work: Work, cuts: Cuts) -> None:
+def note_folds(scene: Scene, cuts: Cuts) -> None:
     """Say where sections of a surface appear or merge just here. At single nodes further out that is no matter."""
-    level, number = work.level, work.number
+    levels, number = scene.parent.plan.levels, scene.number
     for fold in cuts.folds:
-        owner = mostly(fold.owner, work.root, work.batch) if number else fold.owner
-        if not owner.size:
+        counts = scene.counted(fold.owner)
+        if not counts.any():
             continue
-        named = Sided(level.variable, level.level.cuts[fold.cut].surface, fold=True)
-        place = Folded(number, fold.cut, float(fold.x[0]), None if number else tuple(map(int, owner)))
-        work.machine.note_fold(named, place, work.below(owner))
+        owner, x = fold.owner[counts], float(fold.x[counts][0])
+        here = [scene.env[level.variable] for level in levels[:number]]
+        outer = [as_array(cell.v, cuts.sign.size)[owner[0]] for cell in here if isinstance(cell, Cell)]
+        named = Sided(levels[number].variable, levels[number].level.cuts[fold.cut].surface, fold=True)
+        all_of_it = None if number else tuple(map(int, owner))
+        place = Folded(number, fold.cut, x, all_of_it, tuple(map(float, outer)))
+        scene.machine.note_fold(named, place, scene.below(owner))
 
 
 def _not_known(scene: Scene, sums: Sums, owner: Ints, unknown: Bools, named: Sided) -> None:
     sums.et[:, :, owner] = np.where(unknown, np.inf, sums.et[:, :, owner])
     assert named.surface is not None
-    members = scene.work.below(owner[unknown.any(axis=(0, 1))])
+    members = scene.below(owner[unknown.any(axis=(0, 1))])
     if named.other is None:
         where = f"{format_term(named.surface)} = 0 lies on a bound of `{scene.level.variable}`"
         scene.machine.note_unfinished(f"{where}, and beyond it the integrand is not finite", members)
@@ -152,14 +181,14 @@ def at_one_place(scene: Scene, meeting: Meeting) -> tuple[Array, Array, Array]:
     if count > MOST_AT_ONE_PLACE:
         nothing = np.full((1, *v.shape[1:]), np.nan)
         return nothing, nothing, np.zeros_like(nothing)
-    f = scene.flips(meeting.cuts, meeting.owner, meeting.x, False)
+    f, _ = scene.flips(meeting.cuts, meeting.owner, meeting.x, False)
     merged = (f[0] - f[-1])[:, None] * meeting.merged_t
     found = []
     for sign in (1, -1):
         order = np.argsort(sign * v, axis=0, kind="stable")
         after = np.cumsum(1 << order, axis=0)
         speed = np.take_along_axis(v, order, axis=0)
-        crossed = [(_picked(f, a - (1 << o)) - _picked(f, a)) * s for a, o, s in zip(after, order, speed, strict=True)]
+        crossed = [(picked(f, a - (1 << o)) - picked(f, a)) * s for a, o, s in zip(after, order, speed, strict=True)]
         found.append(np.sum(crossed, axis=0) - merged)
     scale = np.abs(f).max(axis=0)[:, None] * np.abs(v).max(axis=0)
     return found[0], found[1], scale
@@ -172,7 +201,7 @@ def at_a_bound(scene: Scene, edges: Sequence[Edge]) -> tuple[Array, Array, Array
     if len(edges) > MOST_AT_ONE_PLACE:
         nothing = np.full((1, *inward.shape[1:]), np.nan)
         return nothing, nothing, np.zeros_like(nothing)
-    f = scene.flips([e.cut for e in edges], first.owner, first.x, not first.upper)
+    f, _ = scene.flips([e.cut for e in edges], first.owner, first.x, not first.upper)
     found = []
     for sign in (1, -1):
         speed = np.maximum(sign * inward, 0.0)
@@ -180,19 +209,22 @@ def at_a_bound(scene: Scene, edges: Sequence[Edge]) -> tuple[Array, Array, Array
         after, speed = np.cumsum(1 << order, axis=0), np.take_along_axis(speed, order, axis=0)
         growth = speed - np.append(speed[1:], np.zeros((1, *speed.shape[1:])), axis=0)
         gained = [
-            np.where(g > 0, (_picked(f, a) - f[0][:, None]) * g, 0.0) for a, g in zip(after, growth, strict=True)
+            np.where(g > 0, (picked(f, a) - f[0][:, None]) * g, 0.0) for a, g in zip(after, growth, strict=True)
         ]
         found.append(sign * np.sum(gained, axis=0))
     return found[0], found[1], np.abs(f[0])[:, None] + np.abs(f[-1])[:, None]
 
 
-def _picked(f: Array, bits: Ints) -> Array:
+def picked(f: Array, bits: Ints) -> Array:
     """Of F by subsets (2^n, m, B) the one for each direction and member (k, B): (m, k, B)."""
     return np.moveaxis(f[bits, :, np.arange(bits.shape[1])], -1, 0)
 
 
 def _on_one_bound(edges: Sequence[Edge], batch: int) -> list[list[Edge]]:
-    """Edges with those others that lie on the same bound of the same members, members with the same ones together."""
+    """Edges with those others that lie on the same bound of the same members, members with the same ones together.
+
+    Where two sections of one surface meet on a bound it folds there, and which of them come in is not known.
+    """
     out: list[list[Edge]] = []
     for upper in (False, True):
         here = [e for e in edges if e.upper == upper]
@@ -203,7 +235,9 @@ def _on_one_bound(edges: Sequence[Edge], batch: int) -> list[list[Edge]]:
             on[n, edge.owner] = True
         for pattern in np.unique(on[:, on.any(axis=0)], axis=1).T:
             owner = np.nonzero((on == pattern[:, None]).all(axis=0))[0]
-            out.append([e.pick(np.isin(e.owner, owner)) for e, there in zip(here, pattern, strict=True) if there])
+            group = [e.pick(np.isin(e.owner, owner)) for e, there in zip(here, pattern, strict=True) if there]
+            if len({e.cut for e in group}) == len(group):
+                out.append(group)
     return out
 
 
@@ -217,19 +251,44 @@ def around(
     machine: Evaluator,
 ) -> tuple[dict[str, Value], dict[int, Mask]]:  # fmt: skip
     """The environment of some members at x, and the sides of all surfaces just above or just below it."""
+    here, inner = placed(level, owner, x, env, sides)
+    if not level.decided:
+        return here, inner
+    step = BESIDE * (1 + np.abs(x)) * (1 if above else -1)
+    at, beside = (surfaces_at(level, {**here, level.variable: Cell(place)}, owner.size, machine)
+                  for place in (x, x + step))  # fmt: skip
+    up = [np.where(np.abs(v) > CLEAR * e, v, w) >= 0 for (v, e), (w, _) in zip(at, beside, strict=True)]
+    return here, decided(level, inner, up)
+
+
+def placed(
+    level: LevelPlan, owner: Ints, x: Array, env: dict[str, Value], sides: dict[int, Mask]
+) -> tuple[dict[str, Value], dict[int, Mask]]:
+    """The environment of some members at x, where nothing moves, and the sides that were decided further out."""
     here = gather({n: still(v) for n, v in env.items()}, owner)
     here[level.variable] = Cell(x)
-    step = 1e-7 * (1 + np.abs(x)) * (1 if above else -1)
-    beside = {**here, level.variable: Cell(x + step)}
-    inner: dict[int, Mask] = {g: take(m, owner) for g, m in sides.items()}
-    if level.decided:
-        at = {n: beside[n] for n in level.surfaces.params}
-        values = machine.with_directions(0).evaluate(level.surfaces, at, None)
-        assert isinstance(values, tuple)
-        for g, value, turned in zip(level.decided, values, level.turned, strict=True):
-            assert isinstance(value, Cell)
-            side = as_array(value.v, owner.size) >= 0
-            for outer in turned:
-                side = side ^ np.logical_not(inner[outer])
-            inner[g] = side
-    return here, inner
+    return here, {g: take(m, owner) for g, m in sides.items()}
+
+
+def surfaces_at(
+    level: LevelPlan, here: dict[str, Value], count: int, machine: Evaluator
+) -> list[tuple[Array, Array]]:
+    """The surfaces that a level decides the sides of, with their rounding, (B,) each."""
+    env = {n: here[n] for n in level.surfaces.params}
+    values = machine.with_directions(0).tracking().evaluate(level.surfaces, env, None)
+    assert isinstance(values, tuple)
+    found = []
+    for value in values:
+        assert isinstance(value, Cell)
+        found.append((as_array(value.v, count), as_array(0.0 if value.e is None else value.e, count)))
+    return found
+
+
+def decided(level: LevelPlan, sides: dict[int, Mask], up: Sequence[Bools]) -> dict[int, Mask]:
+    """The sides of all surfaces so far, with those of this level as their own terms say."""
+    sides = dict(sides)
+    for g, side, turned in zip(level.decided, up, level.turned, strict=True):
+        for outer in turned:
+            side = side ^ np.logical_not(sides[outer])
+        sides[g] = side
+    return sides

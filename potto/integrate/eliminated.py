@@ -174,7 +174,7 @@ def _table(
                  for at, kind in places if kind != "center")  # fmt: skip
     hints = points_of((at for at, kind in places if kind == "center"), state)[:MOST_CENTERS]
     level = level_plan(Level(state, const(span[0]), const(span[1]), hints, cuts), (), ())
-    found = iteration.cut(level, env, 1, machine)
+    found, _ = iteration.cut(level, env, 1, machine)
     segments = found.segments
 
     def function(x: Array, speeds: Array) -> Sums:

@@ -12,16 +12,17 @@ from typing import Any
 import numpy as np
 
 from potto.core.terms import Term
-from potto.integrate import maps
-from potto.integrate.cuts import Cuts, as_array, frame_rows, segments, standing
-from potto.integrate.edges import count_places, count_slivers, note_folds
+from potto.integrate.collapsed import Collapsed, collapsed_ranges, count_collapsed
+from potto.integrate.cuts import Cuts, frame_rows, segments, standing
+from potto.integrate.edges import Scene, count_places, count_slivers, note_folds
 from potto.integrate.maps import Segments
-from potto.integrate.pieces import Evaluator, Sums, components, gather, still, take
+from potto.integrate.pieces import Evaluator, Sums, components, take
 from potto.integrate.plan import LevelPlan, Plan, vanishes
 from potto.integrate.roots import searched_rows
 from potto.integrate.steps import brush
+from potto.integrate.undefined import lost_members, sides_at
 from potto.integrate.work import Work
-from potto.kernels.cells import Array, Cell, Ints, Mask, Value
+from potto.kernels.cells import Array, Bools, Ints, Mask, Value
 
 NARROW = 1e-4  # the part of the range of a variable up to which a stretch may lie on either side of a surface
 
@@ -50,17 +51,25 @@ class Iteration:
         """
         level = self.plan.levels[number]
         k = machine.directions
-        cuts = self.cut(level, env, batch, machine)
+        cuts, collapsed = self.cut(level, env, batch, machine)
         seg = cuts.segments
         outer = sides
-        sides, unsure = self.sides_of(level, env, seg, sides, machine)
-        keep = self.alive(sides, seg)
+        sides, unsure, undefined = self.sides_of(level, env, seg, sides, machine)
+        keep = self.alive(sides, seg, undefined)
+        lost = None
+        if undefined:
+            lost = lost_members(Scene(self, number, level, env, sides, machine, batch, root), seg, undefined, keep)
+            rest = np.nonzero(~np.isin(seg.owner, lost))[0]
+            keep = rest if keep is None else np.intersect1d(keep, rest)
         if machine.costs is not None and number + 1 == len(self.plan.levels):
             machine.costs.stretches(seg.a.size, seg.a.size if keep is None else keep.size)
         if keep is not None:
             seg, sides = seg.pick(keep), {g: take(m, keep) for g, m in sides.items()}
         work = Work(self, number, level, env, seg, sides, machine, cuts.moving and k > 0, batch, root, cuts.conflict)
         sums = work.integrate()
+        scene = Scene(self, number, level, env, outer, machine, batch, root)
+        if collapsed:
+            sums = count_collapsed(scene, collapsed, sums)
         if k and (cuts.meetings or cuts.edges):
             if self.plan.hides:
                 places = [*(place.owner for place in cuts.meetings), *(place.owner for place in cuts.edges)]
@@ -70,22 +79,23 @@ class Iteration:
                 )
                 sums.et[:, :, met] = np.inf
             else:
-                count_places(work, cuts, outer, sums)
+                count_places(scene, cuts, sums)
         if k and cuts.brushes and number + 1 < len(self.plan.levels):
-            brush(work, cuts, outer)
+            brush(scene, cuts)
         if unsure is not None and not number:  # single nodes of variables further out may lie on a surface
             reason = f"rounding hides on which side of a surface stretches of `{level.variable}` lie"
             machine.note_unfinished(reason, work.below(unsure))
             sums.e[:, unsure] = sums.et[:, :, unsure] = np.inf
         if cuts.slivers and not machine.frozen and not self.plan.hides:
-            count_slivers(work, cuts, outer, sums)
+            count_slivers(scene, cuts, sums)
         if k and cuts.folds:
-            note_folds(work, cuts)
+            note_folds(scene, cuts)
         sums.v *= cuts.sign
         sums.t *= cuts.sign
-        if cuts.bound_nan is not None:
-            sums.v[:, cuts.bound_nan] = np.nan
-            sums.t[:, :, cuts.bound_nan] = np.nan
+        for gone in (cuts.bound_nan, lost):
+            if gone is not None:
+                sums.v[:, gone] = sums.t[:, :, gone] = np.nan
+                sums.e[:, gone] = sums.et[:, :, gone] = np.inf
         return sums
 
     @staticmethod
@@ -97,7 +107,10 @@ class Iteration:
         np.maximum.at(most, root, scale)
         return most[root]
 
-    def cut(self, level: LevelPlan, env: dict[str, Value], batch: int, machine: Evaluator) -> Cuts:
+    def cut(
+        self, level: LevelPlan, env: dict[str, Value], batch: int, machine: Evaluator
+    ) -> tuple[Cuts, list[Collapsed]]:
+        """Where the members are cut, and which of them have a range of length zero."""
         values = machine.tracking().evaluate(level.frame, env, None)
         assert isinstance(values, tuple)
         lo, hi, rows = frame_rows(level, values)
@@ -112,45 +125,50 @@ class Iteration:
             if row.cut >= 0 and level.level.cuts[row.cut].surface in self.still:
                 row.t = ()
         cuts = segments(level, lo, hi, rows, batch, machine.directions, level is not self.plan.levels[0])
-        return standing(cuts) if machine.frozen else cuts
+        collapsed = collapsed_ranges(level, lo, hi, rows, batch, machine.directions)
+        if machine.frozen:
+            return standing(cuts), [ranges.at_rest() for ranges in collapsed]
+        return cuts, collapsed
 
     def sides_of(
         self, level: LevelPlan, env: dict[str, Value], seg: Segments, sides: dict[int, Mask], machine: Evaluator
-    ) -> tuple[dict[int, Mask], Ints | None]:
+    ) -> tuple[dict[int, Mask], Ints | None, dict[int, Bools]]:
         """The sides of all surfaces decided so far, per segment: those of this variable from the segment's middle.
 
-        And the members, if any, of which that is rounding for a stretch that matters.
+        And the members, if any, of which that is rounding for a stretch that matters; and the segments on which a
+        surface is not defined, so that it has no side.
         """
         sides = {g: take(mask, seg.owner) for g, mask in sides.items()}
         if not level.decided:
-            return sides, None
-        middle, _, _ = maps.points(seg, np.full((seg.a.size, 1), 0.5))
-        here = {n: v for n, v in env.items() if n in level.surfaces.params}
-        at = {n: still(v) for n, v in gather(here, seg.owner).items()}
-        at[level.variable] = Cell(middle[:, 0])
-        values = machine.with_directions(0).tracking().evaluate(level.surfaces, at, None)
-        assert isinstance(values, tuple)
+            return sides, None, {}
         unsure: Any = False
-        for group, value, turned in zip(level.decided, values, level.turned, strict=True):
-            assert isinstance(value, Cell)
-            at_middle = as_array(value.v, seg.a.size)
+        undefined: dict[int, Bools] = {}
+        values = sides_at(level, env, seg, machine)
+        for group, (at_middle, off), turned in zip(level.decided, values, level.turned, strict=True):
+            if any(outer not in sides for outer in turned):
+                continue  # one that is not defined
             side = at_middle >= 0 if self.plan.groups[group].up_at_zero else at_middle > 0
             for outer in turned:
                 side = side ^ np.logical_not(sides[outer])
             sides[group] = side
-            unsure = unsure | (np.abs(at_middle) < (0.0 if value.e is None else value.e))
+            if np.isnan(at_middle).any():
+                undefined[group] = np.isnan(at_middle)
+            unsure = unsure | (np.abs(at_middle) < off)
         if not np.any(unsure):
-            return sides, None
+            return sides, None, undefined
         reach = np.bincount(seg.owner, seg.b - seg.a)[seg.owner]
         members = np.unique(seg.owner[unsure & (seg.b - seg.a > NARROW * reach)])
-        return sides, members if members.size else None
+        return sides, members if members.size else None, undefined
 
-    def alive(self, sides: dict[int, Mask], seg: Segments) -> Ints | None:
+    def alive(self, sides: dict[int, Mask], seg: Segments, undefined: dict[int, Bools]) -> Ints | None:
         """The segments on which the integrand is not known to vanish; None for all of them."""
         zero = vanishes(self.plan.vanishing, sides)
         if zero is False:
             return None
         mask = np.broadcast_to(np.asarray(zero), seg.a.shape)
+        if undefined:  # there it vanishes only if it does on both sides
+            either = vanishes(self.plan.vanishing, {g: m for g, m in sides.items() if g not in undefined})
+            mask = np.where(np.any(list(undefined.values()), axis=0), either, mask)
         return np.nonzero(~mask)[0] if mask.any() else None
 
     def body(self, env: dict[str, Value], sides: dict[int, Mask], machine: Evaluator) -> Value:

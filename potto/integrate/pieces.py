@@ -31,14 +31,23 @@ class Sided:
     fold: bool = False
 
 
+INNER = -1
+STRAY = 8
+
+
 @dataclass(frozen=True)
 class Folded:
-    """A fold: at which variable, of which of its cuts, where, and for which of the batch; None where for all."""
+    """A fold: at which variable, of which of its cuts, where, and for which of the batch; None where for all.
+
+    outer: where that is in the variables further out. Of an integral inside of another one only that there is one: its
+    variables and its batch mean nothing outside, and the number is INNER.
+    """
 
     number: int
     cut: int
     place: float
     owner: tuple[int, ...] | None
+    outer: tuple[float, ...] = ()
 
 
 class Evaluator(Protocol):
@@ -66,7 +75,7 @@ class Evaluator(Protocol):
     def side(self) -> int: ...
     def note_sided(self, what: Sided, members: Ints | None = None) -> None: ...
     def note_fold(self, what: Sided, where: Folded, members: Ints | None = None) -> None: ...
-    def note_unfinished(self, reason: str, members: Ints | None = None) -> None: ...
+    def note_unfinished(self, reason: str, members: Ints | None = None, once: str = ...) -> None: ...
     def note_degenerate(self, variable: str, members: Ints | None = None) -> None: ...
 
 
@@ -174,14 +183,15 @@ def joined(parts: list[Pieces]) -> Pieces:
 
 
 def mostly(owner: Ints, root: Ints | None, size: int) -> Ints:
-    """Those of `owner`, nodes of a batch of `size`, whose member of the outermost batch has most of its nodes there.
+    """Those of `owner`, nodes of a batch of `size`, which are not so few that they can only be single nodes of the
+    variables further out, of measure zero, for their member of the outermost batch.
 
-    A surface that is met at single nodes of the variables further out is met on a set of measure zero.
+    A rule has a node in the middle of its panel, where by symmetry things meet: one of eleven.
     """
     if root is None:
-        return owner if 2 * owner.size >= size else owner[:0]
+        return owner if STRAY * owner.size >= size else owner[:0]
     counts = np.bincount(root)
-    return owner[(2 * np.bincount(root[owner], minlength=counts.size) >= counts)[root[owner]]]
+    return owner[(STRAY * np.bincount(root[owner], minlength=counts.size) >= counts)[root[owner]]]
 
 
 def gather(env: dict[str, Value], index: Ints) -> dict[str, Value]:

@@ -24,7 +24,8 @@ from potto.integrate.pieces import Sums, components, still
 from potto.integrate.plan import Plan, function_of
 from potto.integrate.rules import EPS
 from potto.integrate.sobol import MOST, Sobol
-from potto.integrate.unseen import MISSED, Largest, peaks
+from potto.integrate.undefined import guarded_samples
+from potto.integrate.unseen import MISSED, Largest, Outcomes, box_of_values, crossings, may_vanish, peaks, unhit
 from potto.kernels.cells import Array, Cell, Mask, Value, map_arrays
 
 SIGMAS = 4.0  # a reported error in standard errors: too small once in 16,000 times
@@ -82,11 +83,13 @@ def _plain(plan: Plan, machine: Any, env: dict[str, Value], told: Told) -> Sums:
     generator = np.random.default_rng(machine.settings.seed)
     run = _Run(plan, machine, env, 0)
     found: list[Moments] = []
+    rare: list[Sums] = []
     means = list(run.means())
     each = 1 + SIDES * (len(means) - 1)
     afforded = int((machine.settings.max_evals - machine.books.spent) / each)
     count = min(machine.settings.samples, max(afforded, LEAST))
-    for dims, f in means:
+    fewest = count
+    for number, (dims, f) in enumerate(means):
         moments, largest, done = Moments(), Largest(), 0
         for u in _random(generator, count if dims else 1, dims):
             samples = f(u)
@@ -98,11 +101,16 @@ def _plain(plan: Plan, machine: Any, env: dict[str, Value], told: Told) -> Sums:
                 break
         found.append(moments)
         run.largest.append(largest)
+        if dims:
+            rare.append(run.unhit(number, done))
+            fewest = min(fewest, done)
     mean, variance = added([m.mean for m in found]), added([m.variance for m in found])
     mean.e, mean.et = mean.e + SIGMAS * np.sqrt(variance.v), mean.et + SIGMAS * np.sqrt(variance.t)
-    mean = run.widened(mean, count)
+    for part in rare:
+        mean.e, mean.et = mean.e + part.v, mean.et + part.t
+    mean = run.widened(mean, fewest)
     run.look(mean)
-    _say_if_cut(mean, machine, count < machine.settings.samples)
+    _say_if_cut(mean, machine, fewest < machine.settings.samples)
     return mean
 
 
@@ -148,6 +156,9 @@ def _quasi(plan: Plan, machine: Any, env: dict[str, Value], method: str, told: T
                 found.fix(f(np.zeros((1, 0))))
         done, size = size, 2 * size
         sums = run.widened(found.estimate(done), REPLICATES * done)
+        for number, (dims, _) in enumerate(means):
+            rare = run.unhit(number, REPLICATES * done) if dims else unhit(None, 1)
+            sums.e, sums.et = sums.e + rare.v, sums.et + rare.t
         if method == "auto" and _enough(sums, settings, settings.rtol):
             break
         if cut := done < count and 2 * machine.books.spent - before > settings.max_evals:
@@ -222,6 +233,46 @@ class _Run:
         """The largest magnitudes of the interior's samples near what is known to be the center of something."""
         return peaks(self.chart, self.drawn, lambda point, n: self.integrand(point, {}, n), self.machine.settings.seed)
 
+    def unhit(self, number: int, points: int) -> Sums:
+        """What the points of one of the means may have missed: the interior's, or those of a surface by one pivot."""
+        if not number:
+            found = unhit(self.rare_outcomes if not self.exact or self.largest[0].hardly("v") else None, points)
+            if self.exact and self.machine.directions and self.largest[0].hardly("t"):
+                found.t = found.t + unhit(self.rare_crossings, points).t
+            return found
+        surface, pivot = [(s, pivot) for s in self.surfaces for pivot in s.pivots][number - 1]
+        if not self.largest[number].hardly("t") or not may_vanish(surface.term, self.box):
+            return unhit(None, points)
+        return unhit(crossings(surface, pivot, self.machine.settings.seed), points)
+
+    @cached_property
+    def rare_outcomes(self) -> Sums | None:
+        return self.outcomes.stakes(self.chart, len(self.plan.levels), self.body, self.machine.settings.seed)
+
+    @cached_property
+    def rare_crossings(self) -> Sums | None:
+        """What any surface may bring that passes through the domain, for all that is known."""
+        found: Sums | None = None
+        count = len(self.plan.levels)
+        tracked = replace(self, machine=self.machine.with_directions(0).tracking())
+        for term, number, forces in () if self.plan.hides else factors(self.plan, count):
+            if may_vanish(term, self.box):
+                surface = Surface(self.chart, term, number, forces, count, None, tracked.body)
+                for pivot in surface.pivots:
+                    more = crossings(surface, pivot, self.machine.settings.seed)
+                    found = more if found is None else added([found, more])
+        return found
+
+    @cached_property
+    def box(self) -> dict[str, tuple[float, float]]:
+        return box_of_values(self.plan.term, self.env)
+
+    @cached_property
+    def outcomes(self) -> Outcomes:
+        """Which way conditions came out at the interior's points: those that can be told and may change there."""
+        groups = () if self.plan.hides else self.plan.groups
+        return Outcomes(self.plan, [g.number for g in groups if may_vanish(g.cut.surface, self.box)])
+
     def widened(self, mean: Sums, points: int) -> Sums:
         """The mean with what so many points may not have seen added to its errors."""
         for largest in self.largest:
@@ -235,11 +286,10 @@ class _Run:
 
     def look(self, mean: Sums) -> None:
         """Say so where all samples are 0, and give the error that this has in the worst case."""
-        if mean.v.any() or mean.t.any():
-            return
-        self.machine.note_unfinished("no sample fell where it counts: the error estimate says nothing")
+        if not mean.v.any() and not mean.t.any():
+            self.machine.note_unfinished("no sample fell where it counts: the error estimate says nothing")
         if self.plan.groups:
-            mean.e, mean.et = np.full_like(mean.e, np.inf), np.full_like(mean.et, np.inf)
+            mean.e = np.where((mean.v == 0) & (mean.e == 0), np.inf, mean.e)
 
     # The integrand
 
@@ -247,6 +297,8 @@ class _Run:
         n = u.shape[0]
         start = self.chart.start(n, self.machine.directions)
         point = self.chart.place(start, list(u.T), 0, self.drawn, crowding=range(self.drawn))
+        if not self.exact:
+            self.outcomes.add(point.env, n, self.machine)
         return self.integrand(point, {}, n)
 
     def integrand(self, point: Point, sides: dict[int, Mask], n: int) -> Sums:
@@ -281,6 +333,12 @@ class _Run:
             for d in range(k):
                 ft[i, d] = 0.0 if not cell.t or cell.t[d] is None else cell.t[d]
                 et[i, d] = 0.0 if not cell.et or cell.et[d] is None else cell.et[d]
+        bad = np.nonzero(np.isnan(f).any(axis=0))[0]
+        if bad.size:
+            zero = guarded_samples(self.plan, point.env, sides, bad, self.machine)
+            f, ft[:, :, bad] = f.copy(), np.nan
+            for part in (f, ft, et):
+                part[..., bad[zero]] = 0.0
         return self.weighted(Sums(f, e, ft, et), point.volume, n)
 
     def weighted(self, sums: Sums, volume: Cell, n: int) -> Sums:

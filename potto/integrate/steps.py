@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from potto.integrate.cuts import Cuts
-from potto.integrate.edges import around
-from potto.integrate.pieces import Pieces, gather, mostly, still, take
-from potto.kernels.cells import Cell, Mask
+from potto.integrate.edges import Scene, around
+from potto.integrate.pieces import Pieces, gather, still, take
+from potto.kernels.cells import Cell
 
 if TYPE_CHECKING:
     from potto.integrate.work import Work
@@ -49,17 +49,17 @@ def look_for_steps(work: Work, whole: Pieces) -> None:
         work.machine.note_degenerate(work.level.variable, work.below(np.unique(seg.owner[follows[jumps]])))
 
 
-def brush(work: Work, cuts: Cuts, sides: dict[int, Mask]) -> None:
+def brush(scene: Scene, cuts: Cuts) -> None:
     """Whether what is further in jumps at a bound on which it should only bend: a surface runs along the bound.
 
     Looked at on both sides of the bound, with the surfaces of this variable as they are inside.
     """
-    parent, number, level, env, machine = work.parent, work.number, work.level, work.env, work.machine
+    parent, number, level, machine = scene.parent, scene.number, scene.level, scene.machine
     for found in cuts.brushes:
-        edge = found.pick(np.isin(found.owner, mostly(found.owner, work.root, work.batch) if number else found.owner))
+        edge = found.pick(scene.counted(found.owner))
         if not edge.owner.size:
             continue
-        here, inner = around(level, edge.owner, edge.x, not edge.upper, env, sides, machine)
+        here, inner = around(level, edge.owner, edge.x, not edge.upper, scene.env, scene.sides, machine)
         frozen, size = machine.with_directions(0), edge.owner.size
         further = parent.plan.levels[number + 1]
         if number + 2 == len(parent.plan.levels) and not further.searched:
@@ -67,7 +67,7 @@ def brush(work: Work, cuts: Cuts, sides: dict[int, Mask]) -> None:
             assert isinstance(sections, tuple)
             if all(isinstance(at, Cell) and np.isfinite(at.v).all() for at in sections):
                 continue  # none of them runs along it
-        steps, root = [], work.below(edge.owner)
+        steps, root = [], scene.below(edge.owner)
         with nullcontext() if machine.costs is None else machine.costs.apart():
             for part in BESIDE:
                 aside = part * (1 + np.abs(edge.x))
@@ -80,4 +80,4 @@ def brush(work: Work, cuts: Cuts, sides: dict[int, Mask]) -> None:
         # What bends would shrink.
         jumps = ((steps[1] > 0.5 * steps[0]) & (steps[1] > DISCONTINUITY * whole)).any(axis=0)
         if jumps.any():
-            machine.note_degenerate(level.variable, work.below(edge.owner[jumps]))
+            machine.note_degenerate(level.variable, scene.below(edge.owner[jumps]))

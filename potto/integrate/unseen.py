@@ -1,23 +1,36 @@
 """What samples cannot have seen: bounds for the parts of an integral that hardly any point fell into.
 
-Owns `Largest` and `peaks`. A set that none of N independent points fell into is, but once in 22,000 times, no larger
-than MISSED/N. What it may hide is worth as much as the integrand is there, and of that something is known all the
-same: a program that divides by what vanishes somewhere, or squares it in an exponential, says where its peaks are; and
-where a few samples are far larger than all others, there is more of their kind.
+Owns `Largest`, `peaks`, and for rare events `Outcomes`, `crossings` and `unhit`.
+
+A set that none of N independent points fell into is, but once in 22,000 times, no larger than MISSED/N. What it may
+hide is worth as much as the integrand is there, and of that something is known all the same: a program that divides by
+what vanishes somewhere, or squares it in an exponential, says where its peaks are; and where a few samples are far
+larger than all others, there is more of their kind.
+
+Rare events are behind conditions. That one never came is no reason to think that it can't, and of one that hardly did
+a spread says too little: of a count m, m + 4 sqrt(m) is too small a bound, by 8 or so (Wilson's interval, 1927). What
+it is worth if it comes is known from points anywhere with the conditions decided that way.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from potto.integrate.chart import Chart, label_of
+from potto.calculus.ranges import range_of
+from potto.core.terms import Integral, Term
+from potto.integrate.chart import Chart, Point, label_of
 from potto.integrate.cuts import as_array
-from potto.integrate.pieces import Sums, still
-from potto.kernels.cells import Array
+from potto.integrate.flux import Surface
+from potto.integrate.pieces import Evaluator, Sums, still
+from potto.integrate.plan import Plan
+from potto.integrate.undefined import fallen
+from potto.kernels.cells import Array, Cell, Mask, Value
 
 MISSED = 10.0
 FEW = 16
@@ -48,6 +61,11 @@ class Largest:
     def top(self, name: str) -> Any:
         x = self.most.get(name)
         return 0.0 if x is None or not x.shape[-1] else x[..., -1]
+
+    def hardly(self, name: str) -> bool:
+        """Whether hardly any of the samples was anything but 0, or there were hardly any."""
+        x = self.most.get(name)
+        return x is None or x.shape[-1] < FEW or bool((x[..., 0] == 0).any())
 
     def tail(self, name: str, points: int) -> Any:
         """What more there may be of the kind of the few largest, as a part of the mean.
@@ -100,3 +118,102 @@ def _center(chart: Chart, number: int, env: dict[str, Any], random: np.random.Ge
     rows = [as_array(root.v, n) for root, (cut, _) in zip(roots, level.rows, strict=True) if cut < 0]
     chosen = np.stack(rows)[random.integers(0, len(rows), n), np.arange(n)]
     return label_of(lo, hi, chosen)
+
+
+# Rare events
+
+MOST_TURNED = 4  # conditions of which all combinations are counted
+PROBES = 128
+
+
+def box_of_values(term: Integral, env: Mapping[str, Value]) -> dict[str, tuple[float, float]]:
+    """Between which numbers parameters and variables are, for one member of a batch."""
+    box: dict[str, tuple[float, float]] = {}
+    for name, value in env.items():
+        if isinstance(value, Cell):
+            box[name] = (float(np.ravel(value.v)[0]),) * 2
+    for variable, (lo, hi) in zip(term.variables, term.bounds, strict=True):
+        low, high = range_of(lo, box), range_of(hi, box)
+        box[variable] = (min(low.lo, high.lo), max(low.hi, high.hi))
+    return box
+
+
+def may_vanish(surface: Term, box: Mapping[str, tuple[float, float]]) -> bool:
+    """Whether a surface may pass through a box, as far as interval arithmetic tells."""
+    found = range_of(surface, box)
+    return not (found.positive or found.negative)
+
+
+class Outcomes:
+    """How often conditions came out which way, together if they are few and else each by itself; and what is at stake.
+
+    groups: the conditions of a plan that may come out either way.
+    """
+
+    def __init__(self, plan: Plan, groups: Sequence[int]) -> None:
+        self.plan, self.groups = plan, tuple(groups)
+        together = len(groups) <= MOST_TURNED
+        self.ways: list[dict[int, bool]] = (
+            [dict(zip(groups, way, strict=True)) for way in itertools.product((False, True), repeat=len(groups))]
+            if together
+            else [{group: up} for group in groups for up in (False, True)]
+        )
+        self.counts = np.zeros(len(self.ways), dtype=np.int64)
+
+    def add(self, env: dict[str, Value], n: int, machine: Evaluator) -> None:
+        """Count samples in."""
+        if not self.groups:
+            return
+        sides = {g: side for g, side, _ in fallen(self.plan, env, n, machine, self.groups)}
+        for i, way in enumerate(self.ways):
+            on = np.ones(n, dtype=bool)
+            for group, up in way.items():
+                on &= sides[group] == up
+            self.counts[i] += np.count_nonzero(on)
+
+    def stakes(
+        self, chart: Chart, drawn: int, f: Callable[[Point, dict[int, Mask], int], Sums], seed: int
+    ) -> Sums | None:
+        """How much samples may differ, at the most, from what they were, if conditions come out as they hardly did.
+
+        f: the integrand times the volume element at points of all variables, with conditions decided or as they fall.
+        """
+        rare = [way for way, count in zip(self.ways, self.counts, strict=True) if count < FEW] if self.groups else []
+        if not rare:
+            return None
+        u = np.random.default_rng((seed, drawn, 1)).random((drawn, PROBES))
+        start = chart.start(PROBES, chart.machine.directions)
+        point = chart.place(start, list(u), 0, drawn, crowding=range(drawn))
+        costs = chart.machine.costs
+        with nullcontext() if costs is None else costs.apart():
+            as_it_falls = f(point, {}, PROBES)
+            other = [f(point, {g: np.full(PROBES, up) for g, up in way.items()}, PROBES) for way in rare]
+        v, t = (np.max([_most(getattr(x, n) - getattr(as_it_falls, n)) for x in other], axis=0) for n in ("v", "t"))
+        return Sums(v, np.zeros_like(v), t, np.zeros_like(t))
+
+
+def crossings(surface: Surface, pivot: int, seed: int) -> Sums:
+    """What a line that crosses a surface may bring: as if the surface went through any point."""
+    k, stop = surface.machine.directions, surface.stop
+    u = np.random.default_rng((seed, stop, pivot)).random((stop, PROBES))
+    marked = {axis: k + i for i, axis in enumerate(surface.pivots)}
+    point = surface.placed(list(u), pivot, marked, PROBES)
+    _, slopes = surface.slopes(surface.term, point, k + len(marked), PROBES)
+    above, below = surface.both_sides(point, pivot, np.zeros(PROBES))
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        rates = np.abs(slopes[:k]) * np.abs(slopes[marked[pivot]]) / (slopes[k:] ** 2).sum(axis=0)
+        t = _most((above.v - below.v)[:, None] * rates)
+    return Sums(np.zeros(t.shape[:1]), np.zeros(t.shape[:1]), t, np.zeros_like(t))
+
+
+def unhit(stakes: Sums | None, points: int) -> Sums:
+    """What so many independent points may have missed of what is at stake: as errors of the values and tangents."""
+    if stakes is None:
+        return Sums(*(np.zeros(1) for _ in range(4)))
+    share = MISSED / points
+    return Sums(share * stakes.v, stakes.e, share * stakes.t, stakes.et)
+
+
+def _most(x: Array) -> Array:
+    """The largest finite magnitude along the last axis."""
+    return np.asarray(np.where(np.isfinite(x), np.abs(x), 0.0).max(axis=-1))

@@ -57,8 +57,8 @@ def _joined(parts: list[Value], sizes: list[int], shape: tuple[int, ...]) -> Val
                 return rows[0]
             if all(row is None for row in rows):
                 return None
-        full = [np.broadcast_to(0.0 if row is None else row, (n, *shape[1:])) for row, n in zip(rows, sizes, strict=True)]
-        return np.concatenate(full)
+        filled = (0.0 if row is None else row for row in rows)
+        return np.concatenate([np.broadcast_to(row, (n, *shape[1:])) for row, n in zip(filled, sizes, strict=True)])
 
     cells: list[Any] = parts
     t = tuple(whole([c.t[d] for c in cells]) for d in range(len(first.t)))

@@ -162,7 +162,8 @@ class _Compiler:
         scope: dict[str, Any] = {name: support.function(path) for name, path in self.out.functions.items()}
         scope.update(Cell=Cell, parts=scalar_parts, **self.objects)
         exec(compile(text, "<kernel>", "exec"), scope)
-        plain = "rt." not in text.replace("rt.falls(", "") and not any(isinstance(o, Dynamic) for o in self.env.values())
+        plain = "rt." not in text.replace("rt.falls(", "")
+        plain = plain and not any(isinstance(known, Dynamic) for known in self.env.values())
         return Kernel(scope["kernel"], text, self.lam.params, plain)
 
     # Arguments in, results out

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from potto.integrate.divergence import BOUNDLESS
+from potto.integrate.undefined import UNDEFINED
 
 INFINITE = "the integral is infinite, or beyond what numbers can hold"
 NO_VALUE = "the integral has no value, or none within reach"
@@ -40,6 +41,10 @@ _ADVICE: tuple[tuple[str, str], ...] = (
     ("too many roots", "shorten the domain, or sample (`--method mc`)"),
     ("inside an inner integral", "write both integrals as one: `integral ([..], [..]) .. d(x, y)`"),
     ("rounding", "more evaluations cannot help, the numbers have no more digits: " + _LESS),
+    (
+        UNDEFINED,
+        "leave such places out by the bounds, or guard the condition: `if [x > -1] then [sqrt(1 + x) < t] else 0`",
+    ),
     (INFINITE, _POLE),
     (NO_VALUE, _POLE),
     ("not a number", "look for a builtin that is used where it is not defined, and guard it with a condition"),

@@ -16,7 +16,8 @@ import numpy as np
 
 from potto.integrate import costs
 from potto.integrate.costs import Costs
-from potto.integrate.pieces import Folded, Sided
+from potto.integrate.pieces import INNER, Folded, Sided
+from potto.integrate.undefined import UNDEFINED
 from potto.kernels.cells import Array, Bools, Ints, Value
 from potto.runtime.convergence import merged
 
@@ -93,6 +94,16 @@ class Met:
                 mask[slice(None) if members is None else members] = False
         return mask
 
+    def note_unfinished(self, reason: str, members: Ints | None, once: str) -> None:
+        """Add a reason; of those that begin with `once`, the first will do."""
+        same = (said for said in self.unfinished if once and said.startswith(once))
+        note(self.unfinished, next(same, reason), members)
+
+    def forget_places_of_folds(self) -> None:
+        """Of folds that an inner integral met, keep that there are any."""
+        for what, (_, members) in self.folds.items():
+            self.folds[what] = Folded(INNER, 0, 0.0, None), members
+
     def note_fold(self, what: Sided, where: Folded, members: Ints | None) -> None:
         """Add a fold; where it is for the first member that has it stands for all."""
         known = {what: self.folds[what][1]} if what in self.folds else {}
@@ -105,9 +116,10 @@ class Met:
         def here(members: Ints | None) -> Ints | None:
             return index if members is None or index is None else index[members]
 
-        for mine, theirs in ((self.unfinished, other.unfinished), (self.degenerate, other.degenerate)):
-            for name, members in theirs.items():
-                note(mine, name, here(members))
+        for name, members in other.degenerate.items():
+            note(self.degenerate, name, here(members))
+        for reason, members in other.unfinished.items():
+            self.note_unfinished(reason, here(members), UNDEFINED if reason.startswith(UNDEFINED) else "")
         for what, members in other.sided.items():
             note(self.sided, what, here(members))
         for what, (fold, members) in other.folds.items():

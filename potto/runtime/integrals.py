@@ -136,7 +136,10 @@ def poisoned(sums: Sums, env: dict[str, Value]) -> Sums:
     if np.any(bad):
         where = np.broadcast_to(bad, sums.v.shape[-1:])
         sums.v[:, where] = np.nan
-        sums.t[:, :, where] = np.nan
+    undefined = np.isnan(sums.v)
+    if undefined.any():  # nor is its derivative one
+        sums.t = np.where(undefined[:, None], np.nan, sums.t)
+        sums.e, sums.et = np.where(undefined, np.inf, sums.e), np.where(undefined[:, None], np.inf, sums.et)
     return sums
 
 
@@ -171,6 +174,7 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
             if outermost and met.folds:
                 beside_folds(machine, plan, linked, batch, sums, partial(_beside, machine, term))
             if not outermost:
+                met.forget_places_of_folds()
                 return sums
             sums = turned_round(machine, order, linked, env, batch, sums)
             if machine.directions and not (met.edges or machine.side):

@@ -195,8 +195,9 @@ class Machine:
         """Where sections of a surface appear or merge: only what is beside the parameters tells about derivatives."""
         self.books.met.note_fold(what, where, members)
 
-    def note_unfinished(self, reason: str, members: Ints | None = None) -> None:
-        note(self.books.met.unfinished, reason, members)
+    def note_unfinished(self, reason: str, members: Ints | None = None, once: str = "") -> None:
+        """Why the answer is not as accurate as was asked; of reasons that begin with `once`, the first will do."""
+        self.books.met.note_unfinished(reason, members, once)
 
     def note_degenerate(self, variable: str, members: Ints | None = None) -> None:
         note(self.books.met.degenerate, variable, members)

@@ -10,15 +10,16 @@ none.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from potto.integrate.cuts import frame_rows
+from potto.integrate.cuts import Row, frame_rows
 from potto.integrate.divergence import BOUNDLESS
-from potto.integrate.pieces import Folded, Sided, Sums, still
+from potto.integrate.pieces import INNER, Folded, Sided, Sums, still
 from potto.integrate.plan import Plan
 from potto.integrate.roots import searched_rows
 from potto.kernels.cells import Array, Cell, Value, map_arrays
@@ -34,6 +35,8 @@ APART = 2.0**-8
 CLOSER = 2.0**-8  # each step by this part of the one before
 # What successive differences may be of the one before where there is a limit, and what is no difference at all.
 SETTLING, SAME = 0.75, 1e-6
+# What is nearer to a fold than this lies at it, as far as steps that parameters notice can tell.
+TOGETHER = 1e-9
 MOST_MEMBERS = 16  # of a batch that are looked at
 
 
@@ -61,7 +64,7 @@ def beside_folds(
 ) -> None:
     """Put the one-sided derivatives of integrals at whose parameters a surface folds in their place, or note both.
 
-    evaluated: the integral for other parameters, of one member.
+    evaluated: the integral for other parameters, of one member. What was noted of other surfaces lacks what folds.
     """
     folds = {what: where for what, (where, _) in machine.books.met.folds.items()}
     with machine.books.apart():
@@ -72,6 +75,9 @@ def beside_folds(
         ]
     for what, (member, d, backward, forward, off) in found:
         t, et = sums.t[:, d, member], sums.et[:, d, member]
+        for _, before, beyond, _ in machine.books.met.edges:
+            if np.shape(before) == sums.t.shape:
+                before[:, d, member], beyond[:, d, member] = backward, forward
         if _same(backward, forward, off) and np.isfinite(forward).all():
             known = np.isfinite(t) & (np.abs(t - forward) <= SAME * np.abs(forward) + et)
             t[:], et[:] = np.where(known, t, forward), np.where(known, et, off)
@@ -94,7 +100,8 @@ def beside_axes(
     machine.books.met.degenerate.clear()
     with machine.books.apart():
         found = list(_sides(machine, plan, linked, range(batch), None, evaluated))
-    still_ones = batch * sum(not any(_moves(v, d) for v in linked.env.values()) for d in range(machine.directions))
+    moving = [any(any(_moving(v, d)) for v in linked.env.values()) for d in range(machine.directions)]
+    still_ones = batch * moving.count(False)
     if len(found) + still_ones < batch * machine.directions:
         return False
     for member, d, backward, forward, off in found:
@@ -158,30 +165,49 @@ def _both(
 
 
 def _step(machine: Machine, plan: Plan, env: dict[str, Value], d: int, where: Folded | None) -> float | None:
-    """The largest step that moves the roots that fold, or all roots, by a small part of the range, either way."""
+    """The largest step that moves the roots that fold, or all roots, by a small part of the range, either way.
+
+    Where nobody knows the roots, since an integral further in has them, a small part of the parameters.
+    """
+    if where is not None and where.number == INNER:
+        sizes = [float(np.abs(cell.v)) for value in env.values() for cell in _moving(value, d)]
+        return APART**2 * max([1.0, *sizes]) if sizes else None
     both = np.concatenate(([0.0], STEPS, -STEPS))
     here = {n: moved(v, both, d, moving=False) for n, v in env.items()}
     quiet, size = machine.with_directions(0), both.size
-    for level in plan.levels[: 1 + (0 if where is None else where.number)]:
+    outer = () if where is None else where.outer
+    for number, level in enumerate(plan.levels[: 1 + (0 if where is None else where.number)]):
         values = quiet.evaluate(level.frame, {n: here[n] for n in level.frame.params}, None)
         assert isinstance(values, tuple)
         lo, hi, rows = frame_rows(level, values)
         rows += searched_rows(replace(level, searched=()), here, lo, hi, size, quiet)
         low, high = (np.broadcast_to(np.nan_to_num(end.v, posinf=1e300, neginf=-1e300), (size,)) for end in (lo, hi))
-        here[level.variable] = Cell(0.5 * low + 0.5 * high)
+        middle = 0.5 * low + 0.5 * high
+        here[level.variable] = Cell(np.full(size, outer[number]) if number < len(outer) else middle)
     off = np.zeros(size)
     for row in rows:
         if where is None or row.cut == where.cut:
             x = np.broadcast_to(row.x, (size,))
             if where is None:
-                x = np.where((x >= low) & (x <= high), x, np.nan)
-            off = np.fmax(off, np.abs(x - (_near(x) if where is None else where.place)))
-    reach = high - low
-    reach = np.where(reach < 1e300, reach, 1.0 + abs(0.0 if where is None else where.place))
-    fits = (off <= APART * reach)[1:].reshape(2, -1).all(axis=0)
+                x = np.where((x >= np.minimum(low, high)) & (x <= np.maximum(low, high)), x, np.nan)
+            start = x[0] if np.isfinite(x[0]) else _near(x) if where is None else where.place
+            off = np.fmax(off, np.abs(x - start))
+    fits = (off <= APART * _room(low, high, rows, where))[1:].reshape(2, -1).all(axis=0)
     moves = (off > 0)[1:].reshape(2, -1).any(axis=0)
     fits = np.logical_and.accumulate(fits) & moves
     return float(STEPS[np.nonzero(fits)[0][-1]]) if fits.any() else None
+
+
+def _room(low: Array, high: Array, rows: Sequence[Row], where: Folded | None) -> Array:
+    """How far it is from one end of the range to the other, or from what folds to what else lies in it."""
+    reach = np.abs(high - low)
+    place = 0.0 if where is None else where.place
+    room = np.where((reach < 1e300) & (reach[0] > 0), reach, 1.0 + abs(place))
+    if where is None:
+        return room
+    gaps = [abs(float(np.broadcast_to(row.x, reach.shape)[0]) - place) for row in rows]
+    near = [gap for gap in gaps if gap > TOGETHER * (1.0 + abs(place))]
+    return np.minimum(room, min(near, default=np.inf))
 
 
 def _near(x: Array) -> Array:
@@ -190,13 +216,18 @@ def _near(x: Array) -> Array:
     return np.concatenate(([np.nan], *(np.full(STEPS.size, place) for place in found)))
 
 
-def _moves(value: Value, d: int) -> bool:
+def _moving(value: Value, d: int) -> Iterator[Cell]:
+    """The numbers in a value that move in a direction."""
     if isinstance(value, Cell):
         t = value.t[d] if d < len(value.t) else None
-        return t is not None and bool(np.any(t))
-    if isinstance(value, tuple):
-        return any(_moves(item, d) for item in value)
-    return isinstance(value, Closure) and any(_moves(inner, d) for inner in value.captured.values())
+        if t is not None and np.any(t):
+            yield value
+    elif isinstance(value, tuple):
+        for item in value:
+            yield from _moving(item, d)
+    elif isinstance(value, Closure):
+        for inner in value.captured.values():
+            yield from _moving(inner, d)
 
 
 def moved(value: Value, step: Any, d: int, moving: bool = True) -> Value:
@@ -231,4 +262,5 @@ def _limit(far: float, nearer: float, nearest: float, noise: float) -> float:
     if abs(second) <= SETTLING * abs(first):
         limit = nearest + second * second / (first - second)
         return limit if abs(limit) > SAME * (abs(far) + abs(nearer)) else 0.0
-    return float("inf") if second > 0 and nearest > 0 else float("-inf") if second < 0 and nearest < 0 else float("nan")
+    grows = first * second > 0 and nearest * second > 0
+    return math.copysign(math.inf, nearest) if grows else math.nan

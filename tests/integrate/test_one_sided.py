@@ -35,6 +35,28 @@ FOLDS = [  # what is integrated, where, backward, forward
     ("integral ([-1e-150, 1e-150], [-1, 1]) [1e300*x^2 + y^2 < t] d(x, y)", 0.0, 0.0, math.pi * 1e-150),
     ("integral ([0, 1], [-1, 1], [-1, 1]) [x^2 + z^2 < t]*y d(y, x, z)", 0.0, 0.0, math.pi / 2),
     ("integral ([0, 1], [-1, 1]) [x^2 < t]*y d(y, x)", 0.0, 0.0, INF),
+    # strips along a curve, as wide as t: 2 t times its length in the measure |dx|
+    ("integral ([0, 1], [0, 1]) [abs(x - y) < t] d(x, y)", 0.0, 0.0, 2.0),
+    ("integral ([0, 1], [0, 1]) [abs(x - y) > t]*exp(x + y) d(x, y)", 0.0, 0.0, 1 - math.e**2),
+    ("integral ([0, 1], [0, 1]) [(x - y)^2 < t^2] d(x, y)", 0.0, -2.0, 2.0),
+    ("integral ([0, 1], [0, 1]) [(x - y)^2 < t] d(x, y)", 0.0, 0.0, INF),
+    ("integral ([0, 1], [0, 1]) [max(x - y, y - x) < t] d(x, y)", 0.0, 0.0, 2.0),
+    ("integral ([0, 1], [0, 1]) [x - y < t and y - x < t] d(x, y)", 0.0, 0.0, 2.0),
+    ("integral ([0, 1], [0, 1]) ([x - y < t]*[y - x < t]) d(x, y)", 0.0, 0.0, 2.0),
+    ("integral [0, 1] (integral [0, 1] [abs(x - y) < t] d(y)) d(x)", 0.0, 0.0, 2.0),
+    ("integral ([0, 1], [0, 1], [0, 1]) [abs(x - y) < t] d(x, y, z)", 0.0, 0.0, 2.0),
+    ("integral ([-1, 1], [-1, 1]) [abs(x*x + y*y - 0.25) < t] d(x, y)", 0.0, 0.0, 2 * math.pi),
+    # a kink at the root
+    ("integral [-1, 1] [max(x, -x) < t] d(x)", 0.0, 0.0, 2.0),
+    ("integral [-1, 1] [max(x, 2*x) < t] d(x)", 0.0, 1.0, 0.5),
+    ("integral [-1, 1] [x + abs(x)/2 < t] d(x)", 0.0, 2.0, 2 / 3),
+    ("integral [-1, 1] [clamp(x, 0, 1/2) + x < t] d(x)", 0.0, 1.0, 0.5),
+    # reversed bounds turn the signs round
+    ("integral [1, -1] [abs(x) < t] d(x)", 0.0, 0.0, -2.0),
+    ("integral [1, -1] [x^2 < t^2] d(x)", 0.0, 2.0, -2.0),
+    ("integral [1, -1] [max(x, -x) < t] d(x)", 0.0, 0.0, -2.0),
+    ("integral ([1, 0], [0, 1]) [abs(x - y) < t] d(x, y)", 0.0, 0.0, -2.0),
+    ("integral ([0, 1], [1, 0]) [abs(x - y) < t] d(x, y)", 0.0, 0.0, -2.0),
 ]
 
 
@@ -42,7 +64,7 @@ FOLDS = [  # what is integrated, where, backward, forward
 def test_sections_that_appear_have_two_sides(body: str, t: float, backward: float, forward: float) -> None:
     answer = rate(body, t)
     note = answer.notes[0]
-    assert note.fold and "folds along" in str(note)
+    assert ("folds along" in str(note)) == note.fold != (note.other is not None)
     for found, exact in ((note.backward, backward), (note.forward, forward)):
         assert float(found) == pytest.approx(exact, rel=1e-6, abs=0)
 
@@ -92,6 +114,12 @@ def test_a_rectangle_that_stands_upright() -> None:
     exact = (4 / 3 * 0.125 * 0.1875, 1.0, 2.0)
     for found, off, wanted in zip(answer.tangent, answer.tangent_error, exact, strict=True):
         assert abs(found - wanted) <= off + 1e-15 and off <= 1e-7
+
+
+def test_a_root_at_a_kink_that_turns_nothing() -> None:
+    """max(y, 2y) < 0 is y < 0 on both sides, wherever its kink is the root."""
+    answer = rate("integral [-1, 1] [max(x - t, 2*x - 2*t) < 0] d(x)", 0.25)
+    assert not answer.notes and abs(answer.tangent - 1.0) <= answer.tangent_error <= 1e-9
 
 
 @pytest.mark.parametrize("t", [math.pi / 2, math.pi])

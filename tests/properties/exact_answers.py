@@ -1,0 +1,62 @@
+"""Holding an answer of Potto's against exact values and one-sided derivatives.
+
+Owns `Rates` and `compare`. No allowance is made but for rounding of the answer itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+ULP = 2.0**-52
+STEP = Fraction(1, 10**40)  # of a piecewise polynomial: some 35 digits of its derivative
+NEXT = Fraction(1, 10**13)  # to rounding the same parameter
+SAME, NOTED = 1e-9, 1e-6  # what is taken for one derivative; how well those in notes, which are extrapolated, are known
+
+
+@dataclass(frozen=True)
+class Rates:
+    """The derivative to both sides of a parameter, and to both sides of those that differ from it by rounding."""
+
+    backward: float
+    forward: float
+    before: float
+    beyond: float
+
+    @classmethod
+    def of(cls, rate: Callable[[Fraction, Fraction], Fraction], t: Fraction) -> Rates:
+        """Those of `rate(parameter, step)`."""
+        return cls(*(float(rate(t + off, step)) for off, step in ((0, -STEP), (0, STEP), (-NEXT, -STEP), (NEXT, STEP))))
+
+    @property
+    def all(self) -> tuple[float, ...]:
+        return (self.backward, self.forward, self.before, self.beyond)
+
+
+def rounding(x: float) -> float:
+    return 8 * ULP * max(1.0, abs(x))
+
+
+def compare(answer: Any, value: float, rates: Rates, context: str) -> str:
+    """What came of a comparison; fails where an answer is wrong by more than it says."""
+    assert abs(answer.value - value) <= answer.error + rounding(value), context
+    assert answer.error < math.inf, context
+    apart, size = max(rates.all) - min(rates.all), max(1.0, *map(abs, rates.all))
+    exact = abs(rates.forward - rates.backward)
+    off = abs(answer.tangent - rates.forward) - answer.tangent_error - rounding(rates.forward)
+    if apart <= SAME * size:
+        assert off <= apart, context
+        return "compared" if answer.converged else "not converged"
+    if exact <= SAME * size and off <= exact and not answer.notes:
+        return "compared"  # rounding of the parameters would change it, and there was none
+    if answer.notes:
+        # a note is about one integral, to which others may add what has one derivative
+        told = [float(note.forward) - float(note.backward) for note in answer.notes]
+        steps = [f - b for b in (rates.backward, rates.before) for f in (rates.forward, rates.beyond)]
+        assert any(abs(x - step) <= NOTED * size for x in told for step in steps), context
+        return "two sides"
+    assert not answer.converged or answer.tangent_error >= apart / 2, context
+    return "not told"
