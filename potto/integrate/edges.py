@@ -142,9 +142,12 @@ def count_slivers(scene: Scene, cuts: Cuts, sums: Sums) -> None:
         swept = lost * np.where(np.isfinite(sliver.speed), sliver.speed, 0.0)
         sums.et[:, :, sliver.owner] += swept[:, None]
         sums.e[at] += lost
-        if len(sliver.cuts) == 1 and sums.gross is not None:  # nothing but what lies between two roundings of a bound
-            added = np.stack((lost.max(axis=0), swept.max(axis=0))) / EPS
-            sums.gross[:, sliver.owner] += np.where((sums.v[at] == 0).all(axis=0), added, 0.0)
+        if len(sliver.cuts) == 1 and sums.gross is not None:
+            # What lies between two roundings of a bound is rounding of the bound, if there is nothing else, and what
+            # is swept there is one of the sides that the derivative has.
+            empty = (sums.v[at] == 0).all(axis=0)
+            sums.gross[0, sliver.owner] += np.where(empty, lost.max(axis=0), 0.0) / EPS
+            sums.gross[1, sliver.owner] += swept.max(axis=0) / EPS
 
 
 def note_folds(scene: Scene, cuts: Cuts) -> None:

@@ -129,8 +129,10 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
                         reasons=tuple(reasons), **common)  # type: ignore[arg-type]  # fmt: skip
     numbers, bounds = numbers_of(value), bounds_of(value)
     tangents, tangent_bounds = tangents_of(value)
-    missing = _reasons([*_flat(numbers, bounds), *_flat(tangents, tangent_bounds)], books, settings)
-    shape = np.broadcast_shapes(*(np.shape(n) for n, _ in _flat(numbers, bounds)))
+    flat = _flat(numbers, bounds)
+    missing = _reasons([*flat, *_flat(tangents, tangent_bounds)], books, settings)
+    arrays = [np.shape(number) for number, _ in flat if number.__class__ is not float]
+    shape = np.broadcast_shapes(*arrays) if arrays else ()
     return Estimate(
         numbers,
         bounds,
@@ -146,8 +148,7 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
 
 def _reasons(flat: list[tuple[Any, Any]], books: Books, settings: Settings) -> Reasons:
     """Why the numbers are not as accurate as was asked for: as the books say, and for other members by their errors."""
-    reasons = dict(books.reasons)
-    merged(reasons, dict.fromkeys(books.met.unfinished, True))
+    reasons = {**books.reasons, **dict.fromkeys(books.met.unfinished, True)}
     before = dict(reasons)
     drawn = not books.methods.isdisjoint(("mc", "qmc"))
     within = books.within if books.methods else CANCELS
