@@ -205,7 +205,8 @@ def _room(low: Array, high: Array, rows: Sequence[Row], where: Folded | None) ->
     room = np.where((reach < 1e300) & (reach[0] > 0), reach, 1.0 + abs(place))
     if where is None:
         return room
-    gaps = [abs(float(np.broadcast_to(row.x, reach.shape)[0]) - place) for row in rows]
+    others = [low, high, *(row.x for row in rows)]
+    gaps = [abs(float(np.broadcast_to(x, reach.shape)[0]) - place) for x in others]
     near = [gap for gap in gaps if gap > TOGETHER * (1.0 + abs(place))]
     return np.minimum(room, min(near, default=np.inf))
 
@@ -262,5 +263,5 @@ def _limit(far: float, nearer: float, nearest: float, noise: float) -> float:
     if abs(second) <= SETTLING * abs(first):
         limit = nearest + second * second / (first - second)
         return limit if abs(limit) > SAME * (abs(far) + abs(nearer)) else 0.0
-    grows = first * second > 0 and nearest * second > 0
+    grows = first * second > 0 and nearest * second > 0 and abs(first) > SAME * abs(nearest)
     return math.copysign(math.inf, nearest) if grows else math.nan
