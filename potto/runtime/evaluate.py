@@ -158,7 +158,7 @@ def _reasons(flat: list[tuple[Any, Any]], books: Books, settings: Settings) -> R
             continue
         if not books.methods:
             found.pop(INFINITE, None)  # of 1/0 no integral is to blame
-        elif found and any(rough(answer, settings.rtol, settings.atol) for answer in books.used.values()):
+        if found and any(rough(answer, settings.rtol, settings.atol) for answer in books.used.values()):
             found = {ROUGH: np.logical_or.reduce(list(found.values()))}
         told = converged_members(before, np.shape(number))
         merged(reasons, {why: where & told if np.ndim(where) else where for why, where in found.items()})
