@@ -14,6 +14,7 @@ import numpy as np
 
 from potto.api import Function, Module
 from potto.diagnostics import PottoError
+from potto.runtime.printing import format_digits, format_range
 
 if TYPE_CHECKING:
     from potto.world import World
@@ -35,14 +36,14 @@ def preview(world: World, file: str, name: str, box: Any = None) -> dict[str, An
     xs = np.linspace(x0, x1, CURVE)
     curve = _values(function, (xs,))
     if curve is not None:
-        return {"image": _uri(_plot(curve)), "text": _text(name, curve, f"{x0:g}..{x1:g}"), "kind": "curve"}
+        return {"image": _uri(_plot(curve)), "text": _text(name, curve, _side(x0, x1)), "kind": "curve"}
     grid = np.meshgrid(np.linspace(x0, x1, SIZE), np.linspace(y1, y0, SIZE))
     image = _values(function, tuple(grid))
     if image is None:
         raise _none(name)
     return {
         "image": _uri(_shade(image)), "kind": "image",
-        "text": _text(name, image, f"{x0:g}..{x1:g} × {y0:g}..{y1:g}"),
+        "text": _text(name, image, f"{_side(x0, x1)} × {_side(y0, y1)}"),
     }  # fmt: skip
 
 
@@ -76,7 +77,11 @@ def _values(function: Function, arguments: tuple[Array, ...]) -> Array | None:
 
 def _text(name: str, values: Array, where: str) -> str:
     good = values[np.isfinite(values)]
-    return f"{name} over {where}: {good.min():.6g} to {good.max():.6g}" if good.size else f"{name}: no finite value"
+    return f"{name} over {where}: {format_range(good.min(), good.max())}" if good.size else f"{name}: no finite value"
+
+
+def _side(low: float, high: float) -> str:
+    return f"{format_digits(low)}..{format_digits(high)}"
 
 
 def _scaled(values: Array) -> Array:

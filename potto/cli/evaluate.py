@@ -29,7 +29,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if settings is None:
         return 2
     from potto.render import ProgramError
-    from potto.runtime.shown import estimate_json, format_bounds, format_estimate
+    from potto.runtime.shown import estimate_json, format_answer, interval
     from potto.world import World
 
     world = World(["."])
@@ -44,9 +44,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
         more = {"stats": totals([estimate])} if options.stats else {}
         console.answer_json({**estimate_json(estimate, answer.type), **more, **others_json(world, file)})
     else:
-        console.answer(format_estimate(estimate))
+        console.answer(format_answer(estimate))
         if estimate.text is None and options.stats:
-            console.complain(f"error: {format_bounds(estimate.error)}")
+            console.complain(f"with its error: {interval(estimate)}")
         console.diagnostics(answer.remarks, world.sources(options.expression.strip()))
     if options.stats:
         show_stats([estimate], console)

@@ -78,9 +78,8 @@ def _slopes(point: ide.Point) -> Callable[[Result], Result]:
     """The value at a point and the slopes there as lines to be read."""
 
     def with_text(found: Result) -> Result:
-        error = f" ± {found['error']}" if "error" in found else ""
-        lines = [f"{point.text} = {found['text']}{error}"]
-        lines += [f"  by {s['by']}: {s['text']} ± {s['error']}" for s in found["slopes"]]
+        lines = [f"{point.text} = {found['shown']}"]
+        lines += [f"  by {s['by']}: {s['shown']}" for s in found["slopes"]]
         missing = [name for name, _ in point.slopes if all(name != s["by"] for s in found["slopes"])]
         lines += [f"  by {name}: no number, it jumps there" for name in missing]
         return {**found, "value": found["text"], "text": "\n".join(lines)}
