@@ -46,7 +46,7 @@ export const PREVIEWS = {
     const [x, y] = [box.x + box.width * 0.52, box.y + box.height * 0.4];
     await page.mouse.move(x, y);
     // Within the disc, and above the line x + y + 0.1 > 0: a pixel of 0.01 with 80 and 30.
-    await frame.locator("#probe", { hasText: /px = 0\.0\d+, py = 0\.\d+: 1\.1 ± .*∂\/∂r: / }).waitFor();
+    await frame.locator("#probe", { hasText: /px = 0\.0\d+, py = 0\.\d+: 1\.10* ± .*∂\/∂r: / }).waitFor();
     await picture("preview-probe");
     const before = await pixels(value);
     await settledAfter(frame, () => page.mouse.wheel(0, -400));

@@ -82,7 +82,17 @@ test("numbers travel whole", () => {
 });
 
 test("numbers are written to the digits that their errors bear out", () => {
-  assert.equal(estimated(0.123456789, 1e-4), "0.1235 ± 1e−4");
+  assert.equal(estimated(0.027, 0.0051), "0.0270 ± 0.0051");
+  assert.equal(estimated(0.123456789, 1e-4), "0.12346 ± 0.00011"); // the value lost 0.000003
+  assert.equal(estimated(-0.02734, Math.fround(0.0051)), "−0.0273 ± 0.0052");
+  assert.equal(estimated(9.996, 0.0996), "10.00 ± 0.11");
+  assert.equal(estimated(1.99, 7.6), "2.0 ± 7.7");
+  assert.equal(estimated(0.3, 51), "0 ± 52");
+  assert.equal(estimated(218, 1122), "0.2e3 ± 1.2e3");
+  assert.equal(estimated(1.1, 2.2e-16), "1.100000000000000 ± 1e−15");
+  assert.equal(estimated(3.3e-7, 1e-10), "3.3000e−7 ± 1.0e−10");
+  assert.equal(estimated(0, 1e-17), "0.0e−17 ± 1.0e−17");
+  assert.equal(estimated(0.5, Infinity), "0.5 (error unknown)");
   assert.equal(estimated(-2, 0), "−2 ± 0");
   assert.equal(estimated(NaN, NaN), "no value");
   assert.equal(short(1.5e-9), "1.5e−9");
