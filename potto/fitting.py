@@ -226,7 +226,7 @@ class _Walk:
         steep = (1 + abs(seen.value) + float(np.abs(seen.gradient @ away))) / max(float(away @ away), 1e-300)
         return seen.value + steep * float(away @ away), 2 * steep * away
 
-    def held(self, x: Array, seen: Seen) -> Array:
+    def held(self, x: Array, seen: Seen) -> Any:
         """Whether a bound stops a parameter."""
         return ((x <= self.low) & (seen.gradient > 0)) | ((x >= self.high) & (seen.gradient < 0))
 

@@ -148,7 +148,7 @@ def _live(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
     found = {"text": format_estimate(estimate), "shown": interval(estimate), "holds": None, "expected": expected}
     if estimate.text is None:
         found["error"], found["exact"] = bounds(estimate), largest(pair(estimate)[1]) == 0
-    said = list(answer.remarks)
+    said = [one for one in answer.remarks if one.diagnostic.code.startswith("P05")]
     if expected is not None and (wanted := _wanted(world, file, expected)) is not None:
         found["holds"] = agrees(estimate, wanted, world.parse(expected))
         if not found["holds"]:

@@ -120,7 +120,7 @@ class _Layout:
         if first.token.kind in _CLAUSES:
             return max(1, first.level) * _INDENT
         if not opened:
-            return (first.level + 1) * _INDENT
+            return max(1, first.level + (not first.body)) * _INDENT  # the bodies of `let`s stand below each other
         closers = 0
         while line.first + closers < line.last and self.tokens[line.first + closers].token.kind in _CLOSERS:
             closers += 1
