@@ -31,8 +31,9 @@ BLUR = Fraction(1, 2**40)
 def format_number(value: float, error: float = 0.0) -> str:
     """`value` alone, to the last digit that `error` leaves certain.
 
-    The error is at most half a unit of the last digit shown. Zeros at the end are kept while they say something (a
-    value known to three digits reads `0.500`) and dropped when the value is known to nearly all digits of a double.
+    With what rounding takes off, the error is at most one unit of the last digit shown. Zeros at the end are kept while
+    they say something (a value known to three digits reads `0.500`) and dropped when the value is known to nearly all
+    digits of a double.
     """
     if not math.isfinite(value):
         return _not_finite(value)
@@ -40,8 +41,9 @@ def format_number(value: float, error: float = 0.0) -> str:
         return f"{format_digits(value, 3)} (error unknown)"
     if error == 0 or error < abs(value) * 2.0**-54:
         return _shorten(repr(float(value)))
-    place = _exponent(2 * _decimal(error))
-    if 2 * _decimal(error) > _power(place):
+    bound = _decimal(abs(error))
+    place = _exponent(bound)
+    while bound + abs(_decimal(value) - _rounded(value, place) * _power(place)) > _power(place):
         place += 1
     count = _rounded(value, place)
     if count == 0:
