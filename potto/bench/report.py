@@ -67,7 +67,7 @@ def _row(rungs: Sequence[Run], measure: Measure) -> str:
     best = min(done, key=lambda run: math.inf if math.isnan(run.error) else run.error)
     said = format_error(best.reported) if best.reported is not None else BLANK
     failed = f"  then {rungs[-1].failure}" if rungs[-1].failure else ""
-    return f"{''.join(f'{cell:>10}' for cell in cells)}   {format_error(best.error):>11} {said:>9}{failed}"
+    return f"{''.join(f'{cell:>10}' for cell in cells)}   {best.error:>11.0e} {said:>9}{failed}"
 
 
 def needed(rungs: Sequence[Run], target: float) -> Run | None:
