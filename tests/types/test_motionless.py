@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -125,6 +126,9 @@ def test_at_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str])
         assert (status, out) == (0, "(9, 0)\n") and err.count("P0615") == 1 and "deriv(f)((3, 1))" in err
     status, out, err = run(capsys, "check", str(path))
     assert status == 0 and (out + err).count("warning[P0615]") == 1
+    _, out, _ = run(capsys, "eval", "--json", str(path), "deriv(f)(3)")
+    answer = json.loads(out)
+    assert answer["tangent"] == 0 and [said["code"] for said in answer["remarks"]] == ["P0615"]
     status, out, err = run(capsys, "eval", str(path), "deriv(f)((3, 1))")
     assert (status, out, err) == (0, "(9, 6)\n", "")
 
