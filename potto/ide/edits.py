@@ -65,8 +65,8 @@ def minimal(old: str, new: str, start: int = 0) -> tuple[Edit, ...]:
 
 
 def _respaced(old: str, new: str, start: int) -> tuple[Edit, ...]:
-    """The edits where texts differ in nothing but blanks: one for each place, in time proportional to their length, where
-    a search for what they have in common takes the square of it."""
+    """The edits where texts differ in nothing but blanks: one for each place, in time proportional to their length; a
+    search for what they have in common would take the square of it."""
     before, after, blanks, out = _gaps(old), _gaps(new), 0, list[Edit]()
     for solid in sorted({*before, *after}):
         first, last = before.get(solid, (solid + blanks, solid + blanks))
