@@ -14,8 +14,10 @@ from potto.modules import DefinitionTarget, names, resolve
 from potto.modules.lookup import Imported, ModuleTarget, scope
 from potto.modules.workspace import files, module_name
 from potto.query import Database, query
-from potto.types import Diffeo, Function, Parameter, Real, TupleOf, Type, Unknown, Var, groups_of, interface, result_of
+from potto.types import Diffeo, Parameter, Real, TupleOf, Type, Var, groups_of, interface, result_of
+from potto.types.types import REAL
 from potto.types.types import resolve as known
+from potto.types.unify import as_tuple, open_type, rebuild, unify
 
 MOST = 50  # that are offered for one parameter
 NEAR = 20  # modules beside a file that are looked at where nothing in it fits
@@ -26,19 +28,29 @@ def fits(db: Database, file: str, name: str, type: Type, beside: bool = True) ->
 
     `beside`: also functions of modules that the file does not import, as `module.function`.
     """
+    type = of_numbers(type)
     found = [text for text in _fitting(db, file, type) if text != name]
     if not found and beside:
         found = list(_found_beside(db, file, type))
     return tuple(found[:MOST]) or tuple(constant(type))
 
 
-def accepts(wanted: Type, has: Type) -> bool:
-    """Whether a function can be given where one is wanted: as many numbers in each group, and as many as a result.
+def of_numbers(type: Type) -> Type:
+    """A type with numbers where any type will do: those are what a viewer sets."""
+    return rebuild(type, lambda part: REAL if isinstance(part, Var) else part)
 
-    Where what varies is passed, it must be accepted: a plain condition on it would be refused.
+
+def accepts(wanted: Type, has: Type) -> bool:
+    """Whether a function of the type `has` can be given where one that takes and gives numbers is wanted.
+
+    Where what varies is passed it must be accepted, as a plain condition on it would be refused; and a diffeomorphism
+    is more than the tuple that it gives.
     """
     groups, given = groups_of(wanted), groups_of(has)
-    if not given or len(groups) != len(given) or not _gives(result_of(has), result_of(wanted)):
+    opened = open_type(has, 0)
+    if not given or len(groups) != len(given) or not unify(opened, open_type(wanted, 0)):
+        return False
+    if isinstance(known(result_of(wanted)), Diffeo) and not isinstance(known(result_of(has)), Diffeo):
         return False
     return all(_passes(asked, taken) for asked, taken in zip(groups, given))
 
@@ -46,8 +58,6 @@ def accepts(wanted: Type, has: Type) -> bool:
 def constant(type: Type) -> Iterator[str]:
     """A constant function of a type as a text, if numbers are its result."""
     groups, size = groups_of(type), numbers(result_of(type))
-    if isinstance(known(result_of(type)), Var):
-        size = 1
     if not groups or not size:
         return
     count = sum(map(len, groups))
@@ -69,37 +79,17 @@ def numbers(type: Type) -> int:
 
 
 def _passes(asked: tuple[Parameter, ...], taken: tuple[Parameter, ...]) -> bool:
-    """Whether what is passed to a group of parameters is accepted; a group of n also takes one tuple of n."""
-    if len(asked) == len(taken):
-        return all(_takes(p.type, q.type) for p, q in zip(asked, taken))
-    one, other = (asked, taken) if len(asked) == 1 else (taken, asked)
-    only = known(one[0].type) if len(one) == 1 else None
-    if isinstance(only, Var):
-        return True
-    if not isinstance(only, TupleOf) or len(only.items) != len(other):
-        return False
-    pairs = [(item, parameter.type) for item, parameter in zip(only.items, other)]
-    return all(_takes(*(pair if one is asked else pair[::-1])) for pair in pairs)
+    """Whether what varies is accepted where it is passed; a group of n also takes one tuple of n."""
+    passed, accepted = _stars(as_tuple(asked)), _stars(as_tuple(taken))
+    return len(passed) != len(accepted) or all(takes or not varies for varies, takes in zip(passed, accepted))
 
 
-def _takes(passed: Type, parameter: Type) -> bool:
-    passed, parameter = known(passed), known(parameter)
-    if isinstance(parameter, Var | Unknown) or isinstance(passed, Var):
-        return True
-    if isinstance(passed, Real):
-        return isinstance(parameter, Real) and (parameter.star or not passed.star)
-    if isinstance(passed, TupleOf) and isinstance(parameter, TupleOf) and len(passed.items) == len(parameter.items):
-        return all(map(_takes, passed.items, parameter.items))
-    return isinstance(passed, Function) and isinstance(parameter, Function) and accepts(parameter, passed)
-
-
-def _gives(has: Type, wanted: Type) -> bool:
-    has, wanted = known(has), known(wanted)
-    if isinstance(wanted, Diffeo):
-        return isinstance(has, Diffeo) and (has.dims == wanted.dims or has.dims is None or wanted.dims is None)
-    if isinstance(wanted, Var | Unknown) or isinstance(has, Var):
-        return numbers(has) > 0 or isinstance(has, Var)
-    return numbers(has) == numbers(wanted) > 0
+def _stars(type: Type) -> list[bool]:
+    """For each number that a type is made of whether it may vary; what may be anything may."""
+    type = known(type)
+    if isinstance(type, TupleOf):
+        return [star for item in type.items for star in _stars(item)]
+    return [type.star if isinstance(type, Real) else True]
 
 
 @query(keep=256)

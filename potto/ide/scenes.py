@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from potto.ide.fitting import fits, numbers
+from potto.ide.fitting import fits, numbers, of_numbers
 from potto.ide.living import lives, wrong_with
 from potto.ide.places import NOWHERE, all_chunks
 from potto.ide.symbols import owner
@@ -19,7 +19,7 @@ from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import nodes, parse_expression
 from potto.syntax.walk import walk
-from potto.types import Diffeo, Function, TupleOf, Type, Var, format_type, groups_of, interface, result_of
+from potto.types import Diffeo, Function, TupleOf, Type, format_type, groups_of, interface, result_of
 from potto.types.types import resolve
 
 _PAIRS = (("x", "y"), ("u", "v"), ("i", "j"))
@@ -74,7 +74,7 @@ def scenes(db: Database, file: str) -> tuple[Scene, ...]:
 @query
 def scene(db: Database, file: str, name: str) -> Scene | None:
     """A function as it can be drawn, at no place: an edit of another definition leaves it as it is."""
-    type = interface(db, file, name).type
+    type = of_numbers(interface(db, file, name).type)
     components = numbers(result_of(type))
     groups = groups_of(type)
     if not components or not groups:
@@ -99,7 +99,7 @@ def _kind(type: Type) -> tuple[Literal["number", "tuple", "function"] | None, in
     type = resolve(type)
     if isinstance(type, Function | Diffeo):
         return "function", 0
-    size = 1 if isinstance(type, Var) else numbers(type)  # any value will do where nothing is asked of it
+    size = numbers(type)
     return ("number" if size == 1 and not isinstance(type, TupleOf) else "tuple" if size else None), size
 
 

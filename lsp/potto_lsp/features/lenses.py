@@ -34,10 +34,13 @@ def code_lenses(ask: Ask) -> list[protocol.CodeLens]:
 
 
 def _previews(ask: Ask, lens: ide.CodeLens, scene: ide.Scene | None) -> list[protocol.CodeLens]:
-    """A function of one or two numbers has a picture; a client that draws for itself shows what has more, too."""
+    """A function of one or two numbers has a picture, also beside functions that are known; a client that draws for
+    itself shows what has more, too."""
     if scene is None:
         return []
-    simple = all(p.kind == "number" for p in scene.parameters) and len(scene.parameters) <= 2 and scene.components == 1
+    numbers = [p for p in scene.parameters if p.kind == "number"]
+    known = all(p.kind == "number" or p.fits for p in scene.parameters)
+    simple = known and len(numbers) <= 2 and scene.components == 1
     if not simple and not ask.client.lists("experimental.commands.commands", "potto.preview"):
         return []
     arguments = [ask.analysis.uri(lens.arguments[0]), lens.arguments[1]]
