@@ -121,7 +121,7 @@ export const PREVIEWS = {
     await settledAfter(frame, () => frame.locator("#p-shader").fill("\\(x, y) . \\(c) . 1"));
     assert.notEqual(await pixels(frame.locator("#value")), before);
     await frame.locator("#p-shader").fill("");
-    await frame.locator("#problem.needed", { hasText: "Give “shader” a function" }).waitFor();
+    await frame.locator("#problem.needed", { hasText: "such as lin" }).waitFor();
     await picture("preview-needs-function");
     await settledAfter(frame, () => frame.locator("#p-shader").fill("lin"));
     await frame.locator("#problem").waitFor({ state: "hidden" });

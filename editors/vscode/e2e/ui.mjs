@@ -154,7 +154,7 @@ const PROMPT = {
     await page.keyboard.type("40 + 2", { delay: 60 }); // without a click: it lands in the prompt, not in the program
     await page.keyboard.press("Enter");
     await terminal.filter({ hasText: /2\spo>/ }).waitFor();
-    assert.match((await terminal.innerText()).replaceAll("\u00a0", " "), /40 \+ 2\s+42/);
+    assert.match((await terminal.innerText()).replaceAll("\u00a0", " "), /40 \+ 2\s+_1 = 42/);
     assert.equal(await text(), before);
     await go(2, 1);
     await page.keyboard.press("Shift+Enter");

@@ -129,5 +129,9 @@ test("a function that nothing fits is asked for, and nothing else is", () => {
   const choice = choiceFor(whole, undefined);
   choice.values.set("shade", "\\(x) . x");
   assert.equal(missing(whole, choice), undefined);
+  const known = scene(given(["flat"]));
+  const emptied = choiceFor(known, undefined);
+  emptied.values.set("shade", "");
+  assert.equal(missing(known, emptied), "Give “shade” a function Real* -> Real, such as flat.");
   assert.equal(choiceFor(whole, choice).values.get("shade"), "\\(x) . x"); // kept over edits
 });
