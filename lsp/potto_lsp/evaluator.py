@@ -222,7 +222,7 @@ def _preview(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
     from potto_lsp.preview import NoPicture, preview
 
     try:
-        return preview(world, task["file"], task["text"], task.get("box"))
+        return preview(world, task["file"], task["text"], task["box"], task["axes"], task["given"])
     except NoPicture as error:
         raise Unanswerable(str(error)) from None
 

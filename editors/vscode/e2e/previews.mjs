@@ -107,6 +107,27 @@ export const PREVIEWS = {
     assert.ok(data.length > 3000 && data.readUInt32BE(16) > 200);
   },
 
+  async "a function that a function needs is found, or asked for"({ page, picture, file }) {
+    await file("shaded.po");
+    await page.keyboard.press("Control+K");
+    await page.keyboard.press("v");
+    await page.locator(".tab.active", { hasText: "Preview shaded.po" }).waitFor();
+    const frame = await preview(page);
+    await frame.locator("main.curves").waitFor();
+    assert.equal(await frame.locator("#p-shader").inputValue(), "lin");
+    assert.ok(await frame.locator("#problem").isHidden());
+    await picture("preview-function");
+    const before = await pixels(frame.locator("#value"));
+    await settledAfter(frame, () => frame.locator("#p-shader").fill("\\(x, y) . \\(c) . 1"));
+    assert.notEqual(await pixels(frame.locator("#value")), before);
+    await frame.locator("#p-shader").fill("");
+    await frame.locator("#problem.needed", { hasText: "such as lin" }).waitFor();
+    await picture("preview-needs-function");
+    await settledAfter(frame, () => frame.locator("#p-shader").fill("lin"));
+    await frame.locator("#problem").waitFor({ state: "hidden" });
+    await page.locator(".tab", { hasText: "Preview shaded.po" }).locator(".codicon-close").click();
+  },
+
   async "a slow preview holds up nothing"({ page, file, command }) {
     await file("slow.po");
     await page.keyboard.press("Control+K");

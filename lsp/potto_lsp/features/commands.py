@@ -91,7 +91,15 @@ def _preview(ask: Ask, file: str, arguments: list[Any]) -> Deferred:
     """A picture over a box: `[[x0, x1], [y0, y1]]`, the unit square if none is given."""
     box = arguments[1] if len(arguments) > 1 else None
     text = _text(arguments)
-    return _shown(ask, text, task(ask, "preview", file, text, {"box": box}))
+    scene = ide.scene(ask.db, file, text) if text in names(ask.db, file) else None
+    functions = [p for p in scene.parameters if p.kind == "function"] if scene is not None else []
+    for parameter in functions:
+        if not parameter.fits:
+            needs = f"`{text}` needs a function `{parameter.name}` of the type {parameter.type}"
+            raise Refusal(f"{needs}: none was found in this file, in what it imports, or beside it")
+    axes = [p.name for p in scene.parameters if p.kind != "function"] if scene is not None else []
+    more = {"box": box, "axes": axes, "given": {p.name: p.fits[0] for p in functions}}
+    return _shown(ask, text, task(ask, "preview", file, text, more))
 
 
 def _text(arguments: list[Any]) -> str:
