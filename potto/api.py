@@ -13,9 +13,10 @@ import itertools
 import os
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
-from potto.arguments import Batch, batch_of, misfit, value_of
+from potto.arguments import Batch, batch_of, misfit, moving, value_of
 from potto.calls import Call, Form, Gradient, gradient
 from potto.diagnostics import Diagnostic, PottoError
 from potto.kernels.cells import Value
@@ -28,7 +29,10 @@ from potto.runtime.functions import Closure
 from potto.source import Span
 from potto.syntax import nodes, print_expression
 from potto.types import derivative_type, format_type, infer_expression
-from potto.types.types import Diffeo, Parameter, Type, groups_of
+from potto.types.kinds import NO_TANGENT
+from potto.types.motionless import GENERAL, LONGEST, MOTIONLESS
+from potto.types.queries import is_derivative
+from potto.types.types import Diffeo, Parameter, TupleOf, Type, groups_of
 from potto.types.types import Function as FunctionType
 from potto.world import World
 
@@ -202,6 +206,7 @@ class Function:
         self._given = given
         self._calls: dict[Form, Call] = {}
         self._known: tuple[int, Value] | None = None
+        self._derives: tuple[int, bool] | None = None
         self._groups: tuple[int, tuple[tuple[Parameter, ...], ...]] | None = None
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
@@ -214,7 +219,27 @@ class Function:
 
     def _run(self, given: Given) -> Estimate:
         arguments, batch = self._arguments(given)
+        if self._is_derivative():
+            self._must_move(given)
         return self._call(given).run([value for _, value in arguments], batch)
+
+    def _is_derivative(self) -> bool:
+        """Whether this is the derivative of a function, whose arguments are all that moves."""
+        revision = self._world.db.revision
+        if self._derives is None or self._derives[0] != revision:
+            self._derives = revision, is_derivative(self._world.db, self._file, self._expr)
+        return self._derives[1]
+
+    def _must_move(self, given: Given) -> None:
+        """Raise PottoError if no argument has a tangent: whatever is evaluated, the derivative would be 0."""
+        assert self._groups is not None
+        if any(_carries(argument, type) for _, argument, type in _labelled(given, self._groups[1])):
+            return
+        first = self._groups[1][0][0].type
+        single = isinstance(first, TupleOf) and not isinstance(first.items[0], TupleOf)  # else tangents of tangents
+        text = moving(print_expression(self._expr), given) if single else ""
+        help = f"write `{text}`" if text and len(text) <= LONGEST else GENERAL
+        raise PottoError([replace(NO_TANGENT(NOWHERE, MOTIONLESS, help=help), severity="error")])
 
     def _call(self, given: Given) -> Call:
         form = tuple((len(args), tuple(words)) for args, words in given)
@@ -316,6 +341,13 @@ def _labelled(
         by_name = {p.name: p.type for p in parameters}
         found += [(name, argument, by_name.get(name)) for name, argument in kwargs.items()]
     return found
+
+
+def _carries(argument: Any, type: Type | None) -> bool:
+    """Whether an argument of a derivative has a tangent, or may have."""
+    if isinstance(argument, tuple):  # of a group, if it is not known what for
+        return type is not None or any(isinstance(item, tuple | list | Function) for item in argument)
+    return type is None or isinstance(argument, list | Function)
 
 
 def bound(function: Function, args: tuple[Any, ...], kwargs: dict[str, Any]) -> builtins.list[tuple[str, Any]]:

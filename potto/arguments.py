@@ -17,6 +17,7 @@ from potto.diagnostics import PottoError, declare
 from potto.kernels.cells import Cell, Value
 from potto.kernels.errors import wrong_call
 from potto.runtime.estimate import Estimate
+from potto.runtime.printing import format_digits
 from potto.source import Span
 from potto.types import format_type
 from potto.types.types import Diffeo, Dist, Function, ListOf, Real, TupleOf, Type, resolve, result_of
@@ -209,3 +210,18 @@ def _kind(argument: Any) -> str:
     if isinstance(argument, tuple | list):
         return f"a {type(argument).__name__} of {len(argument)}"
     return f"a Python {type(argument).__name__}"
+
+
+def moving(head: str, given: Iterable[tuple[tuple[Any, ...], dict[str, Any]]]) -> str:
+    """The call of a derivative with a tangent for its first number, as it is written; nothing for one of arrays."""
+    text = head
+    for args, kwargs in given:
+        words: list[str] = []
+        for name, argument in (*(("", argument) for argument in args), *kwargs.items()):
+            if not isinstance(argument, int | float):
+                return ""
+            number = format_digits(float(argument), 12)
+            number = f"({number}, 1)" if text == head and not words else number
+            words.append(f"{name}={number}" if name else number)
+        text += f"({', '.join(words)})"
+    return text

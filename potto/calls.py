@@ -101,7 +101,7 @@ def applied(expr: nodes.Expr, form: Form) -> nodes.Expr:
 # Gradients
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Gradient(Estimate):
     """An estimate with derivatives by several parameters: `gradient["c"]`, or `tangent` for all of them."""
 

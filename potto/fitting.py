@@ -21,6 +21,7 @@ from potto.diagnostics import PottoError
 from potto.kernels.cells import Array
 from potto.kernels.errors import wrong_call
 from potto.runtime.estimate import Estimate
+from potto.runtime.printing import format_digits
 
 MOST_STEPS = 200
 # The slope of a minimum, measured in the size of the values met and of the parameters.
@@ -34,11 +35,12 @@ Objective = Callable[[Array], "Seen"]
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """The value and the gradient at one place; `error` bounds that of the gradient."""
+    """The value and the gradient at one place; `error` bounds that of the gradient, `value_error` that of the value."""
 
     value: float
     gradient: Array
     error: float = 0.0
+    value_error: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +60,9 @@ class Fit:
     """Where a minimization ended.
 
     parameters, value, slope: the best place met, what is to be least there, and the steepest slope there, measured for
-    each parameter in its own size and left out where a bound stops it. converged: whether this is a minimum; `reason`
-    says why it was left. steps: the way there, from the start. evaluations: calls of the function with its derivatives.
+    each parameter in its own size and left out where a bound stops it. error: a bound of the value's error. converged:
+    whether this is a minimum; `reason` says why it was left. steps: the way there, from the start. evaluations: calls
+    of the function with its derivatives. held: the parameters that a bound stops.
     """
 
     parameters: dict[str, float]
@@ -70,9 +73,26 @@ class Fit:
     steps: tuple[Step, ...]
     evaluations: int
     seconds: float
+    error: float = 0.0
+    held: frozenset[str] = frozenset()
 
     def __getitem__(self, name: str) -> float:
         return self.parameters[name]
+
+    def doubts(self) -> dict[str, float]:
+        """How far each parameter may be off the minimum; digits beyond that say nothing.
+
+        A slope that is left says so, and so does an error of the value: on a parabola through the last step at which
+        the value was larger by more than its error, this is how far away the value rises by its error.
+        """
+        step = next((step for step in reversed(self.steps) if step.value - self.value > self.error), None)
+        share = 0.0 if step is None else math.sqrt(self.error / (step.value - self.value))
+        away = dict.fromkeys(self.parameters, 0.0)
+        if step is not None:
+            away = {n: abs(v - p) for (n, v), p in zip(self.parameters.items(), step.parameters, strict=True)}
+        doubts = {n: max(1e-9 * abs(v), min(1e-3 * self.slope, 1e-3 * abs(v)), 1e-12, share * away[n])
+                  for n, v in self.parameters.items()}  # fmt: skip
+        return doubts | dict.fromkeys(self.held, 0.0)
 
 
 def fit(
@@ -121,7 +141,8 @@ def _seen(found: Any, count: int, target: Any) -> Seen:
     """What is to be least: the function itself, or the mean of its squared distances to the target."""
     by_parameter = (found.tangent,) if count == 1 else found.tangent
     errors = (found.tangent_error,) if count == 1 else found.tangent_error
-    value, tangents = _flat(found.value), np.stack([_flat(t) for t in by_parameter])
+    value, bound = _flat(found.value), _flat(found.error)
+    tangents = np.stack([_flat(t) for t in by_parameter])
     error = max((float(np.max(_flat(e), initial=0.0)) for e in errors), default=0.0)
     if target is None:
         if value.size != 1:
@@ -129,13 +150,14 @@ def _seen(found: Any, count: int, target: Any) -> Seen:
                 f"the function gives {value.size} numbers, and only one number can be least",
                 "say which numbers they should be: give a target",
             )
-        return Seen(float(value[0]), tangents[:, 0], error)
+        return Seen(float(value[0]), tangents[:, 0], error, float(bound[0]))
     wanted = _flat(target)
     if wanted.size not in (1, value.size):
         raise wrong_call(f"the target has {wanted.size} numbers, the function's answer {value.size}")
     off = value - wanted
     scale = float(np.sqrt(np.mean(off**2)))
-    return Seen(float(np.mean(off**2)), 2 * np.mean(off * tangents, axis=1), 2 * scale * error)
+    value_error = float(np.mean((2 * np.abs(off) + bound) * bound))
+    return Seen(float(np.mean(off**2)), 2 * np.mean(off * tangents, axis=1), 2 * scale * error, value_error)
 
 
 def _flat(value: Any) -> Array:
@@ -186,9 +208,10 @@ class _Walk:
             return self._wall(x)
         if not (math.isfinite(seen.value) and np.isfinite(seen.gradient).all()):
             if self.best is None:
-                at = ", ".join(f"{n} = {v:g}" for n, v in zip(self.names, x, strict=True))
-                raise wrong_call(f"at the start, {at}, the value is {seen.value:g} with the slopes "
-                                 f"{', '.join(f'{g:g}' for g in seen.gradient)}", "start where these are numbers")
+                at = ", ".join(f"{n} = {format_digits(v)}" for n, v in zip(self.names, x, strict=True))
+                value, slopes = format_digits(seen.value), ", ".join(map(format_digits, seen.gradient))
+                message = f"at the start, {at}, the value is {value} with the slopes {slopes}"
+                raise wrong_call(message, "start where these are numbers")
             return self._wall(x)
         self.size = max(self.size, abs(seen.value)) if self.evaluations == 1 else self.size
         if self.best is None or seen.value < self.best[1].value:
@@ -203,9 +226,13 @@ class _Walk:
         steep = (1 + abs(seen.value) + float(np.abs(seen.gradient @ away))) / max(float(away @ away), 1e-300)
         return seen.value + steep * float(away @ away), 2 * steep * away
 
+    def held(self, x: Array, seen: Seen) -> Any:
+        """Whether a bound stops a parameter."""
+        return ((x <= self.low) & (seen.gradient > 0)) | ((x >= self.high) & (seen.gradient < 0))
+
     def slope(self, x: Array, seen: Seen) -> float:
         """The steepest slope for which no bound is in the way, each parameter measured in its own size."""
-        free = ~(((x <= self.low) & (seen.gradient > 0)) | ((x >= self.high) & (seen.gradient < 0)))
+        free = ~self.held(x, seen)
         return float(np.max(np.abs(seen.gradient) * np.maximum(np.abs(x), 1e-3) * free, initial=0.0))
 
     def step(self) -> None:
@@ -264,8 +291,9 @@ def minimized(
     assert walk.best is not None
     x, seen = walk.best
     parameters = {name: float(v) for name, v in zip(names, x, strict=True)}
+    held = frozenset(name for name, stops in zip(names, walk.held(x, seen), strict=True) if stops)
     return Fit(parameters, seen.value, walk.slope(x, seen), walk.converged, walk.reason, tuple(walk.steps),
-               walk.evaluations, time.perf_counter() - walk.begun)  # fmt: skip
+               walk.evaluations, time.perf_counter() - walk.begun, seen.value_error, held)  # fmt: skip
 
 
 def _reason(walk: _Walk, message: str, most: int) -> str:

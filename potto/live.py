@@ -14,7 +14,7 @@ from potto.diagnostics import declare
 from potto.render import ProgramError
 from potto.runtime.estimate import Estimate
 from potto.runtime.printing import holds, written_tolerance
-from potto.runtime.shown import format_bounds, format_estimate
+from potto.runtime.shown import format_answer, interval
 from potto.syntax import live_expressions, nodes
 from potto.world import World
 
@@ -50,7 +50,7 @@ def _outcome(world: World, file: str, line: int, text: str, expected: str | None
     value = None
     try:
         estimate = world.evaluate(file, text).estimate
-        value = format_estimate(estimate)
+        value = format_answer(estimate)
         if expected is None:
             return Outcome(file, line, text, expected, value, True)
         wanted = world.evaluate(file, expected).estimate
@@ -58,13 +58,8 @@ def _outcome(world: World, file: str, line: int, text: str, expected: str | None
     except ProgramError as error:
         message = "; ".join(diagnostic.message for diagnostic in error.diagnostics)
         return Outcome(file, line, text, expected, value, False, message)
-    message = "" if good else f"expected {expected}, got {value} (error {format_bounds(bounds(estimate))})"
+    message = "" if good else f"expected {expected}, got {interval(estimate)}"
     return Outcome(file, line, text, expected, value, good, message)
-
-
-def bounds(estimate: Estimate) -> Any:
-    """The error estimates in the form in which the answer is shown."""
-    return estimate.error if estimate.tangent is None else (estimate.error, estimate.tangent_error)
 
 
 def agrees(estimate: Estimate, wanted: Estimate, written: nodes.Expr) -> bool:

@@ -113,7 +113,10 @@ class Session:
         if joined:
             self._see((entry,))
         yield from joined
-        yield from self._shown(entry, settings)
+        told = {item.located for item in said}
+        for item in self._shown(entry, settings):
+            if not (isinstance(item, Said) and item.located in told):
+                yield item
 
     def _joined(self, entry: str) -> Iterator[Outcome]:
         """The imports and definitions of an entry, in the order of the text."""

@@ -30,6 +30,7 @@ from potto.source import SourceText, Span
 from potto.syntax import parse_expression
 from potto.syntax.nodes import Expr
 from potto.types import format_type, infer_expression
+from potto.types.kinds import NO_TANGENT
 from potto.types.types import Type
 
 EXPRESSION = "<expression>"
@@ -104,13 +105,15 @@ class World(Library):
 
     def run(self, file: str, settings: Settings | None = None) -> Iterator[Shown | Located]:
         """Run those statements of a script that no error spoils. The errors come out in their places, those that no
-        statement met in the end; one of evaluation ends the run."""
+        statement met in the end; one of evaluation ends the run. What is said of derivatives that move nothing comes in
+        the end as well: their zeros look like answers."""
         said: set[tuple[str | None, Diagnostic]] = set()
         for event in Script(self.db, file, self.program, settings or current(self.settings(file))).run():
             if isinstance(event, Located):
                 said.add(_identity(event))
             yield event
         yield from (located for located in self.errors(file) if _identity(located) not in said)
+        yield from (located for located in self.diagnostics(file) if located.diagnostic.code == NO_TANGENT.code)
 
     def evaluate(self, file: str, text: str, settings: Settings | None = None) -> Answer:
         """The value of an expression with a file's names in scope. Raises ProgramError, also for an error in a
@@ -132,7 +135,9 @@ class World(Library):
         except PottoError as error:
             whole = Span(0, len(text))
             raise ProgramError([Located(EXPRESSION, placed(d, whole, 0)) for d in error.diagnostics], sources) from None
-        said = tuple(Located(EXPRESSION, d) for d in remarks(estimate, Span(0, len(text)), chosen))
+        warned = [absolute(self.db, EXPRESSION, d, 0) for d in inferred.diagnostics if d.code == NO_TANGENT.code]
+        found = [*warned, *remarks(estimate, Span(0, len(text)), chosen)]
+        said = tuple(Located(EXPRESSION, d) for d in found)
         return Answer(estimate, format_type(inferred.type), said)
 
     def typed(self, file: str, text: str) -> tuple[Expr, Type]:

@@ -1,7 +1,16 @@
 """How laws are tested: with the same examples each time, so that a change is told by its own doing; `make fuzz` looks
-for others."""
+for others.
+
+What tests start can be interrupted, also where the tests themselves run in the background of a script, which lets them
+ignore interrupts and whatever they start as well: only what is ignored is inherited, a handler is not.
+"""
+
+import signal
 
 from hypothesis import settings
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, lambda *_: None)
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.register_profile("explore", deadline=None)

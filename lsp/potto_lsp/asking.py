@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from potto.source import Span
@@ -68,7 +69,7 @@ class Ask:
             raise InvalidParams("`textDocument.uri` is missing")
         return uri
 
-    @property
+    @cached_property
     def file(self) -> str:
         return to_key(self.uri)
 
@@ -136,5 +137,11 @@ class Ask:
         return found
 
     def range(self, span: Span) -> protocol.Range:
-        """A span of the document as a range."""
+        """A span of the document as a range. Answers about whole files have thousands: they give way between them."""
+        self.db.give_way()
         return convert.range_of(self.text, span)
+
+    def position(self, offset: int) -> protocol.Position:
+        """An offset of the document as a position, likewise."""
+        self.db.give_way()
+        return convert.position(self.text, offset)

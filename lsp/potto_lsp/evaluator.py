@@ -119,18 +119,19 @@ def _answer(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
 
 def _evaluate(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
     """The value of an expression."""
-    from potto.runtime.shown import estimate_json, format_estimate
+    from potto.runtime.shown import estimate_json, format_answer
 
     answer = world.evaluate(task["file"], task["text"])
     remarks = [located.diagnostic.message for located in answer.remarks]
     estimate = answer.estimate
-    return {"text": format_estimate(estimate), "remarks": remarks, **estimate_json(estimate, answer.type)}
+    return {"text": format_answer(estimate), "remarks": remarks, **estimate_json(estimate, answer.type)}
 
 
 def _live(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
     """The value of a live expression, whether it is the expected one, and what there is to say about it."""
-    from potto.live import DOES_NOT_HOLD, agrees, bounds
-    from potto.runtime.shown import error_bar, format_bounds, format_estimate, largest
+    from potto.live import DOES_NOT_HOLD, agrees
+    from potto.runtime.printing import largest
+    from potto.runtime.shown import bounds, format_estimate, interval, pair
 
     file, expected = task["file"], task["expected"]
     try:
@@ -144,19 +145,17 @@ def _live(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
         ]
         return {"text": "?", "holds": None, "expected": expected, "tooltip": _rendered(error), "said": _said(said)}
     estimate = answer.estimate
-    found = {"text": format_estimate(estimate), "holds": None, "expected": expected}
+    found = {"text": format_estimate(estimate), "shown": interval(estimate), "holds": None, "expected": expected}
     if estimate.text is None:
-        found["error"] = format_bounds(bounds(estimate))
-        found["bar"], found["exact"] = error_bar(bounds(estimate)), largest(bounds(estimate)) == 0
-    said = list(answer.remarks)
+        found["error"], found["exact"] = bounds(estimate), largest(pair(estimate)[1]) == 0
+    said = [one for one in answer.remarks if one.diagnostic.code.startswith("P05")]
     if expected is not None and (wanted := _wanted(world, file, expected)) is not None:
         found["holds"] = agrees(estimate, wanted, world.parse(expected))
         if not found["holds"]:
-            message = f"this is {found['text']}, not {expected}"
+            message = f"this is {found['shown']}, not {expected}"
             help = "put right the program, or what it is expected to give"
-            note = f"the error is {found['error']}" if "error" in found else ""
             whole = Span(0, len(expected))
-            failed = DOES_NOT_HOLD(whole, message, notes=(note,) if note else (), help=help)
+            failed = DOES_NOT_HOLD(whole, message, help=help)
             said.append(Located("<expected>", failed))
     return {**found, "said": _said(said)}
 
@@ -187,20 +186,21 @@ def _rendered(error: ProgramError) -> str:
 
 def _point(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
     """A value, and the slopes by each parameter where they are numbers; all with error bars."""
-    from potto.runtime.shown import format_bounds, format_estimate, format_numbers
+    from potto.runtime.shown import bounds, format_estimate, interval, tangent_of
 
     estimate = world.evaluate(task["file"], task["text"]).estimate
-    found: dict[str, Any] = {"text": format_estimate(estimate), "slopes": []}
+    found: dict[str, Any] = {"text": format_estimate(estimate), "shown": interval(estimate), "slopes": []}
     if estimate.text is None:
-        found["error"] = format_bounds(estimate.error)
+        found["error"] = bounds(estimate)
     for parameter, expression in task["slopes"]:
         try:
             dual = world.evaluate(task["file"], expression).estimate
         except ProgramError:  # its derivative is no number: it jumps with this parameter
             continue
         if dual.tangent is not None:
-            text, error = format_numbers(dual.tangent, dual.tangent_error), format_bounds(dual.tangent_error)
-            found["slopes"].append({"by": parameter, "text": text, "error": error})
+            slope = tangent_of(dual)
+            said = {"text": format_estimate(slope), "error": bounds(slope), "shown": interval(slope)}
+            found["slopes"].append({"by": parameter, **said})
     return found
 
 
@@ -222,7 +222,7 @@ def _preview(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
     from potto_lsp.preview import NoPicture, preview
 
     try:
-        return preview(world, task["file"], task["text"], task.get("box"))
+        return preview(world, task["file"], task["text"], task["box"], task["axes"], task["given"])
     except NoPicture as error:
         raise Unanswerable(str(error)) from None
 

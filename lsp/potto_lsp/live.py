@@ -80,14 +80,14 @@ class Value:
 
     @property
     def label(self) -> str:
-        text = self.result.get("text", "?") + self.result.get("bar", "")
+        text = self.result.get("shown", "?")
         return f"= {text}, not {self.result['expected']}" if self.result.get("holds") is False else f"= {text}"
 
     @property
     def tooltip(self) -> str:
         if not self.result or "tooltip" in self.result:
             return f"```text\n{self.result.get('tooltip') or self.answer.get('error', '')}\n```"
-        error = f"error at most {self.result['error']}" if self.result.get("bar") else ""
+        error = f"error at most {self.result['error']}" if "±" in self.result.get("shown", "") else ""
         error = "exact" if self.result.get("exact") else error
         held = {True: "as expected", False: "not as expected", None: ""}[self.result["holds"]]
         return "; ".join(part for part in (error, held) if part)
@@ -97,8 +97,8 @@ def shown(point: ide.Point, value: Value) -> str:
     """A point in markdown: the value and the slopes there, with error bars; nothing if there is no value."""
     if not value.result or value.result.get("error") is None:
         return ""
-    lines = [f"- `{point.text}` = {value.result['text']} ± {value.result['error']}"]
-    lines += [f"    - by `{s['by']}`: {s['text']} ± {s['error']}" for s in value.result["slopes"]]
+    lines = [f"- `{point.text}` = {value.result['shown']}"]
+    lines += [f"    - by `{s['by']}`: {s['shown']}" for s in value.result["slopes"]]
     return "\n".join(lines)
 
 

@@ -8,12 +8,16 @@ from __future__ import annotations
 import base64
 import struct
 import zlib
+from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from potto.api import Function, Module
 from potto.diagnostics import PottoError
+from potto.runtime.printing import format_digits, format_range
+from potto_lsp.sampling import NoSamples, argument
 
 if TYPE_CHECKING:
     from potto.world import World
@@ -26,24 +30,46 @@ class NoPicture(Exception):
     """Why something has no picture, for the user to read."""
 
 
-def preview(world: World, file: str, name: str, box: Any = None) -> dict[str, Any]:
-    """The picture of a function as a data URI, and a text that says what is shown. Raises NoPicture."""
-    function = getattr(Module(world, file), name, None)
+def preview(
+    world: World, file: str, name: str, box: Any, axes: Sequence[str], given: Mapping[str, str]
+) -> dict[str, Any]:
+    """The picture of a function as a data URI, and a text that says what is shown. Raises NoPicture.
+
+    `given`: what its parameters that are functions are, as texts; `axes` are the others.
+    """
+    module = Module(world, file)
+    function = getattr(module, name, None)
     (x0, x1), (y0, y1) = _box(box)
     if not isinstance(function, Function):
         raise _none(name)
+    values = partial(_values, function) if not given else partial(_given_values, module, function, axes, given)
+    said = name if not given else f"{name} with {', '.join(f'{key} = {text}' for key, text in given.items())},"
     xs = np.linspace(x0, x1, CURVE)
-    curve = _values(function, (xs,))
+    curve = values((xs,))
     if curve is not None:
-        return {"image": _uri(_plot(curve)), "text": _text(name, curve, f"{x0:g}..{x1:g}"), "kind": "curve"}
+        return {"image": _uri(_plot(curve)), "text": _text(said, curve, _side(x0, x1)), "kind": "curve"}
     grid = np.meshgrid(np.linspace(x0, x1, SIZE), np.linspace(y1, y0, SIZE))
-    image = _values(function, tuple(grid))
+    image = values(tuple(grid))
     if image is None:
         raise _none(name)
     return {
         "image": _uri(_shade(image)), "kind": "image",
-        "text": _text(name, image, f"{x0:g}..{x1:g} × {y0:g}..{y1:g}"),
+        "text": _text(said, image, f"{_side(x0, x1)} × {_side(y0, y1)}"),
     }  # fmt: skip
+
+
+def _given_values(
+    module: Module, function: Function, axes: Sequence[str], given: Mapping[str, str], arguments: tuple[Array, ...]
+) -> Array | None:
+    """The values over a batch of a function that is also given others; None if it has not so many numbers."""
+    if len(axes) != len(arguments):
+        return None
+    try:
+        functions = {key: argument(module, key, text) for key, text in given.items()}
+        value = np.asarray(function(**dict(zip(axes, arguments)), **functions).value, dtype=float)
+    except (NoSamples, PottoError, AttributeError, TypeError, ValueError) as error:
+        raise NoPicture(str(error)) from None
+    return np.broadcast_to(value, arguments[0].shape)
 
 
 def _none(name: str) -> NoPicture:
@@ -61,7 +87,7 @@ def _box(box: Any) -> tuple[tuple[float, float], tuple[float, float]]:
 def _values(function: Function, arguments: tuple[Array, ...]) -> Array | None:
     """The values over a batch, given all at once, as a tuple or one by one; None if it takes none of these."""
     shape = arguments[0].shape
-    for groups in ((arguments,), ((arguments,),), tuple((argument,) for argument in arguments)):
+    for groups in ((arguments,), ((arguments,),), tuple((one,) for one in arguments)):
         try:
             found: Any = function
             for group in groups:
@@ -76,7 +102,11 @@ def _values(function: Function, arguments: tuple[Array, ...]) -> Array | None:
 
 def _text(name: str, values: Array, where: str) -> str:
     good = values[np.isfinite(values)]
-    return f"{name} over {where}: {good.min():.6g} to {good.max():.6g}" if good.size else f"{name}: no finite value"
+    return f"{name} over {where}: {format_range(good.min(), good.max())}" if good.size else f"{name}: no finite value"
+
+
+def _side(low: float, high: float) -> str:
+    return f"{format_digits(low)}..{format_digits(high)}"
 
 
 def _scaled(values: Array) -> Array:

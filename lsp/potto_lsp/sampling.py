@@ -14,8 +14,10 @@ import numpy as np
 
 from potto.api import Function, Module, expression, grad
 from potto.diagnostics import PottoError
+from potto.modules import find_module, resolve_module
 from potto.runtime.estimate import Estimate
 from potto.settings import settings
+from potto.syntax import nodes
 
 if TYPE_CHECKING:
     from potto.world import World
@@ -41,7 +43,7 @@ def sample(
     if not isinstance(function, Function):
         raise NoSamples(f"`{name}` is no function")
     places, shape = _places(axes)
-    given = {key: _argument(module, key, value) for key, value in values.items() if key not in places} | places
+    given = {key: argument(module, key, value) for key, value in values.items() if key not in places} | places
     with settings(rtol=rtol or RTOL):
         try:
             estimate = function(**given) if wrt is None else grad(function, [wrt])(**given)
@@ -76,10 +78,11 @@ def _middles(axis: Mapping[str, Any]) -> Array:
     return middles
 
 
-def _argument(module: Module, name: str, value: Any) -> Any:
-    """A number, a tuple of numbers, or the text of an expression in the module's names."""
+def argument(module: Module, name: str, value: Any) -> Any:
+    """A number, a tuple of numbers, or the text of an expression in the module's names. `m.f` may also be a function
+    of a module that this one does not import."""
     if isinstance(value, list):
-        return tuple(_argument(module, name, item) for item in value)
+        return tuple(argument(module, name, item) for item in value)
     if isinstance(value, str):
         return _meant(module, name, value)
     if isinstance(value, bool) or not isinstance(value, int | float):
@@ -91,10 +94,21 @@ def _meant(module: Module, name: str, text: str) -> Any:
     if not text.strip():
         raise NoSamples(f"`{name}` needs a value")
     try:
-        found = expression(module, text)
+        found = expression(*_home(module, text))
     except PottoError as error:
         raise NoSamples(f"`{name}`: " + "; ".join(d.message for d in error.diagnostics)) from None
     return found.value if isinstance(found, Estimate) else found
+
+
+def _home(module: Module, text: str) -> tuple[Module, str]:
+    """The module in whose names a text is an expression, and the expression there."""
+    written = module._world.parse(text)
+    if isinstance(written, nodes.Member):
+        db, file = module._world.db, module._file
+        other = find_module(db, file, written.path)
+        if other is not None and resolve_module(db, file, written.path) is None:
+            return Module(module._world, other), written.name
+    return module, text
 
 
 def _numbers(name: str, value: Any, error: Any, shape: tuple[int, ...]) -> dict[str, list[str]]:

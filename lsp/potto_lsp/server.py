@@ -174,7 +174,7 @@ class Server:
         uri = uri_of(params)
         document = None if uri is None else self.documents.get(uri)
         ask = Ask(self.session, params)
-        job = Job("slow" if feature.slow else "quick", lambda job: self._answer(id, job, feature, ask, document))
+        job = Job(feature.pace, lambda job: self._answer(id, job, feature, ask, document))
         if document is not None and feature.method != "textDocument/diagnostic":
             job.outdated = lambda: self._outdated(ask, document)
             told = (errors.CONTENT_MODIFIED, "the document has changed", None)

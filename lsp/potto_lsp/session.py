@@ -93,10 +93,16 @@ class Session:
         self.analysis.settings = settings_of(settings)
         self.publisher.whole_workspace = self.analysis.settings.get("diagnostics.scope") != "openFiles"
 
-    def idle(self) -> Iterator[Callable[[], None]]:
-        """The steps of what is done when there is nothing else to do."""
+    def idle(self) -> Iterator[Callable[[], None] | None]:
+        """The steps of what is done when there is nothing else to do; a None when it is told what is wrong with the
+        open files."""
         if self.checked:
-            yield from self.publisher.steps_again()
+            opened = len(self.analysis.documents)
+            for number, step in enumerate(self.publisher.steps_again()):
+                if number == opened:
+                    yield None
+                yield step
+            yield None
         else:
             yield from self._first_check()
         for key in [key for key in self.to_prepare if key in self.analysis.documents]:
@@ -105,13 +111,14 @@ class Session:
             yield lambda key=key: self._keep(key)  # type: ignore[misc]
         yield self.live.refresh
 
-    def _first_check(self) -> Iterator[Callable[[], None]]:
+    def _first_check(self) -> Iterator[Callable[[], None] | None]:
         """The first check of the whole workspace, which may take a while: with progress."""
         if self.publisher.whole_workspace:
             yield self.analysis.call_helpers  # they start while what is open is checked here
         steps = list(self.publisher.steps())
         for number, step in enumerate(steps):
             if number == len(self.analysis.documents):  # what is open is told; the next thing is to be asked about it
+                yield None
                 yield self._load_features
                 yield from steps[:number]  # what was known from an earlier session is found anew, for the edits to come
             while self.analysis.helpers_have_found:
@@ -120,6 +127,7 @@ class Session:
             self._progress.report(number + 1, len(steps))
             if number % TREES == TREES - 1:
                 yield self.analysis.forget_trees
+        yield None
         yield self._load_features
         yield self.analysis.forget_trees
         yield self._all_checked

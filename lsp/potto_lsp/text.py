@@ -9,14 +9,16 @@ code point its start.
 from __future__ import annotations
 
 import re
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import accumulate
 from typing import Literal
 
 Encoding = Literal["utf-8", "utf-16", "utf-32"]
 ENCODINGS: tuple[Encoding, ...] = ("utf-8", "utf-16", "utf-32")
 _LINE_END = re.compile(r"\r\n?|\n")
+_BEYOND_ASCII, _ASTRAL = re.compile(r"[^\x00-\x7f]"), re.compile(r"[^\x00-\uffff]")
 
 
 def line_starts(text: str) -> list[int]:
@@ -85,10 +87,21 @@ class Text:
         offset = min(max(offset, 0), len(self.text))
         number = bisect_right(self.starts, offset) - 1
         start = self.starts[number]
-        head = self.text[start:offset]
-        if self.encoding == "utf-32" or head.isascii():
-            return number, min(offset - start, len(self.line(number)))
-        return number, units(self.line(number)[: offset - start], self.encoding)
+        if offset > start and self.text[offset - 1] == "\r" and self.text.startswith("\n", offset):
+            offset -= 1
+        wide, extra = self._wide
+        return number, offset - start + extra[bisect_left(wide, offset)] - extra[bisect_left(wide, start)]
+
+    @cached_property
+    def _wide(self) -> tuple[list[int], list[int]]:
+        """Where code points stand that are longer than one unit, and by how much those before each are in all. With
+        them a position costs the same in a line of any length."""
+        if self.encoding == "utf-32" or self.text.isascii():
+            return [], [0]
+        pattern = _BEYOND_ASCII if self.encoding == "utf-8" else _ASTRAL
+        wide = [found.start() for found in pattern.finditer(self.text)]
+        longer = (units(self.text[at], self.encoding) - 1 for at in wide)
+        return wide, list(accumulate(longer, initial=0))
 
     def replaced(self, start: int, end: int, inserted: str) -> Text:
         """The text with another one between two offsets; only the lines nearby are looked at again."""

@@ -1,8 +1,10 @@
 """The one thread that owns the database, and the order in which it works.
 
-Owns `Job` and `Worker`. Edits and quick questions are done in the order in which they came. Slow questions (over the
-whole workspace) and the checking of files wait until nothing else is there, and give way to whatever comes: the
-database is cancelled, unwinds at the entry of the next query, and what was found until then is kept.
+Owns `Job` and `Worker`. Edits and quick questions are done in the order in which they came. Then it is told what is
+wrong with the open files: to those who ask, and unasked. Slow questions (over a whole file, which editors ask after
+each key, or over the workspace) wait for that, and the check of all other files for them. What waits gives way to
+whatever comes: the database is cancelled, unwinds at the entry of the next query, and what it has found until then is
+kept.
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 LONG = 0.05  # seconds after which even a quick question gives way to an edit
+PATIENCE = 8  # how often a job gives way to questions; then it is finished first, for else it might never be
 
 _claims = Lock()
 
@@ -33,11 +36,12 @@ class Job:
     `run` and `drop` are given the job, so that none refers to itself: a document stays no longer than its questions.
     """
 
-    kind: Literal["edit", "quick", "slow", "idle"]
+    kind: Literal["edit", "quick", "diagnosis", "slow", "idle"]
     run: Callable[[Job], None]
     outdated: Callable[[], bool] = field(default=lambda: False)
     drop: Callable[[Job], None] = field(default=lambda job: None)
     stop: Callable[[], None] = field(default=lambda: None)
+    given_way: int = 0
     _claimed: bool = False
 
     def claim(self) -> bool:
@@ -52,21 +56,23 @@ class Job:
 
 
 class Worker:
-    """A queue of jobs and the thread that does them. `idle` gives the steps of what to do when there are none;
-    `dead` is called if it cannot start."""
+    """A queue of jobs and the thread that does them. `idle` gives the steps of what to do when there are none, those
+    for which slow questions wait first, and a None behind them; `dead` is called if it cannot start."""
 
     def __init__(
         self,
         start: Callable[[], Database],
-        idle: Callable[[], Iterator[Callable[[], None]]],
+        idle: Callable[[], Iterator[Callable[[], None] | None]],
         dead: Callable[[], None] = lambda: None,
     ) -> None:
         self._start, self._idle, self._dead = start, idle, dead
         self._db: Database | None = None
         self._inbox: SimpleQueue[Job | None] = SimpleQueue()
         self._quick: deque[Job] = deque()
+        self._diagnoses: deque[Job] = deque()
         self._slow: deque[Job] = deque()
-        self._steps: Iterator[Callable[[], None]] | None = None
+        self._steps: Iterator[Callable[[], None] | None] | None = None
+        self._urgent = False  # whether slow questions wait for the next step
         self._running: Job | None = None
         self._since = 0.0
         self._thread = Thread(target=self._work, name="potto-analysis", daemon=True)
@@ -79,9 +85,16 @@ class Worker:
         """Add a job, from any thread. What runs gives way if it is less urgent."""
         self._inbox.put(job)
         running, db = self._running, self._db
-        if running is None or db is None or (job.kind == "slow" and running.kind != "idle"):
+        if running is None or db is None:
             return
-        if running.kind in ("slow", "idle") or (job.kind == "edit" and time.monotonic() - self._since > LONG):
+        if job.kind == "slow" and (running.kind != "idle" or self._urgent):
+            return
+        if job.kind == "diagnosis" and (running.kind not in ("slow", "idle") or self._urgent):
+            return
+        if job.kind == "quick" and running.given_way >= PATIENCE:
+            return
+        waits = running.kind in ("diagnosis", "slow", "idle")
+        if waits or (job.kind == "edit" and time.monotonic() - self._since > LONG):
             db.cancel()
 
     def cancelled(self, job: Job) -> None:
@@ -106,14 +119,20 @@ class Worker:
         self._receive(wait=False)
         if self._quick:
             return self._quick.popleft()
-        if self._slow:
+        if self._diagnoses:
+            return self._diagnoses.popleft()
+        if self._slow and not self._urgent:
             return self._slow.popleft()
         if self._steps is None:
             self._receive(wait=True)
             return None
-        step = next(self._steps, None)
+        try:
+            step = next(self._steps)
+        except StopIteration:
+            self._steps, self._urgent = None, False
+            return None
         if step is None:
-            self._steps = None
+            self._urgent = False
             return None
         return Job("idle", lambda job: step())
 
@@ -122,15 +141,11 @@ class Worker:
             while True:
                 job = self._inbox.get(block=wait)
                 wait = False
-                if job is None:
-                    self._steps = self._idle()
-                    continue
-                if job.kind == "slow":
-                    self._slow.append(job)
-                else:
-                    self._quick.append(job)
-                if job.kind == "edit":
-                    self._steps = self._idle()
+                if job is not None:
+                    waiting = {"slow": self._slow, "diagnosis": self._diagnoses}.get(job.kind, self._quick)
+                    waiting.append(job)
+                if job is None or job.kind == "edit":
+                    self._steps, self._urgent = self._idle(), True
         except Empty:
             return
 
@@ -163,4 +178,5 @@ class Worker:
         if job.kind == "idle":
             self._steps = chain([lambda: job.run(job)], self._steps or ())
         elif not job.claimed:
-            self._slow.appendleft(job)
+            job.given_way += 1
+            (self._diagnoses if job.kind == "diagnosis" else self._slow).appendleft(job)

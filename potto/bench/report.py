@@ -17,6 +17,7 @@ from typing import Any, Literal, TextIO
 from potto.bench.adapter import Adapter, installed
 from potto.bench.measure import Run, slope
 from potto.bench.problems import QUANTITIES, Problem, Quantity, catalogue
+from potto.runtime.printing import format_error
 
 Measure = Literal["time", "evaluations"]
 TARGETS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-12)
@@ -64,7 +65,7 @@ def _row(rungs: Sequence[Run], measure: Measure) -> str:
         return f" failed: {rungs[-1].failure}"
     cells = [_cost(needed(done, target), measure) for target in TARGETS]
     best = min(done, key=lambda run: math.inf if math.isnan(run.error) else run.error)
-    said = f"{best.reported:.0e}" if best.reported is not None else BLANK
+    said = format_error(best.reported) if best.reported is not None else BLANK
     failed = f"  then {rungs[-1].failure}" if rungs[-1].failure else ""
     return f"{''.join(f'{cell:>10}' for cell in cells)}   {best.error:>11.0e} {said:>9}{failed}"
 

@@ -111,7 +111,7 @@ def _tell(
     once: Gradient, twice: Gradient | None, options: argparse.Namespace, console: Console,
     others: dict[str, Any],
 ) -> None:  # fmt: skip
-    from potto.runtime.shown import format_numbers, json_number
+    from potto.runtime.shown import answer_text, json_number
 
     def sides(found: Gradient) -> list[tuple[str, Any, Any]]:
         errors = found.tangent_error if len(found.wrt) > 1 else (found.tangent_error,)
@@ -127,12 +127,12 @@ def _tell(
         answer |= {"converged": all(f.converged for f in both), "evals": sum(f.evals for f in both)}
         console.answer_json({**answer, **others})
         return
-    console.answer(f"{options.name} = {format_numbers(once.value, once.error)}")
+    console.answer(f"{options.name} = {answer_text(once.value, once.error, once.converged)}")
     for name, value, error in sides(once):
-        console.answer(f"  by {name}: {format_numbers(value, error)}")
+        console.answer(f"  by {name}: {answer_text(value, error, once.converged)}")
     if twice is not None:
         console.answer(f"Hessian times ({', '.join(f'{name}={text}' for name, text in options.along)})")
         for name, value, error in sides(twice):
-            console.answer(f"  by {name}: {format_numbers(value, error)}")
+            console.answer(f"  by {name}: {answer_text(value, error, twice.converged)}")
     for reason in dict.fromkeys((*once.reasons, *(twice.reasons if twice is not None else ()))):
         console.complain(f"warning: not as accurate as was asked: {reason}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from typing import Any
 
 from potto.cli.console import Console
 from potto.cli.numbers import accounts, add_options, settings_of, show_stats, totals
@@ -28,8 +29,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     settings = settings_of(options, console)
     if settings is None:
         return 2
-    from potto.render import ProgramError
-    from potto.runtime.shown import estimate_json, format_bounds, format_estimate
+    from potto.render import ProgramError, to_json
+    from potto.runtime.shown import estimate_json, format_answer, interval
     from potto.world import World
 
     world = World(["."])
@@ -41,12 +42,15 @@ def run(options: argparse.Namespace, console: Console) -> int:
         return fail(error, options, console)
     estimate = answer.estimate
     if options.json:
-        more = {"stats": totals([estimate])} if options.stats else {}
+        more: dict[str, Any] = {"stats": totals([estimate])} if options.stats else {}
+        if answer.remarks:
+            sources = world.sources(options.expression.strip())
+            more["remarks"] = [to_json(located, sources) for located in answer.remarks]
         console.answer_json({**estimate_json(estimate, answer.type), **more, **others_json(world, file)})
     else:
-        console.answer(format_estimate(estimate))
+        console.answer(format_answer(estimate))
         if estimate.text is None and options.stats:
-            console.complain(f"error: {format_bounds(estimate.error)}")
+            console.complain(f"with its error: {interval(estimate)}")
         console.diagnostics(answer.remarks, world.sources(options.expression.strip()))
     if options.stats:
         show_stats([estimate], console)

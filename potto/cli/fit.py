@@ -139,8 +139,10 @@ class _Progress:
         self.names, self.console, self.last = names, console, time.perf_counter()
 
     def __call__(self, step: Step) -> None:
-        at = ", ".join(f"{n} = {v:.6g}" for n, v in zip(self.names, step.parameters, strict=True))
-        line = f"step {step.number}: {step.value:.6g} at {at}, slope {step.slope:.1e}"
+        from potto.runtime.printing import format_digits, format_error
+
+        at = ", ".join(f"{n} = {format_digits(v)}" for n, v in zip(self.names, step.parameters, strict=True))
+        line = f"step {step.number}: {format_digits(step.value)} at {at}, slope {format_error(step.slope)}"
         self.console.progress(line)
         if not self.console.err.isatty() and time.perf_counter() - self.last > EVERY:
             self.console.complain(line)
@@ -182,7 +184,7 @@ def _write_trace(found: Fit, path: str) -> None:
 
 
 def _tell(found: Fit, options: argparse.Namespace, console: Console) -> None:
-    from potto.runtime.printing import format_number
+    from potto.runtime.printing import format_error, format_number, with_error
     from potto.runtime.shown import json_number
 
     console.progress("")
@@ -191,12 +193,14 @@ def _tell(found: Fit, options: argparse.Namespace, console: Console) -> None:
         console.answer_json({
             "parameters": found.parameters, "value": json_number(found.value), "slope": json_number(found.slope),
             "converged": found.converged, "reason": found.reason, "steps": count, "evaluations": found.evaluations,
-            "seconds": found.seconds,
+            "seconds": found.seconds, "error": json_number(found.error),
         })  # fmt: skip
         return
+    doubts = found.doubts()
     for name, value in found.parameters.items():
-        console.answer(f"{name} = {format_number(value, max(1e-9 * abs(value), 1e-12))}")
+        console.answer(f"{name} = {format_number(value, doubts[name])}")
     what = options.name if options.target is None else "mean squared distance"
-    console.answer(f"{what} = {found.value:.10g}")
-    console.answer(f"{'converged' if found.converged else 'not converged'}: {found.reason} (slope {found.slope:.1e}, "
+    console.answer(f"{what} = {with_error(found.value, found.error)}")
+    slope = f"slope {format_error(found.slope)}"
+    console.answer(f"{'converged' if found.converged else 'not converged'}: {found.reason} ({slope}, "
                    f"{count} steps, {found.evaluations} evaluations, {found.seconds:.2f} s)")  # fmt: skip

@@ -228,10 +228,12 @@ def _tell(
             "converged": not found.reasons and not found.holes,
         })  # fmt: skip
     else:
+        from potto.runtime.printing import format_error, format_range
+
         for entry in picture.files:
-            console.answer(f"{entry['file']}: {entry['shows']}, {entry['low']:.6g} to {entry['high']:.6g}")
-        cost = f"{found.evaluations / pixels:.1f} evaluations a pixel"
-        console.answer(f"{grid.width} x {grid.height} pixels in {seconds:.2f} s, {cost}, largest error {most:.1e}")
+            console.answer(f"{entry['file']}: {entry['shows']}, {format_range(entry['low'], entry['high'])}")
+        cost = f"{found.evaluations / pixels:.1f} evaluations a pixel, largest error {format_error(most)}"
+        console.answer(f"{grid.width} x {grid.height} pixels in {seconds:.2f} s, {cost}")
     if options.stats:
         show_stats(found.answers, console)
     if found.holes and found.trouble is not None:

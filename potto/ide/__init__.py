@@ -53,7 +53,7 @@ from potto.ide.moving import rename_files
 from potto.ide.outlines import document_symbols, workspace_symbols
 from potto.ide.points import Point, point_of, points
 from potto.ide.renaming import prepare_rename, rename
-from potto.ide.scenes import Scene, SceneParameter, scenes
+from potto.ide.scenes import Scene, SceneParameter, scene, scenes
 from potto.ide.selecting import selection_ranges
 from potto.ide.signatures import signature_help
 from potto.ide.symbols import definition_at
@@ -130,6 +130,7 @@ __all__ = [
     "resolve_code_lens",
     "resolve_completion",
     "resolve_inlay_hint",
+    "scene",
     "scenes",
     "selection_ranges",
     "semantic_tokens",

@@ -23,6 +23,7 @@ from potto.ide.symbols import (
     placeless,
 )
 from potto.ide.words import SPECIALS, TYPES
+from potto.modules import is_diffeo
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import live_expressions, tokenize
@@ -39,7 +40,9 @@ def semantic_tokens(db: Database, file: str, span: Span | None = None) -> tuple[
     """The coloured words of a file, or of what touches a span, in order and without overlaps."""
     found: list[SemanticToken] = []
     for chunk in all_chunks(db, file, span):
-        for start, end, type, modifiers in _words(db, chunk):
+        name = owner(db, chunk)
+        words = loose_words(db, file, chunk.text) if name is None else definition_words(db, file, name)
+        for start, end, type, modifiers in words:
             place = Span(chunk.start + start, chunk.start + end)
             if span is None or (place.start < span.end and span.start < place.end):
                 found.append(SemanticToken(place, type, modifiers))
@@ -49,16 +52,17 @@ def semantic_tokens(db: Database, file: str, span: Span | None = None) -> tuple[
 Word = tuple[int, int, str, tuple[str, ...]]
 
 
-def _words(db: Database, chunk: ChunkAt) -> list[Word] | tuple[Word, ...]:
-    name = owner(db, chunk)
-    return _coloured(db, chunk) if name is None else definition_words(db, chunk.file, name)
-
-
 @query
 def definition_words(db: Database, file: str, name: str) -> tuple[Word, ...]:
     """The coloured words of a definition, relative to its chunk: an edit elsewhere colours it from memory."""
     chunk = placeless(db, file, name)
     return () if chunk is None else tuple(_coloured(db, chunk, name))
+
+
+@query(keep=8192)
+def loose_words(db: Database, file: str, text: str) -> tuple[Word, ...]:
+    """Those of a statement, an import, a comment, or a definition that does not count."""
+    return tuple(_coloured(db, ChunkAt(file, 0, text, is_diffeo(file))))
 
 
 def _coloured(db: Database, chunk: ChunkAt, name: str | None = None) -> list[Word]:

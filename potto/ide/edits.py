@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable, Mapping, Sequence
 
 from potto.ide.model import Change, Edit, FileEdits
 from potto.source import Span
+
+_BLANKS = re.compile(r"\s+")
 
 
 def applied(text: str, edits: Iterable[Edit]) -> str:
@@ -36,9 +39,12 @@ def one_file(file: str, *edits: Edit) -> Change:
 
 
 def minimal(old: str, new: str, start: int = 0) -> tuple[Edit, ...]:
-    """Small edits from one text to another, by lines and then within them; `start` is added to the places."""
+    """Small edits from one text to another, of blanks alone if nothing else differs, else by lines and then within
+    them; `start` is added to the places."""
     if old == new:
         return ()
+    if "".join(old.split()) == "".join(new.split()):
+        return _respaced(old, new, start)
     before, after = old.splitlines(keepends=True), new.splitlines(keepends=True)
     out: list[Edit] = []
     offsets = [0]
@@ -56,6 +62,28 @@ def minimal(old: str, new: str, start: int = 0) -> tuple[Edit, ...]:
         place = start + offsets[first]
         out.append(_trimmed("".join(before[first:last]), "".join(after[new_first:new_last]), place))
     return tuple(out)
+
+
+def _respaced(old: str, new: str, start: int) -> tuple[Edit, ...]:
+    """The edits where texts differ in nothing but blanks: one for each place, in time proportional to their length; a
+    search for what they have in common would take the square of it."""
+    before, after, blanks, out = _gaps(old), _gaps(new), 0, list[Edit]()
+    for solid in sorted({*before, *after}):
+        first, last = before.get(solid, (solid + blanks, solid + blanks))
+        wanted = new[slice(*after.get(solid, (0, 0)))]
+        if old[first:last] != wanted:
+            out.append(_trimmed(old[first:last], wanted, start + first))
+        blanks += last - first
+    return tuple(out)
+
+
+def _gaps(text: str) -> dict[int, tuple[int, int]]:
+    """The runs of blanks of a text, by how many other characters stand before them."""
+    found, blanks = dict[int, tuple[int, int]](), 0
+    for gap in _BLANKS.finditer(text):
+        found[gap.start() - blanks] = gap.span()
+        blanks += len(gap.group())
+    return found
 
 
 def _in_line(old: str, new: str, start: int) -> list[Edit]:

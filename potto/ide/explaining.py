@@ -20,7 +20,8 @@ from potto.core.printer import format_term
 from potto.core.simplify import simplify
 from potto.core.terms import Hole, Lam, Term, postorder
 from potto.elaborate import core, core_term
-from potto.modules import DefinitionTarget, definition, dependencies, is_recursive, references
+from potto.modules import definition, dependencies, is_recursive, references
+from potto.modules.graph import strongly_connected
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import nodes
@@ -31,19 +32,16 @@ LONG = 400  # characters of a formula beyond which a hover leaves it out
 
 @query
 def sound(db: Database, file: str, name: str) -> bool:
-    """Whether the types of a definition and of all that it needs are right: else its terms mean nothing."""
-    seen = {DefinitionTarget(file, name)}
-    pending = list(seen)
-    while pending:
-        target = pending.pop()
+    """Whether the types of a definition and of all that it needs are right: else its terms mean nothing. Of what it
+    needs the answer is asked, so that a chain of calls is not followed to its end from each of its links."""
+    group = strongly_connected(db, file, name)
+    for target in group:
         if interface(db, target.file, target.name).broken or has_errors(check_definition(db, target.file, target.name)):
             return False
         if (None, "deriv") in references(db, target.file, target.name) and is_recursive(db, target.file, target.name):
             return False  # it needs the derivative of itself: symbols for that have no end
-        fresh = [t for t in dependencies(db, target.file, target.name) if t not in seen]
-        seen.update(fresh)
-        pending += fresh
-    return True
+    needed = {needed: None for target in group for needed in dependencies(db, target.file, target.name)}
+    return all(sound(db, target.file, target.name) for target in needed if target not in group)
 
 
 @query

@@ -16,12 +16,12 @@ from potto.ide.fixing_conditions import bracket_fixes, inverse_fixes
 from potto.ide.fixing_names import undefined_fixes
 from potto.ide.fixing_texts import bracketed, suggested_fixes
 from potto.ide.model import Change, Edit
-from potto.ide.offers import At, Offer, diagnostics_at
+from potto.ide.offers import At, Offer, diagnostics_at, reads
 from potto.ide.places import ChunkAt, chunk_at, line_end, line_start
 from potto.modules.kinds import IMPORTED_TWICE, UNUSED_IMPORT
 from potto.source import Span
 from potto.syntax import nodes, walk
-from potto.types.kinds import NOT_DEFINED, TRUTH_ESCAPES, UNUSED_LOCAL, UNUSED_VARIABLE, VARYING_CONDITION
+from potto.types.kinds import NO_TANGENT, NOT_DEFINED, TRUTH_ESCAPES, UNUSED_LOCAL, UNUSED_VARIABLE, VARYING_CONDITION
 
 _MEANT = re.compile(r"did you mean `([^`]+)`(?: or `([^`]+)`)?\?")
 
@@ -42,6 +42,8 @@ def fixes(place: At) -> Iterator[Offer]:
             yield from inverse_fixes(place, said)
         elif said.code in (UNUSED_IMPORT.code, IMPORTED_TWICE.code):
             yield from _unused_import(place, said)
+        elif said.code == NO_TANGENT.code:
+            yield from _with_tangent(place, said)
         elif said.code in (UNUSED_LOCAL.code, UNUSED_VARIABLE.code):
             yield from _unused_local(place, said)
 
@@ -56,6 +58,20 @@ def _meant(place: At, said: Diagnostic) -> Iterator[Offer]:
         text = meant if "." in written or said.code.startswith("P0202") else meant.rpartition(".")[2]
         change = one_file(place.file, Edit(said.span, text))
         yield Offer(f"Change to `{text}`", "quickfix", lambda c=change: c, said, preferred=number == 0)  # type: ignore[misc]
+
+
+def _with_tangent(place: At, said: Diagnostic) -> Iterator[Offer]:
+    """A number with the tangent 1, where none was given."""
+    chunk = chunk_at(place.db, place.file, said.span.start)
+    written = place.text[said.span.start : said.span.end]
+    before = place.text[: said.span.start].rstrip(" ")[-1:]
+    both = f"(({written}, 1), (1, 0))"  # of a second derivative
+    pair = both if both in said.help else f"({written}, 1)"
+    written_as = pair if before in ("(", ",", "=") else f"({pair})"
+    if chunk is None or reads(chunk, [Edit(said.span.shift(-chunk.start), written_as)]) is None:
+        return
+    change = one_file(place.file, Edit(said.span, written_as))
+    yield Offer(f"Write `{pair}`", "quickfix", lambda: change, said, preferred=True)
 
 
 # What is not used

@@ -21,9 +21,9 @@ def folding_ranges(db: Database, file: str) -> tuple[Fold, ...]:
         if "\n" in chunk.text:
             found += (Fold(chunk.absolute(f.span), f.kind) for f in chunk_folds(db, chunk.text, chunk.diffeo))
         if chunk.text.startswith(_IMPORTS):
-            item = chunk.parsed(db).item
-            if isinstance(item, nodes.FromImport | nodes.Import):
-                imports.append(chunk.absolute(item.span))
+            sketch = chunk.sketch(db)
+            if sketch.kind == "import":
+                imports.append(chunk.absolute(sketch.span))
     if imports:
         found.append(Fold(imports[0].cover(imports[-1]), "imports"))
     kept: dict[int, Fold] = {}

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 from potto.ide.documents import kind_of
 from potto.ide.explaining import derivative_text
 from potto.ide.finding import occurrences_of
+from potto.ide.living import lives
 from potto.ide.model import CodeLens
 from potto.ide.places import all_chunks
 from potto.ide.points import points
 from potto.ide.symbols import DefinitionSymbol, owner
 from potto.query import Database
-from potto.syntax import live_expressions, nodes
+from potto.source import Span
 
 LONG_CALL = 40  # characters of a call beyond which a title does not show it
 
@@ -22,29 +24,28 @@ def code_lenses(db: Database, file: str) -> tuple[CodeLens, ...]:
     found: list[CodeLens] = []
     running = False
     for chunk in all_chunks(db, file):
-        item = chunk.parsed(db).item
-        if isinstance(item, nodes.Definition | nodes.DiffeoDefinition):
-            name = owner(db, chunk)
-            if name is None:
-                continue
-            span, start = chunk.absolute(item.name_span), str(chunk.start + item.name_span.start)
-            kind = kind_of(db, file, name)
-            if kind == "constant":
-                found.append(CodeLens(span, "evaluate", (file, name), "evaluate"))
-            elif kind == "function":
-                found.append(CodeLens(span, "evaluate", (file, name)))
-                found.append(CodeLens(span, "differentiate", (file, name)))
-                found.append(CodeLens(span, "showDerivative", (file, name)))
-            else:
-                found.append(CodeLens(span, "showDerivative", (file, name), "show derivative"))
-            found.append(CodeLens(span, "showReferences", (file, name, start)))
-        elif isinstance(item, nodes.Print | nodes.For | nodes.ExpressionStatement) and not running:
+        sketch, name = chunk.sketch(db), owner(db, chunk)
+        if name is not None:
+            found += _of_definition(db, file, name, chunk.absolute(sketch.name_span))
+        elif sketch.kind == "statement" and not running:
             running = True
-            found.append(CodeLens(chunk.absolute(item.span), "run", (file,), "run"))
-        if "#>" in chunk.text:
-            for live in live_expressions(chunk.text):
-                found.append(CodeLens(chunk.absolute(live.span), "evaluate", (file, live.text), "evaluate"))
+            found.append(CodeLens(chunk.absolute(sketch.span), "run", (file,), "run"))
+        for live in lives(db, chunk.text) if "#>" in chunk.text else ():
+            found.append(CodeLens(chunk.absolute(live.span), "evaluate", (file, live.text), "evaluate"))
     return tuple(sorted(found, key=lambda lens: lens.span.start))
+
+
+def _of_definition(db: Database, file: str, name: str, span: Span) -> Iterator[CodeLens]:
+    match kind_of(db, file, name):
+        case "constant":
+            yield CodeLens(span, "evaluate", (file, name), "evaluate")
+        case "function":
+            yield CodeLens(span, "evaluate", (file, name))
+            yield CodeLens(span, "differentiate", (file, name))
+            yield CodeLens(span, "showDerivative", (file, name))
+        case _:
+            yield CodeLens(span, "showDerivative", (file, name), "show derivative")
+    yield CodeLens(span, "showReferences", (file, name, str(span.start)))
 
 
 def resolve_code_lens(db: Database, lens: CodeLens) -> CodeLens:

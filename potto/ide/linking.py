@@ -13,14 +13,13 @@ from potto.ide.symbols import LocalSymbol, ModuleSymbol, meaning_of, symbol_at
 from potto.modules.texts import exists
 from potto.query import Database
 from potto.source import Span
-from potto.syntax import nodes
 
 
 def document_links(db: Database, file: str) -> tuple[DocumentLink, ...]:
     """The modules of imports, with the files that they mean."""
     links: list[DocumentLink] = []
     for chunk in all_chunks(db, file):
-        if not isinstance(chunk.parsed(db).item, nodes.FromImport | nodes.Import):
+        if chunk.sketch(db).kind != "import":
             continue
         for occurrence in chunk.index(db).occurrences:
             if occurrence.role not in ("module", "import"):

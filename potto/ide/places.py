@@ -7,12 +7,39 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from dataclasses import dataclass
+from typing import Literal
 
 from potto.ide.index import Index, index
 from potto.modules import ChunkRef, chunks, is_diffeo, parsed, source
 from potto.query import Database, query
 from potto.source import Span
-from potto.syntax import ParsedChunk
+from potto.syntax import ParsedChunk, nodes
+
+NOWHERE = Span(0, 0)
+
+
+@dataclass(frozen=True, slots=True)
+class Sketch:
+    """What a chunk is, the name that it defines, and where the name and all of it are, relative to the chunk."""
+
+    kind: Literal["definition", "import", "statement", "other"]
+    span: Span = NOWHERE
+    name: str | None = None
+    name_span: Span = NOWHERE
+
+
+@query(keep=16384)
+def sketch(db: Database, text: str, diffeo: bool) -> Sketch:
+    """A chunk in outline. Questions about whole files ask this of every chunk: trees are large, and soon forgotten."""
+    match parsed(db, text, diffeo).item:
+        case (nodes.Definition() | nodes.DiffeoDefinition()) as item:
+            return Sketch("definition", item.span, item.name, item.name_span)
+        case (nodes.Import() | nodes.FromImport()) as item:
+            return Sketch("import", item.span)
+        case (nodes.Print() | nodes.For() | nodes.ExpressionStatement()) as item:
+            return Sketch("statement", item.span)
+        case _:
+            return Sketch("other")
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +54,10 @@ class ChunkAt:
     def parsed(self, db: Database) -> ParsedChunk:
         """Its tree."""
         return parsed(db, self.text, self.diffeo)
+
+    def sketch(self, db: Database) -> Sketch:
+        """What it is, without its tree."""
+        return sketch(db, self.text, self.diffeo)
 
     def index(self, db: Database) -> Index:
         """Its names."""

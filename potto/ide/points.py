@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from potto.ide.documents import kind_of
+from potto.ide.fitting import fits, numbers
 from potto.ide.places import all_chunks
 from potto.ide.symbols import callee
 from potto.modules import names, parsed
@@ -95,11 +96,23 @@ def point_of(db: Database, file: str, text: str) -> Point | None:
 
 def _chosen(db: Database, file: str, name: str) -> tuple[Point, ...]:
     groups = groups_of(interface(db, file, name).type)
-    if not all(_is_number(parameter.type) for group in groups for parameter in group):
+    usual = [[_usual(db, file, name, parameter.type) for parameter in group] for group in groups]
+    written = "".join(f"({', '.join(text or '' for text in group)})" for group in usual)
+    if not all(all(group) for group in usual) or name not in names(db, file):
         return ()
-    written = "".join(f"({', '.join([USUAL] * len(group))})" for group in groups)
-    point = point_of(db, file, name + written) if name in names(db, file) else None
+    point = point_of(db, file, name + written)
     return () if point is None else (Point(point.text, point.slopes, chosen=True),)
+
+
+def _usual(db: Database, file: str, name: str, type: Type) -> str | None:
+    """What a parameter is given where nothing is said: a number, a tuple of them, or a function that fits."""
+    if _is_number(type):
+        return USUAL
+    if isinstance(resolve(type), Function):
+        said = not isinstance(resolve(result_of(type)), Var)  # whether it is known what it gives
+        return next(iter(fits(db, file, name, type, beside=False)), None) if said else None
+    size = numbers(type)
+    return f"({', '.join([USUAL] * size)})" if size else None
 
 
 def _is_number(type: Type) -> bool:
@@ -216,4 +229,7 @@ def _slopes(
 def _dual(text: str, parameter: Parameter, moves: bool) -> str:
     if isinstance(resolve(parameter.type), Function):
         return f"deriv({text})"
+    size = numbers(parameter.type)
+    if size > 1:  # a tuple with its tangent, which does not move
+        return f"({text}, ({', '.join(['0'] * size)}))"
     return f"({text}, 1)" if moves else text

@@ -7,27 +7,39 @@ are for the viewer to set. They start as a live expression of the file calls the
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import Literal
 
-from potto.ide.places import all_chunks
+from potto.ide.fitting import fits, numbers, of_numbers
+from potto.ide.living import lives, wrong_with
+from potto.ide.places import NOWHERE, all_chunks
 from potto.ide.symbols import owner
-from potto.modules import DefinitionTarget, names
-from potto.modules import resolve as meaning
-from potto.query import Database
+from potto.query import Database, query
 from potto.source import Span
-from potto.syntax import live_expressions, nodes, parse_expression
+from potto.syntax import nodes, parse_expression
 from potto.syntax.walk import walk
-from potto.types import Diffeo, Function, Real, TupleOf, Type, Var, format_type, groups_of, interface, result_of
+from potto.types import Diffeo, Function, TupleOf, Type, format_type, groups_of, interface, result_of
 from potto.types.types import resolve
 
 _PAIRS = (("x", "y"), ("u", "v"), ("i", "j"))
 
 
 @dataclass(frozen=True, slots=True)
+class Given:
+    """What a call gives to a parameter: the numbers, if they are written out, and its text."""
+
+    value: tuple[float, ...] = ()
+    text: str = ""
+
+
+Arguments = tuple[tuple[str | int, Given], ...]
+
+
+@dataclass(frozen=True, slots=True)
 class SceneParameter:
-    """A parameter. `size`: how many numbers it has, 0 for a function; `fits`: definitions that it could be given."""
+    """A parameter. `size`: how many numbers it has, 0 for a function; `fits`: texts of functions that it could be
+    given, the one to begin with first."""
 
     name: str
     kind: Literal["number", "tuple", "function"]
@@ -52,51 +64,43 @@ def scenes(db: Database, file: str) -> tuple[Scene, ...]:
     """The functions of a file that can be drawn, in order."""
     found: list[Scene] = []
     for chunk in all_chunks(db, file):
-        item, name = chunk.parsed(db).item, owner(db, chunk)
-        if name is None or not isinstance(item, nodes.Definition | nodes.DiffeoDefinition):
-            continue
-        scene = _scene(db, file, name, chunk.absolute(item.name_span))
-        if scene is not None:
-            found.append(scene)
+        name = owner(db, chunk)
+        drawn = None if name is None else scene(db, file, name)
+        if drawn is not None:
+            found.append(replace(drawn, span=chunk.absolute(chunk.sketch(db).name_span)))
     return tuple(found)
 
 
-def _scene(db: Database, file: str, name: str, span: Span) -> Scene | None:
-    type = interface(db, file, name).type
-    components = _numbers(result_of(type))
+@query
+def scene(db: Database, file: str, name: str) -> Scene | None:
+    """A function as it can be drawn, at no place: an edit of another definition leaves it as it is."""
+    type = of_numbers(interface(db, file, name).type)
+    components = numbers(result_of(type))
     groups = groups_of(type)
     if not components or not groups:
         return None
-    given = _given(db, file, name)
+    given = dict(db.entry(_given, (file,), name) or ())
     made: list[SceneParameter] = []
     for parameter in (parameter for group in groups for parameter in group):
         kind, size = _kind(parameter.type)
         if kind is None or parameter.name is None:
             return None
-        value = given.get(parameter.name, given.get(len(made), ()))
-        fits = _fits(db, file, name, parameter.type) if kind == "function" else ()
-        text = format_type(parameter.type)
-        made.append(SceneParameter(parameter.name, kind, text, size, value if len(value) == size else (), fits))
-    numbers = [parameter.name for parameter in made if parameter.kind == "number"]
-    return Scene(name, span, tuple(made), components, _axes(numbers)) if numbers else None
+        written = given.get(parameter.name, given.get(len(made), Given()))
+        value = written.value if len(written.value) == size else ()
+        usable = fits(db, file, name, parameter.type) if kind == "function" else ()
+        if kind == "function" and written.text and not wrong_with(db, file, written.text):
+            usable = tuple(dict.fromkeys((written.text, *usable)))
+        made.append(SceneParameter(parameter.name, kind, format_type(parameter.type), size, value, usable))
+    axes = _axes([parameter.name for parameter in made if parameter.kind == "number"])
+    return Scene(name, NOWHERE, tuple(made), components, axes) if axes else None
 
 
 def _kind(type: Type) -> tuple[Literal["number", "tuple", "function"] | None, int]:
     type = resolve(type)
     if isinstance(type, Function | Diffeo):
         return "function", 0
-    size = 1 if isinstance(type, Var) else _numbers(type)  # any value will do where nothing is asked of it
+    size = numbers(type)
     return ("number" if size == 1 and not isinstance(type, TupleOf) else "tuple" if size else None), size
-
-
-def _numbers(type: Type) -> int:
-    """How many numbers a value has: 0 if it is neither a number nor a flat tuple of them."""
-    type = resolve(type)
-    if isinstance(type, Real):
-        return 1
-    if isinstance(type, TupleOf) and all(isinstance(resolve(item), Real) for item in type.items):
-        return len(type.items)
-    return 0
 
 
 def _axes(numbers: list[str]) -> tuple[str, ...]:
@@ -108,32 +112,26 @@ def _axes(numbers: list[str]) -> tuple[str, ...]:
     return tuple(numbers) if len(numbers) == 2 else tuple(numbers[:1])
 
 
-def _fits(db: Database, file: str, name: str, type: Type) -> tuple[str, ...]:
-    """The names of a file that take as many arguments, and give as many numbers, as a function that is asked for."""
-    wanted = [len(group) for group in groups_of(type)]
-    found: list[str] = []
-    for other in names(db, file):
-        target = meaning(db, file, other)
-        if other != name and isinstance(target, DefinitionTarget):
-            has = interface(db, target.file, target.name).type
-            like = [len(group) for group in groups_of(has)] == wanted
-            if wanted and like and _numbers(result_of(has)) == (_numbers(result_of(type)) or 1):
-                found.append(other)
-    return tuple(found)
-
-
-def _given(db: Database, file: str, name: str) -> dict[str | int, tuple[float, ...]]:
-    """The numbers that live expressions give to a function, by name and by place; the first call counts."""
+@query
+def _given(db: Database, file: str) -> Mapping[str, Arguments]:
+    """What live expressions give to each function, by name and by place; the first call counts. A table, to be read
+    by entry."""
+    table: dict[str, Arguments] = {}
     for chunk in all_chunks(db, file):
-        if "#>" not in chunk.text:
-            continue
-        for live in live_expressions(chunk.text):
-            for node in walk(parse_expression(live.text).expr):
-                if isinstance(node, nodes.Apply) and (called := _called(node.function)) is not None:
-                    of, dual = called
-                    if of == name:
-                        return dict(_arguments(node.arguments, dual))
-    return {}
+        for live in lives(db, chunk.text) if "#>" in chunk.text else ():
+            for called, arguments in _calls(db, live.text):
+                table.setdefault(called, arguments)
+    return table
+
+
+@query(keep=8192)
+def _calls(db: Database, text: str) -> tuple[tuple[str, Arguments], ...]:
+    """The functions that an expression calls by name, with what it gives to them."""
+    calls = (node for node in walk(parse_expression(text).expr) if isinstance(node, nodes.Apply))
+    named = ((_called(node.function), node) for node in calls)
+    return tuple(
+        (called[0], tuple(_arguments(node.arguments, called[1], text))) for called, node in named if called is not None
+    )
 
 
 def _called(head: nodes.Expr) -> tuple[str, bool] | None:
@@ -149,13 +147,16 @@ def _called(head: nodes.Expr) -> tuple[str, bool] | None:
     return None
 
 
-def _arguments(given: tuple[nodes.Argument, ...], dual: bool) -> Iterator[tuple[str | int, tuple[float, ...]]]:
+def _arguments(given: tuple[nodes.Argument, ...], dual: bool, text: str) -> Iterator[tuple[str | int, Given]]:
     for place, argument in enumerate(given):
-        value = _constant(argument.value)
-        if dual and isinstance(argument.value, nodes.Tuple):
+        written, value = argument.value, _constant(argument.value)
+        if dual and isinstance(written, nodes.Tuple):
             value = value[:1]
+        match written:
+            case nodes.Apply(_, nodes.Name(_, "deriv"), (derived,), _) if dual:
+                written = derived.value
         key = place if argument.name is None else argument.name[1:] if dual else argument.name
-        yield key, value
+        yield key, Given(value, text[written.span.start : written.span.end])
 
 
 def _constant(expr: nodes.Expr) -> tuple[float, ...]:

@@ -236,8 +236,5 @@ def placeless(db: Database, file: str, name: str) -> ChunkAt | None:
 
 def owner(db: Database, chunk: ChunkAt) -> str | None:
     """The name that a chunk defines, if it is the definition that counts."""
-    item = chunk.parsed(db).item
-    name = getattr(item, "name", None)
-    if not isinstance(name, str) or isinstance(item, nodes.BrokenItem):
-        return None
-    return name if chunk_start(db, chunk.file, name) == chunk.start else None
+    name = chunk.sketch(db).name
+    return name if name is not None and chunk_start(db, chunk.file, name) == chunk.start else None

@@ -199,10 +199,14 @@ def crossings(surface: Surface, pivot: int, seed: int) -> Sums:
     marked = {axis: k + i for i, axis in enumerate(surface.pivots)}
     point = surface.placed(list(u), pivot, marked, PROBES)
     _, slopes = surface.slopes(surface.term, point, k + len(marked), PROBES)
-    above, below = surface.both_sides(point, pivot, np.zeros(PROBES))
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         rates = np.abs(slopes[:k]) * np.abs(slopes[marked[pivot]]) / (slopes[k:] ** 2).sum(axis=0)
-        t = _most((above.v - below.v)[:, None] * rates)
+    if not slopes[:k].any():  # nothing that is differentiated moves it
+        return Sums(np.zeros(1), np.zeros(1), np.zeros((1, k)), np.zeros((1, k)))
+    costs = surface.machine.costs
+    with nullcontext() if costs is None else costs.apart():
+        above, below = surface.both_sides(point, pivot, np.zeros(PROBES))
+    t = _most((above.v - below.v)[:, None] * rates)
     return Sums(np.zeros(t.shape[:1]), np.zeros(t.shape[:1]), t, np.zeros_like(t))
 
 

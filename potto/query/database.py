@@ -185,6 +185,11 @@ class Database(Engine):
         finally:
             self._release()
 
+    def give_way(self) -> None:
+        """Raise `Cancelled` if this evaluation is to end: for long work between queries, which do so by themselves."""
+        if self._cancelled == self._evaluation:
+            raise Cancelled
+
     # Events
 
     @property

@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from potto.runtime.printing import concisely, format_digits, format_seconds, format_tuple
+
 
 @dataclass(frozen=True)
 class OneSided:
@@ -48,10 +50,10 @@ def _number(x: Any) -> str:
     flat = flat[~np.isnan(flat)]  # members of a batch that have no such sides
     if not flat.size:
         return "not known"
-    return f"{flat[0]:.12g}" if flat.size == 1 else f"{flat[0]:.12g}, ..."
+    return f"{format_digits(flat[0], 12)}{', ...' if flat.size > 1 else ''}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Estimate:
     """The outcome of an evaluation.
 
@@ -86,3 +88,13 @@ class Estimate:
 
     def __float__(self) -> float:
         return float(self.value)
+
+    def __repr__(self) -> str:
+        """`0.349858807576(4)  5 evaluations  0.1 ms`."""
+        text = self.text
+        if text is None:
+            text = concisely(self.value, self.error)
+            if self.tangent is not None:
+                text = format_tuple([text, concisely(self.tangent, self.tangent_error)])
+        missed = "" if self.converged or self.text is not None else " (not converged)"
+        return f"{text}{missed}  {self.evals:,} evaluations  {format_seconds(self.seconds)}"

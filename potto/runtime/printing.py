@@ -1,58 +1,172 @@
 """Numbers as text, to the digits that their error estimates support.
 
-Owns the choice of digits, and the comparison of a value with digits that somebody wrote (`#= 0.333`).
-Knows nothing of terms or terminals.
+Owns the choice of digits for every face, and the comparison of a value with digits that somebody wrote (`#= 0.333`).
+Knows nothing of terms, estimates or terminals, and does without numpy: arrays are told by their `ndim`.
+
+Beside its error a value has the error's second digit, and the error is rounded up by what the value lost when it was
+rounded: so the interval that one reads contains the interval that was computed. Alone it has the last digit that the
+error leaves certain to one unit.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
 
 ROUNDING = 8 * 2.0**-52  # a few rounding errors: what remains of an error estimate of zero
+MOST_ITEMS = 12  # of an array that are shown
+DOUBLE = 18  # significant digits: one more than tell all doubles apart, so that rounding to them loses nothing
+SMALLEST = -5  # the power of ten from which on numbers are written without an exponent
+SMALLEST_ERROR = -4  # the same of errors
+# Of a unit of the last digit: 0.027 is no double, and the one nearest to it is not to cost a unit of the error.
+BLUR = Fraction(1, 2**40)
+
+
+# One number
 
 
 def format_number(value: float, error: float = 0.0) -> str:
-    """`value` to the last digit that `error` leaves certain.
+    """`value` alone, to the last digit that `error` leaves certain.
 
-    The error is at most half a unit of the last digit shown. Zeros at the end are kept while they say something (a
-    value known to three digits reads `0.500`) and dropped when the value is known to nearly all digits of a double.
+    With what rounding takes off, the error is at most one unit of the last digit shown. Zeros at the end are kept while
+    they say something (a value known to three digits reads `0.500`) and dropped when the value is known to nearly all
+    digits of a double.
     """
-    if math.isnan(value) or math.isinf(value):
-        return "nan" if math.isnan(value) else ("inf" if value > 0 else "-inf")
-    if math.isnan(error) or math.isinf(error):
-        return f"{_shorten(f'{value:.3g}')} (error unknown)"
+    if not math.isfinite(value):
+        return _not_finite(value)
+    if not math.isfinite(error):
+        return f"{format_digits(value, 3)} (error unknown)"
     if error == 0 or error < abs(value) * 2.0**-54:
-        return _shorten(repr(value))
-    place = math.ceil(math.log10(2 * error) - 1e-9)  # the power of ten of the last digit
-    return _rounded(value, place)
+        return _shorten(repr(float(value)))
+    bound = _decimal(abs(error))
+    place = _exponent(bound)
+    while bound + abs(_decimal(value) - _rounded(value, place) * _power(place)) > _power(place):
+        place += 1
+    count = _rounded(value, place)
+    if count == 0:
+        return "0" if place <= -9 else _positional(0, min(place, 0))
+    if len(str(abs(count))) < 9:
+        return _written(count, place)
+    return _shorten(_written(count, place))
 
 
-def _rounded(value: float, place: int) -> str:
-    if value == 0:
-        return "0" if place <= -9 else _plain(0.0, place)
-    size = math.floor(math.log10(abs(value)))
-    digits = size - place + 1  # significant ones
-    if digits >= 17:
-        return _shorten(repr(value))
-    if digits == 0 and abs(value) >= 0.5 * 10.0**place:  # rounds up to one unit of the last digit
-        unit = math.copysign(10.0**place, value)
-        return _exponent(f"{unit:.0e}", False) if place > 0 or place < -5 else f"{unit:.{-place}f}"
-    if digits <= 0:
-        return "0" if place <= -9 else _plain(0.0, place)
-    if place > 0 or size < -5:
-        return _exponent(f"{value:.{digits - 1}e}", digits >= 9)
-    text = f"{value:.{-place}f}"
-    return _shorten(text) if digits >= 9 else text
+def format_digits(value: float, digits: int = 6) -> str:
+    """`value` to so many significant digits: for labels and progress, where no error is known."""
+    if not math.isfinite(value):
+        return _not_finite(value)
+    return _shorten(f"{value:.{digits}g}")
 
 
-def _plain(value: float, place: int) -> str:
-    return f"{value:.{max(-place, 0)}f}"
+def format_error(error: float) -> str:
+    """An error estimate to two digits, rounded up."""
+    if error == 0 or not math.isfinite(error):
+        return _shorten(repr(float(error)))
+    place = _exponent(_decimal(abs(error))) - 1
+    count = math.ceil(_decimal(abs(error)) / _power(place) - BLUR)
+    if count == 100:
+        count, place = 10, place + 1
+    return f"{'-' if error < 0 else ''}{_scientific(count, place, place + 1)}"
 
 
-def _exponent(text: str, shorten: bool) -> str:
-    mantissa, exponent = text.split("e")
-    return f"{_shorten(mantissa) if shorten else mantissa}e{int(exponent)}"
+def format_concise(value: float, error: float) -> str:
+    """`0.0270(51)`: the error in units of the last digit."""
+    found = _interval(value, error)
+    return format_number(value, error) if found is None else found.concise
+
+
+@dataclass(frozen=True, slots=True)
+class _Interval:
+    """count * 10^place, off by at most error * 10^place; the error has at most two digits."""
+
+    count: int
+    error: int
+    place: int
+
+    @property
+    def scale(self) -> int:
+        """The power of ten of the first digit of value or error."""
+        return len(str(max(abs(self.count), self.error))) - 1 + self.place
+
+    @property
+    def plain(self) -> bool:
+        """Whether it is written without an exponent."""
+        return self.place <= 0 and self.scale >= SMALLEST
+
+    @property
+    def value(self) -> str:
+        return _positional(self.count, self.place) if self.plain else _scientific(self.count, self.place, self.scale)
+
+    @property
+    def bound(self) -> str:
+        scale = len(str(self.error)) - 1 + self.place
+        plain = self.plain and scale >= SMALLEST_ERROR
+        return _positional(self.error, self.place) if plain else _scientific(self.error, self.place, scale)
+
+    @property
+    def concise(self) -> str:
+        mantissa, mark, exponent = self.value.partition("e")
+        return f"{mantissa}({self.error}){mark}{exponent}"
+
+
+def _interval(value: float, error: float) -> _Interval | None:
+    """The digits of a value beside its error; None where one is not finite or the error is zero."""
+    if not (math.isfinite(value) and math.isfinite(error)) or error == 0:
+        return None
+    exact, bound = Fraction(value), _decimal(abs(error))
+    place = _exponent(bound) - 1
+    if value:
+        place = max(place, _exponent(abs(exact)) - DOUBLE + 1)
+    while True:
+        unit = _power(place)
+        count = _rounded(value, place)
+        total = max(math.ceil(bound / unit + abs(count - exact / unit) - BLUR), 1)
+        if total < 100:
+            return _Interval(count, total, place)
+        place += 1
+
+
+def _decimal(value: float) -> Fraction:
+    """The shortest decimal that stands for a double."""
+    return Fraction(repr(float(value)))
+
+
+def _rounded(value: float, place: int) -> int:
+    """A value in units of 10^place. Its shortest decimal is rounded, so that 0.3 has zeros behind the three."""
+    return round(_decimal(value) / _power(place))
+
+
+def _power(place: int) -> Fraction:
+    return Fraction(10) ** place
+
+
+def _exponent(value: Fraction) -> int:
+    """The power of ten of the first digit of a positive number."""
+    guess = len(str(value.numerator)) - len(str(value.denominator))
+    return guess if value >= _power(guess) else guess - 1
+
+
+def _written(count: int, place: int) -> str:
+    """count * 10^place with all the digits of the count; not zero."""
+    scale = len(str(abs(count))) - 1 + place
+    return _positional(count, place) if place <= 0 and scale >= SMALLEST else _scientific(count, place, scale)
+
+
+def _positional(count: int, place: int) -> str:
+    """`0.0270`; place is at most 0."""
+    sign, digits = "-" if count < 0 else "", str(abs(count)).rjust(1 - place, "0")
+    return f"{sign}{digits}" if place == 0 else f"{sign}{digits[:place]}.{digits[place:]}"
+
+
+def _scientific(count: int, place: int, scale: int) -> str:
+    """`2.70e-7`: with the exponent `scale`, which is at least that of the first digit."""
+    return f"{_positional(count, place - scale)}{f'e{scale}' if scale else ''}"
+
+
+def _not_finite(value: float) -> str:
+    return "nan" if math.isnan(value) else ("inf" if value > 0 else "-inf")
 
 
 def _shorten(text: str) -> str:
@@ -65,16 +179,103 @@ def _shorten(text: str) -> str:
     return f"{mantissa}e{int(exponent)}" if exponent else mantissa
 
 
-def format_error(error: float) -> str:
-    """An error estimate to two digits."""
-    if error == 0 or math.isnan(error) or math.isinf(error):
-        return format_number(error)
-    return f"{error:.1e}".replace("e-0", "e-").replace("e+0", "e").replace("e+", "e")
+def format_seconds(time: float) -> str:
+    """A time as people read it."""
+    return f"{time:.2f} s" if time >= 1 else f"{time * 1e3:.0f} ms" if time >= 0.01 else f"{time * 1e3:.1f} ms"
+
+
+def format_range(low: float, high: float, digits: int = 6) -> str:
+    """`0 to 0.25`: what numbers go from and to."""
+    return f"{format_digits(low, digits)} to {format_digits(high, digits)}"
+
+
+# Tuples, lists and arrays of them, with errors of the same form
+
+
+def format_numbers(value: Any, error: Any) -> str:
+    """A number, or a tuple, list or array of them, to the digits that the errors support."""
+    return _joined(value, error, format_number)
+
+
+def concisely(value: Any, error: Any) -> str:
+    """The same, each with its error behind it: `(0.0270(51), 1)`."""
+    return _joined(value, error, format_concise)
+
+
+def _joined(value: Any, error: Any, form: Callable[[float, float], str]) -> str:
+    if isinstance(value, tuple | list):
+        parts = [_joined(v, e, form) for v, e in zip(value, error, strict=True)]
+        return format_tuple(parts) if isinstance(value, tuple) else f"[{', '.join(parts)}]"
+    if value is None:
+        return "<function>"
+    if getattr(value, "ndim", 0):
+        shown = [form(v, e) for v, e in _first(value, error)]
+        return f"[{', '.join(shown)}{', ...' if value.size > MOST_ITEMS else ''}]"
+    return form(float(value), float(error))
+
+
+def _first(value: Any, error: Any) -> list[tuple[float, float]]:
+    """The items of an array that are shown, each with its error."""
+    flat = value.ravel()[:MOST_ITEMS].tolist()
+    if not getattr(error, "ndim", 0):
+        return [(v, float(error)) for v in flat]
+    return list(zip(flat, error.ravel()[:MOST_ITEMS].tolist(), strict=True))
+
+
+def with_error(value: Any, error: Any) -> str:
+    """`0.300 ± 0.012`, `(0.300, 1) ± (0.012, 0)`; without the error where it is zero or not known."""
+    if not 0 < largest(error) < math.inf or (isinstance(value, int | float) and not math.isfinite(value)):
+        if isinstance(value, tuple) and any(0 < largest(e) < math.inf for e in error):
+            return format_tuple([with_error(v, e) for v, e in zip(value, error, strict=True)])
+        return format_numbers(value, error)
+    return " ± ".join(format_bars(value, error))
+
+
+def format_bars(value: Any, error: Any) -> tuple[str, str]:
+    """The two sides of the `±`."""
+    return _joined(value, error, lambda v, e: _bar(v, e)[0]), _bars(value, error)
+
+
+def _bars(value: Any, error: Any) -> str:
+    if isinstance(value, tuple | list):
+        return format_tuple([_bars(v, e) for v, e in zip(value, error, strict=True)])
+    if getattr(value, "ndim", 0):
+        bars = [_bar(v, e)[1] for v, e in _first(value, error)]
+        return f"at most {max([*bars, format_error(largest(error))], key=float)}"
+    return _bar(float(value), float(error))[1]
+
+
+def _bar(value: float, error: float) -> tuple[str, str]:
+    found = _interval(value, error)
+    if found is None:
+        return format_number(value, error), format_error(error)
+    return found.value, found.bound
+
+
+def format_bounds(error: Any) -> str:
+    """Error estimates to two digits, in the form of the value."""
+    if isinstance(error, tuple | list):
+        return format_tuple([format_bounds(item) for item in error])
+    if getattr(error, "ndim", 0):
+        return f"at most {format_error(largest(error))}"
+    return format_error(float(error))
+
+
+def largest(error: Any) -> float:
+    """The largest of the errors of a value."""
+    if getattr(error, "ndim", 0):
+        return float(error.max(initial=0.0))
+    if isinstance(error, tuple | list):
+        return max((largest(item) for item in error), default=0.0)
+    return float(error) if error is not None and error == error else math.inf
 
 
 def format_tuple(parts: Sequence[str]) -> str:
     """`(a, b)`."""
     return f"({', '.join(parts)})"
+
+
+# Digits that somebody wrote
 
 
 def written_tolerance(text: str) -> float:

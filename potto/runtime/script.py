@@ -23,7 +23,7 @@ from potto.runtime.estimate import Estimate
 from potto.runtime.evaluate import Clock, Program, report
 from potto.runtime.functions import Closure
 from potto.runtime.machine import Machine
-from potto.runtime.shown import as_dual, format_value, gives_dual
+from potto.runtime.shown import as_dual, format_answer, format_value, gives_dual
 from potto.settings import Settings
 from potto.source import Span
 from potto.spoiled import statement_errors
@@ -91,7 +91,7 @@ class Script:
         kept: Value | None = None
         for argument in arguments:
             value, estimate = self.value(argument, env)
-            texts.append(format_value(value))
+            texts.append(format_value(value) if estimate is None else format_answer(estimate))
             if estimate is not None:
                 estimates.append(estimate)
                 kept = value if len(arguments) == 1 else None

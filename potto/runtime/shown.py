@@ -18,16 +18,16 @@ from potto.kernels.cells import Cell, Value
 from potto.runtime.estimate import Estimate
 from potto.runtime.functions import Derivative
 from potto.runtime.machine import Linker
-from potto.runtime.printing import format_error, format_number, format_tuple
+from potto.runtime.printing import format_bounds, format_numbers, format_tuple, with_error
 
 NOTHING: Mapping[str, Value] = MappingProxyType({})
-MOST_ITEMS = 12  # of an array that are shown
+MISSED = " (not converged)"  # what is said behind an answer that missed its tolerance
 
 
 def format_value(value: Value) -> str:
     """A value as `print` shows it: numbers to the digits that their errors support."""
     if isinstance(value, Cell):
-        return _numbers(value.v, 0.0 if value.e is None else value.e)
+        return format_numbers(value.v, 0.0 if value.e is None else value.e)
     if isinstance(value, tuple):
         return format_tuple([format_value(item) for item in value])
     if isinstance(value, list):
@@ -35,59 +35,45 @@ def format_value(value: Value) -> str:
     return "<derivative>" if isinstance(value, Derivative) else "<function>"
 
 
-def format_estimate(estimate: Estimate) -> str:
-    """The answer of an estimate, a dual as `(value, tangent)`."""
+def format_answer(estimate: Estimate) -> str:
+    """An answer as it stands on a line: see `answer_text`."""
     if estimate.text is not None:
         return estimate.text
-    value = format_numbers(estimate.value, estimate.error)
+    return answer_text(*pair(estimate), estimate.converged)
+
+
+def answer_text(value: Any, error: Any, converged: bool) -> str:
+    """The digits of an answer that hold; of one that missed its tolerance all digits beside the error, and that."""
+    return format_numbers(value, error) if converged else with_error(value, error) + MISSED
+
+
+def interval(estimate: Estimate) -> str:
+    """The answer with its error bars; what missed its tolerance says so."""
+    if estimate.text is not None:
+        return estimate.text
+    return with_error(*pair(estimate)) + ("" if estimate.converged else MISSED)
+
+
+def bounds(estimate: Estimate) -> str:
+    """The errors alone, in the form of the answer."""
+    return format_bounds(pair(estimate)[1])
+
+
+def tangent_of(dual: Estimate) -> Estimate:
+    """The tangent of a dual as an answer of its own."""
+    return replace(dual, value=dual.tangent, error=dual.tangent_error, tangent=None, tangent_error=None)
+
+
+def pair(estimate: Estimate) -> tuple[Any, Any]:
+    """The numbers of an answer and their errors, in the form in which they are shown: a dual is a pair."""
     if estimate.tangent is None:
-        return value
-    return format_tuple([value, format_numbers(estimate.tangent, estimate.tangent_error)])
+        return estimate.value, estimate.error
+    return (estimate.value, estimate.tangent), (estimate.error, estimate.tangent_error)
 
 
-def format_numbers(value: Any, error: Any) -> str:
-    """A number, or a tuple, list or array of them, with errors of the same form."""
-    if isinstance(value, tuple):
-        return format_tuple([format_numbers(v, e) for v, e in zip(value, error, strict=True)])
-    if isinstance(value, list):
-        return f"[{', '.join(format_numbers(v, e) for v, e in zip(value, error, strict=True))}]"
-    return "<function>" if value is None else _numbers(value, error)
-
-
-def format_bounds(error: Any) -> str:
-    """Error estimates to two digits, in the form of the value."""
-    if isinstance(error, tuple | list):
-        return format_tuple([format_bounds(item) for item in error])
-    if isinstance(error, np.ndarray) and error.ndim:
-        return f"at most {format_error(float(np.max(error, initial=0.0)))}"
-    return format_error(float(error))
-
-
-def with_error(value: Any, error: Any) -> str:
-    """`0.3 ± 4e-16`; without the error where it is zero."""
-    return format_numbers(value, error) + error_bar(error)
-
-
-def error_bar(error: Any) -> str:
-    """` ± 4e-16`; nothing where the error is zero or not known."""
-    return f" ± {format_bounds(error)}" if 0 < largest(error) < math.inf else ""
-
-
-def largest(error: Any) -> float:
-    """The largest of the errors of a value."""
-    if isinstance(error, np.ndarray):
-        return float(np.max(error, initial=0.0))
-    if isinstance(error, tuple | list):
-        return max((largest(item) for item in error), default=0.0)
-    return float(error) if error is not None and error == error else math.inf
-
-
-def _numbers(value: Any, error: Any) -> str:
-    if isinstance(value, np.ndarray) and value.ndim:
-        flat, bounds = value.ravel(), np.broadcast_to(error, value.shape).ravel()
-        shown = [format_number(float(v), float(e)) for v, e in zip(flat[:MOST_ITEMS], bounds[:MOST_ITEMS], strict=True)]
-        return f"[{', '.join(shown)}{', ...' if flat.size > MOST_ITEMS else ''}]"
-    return format_number(float(value), float(error))
+def format_estimate(estimate: Estimate) -> str:
+    """The digits of an answer that hold, a dual as `(value, tangent)`: as a program may write them."""
+    return estimate.text if estimate.text is not None else format_numbers(*pair(estimate))
 
 
 # For machines

@@ -2,9 +2,10 @@
 
 Owns `Chunk` and `split`. A chunk starts at each line with code in its first column, also while a bracket is open that
 nothing closes before the next definition: so that a stray bracket can't swallow it. Some things go with the chunk above
-or below: a line that starts with a closing bracket, which can start nothing, and the lines within brackets that are
-closed belong to the chunk above them; comment lines directly above a definition belong to the definition. Other
-comments in the first column are chunks of their own, unless an indented line follows.
+or below: a line that starts with a closing bracket, which can start nothing, the lines within brackets that are closed,
+and the body of a `let` whose `in` ends the line before belong to the chunk above them; comment lines directly above a
+definition belong to the definition. Other comments in the first column are chunks of their own, unless an indented line
+follows.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ the line before, so that blank and indented lines are passed over as fast as mem
 _BRACKETS = re.compile(r"""[(\[]|[)\]]|"[^"\n]*"?|\#[^\n]*|\n""")
 _ITEM = re.compile(rf"(?:def|diffeo|from|import|for|print)\b|{FIRST_NAME.pattern}[ \t]*=(?!=)")
 """The start of a line in the first column that is no part of an expression."""
+_LET, _IN = re.compile(r"\blet\b"), re.compile(r"(?<![\w.])in\Z")
 _INDENTED = re.compile(r"\n[^\S\n]+[^\s]")
 
 MOST_WASTED = 200_000
@@ -58,7 +60,9 @@ def _starts(text: str) -> list[int]:
         if first == "#":
             end = text.find("\n", found.end())
             end = len(text) if end < 0 else end
-        elif starts and (first in ")]" or found.end() < closed):
+        elif starts and (
+            first in ")]" or found.end() < closed or _is_body(text, starts[-1], start, found.start(1))
+        ):
             comments = []
         elif starts and (close := lookahead.closes(starts[-1], found.start(1))):
             comments, closed = [], close
@@ -76,6 +80,21 @@ def _passed(text: str, end: int, start: int, starts: list[int], comments: list[i
     if not starts:  # there is no chunk yet that it could go on with
         starts += comments if comments and indented.start() == end else [*comments, indented.start()]
     return []
+
+
+def _is_body(text: str, chunk: int, end: int, line: int) -> bool:
+    """Whether a line in the first column is the body of a `let` in the chunk above it, whose last code ends at `in`."""
+    while True:
+        while end > chunk and text[end - 1].isspace():
+            end -= 1
+        begin = text.rfind("\n", chunk, end) + 1
+        comment = text.find("#", begin, end)
+        if comment < 0 or end <= chunk:
+            break
+        end = comment
+    if not text.endswith("in", begin, end) or _IN.search(text, begin, end) is None:
+        return False
+    return _LET.search(text, chunk, end) is not None and _ITEM.match(text, line) is None
 
 
 class _Lookahead:

@@ -62,71 +62,71 @@ def _format_chunk(text: str, diffeo: bool) -> str:
 
 @dataclass(slots=True)
 class _Line:
-    """A line to be: a blank line, a comment, or tokens with perhaps a comment after them."""
+    """A line to be: the tokens from `first` up to `last`."""
 
     first: int
     last: int
     indent: int = 0
-    comment: str = ""
 
 
 class _Layout:
-    """The lines of one chunk."""
+    """The lines of one chunk. Each is made once, from the first to the last, so that to lay out a chunk takes time in
+    proportion to its length, however it is broken."""
 
     def __init__(self, text: str, tokens: list[Spaced], comments: list[Comment]) -> None:
         self.source = normalized(text)
         self.tokens = tokens
         self.comments = comments
-        self.breaks = self._written_breaks()
 
     def text(self) -> str:
         """The chunk's text, its lines broken until they fit or can't be broken."""
-        while True:
-            lines = self._lines()
-            more = {place for line in lines if (place := self._break_in(line)) is not None}
-            if not more:
-                break
-            self.breaks |= more
-        return "\n".join(self._assembled(lines))
+        return "\n".join(self._assembled(self._lines()))
 
-    def _written_breaks(self) -> set[int]:
+    def _written_breaks(self) -> list[int]:
         """The tokens that the author began a line with."""
-        out: set[int] = set()
+        out: list[int] = []
         for index in range(1, len(self.tokens)):
             before, token = self.tokens[index - 1].token, self.tokens[index].token
             if self.source.find("\n", before.end, token.start) >= 0:
-                out.add(index)
+                out.append(index)
         return out
 
     def _lines(self) -> list[_Line]:
-        """The lines of tokens, indented."""
-        starts = [0, *sorted(self.breaks)]
-        lines = [_Line(first, last) for first, last in zip(starts, [*starts[1:], len(self.tokens)])]
-        opened: list[int] = []  # the lines on which the brackets that are open here were opened
-        for number, line in enumerate(lines):
-            line.indent = self._indent(line, lines, opened)
-            for index in range(line.first, line.last):
-                kind = self.tokens[index].token.kind
-                if kind in _OPENERS:
-                    opened.append(number)
-                elif kind in _CLOSERS:
-                    opened.pop()
+        """The lines of tokens, indented, none too long that could be broken."""
+        breaks = self._written_breaks()
+        lines: list[_Line] = []
+        opened: list[int] = []  # the indentations of the lines on which the brackets that are open here were opened
+        for start, end in zip([0, *breaks], [*breaks, len(self.tokens)]):
+            first: int | None = start
+            while first is not None:
+                line = _Line(first, end)
+                line.indent = self._indent(line, opened)
+                first = self._break_in(line)
+                line.last = end if first is None else first
+                lines.append(line)
+                self._follow_brackets(line, opened)
         return lines
 
-    def _indent(self, line: _Line, lines: list[_Line], opened: list[int]) -> int:
+    def _follow_brackets(self, line: _Line, opened: list[int]) -> None:
+        for index in range(line.first, line.last):
+            kind = self.tokens[index].token.kind
+            if kind in _OPENERS:
+                opened.append(line.indent)
+            elif kind in _CLOSERS:
+                opened.pop()
+
+    def _indent(self, line: _Line, opened: list[int]) -> int:
         first = self.tokens[line.first]
         if first.starts:
             return first.level * _INDENT
         if first.token.kind in _CLAUSES:
             return max(1, first.level) * _INDENT
         if not opened:
-            return (first.level + 1) * _INDENT
+            return max(1, first.level + (not first.body)) * _INDENT  # the bodies of `let`s stand below each other
         closers = 0
         while line.first + closers < line.last and self.tokens[line.first + closers].token.kind in _CLOSERS:
             closers += 1
-        if closers:
-            return lines[opened[-closers]].indent
-        return lines[opened[-1]].indent + _INDENT
+        return opened[-closers] if closers else opened[-1] + _INDENT
 
     def _written(self, line: _Line) -> str:
         parts: list[str] = []
@@ -143,27 +143,28 @@ class _Layout:
         best: int | None = None
         for index in range(line.first, line.last):
             item = self.tokens[index]
-            if index > line.first and item.may_break:
-                fits = width <= WIDTH
-                if best is None or (fits and item.depth <= self.tokens[best].depth):
-                    best = index
+            if index > line.first and item.may_break and (best is None or item.depth <= self.tokens[best].depth):
+                best = index
             width += len(item.token.text) + (1 if item.blank and index > line.first else 0)
-        return best if width > WIDTH else None
+            if width > WIDTH and best is not None:  # what follows does not fit, and is not looked at
+                return best
+        return None
 
     def _assembled(self, lines: list[_Line]) -> list[str]:
         """The lines with the comments and single blank lines that stood between them."""
         out: list[str] = []
-        comments = list(self.comments)
+        comments, told = self.comments, 0
         previous = 0
         for line in lines:
             start = self.tokens[line.first].token.start
             end = self.tokens[line.last - 1].token.end
-            while comments and comments[0].span.start < start:
-                previous = self._comment(out, comments.pop(0), line.indent, previous)
+            while told < len(comments) and comments[told].span.start < start:
+                previous = self._comment(out, comments[told], line.indent, previous)
+                told += 1
             self._blank_line(out, previous, start)
             out.append(" " * line.indent + self._written(line))
             previous = end
-        for comment in comments:
+        for comment in comments[told:]:
             previous = self._comment(out, comment, max(_INDENT, lines[-1].indent), previous)
         return out
 

@@ -67,6 +67,8 @@ class _Lexer:
     indent: int = 0
     tabs: bool | None = None
     has_sum: bool = False
+    let_in: int = -1
+    """Where the last `in` of a `let` stands."""
     too_deep: bool = False
 
     def run(self) -> None:
@@ -123,7 +125,8 @@ class _Lexer:
             nesting.open_word(kind, start)
             self.has_sum = self.has_sum or kind == "SUM"
         elif kind == "IN":
-            nesting.close_in()
+            if nesting.close_in():
+                self.let_in = start
         elif kind == "DIFFEO" and not tokens and _DEFINES.match(self.text, end):
             kind, self.clauses = "DIFFEODEF", True
         self._add(kind, word, start, end)
@@ -291,6 +294,8 @@ class _Lexer:
         """Whether a line that stands where a statement could start can only continue the one before."""
         if _CONTINUES.match(self.text, position):
             return True
+        if self.tokens[-1].start == self.let_in:  # its body is still to come, and a binding is none
+            return _BINDING.match(self.text, position) is None
         if self.clauses and _CLAUSE.match(self.text, position):
             return True
         return (

@@ -99,6 +99,10 @@ class Stop:
 
 _SUM_HELP = "write `sum i in 1..n (body)`"
 _LET_HELP = "write `let a = 1 in a + 2`; a name that has a line to itself needs no `let`: `a = 1`"
+_LET_BODY = (
+    "the result follows `in`, on its line or on the next: `let a = 1 in a + 2`; "
+    "a name that has a line to itself needs no `let`: `a = 1`"
+)
 _PARTS: tuple[tuple[str, tuple[str, ...], str, str], ...] = (
     ("THEN", ("IF",), "expected `then` after the condition of `if`", "write `if p then a else b`"),
     ("ELSE", ("IF",), "expected `else` after the first choice of `if`", "an `if` has a value either way"),
@@ -229,7 +233,8 @@ def _missing_expression(stop: Stop) -> Diagnostic:
         return kinds.MISSING_EXPRESSION(
             before.span, f"expected an expression after `{_shown(before)}`, before `{at.text}`"
         )
-    return kinds.MISSING_EXPRESSION(before.span, f"expected an expression after `{_shown(before)}`")
+    help = _LET_BODY if before.kind == "IN" and stop.last("LET") is not None else ""
+    return kinds.MISSING_EXPRESSION(before.span, f"expected an expression after `{_shown(before)}`", help=help)
 
 
 def _no_body(stop: Stop) -> Diagnostic:

@@ -67,10 +67,11 @@ class Nesting:
                 return True
         return False
 
-    def close_in(self) -> None:
-        """`in` belongs to the innermost `let` or `sum` at this depth."""
+    def close_in(self) -> bool:
+        """`in` belongs to the innermost `let` or `sum` at this depth; whether it is that of a `let`."""
         if self.words and self.words[-1].kind != "INTEGRAL" and self.words[-1].depth == len(self.brackets):
-            self.words.pop()
+            return self.words.pop().kind == "LET"
+        return False
 
     def in_let(self) -> bool:
         """Whether what comes next at this depth could be a further binding of a `let`."""

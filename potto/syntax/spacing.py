@@ -31,6 +31,8 @@ class Spaced:
     """How many blocks it stands in."""
     starts: bool
     """Whether it starts a line of its block."""
+    body: bool = False
+    """Whether the body of a `let` begins with it."""
 
 
 @dataclass(slots=True)
@@ -49,6 +51,7 @@ class _Pass:
         self.brackets = [_Bracket("", False)]
         self.level = 0
         self.starts = True
+        self.body = False  # whether the `in` of a `let` stands directly before
         self.marked = False  # whether an empty token (the body of a sum or a def) stands directly before
         self.bounds_closed = False
         self.head = tokens[0].kind in ("DEF", "DIFFEODEF") if tokens else False
@@ -79,8 +82,8 @@ class _Pass:
         blank = before is not None and not self.starts and self._blank(before, token)
         depth = len(self.brackets) - 1
         may_break = before is not None and self._may_break(before, token) and not (self.loop and depth == 0)
-        self.out.append(Spaced(token, blank, depth, may_break, self.level, self.starts))
-        self.starts = self.marked = self.bounds_closed = False
+        self.out.append(Spaced(token, blank, depth, may_break, self.level, self.starts, self.body))
+        self.body = self.starts = self.marked = self.bounds_closed = False
         if kind in _OPENERS:
             self.brackets.append(_Bracket(kind, before is not None and before.kind == "INTEGRAL"))
         elif kind in _CLOSERS:
@@ -93,6 +96,7 @@ class _Pass:
             self.brackets[-1].lets += 1
         elif kind == "IN" and self.brackets[-1].lets:
             self.brackets[-1].lets -= 1
+            self.body = True
 
     def _is_prefix(self, index: int = -1) -> bool:
         """Whether the sign that was written last (or would be next, at 0) has no operand before it."""

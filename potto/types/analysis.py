@@ -24,6 +24,7 @@ from potto.types.flow import Walk
 from potto.types.infer import bindings, returned
 from potto.types.interfaces import Closing, Decorating, Interface, chain_of
 from potto.types.lints import lints
+from potto.types.motionless import is_derivative
 from potto.types.reasons import NO_REASONS, Reasons
 from potto.types.recursion import endless
 from potto.types.scope import Outside
@@ -209,6 +210,7 @@ def _conclude(
         plain=_named(decorating.plain, decorating),
         varies=_named(_varying(value), decorating),
         diffeo=isinstance(item, nodes.DiffeoDefinition),
+        derivative=isinstance(item, nodes.Definition) and not item.groups and is_derivative(inference, item.body),
     )
     found = _sorted((*inference.diagnostics, *walk.diagnostics, *lints(inference, walk, item)))
     if not details:

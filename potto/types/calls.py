@@ -17,6 +17,7 @@ from potto.syntax import nodes
 from potto.types import kinds
 from potto.types.context import Inference, Plan, comparison, describe, mismatch, rule
 from potto.types.infer import is_known, special, strip
+from potto.types.motionless import check_tangents, takes_duals
 from potto.types.scope import Builtin
 from potto.types.types import (
     REAL,
@@ -271,6 +272,8 @@ class _Filling:
     def result(self, callee: Function) -> Type:
         """Check the arguments, note the plan, and give the type of the call."""
         self._check()
+        if takes_duals(self.parameters):
+            self.inference.later(lambda: check_tangents(self.inference, self.node))
         if len(self.groups) == 1:  # and so it is filled
             self.inference.plans[id(self.node)] = Plan((tuple(self.slots),), self.spread)
             return callee.result

@@ -65,7 +65,8 @@ class Interface:
 
     `plain`: the names of the parameters that must not vary. `varies`: those that the result varies with. `flow` is for
     the checker: what goes where. `diffeo`: declared a diffeomorphism. `broken`: the text could not be read; the type is
-    the best guess, and fits everything where the definition is used.
+    the best guess, and fits everything where the definition is used. `derivative`: nothing but the derivative of a
+    function.
     """
 
     name: str
@@ -75,6 +76,7 @@ class Interface:
     varies: tuple[str, ...] = ()
     diffeo: bool = False
     broken: bool = False
+    derivative: bool = False
 
     @property
     def groups(self) -> tuple[tuple[str | None, ...], ...]:

@@ -37,3 +37,4 @@ UNUSED_VARIABLE = declare("P0611", "a variable of integration that is not used",
 SHADOWED = declare("P0612", "a name that hides another one", "warning")
 STILL_SURFACE = declare("P0613", "a surface that no parameter moves", "hint")
 CONSTANT_CONDITION = declare("P0614", "a condition that never changes", "warning")
+NO_TANGENT = declare("P0615", "a derivative called without a tangent", "warning")

@@ -19,6 +19,7 @@ from potto.modules.texts import chunk_text, definition, is_diffeo, parsed
 from potto.query import Database, query
 from potto.quick import quick
 from potto.syntax import nodes
+from potto.types import motionless
 from potto.types.algebra import symbolic
 from potto.types.analysis import Analysis, Typed, analyse, local_type, typed
 from potto.types.context import Inference, ensure_stack
@@ -154,6 +155,16 @@ def check_statement(db: Database, file: str, statement: nodes.Statement) -> tupl
 def infer_expression(db: Database, file: str, expr: nodes.Expr, locals: tuple[tuple[str, Type], ...] = ()) -> Inferred:
     """The type of an expression in a file's scope. `locals`: further names that have a type, innermost last."""
     return _inferred(db, file, expr, locals)[0]
+
+
+@query(keep=1024)
+def is_derivative(db: Database, file: str, expr: nodes.Expr) -> bool:
+    """Whether an expression in a file's scope is the derivative of a function, so that it moves with its arguments
+    alone."""
+    ensure_stack()
+    inference = Inference(_outside(db, file, _used(expr)), {})
+    inference.infer(expr)
+    return motionless.is_derivative(inference, expr)
 
 
 def expression_names(

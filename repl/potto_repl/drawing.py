@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Literal
 
+from potto.runtime.printing import format_digits
 from potto_repl.pictures import Color, Curve, Image, Plot, line
 
 Protocol = Literal["kitty", "iterm", "sixel", "blocks"]
@@ -45,7 +46,7 @@ def braille(plot: Plot, width: int = 60, height: int = 12, *, unicode: bool = Tr
     for r in range(height):
         drawn = "".join(_cell(cells[r][c], owners[r][c], unicode, color) for c in range(width))
         lines.append(f"{labels.get(r, ''):>{margin}} {bar}{drawn}".rstrip())
-    first, last = f"{plot.lo:.4g}", f"{plot.hi:.4g}"
+    first, last = format_digits(plot.lo, 4), format_digits(plot.hi, 4)
     foot = f"{first} {last:>{max(width - len(first) - 1, 0)}}"
     corner = "└" + "─" * width if unicode else "+" + "-" * width
     lines += [" " * (margin + 1) + corner, " " * (margin + 2) + foot]

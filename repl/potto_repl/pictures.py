@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from potto.png import encode
+from potto.runtime.printing import format_digits
 
 Color = tuple[int, int, int]
 COLORS: tuple[Color, ...] = ((31, 119, 180), (214, 39, 40), (44, 160, 44), (148, 103, 189), (255, 127, 14))
@@ -117,7 +118,7 @@ class Plot:
             out.append(f'<text x="{left - 6}" y="{y + 4:.1f}" text-anchor="end">{self.label(label)}</text>')
         for share, label in ((0.0, self.lo), (0.5, (self.lo + self.hi) / 2), (1.0, self.hi)):
             x = left + share * inner_w
-            out.append(f'<text x="{x:.1f}" y="{height - 20}" text-anchor="middle">{label:.4g}</text>')
+            out.append(f'<text x="{x:.1f}" y="{height - 20}" text-anchor="middle">{format_digits(label, 4)}</text>')
         for number, curve in enumerate(self.curves):
             color = "rgb({},{},{})".format(*COLORS[number % len(COLORS)])
             for band in self._bands(curve):
@@ -135,7 +136,7 @@ class Plot:
     def label(self, value: float) -> str:
         """A height in few digits; what is nothing beside the others is 0."""
         low, high = self.span
-        return f"{0.0 if abs(value) < 1e-4 * (high - low) else value:.4g}"
+        return format_digits(0.0 if abs(value) < 1e-4 * (high - low) else value, 4)
 
     def _bands(self, curve: Curve) -> list[list[tuple[float, float]]]:
         """Between which heights the curve may lie, where that can be seen."""

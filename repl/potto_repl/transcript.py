@@ -148,8 +148,8 @@ def _expected(value: Valued) -> str | None:
     if not value.estimates or "<" in value.text or "unknown" in value.text or "nan" in value.text:
         return None
     estimate = value.estimates[0]
-    if "mc" in estimate.method or ROUGH in estimate.reasons:
-        return None  # it was sampled, or made of what was: another seed, other digits
+    if "mc" in estimate.method or ROUGH in estimate.reasons or not estimate.converged:
+        return None  # it was sampled, or made of what was: another seed, other digits; or it missed its tolerance
     return value.text
 
 

@@ -16,13 +16,8 @@ from potto.diagnostics import PottoError
 from potto.elaborate import elaborate_expression
 from potto.runtime.estimate import Estimate
 from potto.runtime.evaluate import Clock, report
-from potto.runtime.shown import (
-    as_dual,
-    estimate_json,
-    format_estimate,
-    gives_dual,
-    with_error,
-)
+from potto.runtime.printing import format_seconds, with_error
+from potto.runtime.shown import MISSED, as_dual, estimate_json, format_estimate, gives_dual, interval
 from potto.settings import Settings
 from potto.syntax import nodes
 from potto.world import World
@@ -51,13 +46,8 @@ def tail(estimate: Estimate, settings: Settings) -> str:
     if "mc" in estimate.method:
         most = "up to " if "qmc" in estimate.method else ""  # it stops where that is enough, or the budget is spent
         words += [f"{most}{settings.samples:,} samples", f"seed {settings.seed}"]
-    words += [f"{estimate.evals:,} evaluations", seconds(estimate.seconds)]
+    words += [f"{estimate.evals:,} evaluations", format_seconds(estimate.seconds)]
     return ", ".join(words)
-
-
-def seconds(time: float) -> str:
-    """A time as people read it."""
-    return f"{time:.2f} s" if time >= 1 else f"{time * 1e3:.0f} ms" if time >= 0.01 else f"{time * 1e3:.1f} ms"
 
 
 def is_dual(world: World, file: str, expr: nodes.Expr) -> bool:
@@ -140,7 +130,7 @@ def value_parts(
     head = f"{name} = " if name else ""
     data = {**estimate_json(estimate, type), **({"name": name} if name else {})}
     if estimate.tangent is None:
-        text = estimate.text if estimate.text is not None else with_error(estimate.value, estimate.error)
+        text = interval(estimate)
         yield Part("answer", f"{head}{text}{f' : {type}' if type else ''}", {**data, "text": text})
     else:
         text = format_estimate(estimate)
@@ -149,7 +139,7 @@ def value_parts(
             rows += [("  interior", parts.interior, parts.interior_error),
                      ("  boundary", parts.boundary, parts.boundary_error)]  # fmt: skip
             data["interior"], data["boundary"] = _plain(parts.interior), _plain(parts.boundary)
-        lines = [f"{head}{text}{f' : {type}' if type else ''}"]
+        lines = [f"{head}{text}{'' if estimate.converged else MISSED}{f' : {type}' if type else ''}"]
         lines += [f"  {label:<11} {with_error(value, error)}" for label, value, error in rows]
         yield Part("answer", "\n".join(lines), {**data, "text": text})
     cost = tail(estimate, settings)

@@ -3,12 +3,28 @@
 from __future__ import annotations
 
 import math
+import re
+from decimal import Decimal
+from fractions import Fraction
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from potto.runtime.printing import format_error, format_number, holds, written_tolerance
+import potto
+from potto.runtime.printing import (
+    concisely,
+    format_bounds,
+    format_digits,
+    format_error,
+    format_number,
+    format_numbers,
+    holds,
+    with_error,
+    written_tolerance,
+)
+from potto.runtime.shown import MISSED, format_answer, interval
 
 
 @pytest.mark.parametrize(
@@ -18,6 +34,9 @@ from potto.runtime.printing import format_error, format_number, holds, written_t
         (1 / 3, 0.0, "0.3333333333333333"),
         (0.49987, 2e-3, "0.50"),  # +-0.002 leaves the second decimal certain to half a unit
         (0.0886123456789, 1.2e-14, "0.0886123456789"),
+        (0.754, 5.5e-3, "0.75"),  # 0.004 are lost in rounding: with the error less than a unit
+        (0.756, 7e-3, "0.8"),  # 0.76 may be off by 0.011
+        (0.027, 5.1e-3, "0.03"),
         (3.0, 0.0, "3"),
         (0.1 + 0.2, 5.6e-17, "0.3"),  # the last digits of the double are rounding
         (math.sqrt(2), 2.3e-16, "1.414213562373095"),
@@ -68,6 +87,177 @@ def test_holding() -> None:
 
 
 def test_error_estimates_are_shown_to_two_digits() -> None:
-    assert format_error(1.234e-13) == "1.2e-13"
+    assert format_error(1.234e-13) == "1.3e-13"  # rounded up: the interval must not shrink
+    assert format_error(1.2e-13) == "1.2e-13"
+    assert format_error(9.91e-5) == "1.0e-4"
     assert format_error(0.0) == "0"
     assert format_error(3e5) == "3.0e5"
+    assert format_error(5.1) == "5.1" and format_error(math.inf) == "inf" and format_error(math.nan) == "nan"
+
+
+# A value beside its error
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "bar", "concise"),
+    [
+        (0.027, 0.0051, "0.0270 ± 0.0051", "0.0270(51)"),
+        (-0.027, 0.0051, "-0.0270 ± 0.0051", "-0.0270(51)"),
+        (0.0273, 0.0051, "0.0273 ± 0.0051", "0.0273(51)"),
+        (0.02734, 0.0051, "0.0273 ± 0.0052", "0.0273(52)"),  # 0.00004 were lost in rounding the value
+        (9.996, 0.0996, "10.00 ± 0.11", "10.00(11)"),  # 0.0996 + 0.004 needs three digits: one place further
+        (1.99, 7.6, "2.0 ± 7.7", "2.0(77)"),
+        (76.6, 76.6, "77 ± 77", "77(77)"),
+        (0.3, 51.0, "0 ± 52", "0(52)"),
+        (218.0, 1122.0, "0.2e3 ± 1.2e3", "0.2(12)e3"),
+        (123456.0, 50.0, "123456 ± 50", "123456(50)"),
+        (0.0, 1e-17, "0.0e-17 ± 1.0e-17", "0.0(10)e-17"),
+        (0.3, 4e-16, "0.30000000000000000 ± 4.2e-16", "0.30000000000000000(42)"),  # the double is 1.1e-17 below 0.3
+        (1.0, 1e-300, "1.00000000000000000 ± 1e-17", "1.00000000000000000(1)"),
+        (1e300, 3.1e290, "1.00000000000e300 ± 3.2e290", None),
+        (1e-300, 3.05e-305, "1.000000e-300 ± 3.1e-305", None),
+        (5e-324, 5e-324, "5.0e-324 ± 5.1e-324", None),
+        (1 / 3, 0.0, "0.3333333333333333", "0.3333333333333333"),
+        (0.5, math.inf, "0.5 (error unknown)", "0.5 (error unknown)"),
+        (0.5, math.nan, "0.5 (error unknown)", "0.5 (error unknown)"),
+        (math.inf, 0.0, "inf", "inf"),
+        (-math.inf, 1.0, "-inf", "-inf"),
+        (math.nan, 1.0, "nan", "nan"),
+    ],
+)
+def test_a_value_beside_its_error(value: float, error: float, bar: str, concise: str | None) -> None:
+    assert with_error(value, error) == bar
+    assert concise is None or concisely(value, error) == concise
+
+
+DOUBLES = st.floats(allow_nan=False, allow_infinity=False)
+ERRORS = st.floats(0, exclude_min=True, allow_infinity=False)
+NEAR = st.tuples(st.floats(1e-9, 1e9), st.floats(1e-17, 10)).map(lambda pair: (pair[0], pair[0] * pair[1]))
+PAIRS = st.tuples(DOUBLES, ERRORS) | NEAR | NEAR.map(lambda pair: (-pair[0], pair[1]))
+
+
+def read(text: str) -> tuple[Decimal, Decimal]:
+    """Value and error as a person reads them, in either form."""
+    if "±" in text:
+        value, error = text.split(" ± ")
+        return Decimal(value), Decimal(error)
+    mantissa, error, exponent = re.fullmatch(r"(-?[\d.]+)\((\d+)\)(e-?\d+)?", text).groups()  # type: ignore[union-attr]
+    value = Decimal(mantissa + (exponent or ""))
+    return value, Decimal(error).scaleb(value.as_tuple().exponent)  # type: ignore[arg-type]
+
+
+@given(PAIRS)
+def test_the_interval_that_one_reads_contains_the_one_computed(pair: tuple[float, float]) -> None:
+    value, error = pair
+    for text in (with_error(value, error), concisely(value, error)):
+        shown, bar = map(Fraction, read(text))
+        bar *= 1 + Fraction(1, 10**11)  # few decimals are doubles: what that comes to is below the last digit shown
+        assert shown - bar <= Fraction(value) - Fraction(error)
+        assert shown + bar >= Fraction(value) + Fraction(error)
+
+
+@given(PAIRS)
+def test_errors_have_at_most_two_digits_and_values_no_fewer_places(pair: tuple[float, float]) -> None:
+    value, bar = read(with_error(*pair))
+    digits = str(bar.as_tuple().digits and int("".join(map(str, bar.as_tuple().digits))))
+    assert len(digits) <= 2
+    assert value.as_tuple().exponent <= bar.as_tuple().exponent  # type: ignore[operator]
+    assert read(concisely(*pair)) == (value, bar)  # both forms say the same
+
+
+@given(PAIRS)
+def test_bars_are_not_much_larger_than_the_error(pair: tuple[float, float]) -> None:
+    value, error = pair
+    _, bar = read(with_error(value, error))
+    # rounding up adds less than a unit, rounding of the value half of one, and a unit is a tenth of the error at most;
+    # of errors below the last digits of a double those digits are left
+    assert Fraction(bar) <= Fraction(error) * Fraction(13, 10) + Fraction(abs(value)) * Fraction(1, 10**16)
+
+
+@given(DOUBLES, st.floats(0, 2.0**-60))
+def test_a_value_known_to_its_last_bit_reads_back_as_itself(value: float, share: float) -> None:
+    shown = with_error(value, abs(value) * share).partition(" ± ")[0]
+    assert float(shown) == value
+
+
+@given(PAIRS)
+def test_alone_the_last_digit_is_off_by_one_at_most(pair: tuple[float, float]) -> None:
+    value, error = pair
+    # the last digit shown is 10^p at most, where 2 * error <= 10^p; zeros behind it may have been dropped
+    unit = Fraction(10) ** next(p for p in range(-330, 330) if 2 * Decimal(repr(error)) <= Decimal(10) ** p)
+    assert abs(Fraction(format_number(value, error)) - Fraction(value)) + Fraction(error) <= unit + Fraction(
+        math.ulp(value)
+    )
+
+
+# Tuples, lists, arrays, duals
+
+
+def test_every_number_of_a_tuple_has_its_own_digits() -> None:
+    assert with_error((0.5, 0.25), (1e-5, 0.0)) == "(0.500000, 0.25) ± (1.0e-5, 0)"
+    assert with_error((0.5, (0.25, 2.0)), (1e-2, (0.0, 0.3))) == "(0.500, (0.25, 2.00)) ± (0.010, (0, 0.30))"
+    assert with_error((0.5, 0.25), (1e-5, math.inf)) == "(0.500000 ± 1.0e-5, 0.25 (error unknown))"
+    assert with_error((0.5, 2.0), (0.0, 0.0)) == "(0.5, 2)"
+    assert with_error([0.5, 2.0], [1e-3, 1e-2]) == "[0.5000, 2.000] ± (0.0010, 0.010)"
+    assert concisely((0.5, [1.0, 2.0]), (1e-3, [0.0, 0.1])) == "(0.5000(10), [1, 2.00(10)])"
+    assert format_bounds((0.011, (0.0, 0.3))) == "(1.1e-2, (0, 3.0e-1))"
+
+
+def test_one_bar_serves_a_whole_array() -> None:
+    values, errors = np.array([0.5, 0.27182]), np.array([1e-3, 5e-4])
+    text, _, bar = with_error(values, errors).partition(" ± at most ")
+    assert text == "[0.5000, 0.27182]" and float(bar) >= 1e-3
+    assert with_error(values, np.zeros(2)) == "[0.5, 0.27182]"
+    assert format_numbers(np.linspace(0, 1, 20), 0.0).endswith(", ...]")
+    assert concisely(values, 1e-3) == "[0.5000(10), 0.2718(11)]"
+
+
+def test_labels_have_the_digits_that_were_asked_for() -> None:
+    assert [format_digits(x) for x in (0.1 + 0.2, 1e6, 1234567.0, -0.0, 1e-7, math.inf, -math.inf, math.nan)] == [
+        "0.3", "1e6", "1.23457e6", "0", "1e-7", "inf", "-inf", "nan",
+    ]  # fmt: skip
+    assert format_digits(1 / 3, 4) == "0.3333"
+
+
+# Answers
+
+
+PROGRAM = "def f(t, w) integral [0, 1] [x < t]*w*x d(x)\n"
+
+
+def test_an_estimate_is_one_line_in_python() -> None:
+    f = potto.compile(PROGRAM).f
+    line = repr(f(0.3, 1.0))
+    assert re.fullmatch(r"0\.0450+\(\d\d?\)  [\d,]+ evaluations  [\d.]+ m?s", line), line
+    assert abs(read(line.split("  ")[0])[0] - Decimal("0.045")) <= read(line.split("  ")[0])[1]
+    assert re.fullmatch(r"\(0\.045.*, 0\.30.*\)  .* evaluations  .*", repr(potto.deriv(f)((0.3, 1), (1.0, 0))))
+    assert re.fullmatch(r"\[0\(?.*, 0\.125.*\]  .*", repr(f(np.array([0.0, 0.5]), 1.0)))
+    assert repr(potto.grad(f, ["t", "w"])(t=0.3, w=1.0)).startswith("(0.045")
+
+
+def test_what_missed_its_tolerance_says_so_on_the_same_line() -> None:
+    good = potto.Estimate(0.027, 0.0051)
+    bad = potto.Estimate(0.027, 0.0051, converged=False)
+    dual = potto.Estimate(0.5, 0.0, 0.027, 0.0051, converged=False)
+    assert format_answer(good) == "0.03" and interval(good) == "0.0270 ± 0.0051"
+    assert format_answer(bad) == interval(bad) == f"0.0270 ± 0.0051{MISSED}"
+    assert format_answer(dual) == f"(0.5, 0.0270) ± (0, 0.0051){MISSED}"
+    assert repr(bad).startswith(f"0.0270(51){MISSED}  ") and MISSED not in repr(good)
+    unknown = potto.Estimate(0.5, math.inf, converged=False)
+    assert format_answer(unknown) == f"0.5 (error unknown){MISSED}"
+
+
+@pytest.mark.parametrize("method", ["quadrature", "mc", "qmc"])
+def test_as_many_printed_intervals_hold_as_computed_ones(method: str) -> None:
+    """integral of [x < t]*x^2*3 over [0, 1] is t^3: printing loses no interval that held."""
+    f = potto.compile("def f(t) integral [0, 1] [x < t]*3*x^2 d(x)\n").f
+    computed = printed = 0
+    for seed in range(60):
+        t = 0.2 + seed / 100
+        with potto.settings(method=method, samples=300, seed=seed, max_evals=2000):
+            r = f(t)
+        truth = Fraction(t) ** 3
+        computed += abs(Fraction(r.value) - truth) <= Fraction(r.error)
+        value, bar = (Fraction(part) for part in read(interval(r).removesuffix(MISSED)))
+        printed += abs(value - truth) <= bar
+    assert printed >= computed

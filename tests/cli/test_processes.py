@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 import tomllib
 from pathlib import Path
+
+import pytest
 
 import potto
 
@@ -64,3 +67,43 @@ def test_standard_input_as_a_pipe() -> None:
     command = [*COMMAND, "eval", "-", "f(3)"]
     ran = subprocess.run(command, input="def f(x) x^2\n", capture_output=True, text=True, check=False)
     assert (ran.returncode, ran.stdout) == (0, "9\n")
+
+
+# Interrupts. What is started in the background of a script is told by the shell to ignore them, and keeps to it.
+
+IGNORING = ["sh", "-c", "trap '' INT; exec \"$@\"", "sh"]
+FACES = [
+    pytest.param(["run", "-"], "print(6*7)\n", "42\n", id="run"),
+    pytest.param(["eval", "-", "f(6)"], "def f(x) 7*x\n", "42\n", id="eval"),
+    pytest.param(["check", "-"], "def f(x) 7*x\n", "", id="check"),
+    pytest.param(["fmt", "-"], "a  =  42\n", "a = 42\n", id="fmt"),
+    pytest.param(["repl"], "6*7\n", "42 : Real\n", id="repl"),
+]
+
+
+def begun(before: list[str], words: list[str]) -> subprocess.Popen[str]:
+    """A process that waits for its standard input; how interrupts reach it is settled."""
+    process = subprocess.Popen([*before, sys.executable, "-c", READING, *words], stdin=subprocess.PIPE,
+                               stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)  # fmt: skip
+    assert process.stdout is not None
+    assert process.stdout.readline() == "ready\n"
+    return process
+
+
+READING = "import sys, potto.__main__ as m\nprint('ready', flush=True)\nsys.exit(m.main(sys.argv[1:]))"
+
+
+@pytest.mark.parametrize(("words", "text", "answer"), FACES)
+def test_who_ignores_interrupts_goes_on(words: list[str], text: str, answer: str) -> None:
+    process = begun(IGNORING, words)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(text, timeout=120)
+    assert process.returncode == 0 and out.startswith(answer) and "interrupted" not in err
+
+
+@pytest.mark.parametrize("words", [face.values[0] for face in FACES])
+def test_who_does_not_is_ended(words: list[str]) -> None:
+    process = begun([], words)
+    process.send_signal(signal.SIGINT)
+    out, _ = process.communicate(timeout=120)
+    assert process.returncode in (130, -signal.SIGINT) and out == ""  # the second before the command has taken over

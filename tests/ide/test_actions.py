@@ -233,3 +233,18 @@ def test_an_action_of_an_old_text_is_disabled():
     action = next(a for a in ide.code_actions(f.db, f.file, f.span) if a.title == "Define `gain`")
     f.library.files.set_text(f.file, "def f(a) a\n")
     assert ide.resolve_code_action(f.db, action).disabled
+
+
+def test_give_a_number_its_tangent():
+    head = "def f(t) t^2\ndef g(a, b) a*b\n"
+    for before, after in (
+        ("deriv(f)($00.3)", "deriv(f)((0.3, 1))"),
+        ("deriv(f)(dt=$00.3)", "deriv(f)(dt=(0.3, 1))"),
+        ("deriv(f) $00.3", "deriv(f) ((0.3, 1))"),
+        ("deriv(g)($00.3 + 1, 2)", "deriv(g)((0.3 + 1, 1), 2)"),
+        ("deriv(g)(($00.3, 2))", "deriv(g)(((0.3, 1), 2))"),
+        ("deriv(deriv(f))($00.3)", "deriv(deriv(f))(((0.3, 1), (1, 0)))"),
+    ):
+        f = fixture(f"{head}a = {before}\n")
+        title = next(title for title in f.actions() if title.startswith("Write `("))
+        assert fixed(f"{head}a = {before}\n", title) == f"{head}a = {after}\n"

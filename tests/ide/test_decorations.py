@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import random
 from pathlib import Path
 
 import pytest
 from ide_fixture import Fixture, edited, fixture
 
 import potto.ide as ide
+from potto.ide.edits import applied, minimal
 from potto.source import Span
 from potto.syntax import format_source
 
@@ -177,3 +179,23 @@ def test_a_file_that_is_not_there():
     nowhere = f.key("nothing.po")
     assert ide.hover(f.db, nowhere, 3) is None and ide.document_symbols(f.db, nowhere) == ()
     assert ide.format_document(f.db, nowhere) == () and ide.code_actions(f.db, nowhere, Span(0, 0)) == ()
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_edits_of_blanks_make_the_new_text_and_touch_nothing_else(seed: int) -> None:
+    rng = random.Random(seed)
+    words = [rng.choice(["a", "b+", "é", "(", "[x", "\\y"]) for _ in range(rng.randrange(30))]
+    old, new = ("".join(word + rng.choice(["", " ", "  ", "\n", "\n    ", "\t"]) for word in words) for _ in range(2))
+    edits = minimal(old, new, 7)
+    assert applied("-" * 7 + old, edits) == "-" * 7 + new
+    assert all(not (("-" * 7 + old)[e.span.start : e.span.end] + e.text).strip() for e in edits)
+
+
+def test_edits_of_a_long_line_are_one_for_each_place() -> None:
+    """A search for what both have in common would take the square of its length."""
+    old = "+".join(f"a{i}" for i in range(20_000))
+    new = old.replace("+", " + ")
+    edits = minimal(old, new)
+    assert len(edits) == 2 * 19_999 and applied(old, edits) == new
+    lines = [f"a{i}" if i % 2 else f"a{i} " for i in range(20_000)]
+    assert len(minimal("\n".join(lines), "\n".join(line.strip() for line in lines))) == 10_000

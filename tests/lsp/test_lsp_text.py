@@ -102,3 +102,15 @@ def test_half_a_surrogate_pair_is_survived() -> None:
     for encoding in ENCODINGS:
         text = Text("a\ud800b", encoding)
         assert text.position(3)[1] == {"utf-8": 5, "utf-16": 3, "utf-32": 3}[encoding]
+
+
+@pytest.mark.parametrize("encoding", ENCODINGS)
+def test_positions_in_a_very_long_line(encoding: Encoding) -> None:
+    """Each is found without looking at the line: all of them together take no longer than to read it a few times."""
+    text = "é𝄞ab" * 50_000 + "\r\n" + "x𝄞"
+    units = {"utf-8": 8, "utf-16": 5, "utf-32": 4}[encoding]
+    found = Text(text, encoding)
+    for place in range(0, 200_000, 4):
+        assert found.position(place) == (0, place // 4 * units)
+    assert found.position(200_001) == found.position(200_000) == (0, 50_000 * units)
+    assert found.position(200_003) == (1, 1)

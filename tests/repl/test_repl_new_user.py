@@ -17,10 +17,12 @@ HERE = Path(__file__).parent
 GOLDEN = HERE / "new_user_transcript.txt"
 # What is measured or rounded differently from machine to machine.
 _CHANGING = ((r"(?:^.*[│└].*\n)+.*\n", "[picture]\n"), (r"± \([^)]*\)", "± #"), (r"(at \w+ = \d\.\d{5})\d+", r"\1"),
-             (r"[\d,.]+ (?:ms|s)\b", "# ms"), (r"± \d\.\de-\d+", "± #"), (r"[\d,]+ evaluations", "# evaluations"),
+             (r"[\d,.]+ (?:ms|s)\b", "# ms"), (r"± \d(?:\.\d)?e-\d+", "± #"), (r"[\d,]+ evaluations", "# evaluations"),
              (r"slope \d\.\de-\d+", "slope #"), (r"= \d(?:\.\d+)?e-\d\d\b", "= #"), (r"\d+ steps", "# steps"),
              (r"\d+ points, error at most \d\.\de-\d+", "# points, error at most #"),
-             (r"\d\.\de-1\d apart|\b0 apart", "# apart"), (r"\b\d\.\de-1\d\b", "#"))  # fmt: skip
+             (r"\d\.\de-1\d apart|\b0 apart", "# apart"), (r"\b\d\.\de-1\d\b", "#"),
+             # beside an error a value has as many digits as the error has
+             (r"(\d\.\d{11})\d+", r"\1"), (r"\.0{9,}(?!\d)", ""), (r"(\.\d*?[1-9])0{6,}(?!\d)", r"\1"))  # fmt: skip
 
 
 def settled(text):

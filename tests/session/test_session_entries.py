@@ -209,3 +209,13 @@ def test_many_entries_stay_quick(tmp_path):
         assert value(s.run("f149(0)")) == 149
     again = [e for e in events if e.kind == "executed" and e.query == "core" and e.args[1] != "_"]
     assert len({e.args for e in again}) == len(again)
+
+
+def test_a_derivative_in_which_nothing_moves_is_said_once(tmp_path):
+    s = session(tmp_path)
+    list(s.steps(JUMP))
+    found = list(s.steps("deriv(f)(0.3)"))
+    assert codes(found) == ["P0615"] and any(isinstance(o, Valued) for o in found)
+    assert codes(list(s.steps("print(deriv(f)(0.3))"))) == ["P0615"]
+    assert codes(list(s.steps("deriv(f)((0.3, 1))"))) == []
+    assert [located.diagnostic.code for located in s.evaluate("deriv(f)(0.3)").remarks] == ["P0615"]

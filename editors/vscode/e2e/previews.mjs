@@ -46,7 +46,7 @@ export const PREVIEWS = {
     const [x, y] = [box.x + box.width * 0.52, box.y + box.height * 0.4];
     await page.mouse.move(x, y);
     // Within the disc, and above the line x + y + 0.1 > 0: a pixel of 0.01 with 80 and 30.
-    await frame.locator("#probe", { hasText: /px = 0\.0\d+, py = 0\.\d+: 1\.1 ± .*∂\/∂r: / }).waitFor();
+    await frame.locator("#probe", { hasText: /px = 0\.0\d+, py = 0\.\d+: 1\.10* ± .*∂\/∂r: / }).waitFor();
     await picture("preview-probe");
     const before = await pixels(value);
     await settledAfter(frame, () => page.mouse.wheel(0, -400));
@@ -105,6 +105,27 @@ export const PREVIEWS = {
     const data = readFileSync(target);
     assert.equal(data.subarray(1, 4).toString(), "PNG");
     assert.ok(data.length > 3000 && data.readUInt32BE(16) > 200);
+  },
+
+  async "a function that a function needs is found, or asked for"({ page, picture, file }) {
+    await file("shaded.po");
+    await page.keyboard.press("Control+K");
+    await page.keyboard.press("v");
+    await page.locator(".tab.active", { hasText: "Preview shaded.po" }).waitFor();
+    const frame = await preview(page);
+    await frame.locator("main.curves").waitFor();
+    assert.equal(await frame.locator("#p-shader").inputValue(), "lin");
+    assert.ok(await frame.locator("#problem").isHidden());
+    await picture("preview-function");
+    const before = await pixels(frame.locator("#value"));
+    await settledAfter(frame, () => frame.locator("#p-shader").fill("\\(x, y) . \\(c) . 1"));
+    assert.notEqual(await pixels(frame.locator("#value")), before);
+    await frame.locator("#p-shader").fill("");
+    await frame.locator("#problem.needed", { hasText: "such as lin" }).waitFor();
+    await picture("preview-needs-function");
+    await settledAfter(frame, () => frame.locator("#p-shader").fill("lin"));
+    await frame.locator("#problem").waitFor({ state: "hidden" });
+    await page.locator(".tab", { hasText: "Preview shaded.po" }).locator(".codicon-close").click();
   },
 
   async "a slow preview holds up nothing"({ page, file, command }) {

@@ -144,12 +144,18 @@ const TESTS = {
 };
 
 const PROMPT = {
-  async "a prompt opens with the file, and takes a selection"({ page, picture, code, file, command, go }) {
+  async "a prompt opens with the file, takes the keyboard, and a selection"({ page, picture, code, file, command, go, text }) {
     if (!code.terminal) return "no terminal could be built here";
     await file("shapes.po");
     await command("Potto: Open REPL");
     const terminal = page.locator(".terminal-wrapper.active .xterm-rows");
     await terminal.filter({ hasText: /1\spo>/ }).waitFor();
+    const before = await text();
+    await page.keyboard.type("40 + 2", { delay: 60 }); // without a click: it lands in the prompt, not in the program
+    await page.keyboard.press("Enter");
+    await terminal.filter({ hasText: /2\spo>/ }).waitFor();
+    assert.match((await terminal.innerText()).replaceAll("\u00a0", " "), /40 \+ 2\s+_1 = 42/);
+    assert.equal(await text(), before);
     await go(2, 1);
     await page.keyboard.press("Shift+Enter");
     await terminal.filter({ hasText: /ball\s:\s\(x:\sReal\*,\sy:\sReal\*,\sr:\sReal\*\)\s->\sReal/ }).waitFor();

@@ -13,11 +13,15 @@ interface Prompt {
 
 let prompt: Prompt | undefined;
 
-/** The prompt with the names of a file; one that is open for that file is used again. */
-export async function openRepl(server: Server, document: vscode.TextDocument | undefined): Promise<vscode.Terminal | undefined> {
+/** The prompt with the names of a file; one that is open for that file is used again. Who opens it is to type there. */
+export async function openRepl(
+  server: Server,
+  document: vscode.TextDocument | undefined,
+  preserveFocus = false,
+): Promise<vscode.Terminal | undefined> {
   const file = document?.uri.scheme === "file" && document.languageId === "potto" ? document.uri.fsPath : undefined;
   if (prompt && prompt.file === file && prompt.terminal.exitStatus === undefined) {
-    prompt.terminal.show(true);
+    prompt.terminal.show(preserveFocus);
     return prompt.terminal;
   }
   if (document?.isDirty && file) await document.save();
@@ -30,16 +34,16 @@ export async function openRepl(server: Server, document: vscode.TextDocument | u
     iconPath: new vscode.ThemeIcon("graph-line"),
   });
   prompt = { terminal, file };
-  terminal.show(true);
+  terminal.show(preserveFocus);
   return terminal;
 }
 
-/** Send what is selected to the prompt; the whole definition at the cursor if nothing is. */
+/** Send what is selected to the prompt; the whole definition at the cursor if nothing is. The next is sent from there. */
 export async function runSelection(server: Server, editor: vscode.TextEditor): Promise<void> {
   const texts = editor.selections.map((selection) => selected(editor.document, selection)).filter((text) => text.trim());
   if (!texts.length) return;
   const before = prompt?.terminal;
-  const terminal = await openRepl(server, editor.document);
+  const terminal = await openRepl(server, editor.document, true);
   if (!terminal) return;
   if (terminal !== before) await new Promise((resolve) => setTimeout(resolve, 1500)); // it reads once it has drawn its prompt
   for (const text of texts) terminal.sendText(`${PASTE}${entryOf(text)}${PASTED}`, true);

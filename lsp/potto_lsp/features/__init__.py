@@ -1,7 +1,8 @@
 """The table of features: which method is answered by which adapter, and how the client hears of it.
 
 Owns `FEATURES` and `capabilities`. An adapter is a function from an `Ask` to what is sent; its module is loaded when it
-is first asked, so that the greeting waits for none of them. `slow` marks what looks through the whole workspace.
+is first asked, so that the greeting waits for none of them. `pace` says for what a question waits, see `work`: `slow`
+is what looks through a whole file or the whole workspace.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import importlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
     from potto_lsp.asking import Ask
@@ -33,7 +34,7 @@ class Feature:
     method: str
     adapter: str
     announces: Mapping[str, Any] = field(default_factory=dict)
-    slow: bool = False
+    pace: Literal["quick", "diagnosis", "slow"] = "quick"
 
     def load(self) -> None:
         """Load the adapter."""
@@ -66,16 +67,16 @@ _ALL = (
     Feature(_DOCUMENT + "declaration", "targets.declaration", {"declarationProvider": True}),
     Feature(_DOCUMENT + "typeDefinition", "targets.type_definition", {"typeDefinitionProvider": True}),
     Feature(_DOCUMENT + "implementation", "targets.implementation", {"implementationProvider": True}),
-    Feature(_DOCUMENT + "references", "finding.references", {"referencesProvider": True}, slow=True),
+    Feature(_DOCUMENT + "references", "finding.references", {"referencesProvider": True}, pace="slow"),
     Feature(_DOCUMENT + "documentHighlight", "finding.highlights", {"documentHighlightProvider": True}),
-    Feature(_DOCUMENT + "documentSymbol", "outlines.document_symbols", {"documentSymbolProvider": True}),
-    Feature("workspace/symbol", "outlines.workspace_symbols", {"workspaceSymbolProvider": True}, slow=True),
+    Feature(_DOCUMENT + "documentSymbol", "outlines.document_symbols", {"documentSymbolProvider": True}, pace="slow"),
+    Feature("workspace/symbol", "outlines.workspace_symbols", {"workspaceSymbolProvider": True}, pace="slow"),
     Feature(_DOCUMENT + "prepareCallHierarchy", "calling.prepare", {"callHierarchyProvider": True}),
-    Feature("callHierarchy/incomingCalls", "calling.incoming", slow=True),
-    Feature("callHierarchy/outgoingCalls", "calling.outgoing", slow=True),
-    Feature(_DOCUMENT + "rename", "renaming.rename", {"renameProvider": {"prepareProvider": True}}, slow=True),
+    Feature("callHierarchy/incomingCalls", "calling.incoming", pace="slow"),
+    Feature("callHierarchy/outgoingCalls", "calling.outgoing", pace="slow"),
+    Feature(_DOCUMENT + "rename", "renaming.rename", {"renameProvider": {"prepareProvider": True}}, pace="slow"),
     Feature(_DOCUMENT + "prepareRename", "renaming.prepare"),
-    Feature("workspace/willRenameFiles", "renaming.will_rename_files", slow=True),
+    Feature("workspace/willRenameFiles", "renaming.will_rename_files", pace="slow"),
     Feature(
         _DOCUMENT + "codeAction",
         "acting.code_actions",
@@ -84,9 +85,10 @@ _ALL = (
             "source.fixAll"]}},
     ),
     Feature("codeAction/resolve", "acting.resolve"),
-    Feature(_DOCUMENT + "codeLens", "lenses.code_lenses", {"codeLensProvider": {"resolveProvider": True}}),
-    Feature("codeLens/resolve", "lenses.resolve", slow=True),
-    Feature(_DOCUMENT + "inlayHint", "hinting.inlay_hints", {"inlayHintProvider": {"resolveProvider": True}}),
+    Feature(_DOCUMENT + "codeLens", "lenses.code_lenses", {"codeLensProvider": {"resolveProvider": True}}, pace="slow"),
+    Feature("codeLens/resolve", "lenses.resolve", pace="slow"),
+    Feature(_DOCUMENT + "inlayHint", "hinting.inlay_hints", {"inlayHintProvider": {"resolveProvider": True}},
+            pace="slow"),
     Feature("inlayHint/resolve", "hinting.resolve"),
     Feature(_DOCUMENT + "inlineValue", "hinting.inline_values", {"inlineValueProvider": True}),
     Feature(
@@ -95,14 +97,15 @@ _ALL = (
         {"semanticTokensProvider": {
             "legend": {"tokenTypes": list(TOKEN_TYPES), "tokenModifiers": list(TOKEN_MODIFIERS)},
             "full": {"delta": True}, "range": True}},
+        pace="slow",
     ),
-    Feature(_DOCUMENT + "semanticTokens/full/delta", "colours.delta"),
-    Feature(_DOCUMENT + "semanticTokens/range", "colours.in_range"),
-    Feature(_DOCUMENT + "foldingRange", "folding.folding_ranges", {"foldingRangeProvider": True}),
+    Feature(_DOCUMENT + "semanticTokens/full/delta", "colours.delta", pace="slow"),
+    Feature(_DOCUMENT + "semanticTokens/range", "colours.in_range", pace="slow"),
+    Feature(_DOCUMENT + "foldingRange", "folding.folding_ranges", {"foldingRangeProvider": True}, pace="slow"),
     Feature(_DOCUMENT + "selectionRange", "folding.selection_ranges", {"selectionRangeProvider": True}),
     Feature(_DOCUMENT + "linkedEditingRange", "linking.linked_editing", {"linkedEditingRangeProvider": True}),
-    Feature(_DOCUMENT + "documentLink", "linking.document_links", {"documentLinkProvider": {}}),
-    Feature(_DOCUMENT + "formatting", "formatting.document", {"documentFormattingProvider": True}),
+    Feature(_DOCUMENT + "documentLink", "linking.document_links", {"documentLinkProvider": {}}, pace="slow"),
+    Feature(_DOCUMENT + "formatting", "formatting.document", {"documentFormattingProvider": True}, pace="slow"),
     Feature(_DOCUMENT + "rangeFormatting", "formatting.in_range", {"documentRangeFormattingProvider": True}),
     Feature(
         _DOCUMENT + "onTypeFormatting",
@@ -113,10 +116,10 @@ _ALL = (
         _DOCUMENT + "diagnostic",
         "diagnosing.document",
         {"diagnosticProvider": {"identifier": "potto", "interFileDependencies": True, "workspaceDiagnostics": True}},
-        slow=True,
+        pace="diagnosis",
     ),
-    Feature("workspace/diagnostic", "diagnosing.workspace", slow=True),
-    Feature("potto/scenes", "previewing.scenes"),
+    Feature("workspace/diagnostic", "diagnosing.workspace", pace="slow"),
+    Feature("potto/scenes", "previewing.scenes", pace="slow"),
     Feature("potto/sample", "previewing.sample"),
     Feature(
         "workspace/executeCommand",

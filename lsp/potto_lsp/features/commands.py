@@ -78,9 +78,8 @@ def _slopes(point: ide.Point) -> Callable[[Result], Result]:
     """The value at a point and the slopes there as lines to be read."""
 
     def with_text(found: Result) -> Result:
-        error = f" ± {found['error']}" if "error" in found else ""
-        lines = [f"{point.text} = {found['text']}{error}"]
-        lines += [f"  by {s['by']}: {s['text']} ± {s['error']}" for s in found["slopes"]]
+        lines = [f"{point.text} = {found['shown']}"]
+        lines += [f"  by {s['by']}: {s['shown']}" for s in found["slopes"]]
         missing = [name for name, _ in point.slopes if all(name != s["by"] for s in found["slopes"])]
         lines += [f"  by {name}: no number, it jumps there" for name in missing]
         return {**found, "value": found["text"], "text": "\n".join(lines)}
@@ -92,7 +91,15 @@ def _preview(ask: Ask, file: str, arguments: list[Any]) -> Deferred:
     """A picture over a box: `[[x0, x1], [y0, y1]]`, the unit square if none is given."""
     box = arguments[1] if len(arguments) > 1 else None
     text = _text(arguments)
-    return _shown(ask, text, task(ask, "preview", file, text, {"box": box}))
+    scene = ide.scene(ask.db, file, text) if text in names(ask.db, file) else None
+    functions = [p for p in scene.parameters if p.kind == "function"] if scene is not None else []
+    for parameter in functions:
+        if not parameter.fits:
+            needs = f"`{text}` needs a function `{parameter.name}` of the type {parameter.type}"
+            raise Refusal(f"{needs}: none was found in this file, in what it imports, or beside it")
+    axes = [p.name for p in scene.parameters if p.kind != "function"] if scene is not None else []
+    more = {"box": box, "axes": axes, "given": {p.name: p.fits[0] for p in functions}}
+    return _shown(ask, text, task(ask, "preview", file, text, more))
 
 
 def _text(arguments: list[Any]) -> str:

@@ -13,7 +13,7 @@ KINDS = {"comment": "comment", "imports": "imports", "region": "region"}
 def folding_ranges(ask: Ask) -> list[protocol.FoldingRange]:
     found: list[protocol.FoldingRange] = []
     for fold in ide.folding_ranges(ask.db, ask.file):
-        first, last = ask.text.position(fold.span.start)[0], ask.text.position(fold.span.end)[0]
+        first, last = ask.position(fold.span.start)["line"], ask.position(fold.span.end)["line"]
         if last > first:
             found.append({"startLine": first, "endLine": last, "kind": KINDS[fold.kind]})
     return found

@@ -8,7 +8,8 @@ from potto_lsp.asking import Ask
 
 
 def document(ask: Ask) -> list[protocol.TextEdit]:
-    return convert.text_edits(ask.text, ide.format_document(ask.db, ask.file))
+    edits = ide.format_document(ask.db, ask.file)
+    return [{"range": ask.range(edit.span), "newText": edit.text} for edit in edits]
 
 
 def in_range(ask: Ask) -> list[protocol.TextEdit]:

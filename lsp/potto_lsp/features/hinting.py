@@ -24,7 +24,7 @@ def inlay_hints(ask: Ask) -> list[protocol.InlayHint]:
 
 def _hint(ask: Ask, hint: ide.InlayHint) -> protocol.InlayHint:
     found: protocol.InlayHint = {
-        "position": convert.position(ask.text, hint.offset),
+        "position": ask.position(hint.offset),
         "label": hint.label,
         "kind": KINDS[hint.kind],
         "paddingLeft": hint.pad_left,
@@ -45,7 +45,7 @@ def _live(ask: Ask, span: Span) -> list[protocol.InlayHint]:
     for live, value in ask.session.live.values(ask.file):
         if value is not None and span.start <= live.span.end <= span.end:
             found.append({
-                "position": convert.position(ask.text, live.span.end),
+                "position": ask.position(live.span.end),
                 "label": value.label,
                 "tooltip": convert.markdown(value.tooltip),
                 "paddingLeft": True,

@@ -20,9 +20,10 @@ REFERENCES = "potto.showReferences"  # of the client; only one that says that it
 
 def code_lenses(ask: Ask) -> list[protocol.CodeLens]:
     found: list[protocol.CodeLens] = []
+    scenes = {scene.name: scene for scene in ide.scenes(ask.db, ask.file)}
     for lens in ide.code_lenses(ask.db, ask.file):
         if lens.command == "showDerivative":
-            found += _previews(ask, lens)
+            found += _previews(ask, lens, scenes.get(lens.arguments[1]))
         made: protocol.CodeLens = {"range": ask.range(lens.span)}
         if lens.title:
             made["command"] = _command(ask, lens)
@@ -32,12 +33,14 @@ def code_lenses(ask: Ask) -> list[protocol.CodeLens]:
     return found
 
 
-def _previews(ask: Ask, lens: ide.CodeLens) -> list[protocol.CodeLens]:
-    """A function of one or two numbers has a picture; a client that draws for itself shows what has more, too."""
-    scene = next((scene for scene in ide.scenes(ask.db, ask.file) if scene.name == lens.arguments[1]), None)
+def _previews(ask: Ask, lens: ide.CodeLens, scene: ide.Scene | None) -> list[protocol.CodeLens]:
+    """A function of one or two numbers has a picture, also beside functions that are known; a client that draws for
+    itself shows what has more, too."""
     if scene is None:
         return []
-    simple = all(p.kind == "number" for p in scene.parameters) and len(scene.parameters) <= 2 and scene.components == 1
+    numbers = [p for p in scene.parameters if p.kind == "number"]
+    known = all(p.kind == "number" or p.fits for p in scene.parameters)
+    simple = known and len(numbers) <= 2 and scene.components == 1
     if not simple and not ask.client.lists("experimental.commands.commands", "potto.preview"):
         return []
     arguments = [ask.analysis.uri(lens.arguments[0]), lens.arguments[1]]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 
-from potto.runtime.printing import format_error
+from potto.runtime.printing import format_digits, format_error, format_range
 from potto_repl.drawing import braille, half_blocks, room_for_curves
 from potto_repl.expressions import split_items
 from potto_repl.pictures import Curve, Plot, image_of
@@ -62,7 +62,7 @@ def _caption(plot: Plot) -> str:
     for label, curve in zip(plot.labels, plot.curves, strict=True):
         of = f" of {label}" if several else ""
         seen = [jump for jump in curve.jumps if low <= min(jump[1:]) and max(jump[1:]) <= high]
-        places = ", ".join(f"{x:.4g} ({a:.4g} to {b:.4g})" for x, a, b in seen[:MOST_JUMPS])
+        places = ", ".join(f"{format_digits(x, 4)} ({format_range(a, b, 4)})" for x, a, b in seen[:MOST_JUMPS])
         if places:
             said.append(f"jumps{of} at {plot.axis} = {places}{', ...' if len(seen) > MOST_JUMPS else ''}")
         if any(math.isfinite(y) and not low <= y <= high for y in curve.ys):
@@ -123,7 +123,8 @@ def image(session: Conversation, text: str) -> Part:
     session.last_picture = picture
     shown = half_blocks(picture, unicode=session.options.unicode, color=False)
     dark, light = ("blue below 0", "red above") if picture.signed else ("dark", "light")
-    scale = f"{axes.label}: {picture.low:.4g} ({dark}) to {picture.high:.4g} ({light})"
+    low, high = format_digits(picture.low, 4), format_digits(picture.high, 4)
+    scale = f"{axes.label}: {low} ({dark}) to {high} ({light})"
     data = {"image": axes.label, "pixels": count, "low": picture.low, "high": picture.high, "_picture": picture,
             "_scale": scale}  # fmt: skip
     return Part("picture", f"{shown}\n{scale}", data)

@@ -12,8 +12,8 @@ from potto.elaborate import elaborate_expression
 from potto.kernels import compile as compiling
 from potto.render import Located, ProgramError
 from potto.runtime.estimate import Estimate
-from potto.runtime.printing import format_error
-from potto.runtime.shown import as_dual, format_numbers, largest, with_error
+from potto.runtime.printing import format_bars, format_error, format_numbers, format_seconds, largest, with_error
+from potto.runtime.shown import MISSED, as_dual
 from potto.settings import Settings
 from potto.syntax import parse_expression
 from potto.types import infer_expression
@@ -23,7 +23,7 @@ from potto_repl.registry import command
 from potto_repl.reply import Part, Refusal, diagnostic
 from potto_repl.session import Conversation, plain_names
 from potto_repl.slopes import slopes
-from potto_repl.values import is_dual, parts_of, seconds, tail, value_parts
+from potto_repl.values import is_dual, parts_of, tail, value_parts
 
 TOLERANCES = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 SAMPLES = (1_000, 10_000, 100_000)
@@ -54,10 +54,10 @@ def gradient(session: Conversation, text: str) -> Iterator[Part]:
     for slope in slopes(session, called):
         dual = slope.dual
         if not lines:
-            lines.append(f"{text.strip()} = {with_error(dual.value, dual.error)}")
+            lines.append(f"{text.strip()} = {with_error(dual.value, dual.error)}{_missed(dual)}")
             data["value"] = dual.value
         sign = "∂/∂" if session.options.unicode else "d/d"
-        line = f"  {sign}{slope.name} = {with_error(dual.tangent, dual.tangent_error)}"
+        line = f"  {sign}{slope.name} = {with_error(dual.tangent, dual.tangent_error)}{_missed(dual)}"
         if slope.parts is not None:
             interior = format_numbers(slope.parts.interior, slope.parts.interior_error)
             boundary = format_numbers(slope.parts.boundary, slope.parts.boundary_error)
@@ -68,6 +68,10 @@ def gradient(session: Conversation, text: str) -> Iterator[Part]:
     yield Part("answer", "\n".join(lines), {"gradient": data})
     if cost:
         yield Part("tail", cost)
+
+
+def _missed(estimate: Estimate) -> str:
+    return "" if estimate.converged else MISSED
 
 
 @command("time", argument="EXPR", completes="expression")
@@ -97,8 +101,8 @@ def show_time(session: Conversation, text: str) -> Iterator[Part]:
     phases["evaluate"] = max(estimate.seconds - estimate.compile_seconds, 0.0)
     kernels = compiling.counts.compiled - made
     total = sum(phases.values())
-    rows = [f"{name:<9} {seconds(spent):>9}  {spent / total:4.0%}" for name, spent in phases.items()]
-    rows += [f"{'total':<9} {seconds(total):>9}", f"{kernels} kernels made, {estimate.evals:,} evaluations"]
+    rows = [f"{name:<9} {format_seconds(spent):>9}  {spent / total:4.0%}" for name, spent in phases.items()]
+    rows += [f"{'total':<9} {format_seconds(total):>9}", f"{kernels} kernels made, {estimate.evals:,} evaluations"]
     yield Part("answer", "\n".join(rows), {"seconds": phases, "kernels": kernels, "evaluations": estimate.evals})
 
 
@@ -133,8 +137,8 @@ def show_error(session: Conversation, text: str) -> Iterator[Part]:
     data = []
     for (label, accuracy, e), (value, error) in zip(rows, numbers, strict=True):
         actual = distance(value, best[0])
-        table.append((label, accuracy, format_numbers(value, error), format_error(largest(error)),
-                      format_error(actual), f"{e.evals:,}", seconds(e.seconds)))  # fmt: skip
+        table.append((label, accuracy, *format_bars(value, error), format_error(actual), f"{e.evals:,}",
+                      format_seconds(e.seconds)))  # fmt: skip
         data.append({"method": label, "asked": accuracy, "error": largest(error), "actual": actual, "evals": e.evals})
     yield Part("answer", columns(table), {"table": data})
 

@@ -12,10 +12,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 
 from potto.api import Function
-from potto.fitting import Fit, Step
+from potto.fitting import Step
 from potto.fitting import fit as fitted
-from potto.runtime.printing import format_number
-from potto.runtime.shown import largest, with_error
+from potto.runtime.printing import format_digits, format_error, format_number, format_seconds, with_error
 from potto.settings import settings
 from potto_repl.drawing import braille, room_for_curves
 from potto_repl.expressions import checked, split_items
@@ -24,7 +23,6 @@ from potto_repl.registry import command
 from potto_repl.reply import Part, Refusal
 from potto_repl.sampled import free_names
 from potto_repl.session import Conversation, plain_names
-from potto_repl.values import seconds
 
 ROUNDING = 1e-16  # of the largest value: what lies below says nothing
 FEWEST = 3  # steps that are worth a picture
@@ -53,37 +51,22 @@ def fit(session: Conversation, text: str) -> Iterator[Part]:
 
     def told(step: Step) -> None:
         if session.progress is not None and time.perf_counter() - begun > PATIENCE:
-            session.progress(f"step {step.number}, value {step.value:.6g}, slope {step.slope:.1e}")
+            value, slope = format_digits(step.value), format_error(step.slope)
+            session.progress(f"step {step.number}, value {value}, slope {slope}")
 
     with settings(**asdict(session.settings)):
         found = fitted(function, values, given=given, progress=told)
-        least = function(**found.parameters, **given)
-    doubts = _doubts(found, largest(least.error))
+    doubts = found.doubts()
     best = [f"{n} = {format_number(v, doubts[n])}" for n, v in found.parameters.items()]
-    said = [f"{name} = {with_error(least.value, least.error)} at {', '.join(best)}"]
-    said.append(f"  slope {found.slope:.1e}{'' if found.converged else ': ' + found.reason}")
+    said = [f"{name} = {with_error(found.value, found.error)} at {', '.join(best)}"]
+    said.append(f"  slope {format_error(found.slope)}{'' if found.converged else ': ' + found.reason}")
     data = {"fit": name, "value": found.value, "parameters": found.parameters, "slope": found.slope,
             "steps": len(found.steps) - 1, "converged": found.converged}  # fmt: skip
     yield Part("answer", "\n".join(said), data)
     count = len(found.steps) - 1
     if count >= FEWEST:
         yield _course(session, name, [step.value for step in found.steps])
-    yield Part("tail", f"{count} steps, {found.evaluations} evaluations, {seconds(time.perf_counter() - begun)}")
-
-
-def _doubts(found: Fit, error: float) -> dict[str, float]:
-    """How far each parameter may be off the minimum; digits beyond that are not shown.
-
-    A slope that is left says so, and so does an error of the value: on a parabola through the last step at which the
-    value was larger by more than its error, this is how far away the value rises by its error.
-    """
-    step = next((step for step in reversed(found.steps) if step.value - found.value > error), None)
-    share = 0.0 if step is None else math.sqrt(error / (step.value - found.value))
-    away = dict.fromkeys(found.parameters, 0.0)
-    if step is not None:
-        away = {n: abs(v - p) for (n, v), p in zip(found.parameters.items(), step.parameters, strict=True)}
-    return {n: max(1e-9 * abs(v), min(1e-3 * found.slope, 1e-3 * abs(v)), 1e-12, share * away[n])
-            for n, v in found.parameters.items()}  # fmt: skip
+    yield Part("tail", f"{count} steps, {found.evaluations} evaluations, {format_seconds(time.perf_counter() - begun)}")
 
 
 def _course(session: Conversation, name: str, values: Sequence[float]) -> Part:

@@ -8,7 +8,7 @@ export interface SceneParameter {
   readonly size: number;
   /** The numbers to begin with; empty if none are known. */
   readonly value: readonly number[];
-  /** Definitions that a function could be. */
+  /** Functions that it could be, as texts: definitions, or at least a constant one; empty if nothing fits. */
   readonly fits: readonly string[];
 }
 

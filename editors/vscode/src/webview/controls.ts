@@ -41,6 +41,15 @@ function start(parameter: SceneParameter): Given {
   return parameter.value.length ? parameter.value : Array<number>(parameter.size).fill(0.5);
 }
 
+/** What a scene still needs before anything can be drawn: functions, where the fields for them are empty. */
+export function missing(scene: Scene, choice: Choice): string | undefined {
+  const empty = scene.parameters.filter(({ name, kind }) => kind === "function" && choice.values.get(name) === "");
+  if (!empty.length) return undefined;
+  const needed = empty.map(({ name, type, fits: [first] }) => `“${name}” a function ${type}${first ? `, such as ${first}` : ""}`);
+  const found = empty.some(({ fits }) => !fits.length) ? " None was found in this file, in what it imports, or beside it." : "";
+  return `Give ${needed.join(", and ")}.${found}`;
+}
+
 export class Controls {
   private readonly reach = new Map<string, [number, number]>(); // of sliders
 

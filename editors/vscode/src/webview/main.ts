@@ -1,6 +1,6 @@
 // The page of a preview: what is shown, what is asked for, and what the mouse does.
 import type { FromPreview, Scene, ToPreview } from "../preview/messages";
-import { type Choice, choiceFor, Controls, make } from "./controls";
+import { type Choice, choiceFor, Controls, make, missing } from "./controls";
 import { decoded, estimated, type Field, type Grid, short } from "./numbers";
 import { type Cells, cells, drawCells, drawCurve, type Palette, pictureHeight, type View } from "./picture";
 import { type Outcome, Sampler, type Wish } from "./sampler";
@@ -60,8 +60,9 @@ problem.querySelector("button")?.addEventListener("click", () => {
   ask(true);
 });
 
-/** Say what is wrong, and dim what was drawn before. */
-function complain(message: string): void {
+/** Say what is wrong, or still needed, and dim what was drawn before. */
+function complain(message: string, needed = false): void {
+  problem.classList.toggle("needed", needed);
   problem.firstElementChild?.replaceChildren(...explained(message));
   problem.hidden = false;
   pictures.classList.add(drawn ? "stale" : "blank");
@@ -168,6 +169,11 @@ function layout(): void {
 
 function ask(again = false): void {
   if (!scene || !choice) return;
+  const needed = missing(scene, choice);
+  if (needed !== undefined) {
+    complain(needed, true);
+    return;
+  }
   const { axes, wrt, values } = choice;
   const { name } = scene;
   const flat = axes.length === 2;

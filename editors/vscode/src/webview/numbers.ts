@@ -58,14 +58,47 @@ export function short(number: number, digits = 6): string {
   if (!Number.isFinite(number)) return Number.isNaN(number) ? "no value" : number > 0 ? "∞" : "−∞";
   const rounded = Number(number.toPrecision(digits));
   const text = rounded !== 0 && Math.abs(rounded) < 1e-3 ? rounded.toExponential() : rounded.toString();
-  return text.replaceAll("-", "−").replace("e+", "e");
+  return tidy(text);
 }
 
-/** A value to the digits that its error bears out, and the error. */
+/**
+ * A value to the second digit of its error, and the error: as `potto/runtime/printing.py` writes them. The error is
+ * rounded up by what the value loses, so that the interval that one reads contains the one that was computed.
+ */
 export function estimated(value: number | undefined, error: number | undefined): string {
   if (value === undefined || error === undefined || !Number.isFinite(value)) return short(value ?? NaN);
-  const known = error > 0 && value !== 0 ? Math.floor(Math.log10(Math.abs(value) / error)) + 1 : 10;
-  return `${short(value, Math.min(Math.max(known, 1), 10))} ± ${short(error, 2)}`;
+  if (!Number.isFinite(error)) return `${short(value, 3)} (error unknown)`;
+  if (error === 0) return `${short(value, 17)} ± 0`;
+  for (let place = Math.max(exponent(error) - 1, exponent(value) - 15); ; place++) {
+    const scale = Math.max(exponent(value), exponent(error), place);
+    const text = written(value, place, scale);
+    const unit = 10 ** place;
+    const bound = Math.max(Math.ceil((error + Math.abs(Number(text) - value)) / unit - BLUR), 1);
+    if (bound >= 100) continue;
+    const size = bound >= 10 ? place + 1 : place;
+    const plain = place <= 0 && scale >= SMALLEST;
+    const bar = plain && size > SMALLEST ? (bound * unit).toFixed(-place) : written(bound * unit, place, size, true);
+    return tidy(`${text} ± ${bar}`);
+  }
+}
+
+const BLUR = 1e-5; // of a unit: errors arrive in single precision, and few decimals are doubles
+const SMALLEST = -5; // the power of ten from which on numbers are written without an exponent
+
+/** The power of ten of the first digit; far below every other for zero. */
+function exponent(number: number): number {
+  return number === 0 ? -400 : Number(number.toExponential().split("e")[1]);
+}
+
+/** A number rounded at a power of ten, with the exponent `scale` where it has one. */
+function written(number: number, place: number, scale: number, scientific = false): string {
+  if (!scientific && place <= 0 && scale >= SMALLEST) return number.toFixed(Math.min(-place, 100));
+  const mantissa = Number(`${number.toExponential().split("e")[0]}e${exponent(number) - scale}`);
+  return `${number === 0 ? (0).toFixed(scale - place) : mantissa.toFixed(scale - place)}${scale ? `e${scale}` : ""}`;
+}
+
+function tidy(text: string): string {
+  return text.replaceAll("-", "−").replaceAll("e+", "e");
 }
 
 /** Evenly spaced round numbers within a stretch, about so many. */

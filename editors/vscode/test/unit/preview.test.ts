@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import type { Samples } from "../../src/preview/messages";
-import { choiceFor } from "../../src/webview/controls";
+import { choiceFor, missing } from "../../src/webview/controls";
 import { decoded, estimated, label, short, span, ticks } from "../../src/webview/numbers";
 import { stretches } from "../../src/webview/picture";
 import { Sampler, type Wish } from "../../src/webview/sampler";
@@ -82,7 +82,17 @@ test("numbers travel whole", () => {
 });
 
 test("numbers are written to the digits that their errors bear out", () => {
-  assert.equal(estimated(0.123456789, 1e-4), "0.1235 ± 1e−4");
+  assert.equal(estimated(0.027, 0.0051), "0.0270 ± 0.0051");
+  assert.equal(estimated(0.123456789, 1e-4), "0.12346 ± 0.00011"); // the value lost 0.000003
+  assert.equal(estimated(-0.02734, Math.fround(0.0051)), "−0.0273 ± 0.0052");
+  assert.equal(estimated(9.996, 0.0996), "10.00 ± 0.11");
+  assert.equal(estimated(1.99, 7.6), "2.0 ± 7.7");
+  assert.equal(estimated(0.3, 51), "0 ± 52");
+  assert.equal(estimated(218, 1122), "0.2e3 ± 1.2e3");
+  assert.equal(estimated(1.1, 2.2e-16), "1.100000000000000 ± 1e−15");
+  assert.equal(estimated(3.3e-7, 1e-10), "3.3000e−7 ± 1.0e−10");
+  assert.equal(estimated(0, 1e-17), "0.0e−17 ± 1.0e−17");
+  assert.equal(estimated(0.5, Infinity), "0.5 (error unknown)");
   assert.equal(estimated(-2, 0), "−2 ± 0");
   assert.equal(estimated(NaN, NaN), "no value");
   assert.equal(short(1.5e-9), "1.5e−9");
@@ -109,4 +119,29 @@ test("a choice starts from what is known and is kept over edits as far as it fit
   const without = { ...scene, parameters: scene.parameters.slice(0, 2) };
   assert.equal(choiceFor(without, first).wrt, "x");
   assert.deepEqual(choiceFor({ ...without, axes: ["x"], parameters: [number("x")] }, first).axes, ["x"]);
+});
+
+test("a function that nothing fits is asked for, and nothing else is", () => {
+  const given = (fits: string[], kind = "function" as "function" | "number" | "tuple") =>
+    ({ name: "shade", kind, type: "Real* -> Real", size: kind === "function" ? 0 : 1, value: [], fits }) as const;
+  const scene = (...parameters: ReturnType<typeof given>[]) => ({
+    name: "f", range: { start: { line: 0, character: 0 } }, components: 1, axes: ["x"],
+    parameters: [{ name: "x", kind: "number" as const, type: "Real", size: 1, value: [], fits: [] }, ...parameters],
+  });
+  const needed = (...parameters: ReturnType<typeof given>[]) => missing(scene(...parameters), choiceFor(scene(...parameters), undefined));
+  assert.match(needed(given([])) ?? "", /Give “shade” a function Real\* -> Real\. None was found/);
+  assert.equal(needed(given(["flat", "lin"])), undefined);
+  assert.equal(needed(given(["\\(x) . 1"])), undefined);
+  assert.equal(needed(given([], "number")), undefined);
+  assert.equal(needed(given([], "tuple")), undefined);
+  assert.match(needed({ ...given([]), name: "a" }, { ...given([]), name: "b" }) ?? "", /“a” .*, and “b” /);
+  const whole = scene(given([]));
+  const choice = choiceFor(whole, undefined);
+  choice.values.set("shade", "\\(x) . x");
+  assert.equal(missing(whole, choice), undefined);
+  const known = scene(given(["flat"]));
+  const emptied = choiceFor(known, undefined);
+  emptied.values.set("shade", "");
+  assert.equal(missing(known, emptied), "Give “shade” a function Real* -> Real, such as flat.");
+  assert.equal(choiceFor(whole, choice).values.get("shade"), "\\(x) . x"); // kept over edits
 });

@@ -1,4 +1,4 @@
-// Bundles the unit tests and runs them with Node's own test runner. They need no editor.
+// Bundles the unit tests and runs them with Node's own test runner. They need no editor: `vscode.stub.ts` stands for it.
 import { spawnSync } from "node:child_process";
 import { mkdtempSync, readdirSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
@@ -16,6 +16,7 @@ await esbuild.build({
   bundle: true,
   platform: "node",
   format: "esm",
+  alias: { vscode: join(here, "vscode.stub.ts") },
   logLevel: "warning",
 });
 const files = tests.map((name) => join(out, name.replace(/ts$/, "mjs")));

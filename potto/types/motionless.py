@@ -1,0 +1,165 @@
+"""Calls of derivatives in which nothing moves: no argument has a tangent, so the tangent of the answer is 0.
+
+Owns the check and `is_derivative`. A plain number may be given for a dual and has tangent 0; where all are plain, a
+pair was forgotten. Who cannot be sure is silent: functions and tuples may carry tangents, and so may whatever a
+function that was called in part has been given before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from potto.diagnostics import Diagnostic
+from potto.source import Span
+from potto.syntax import nodes
+from potto.syntax.printer import print_expression
+from potto.types import kinds
+from potto.types.context import Inference, Plan
+from potto.types.scope import Builtin, Global, Local
+from potto.types.types import REAL, Dist, Function, Parameter, Real, TupleOf, Type, groups_of, resolve
+
+LONGEST = 60  # characters of a call that a help writes out
+MOTIONLESS = "no argument of this derivative has a tangent, so its tangent is 0 everywhere"
+NOWHERE = Span(0, 0)
+_ONE, _ZERO = nodes.Number(NOWHERE, "1", 1.0), nodes.Number(NOWHERE, "0", 0.0)
+GENERAL = "give the number that moves as a pair, `(value, tangent)`"
+
+
+def takes_duals(parameters: Sequence[Parameter]) -> bool:
+    """Whether a plain number may be given for one of the parameters where a dual is meant."""
+    for parameter in parameters:
+        found = resolve(parameter.type)
+        if isinstance(found, TupleOf) and found.dual:
+            return True
+    return False
+
+
+def check_tangents(inference: Inference, node: nodes.Apply) -> None:
+    """Report a call of a derivative in which no argument has a tangent. To be asked when all types are known."""
+    if isinstance(resolve(inference.types[id(node)]), Function):
+        return  # the groups that are open may bring one
+    calls, head = _calls(inference, node)
+    if not is_derivative(inference, head):
+        return
+    first: nodes.Expr | None = None
+    for call in reversed(calls):
+        plan = inference.plans.get(id(call))
+        if plan is None or _carries(inference, call, plan):
+            return
+        if first is None and call.arguments:
+            first = call.arguments[0].value
+    if first is not None:
+        inference.report(_motionless(inference, node, calls, head, first))
+
+
+def is_derivative(inference: Inference, expr: nodes.Expr) -> bool:
+    """Whether an expression is `deriv(…)` or another name of one, so that all that moves in it are its arguments."""
+    while True:
+        match expr:
+            case nodes.Paren(inner=inner):
+                expr = inner
+            case nodes.Let(body=body):
+                expr = body
+            case nodes.Apply():
+                return _derives(inference, expr)
+            case nodes.Name() | nodes.Member():
+                meaning = inference.meanings.get(id(expr))
+                if isinstance(meaning, Local) and meaning.kind == "local" and meaning.value is not None:
+                    expr = meaning.value
+                else:
+                    return isinstance(meaning, Global) and meaning.interface.derivative
+            case _:
+                return False
+
+
+def _derives(inference: Inference, node: nodes.Apply) -> bool:
+    head: nodes.Expr = node.function
+    while isinstance(head, nodes.Paren):
+        head = head.inner
+    meaning = inference.meanings.get(id(head))
+    return isinstance(meaning, Builtin) and meaning.name == "deriv"
+
+
+def _calls(inference: Inference, node: nodes.Apply) -> tuple[list[nodes.Apply], nodes.Expr]:
+    """The calls of a curried function, the last one first, and what is called."""
+    calls: list[nodes.Apply] = []
+    head: nodes.Expr = node
+    while True:
+        while isinstance(head, nodes.Paren):
+            head = head.inner
+        if not isinstance(head, nodes.Apply) or _derives(inference, head):
+            return calls, head
+        calls.append(head)
+        head = head.function
+
+
+def _carries(inference: Inference, call: nodes.Apply, plan: Plan) -> bool:
+    """Whether one of the arguments has a tangent, or may have."""
+    if any(slots is not None and any(len(slot) > 1 for slot in slots) for slots in plan.groups):
+        return True  # several make up one parameter: the value and its tangent
+    for argument in call.arguments:
+        found = resolve(inference.types[id(argument.value)])
+        if plan.spread and isinstance(found, TupleOf):
+            if not all(_is_plain(item) for item in found.items):
+                return True
+        elif not _is_plain(found):
+            return True
+    return False
+
+
+def _is_plain(type: Type) -> bool:
+    return isinstance(resolve(type), Real | Dist)
+
+
+def _motionless(
+    inference: Inference, node: nodes.Apply, calls: Sequence[nodes.Apply], head: nodes.Expr, first: nodes.Expr
+) -> Diagnostic:
+    innermost = calls[-1]
+    plan = inference.plans[id(innermost)]
+    while isinstance(first, nodes.Paren):
+        first = first.inner
+    if plan.spread and isinstance(first, nodes.Tuple):
+        first = first.items[0]
+    several = sum(len(call.arguments) for call in calls) > 1 or plan.spread
+    moved = _moving(first, inference.types[id(head)])
+    text = "" if moved is None else _written(calls, head, first, moved)
+    if not text or len(text) > LONGEST or "\n" in text:
+        help = GENERAL
+    else:
+        help = f"for the derivative by the first write `{text}`" if several else f"write `{text}`"
+    label = "as all others, without a tangent" if several else "a plain number has the tangent 0"
+    return kinds.NO_TANGENT(first.span, MOTIONLESS, label=label, help=help)
+
+
+def _moving(first: nodes.Expr, derivative: Type) -> nodes.Expr | None:
+    """A number with the tangent 1; in a second derivative with both. None where there are more."""
+    groups = groups_of(derivative)
+    type = resolve(groups[0][0].type) if groups and groups[0] else REAL
+    depth = 0
+    while isinstance(type, TupleOf):
+        type, depth = resolve(type.items[0]), depth + 1
+    pair = nodes.Tuple(first.span, (first, _ONE))
+    if depth == 1:
+        return pair
+    return nodes.Tuple(first.span, (pair, nodes.Tuple(NOWHERE, (_ONE, _ZERO)))) if depth == 2 else None
+
+
+def _written(calls: Sequence[nodes.Apply], head: nodes.Expr, first: nodes.Expr, moved: nodes.Expr) -> str:
+    """The call with its first argument moving."""
+
+    def changed(value: nodes.Expr) -> nodes.Expr:
+        inner = value
+        while isinstance(inner, nodes.Paren):
+            inner = inner.inner
+        if inner is first:
+            return moved
+        if isinstance(inner, nodes.Tuple) and any(item is first for item in inner.items):
+            return replace(inner, items=tuple(moved if item is first else item for item in inner.items))
+        return value
+
+    made = head
+    for call in reversed(calls):
+        arguments = tuple(replace(argument, value=changed(argument.value)) for argument in call.arguments)
+        made = nodes.Apply(call.span, made, arguments, True)
+    return print_expression(made)
