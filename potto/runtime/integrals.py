@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import operator
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import AbstractContextManager
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
@@ -24,11 +24,11 @@ from potto.integrate.pieces import Sums, still
 from potto.integrate.plan import Plan
 from potto.integrate.straight import certain
 from potto.kernels import errors
-from potto.kernels.cells import Array, Cell, Number, Value, all_arrays, map_arrays
+from potto.kernels.cells import Array, Cell, Ints, Number, Value, all_arrays, map_arrays
 from potto.runtime.differences import by_differences
 from potto.runtime.elimination import ACCURATE, WORTH, step_by_step
 from potto.runtime.one_sided import beside_axes, beside_folds, from_both_sides, one_direction
-from potto.runtime.plans import Linked, link, plan_for, split_by_decisions
+from potto.runtime.plans import Linked, Mixed, link, plan_for, split_by_decisions
 
 if TYPE_CHECKING:
     from potto.runtime.machine import Machine
@@ -78,20 +78,40 @@ def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermos
     linked = link(flat)
     groups = split_by_decisions(machine, term, linked, batch)
     if groups is None:
-        sums = _vouched(machine, term, linked, batch, outermost)
-        return _shaped(poisoned(sums, linked.env), shape)
+        sums = _in_cases(machine, term, linked, batch, outermost)
+    else:
+        sums = _in_groups(machine, term, flat, batch, groups, outermost)
+    return _shaped(poisoned(sums, linked.env), shape)
+
+
+def _in_groups(
+    machine: Machine, term: Integral, env: dict[str, Value], batch: int, groups: Iterable[Ints], outermost: bool
+) -> Sums:
+    """The integrals of a batch, group by group."""
     result: Sums | None = None
     for index in groups:
-        here = {n: map_arrays(v, lambda a, index=index: a[index]) for n, v in flat.items()}
-        there = link(here)
-        part = _vouched(machine, term, there, index.size, outermost)
+        there = link({n: map_arrays(v, operator.itemgetter(index)) for n, v in env.items()})
+        part = _in_cases(machine, term, there, index.size, outermost)
         if result is None:
             m, k = part.v.shape[0], part.t.shape[1]
             result = Sums(np.zeros((m, batch)), np.zeros((m, batch)), np.zeros((m, k, batch)), np.zeros((m, k, batch)))
         result.v[:, index], result.e[:, index] = part.v, part.e
         result.t[:, :, index], result.et[:, :, index] = part.t, part.et
     assert result is not None
-    return _shaped(poisoned(result, linked.env), shape)
+    return result
+
+
+def _in_cases(machine: Machine, term: Integral, linked: Linked, batch: int, outermost: bool) -> Sums:
+    """The integrals of a batch, those together that meet the same cases of conditions inside of conditions."""
+    try:
+        return _vouched(machine, term, linked, batch, outermost)
+    except Mixed as mixed:
+        fits = np.broadcast_to(mixed.fits, (batch,)).copy()
+    fits[0] = True  # the plan was made for it
+    if fits.all():
+        raise AssertionError("a plan that does not hold for what it was made for")
+    groups = np.nonzero(fits)[0], np.nonzero(~fits)[0]
+    return _in_groups(machine, term, linked.env, batch, groups, outermost)
 
 
 def _vouched(machine: Machine, term: Integral, linked: Linked, batch: int, outermost: bool) -> Sums:
@@ -163,7 +183,7 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
             plain = certain(plan.straight, machine, linked.env)
             if plain is not None:
                 return plain
-        sums = counted(in_parts(plan, machine, plan.environment(env, linked.env), batch), plan.reaches, machine)
+        sums = counted(in_parts(plan, machine, plan.environment(env, linked.env), batch), plan, machine)
         if not machine.books.degenerate:
             if outermost and machine.books.sided and not machine.side:
                 from_both_sides(machine, plan, plan.environment(env, linked.env), batch, sums, iterated)
@@ -198,7 +218,7 @@ def _sampled(machine: Machine, term: Integral, linked: Linked, env: dict[str, Va
     from potto.integrate.sampling import sample
 
     plan, method = plan_for(machine, term, linked), machine.settings.method
-    sums = counted(sample(plan, machine, plan.environment(env, linked.env), batch, method), plan.reaches, machine)
+    sums = counted(sample(plan, machine, plan.environment(env, linked.env), batch, method), plan, machine)
     machine.books.methods.add("mc" if method == "mc" else "qmc")
     if _left_out(machine):
         sums.et = np.full_like(sums.et, np.inf)  # what crosses those that were left out is not known
@@ -262,9 +282,15 @@ def expected(machine: Machine, term: Integral, linked: Linked) -> int:
     return PER_LEVEL ** len(term.variables) * 2 ** plan_for(machine, term, linked).doublings  # type: ignore[no-any-return]
 
 
-def counted(sums: Sums, known: bool, machine: Machine) -> Sums:
-    """The sums, with derivatives that no one vouches for where not all jumps could be taken account of."""
-    if machine.directions and not known:
+def counted(sums: Sums, plan: Plan, machine: Machine) -> Sums:
+    """The sums, with derivatives that no one vouches for where not all jumps could be taken account of, and of values
+    by quadrature where it is not known where they are."""
+    if plan.confused:
+        machine.note_unfinished("conditions inside of conditions make more cases than can be told apart")
+        sums.et = np.full_like(sums.et, np.inf)
+        if "quadrature" in machine.books.methods:
+            sums.e = np.full_like(sums.e, np.inf)
+    elif machine.directions and not plan.reaches:
         machine.note_unfinished("a condition jumps inside an inner integral where its boundary term is not counted")
         sums.et = np.full_like(sums.et, np.inf)
     return sums
