@@ -1,8 +1,8 @@
 """Brackets taken out of conditions: the outer condition on either side of the inner one.
 
-Owns `lifted`. The surface of `[0.3*[u < s] + 0.5*u < 0.2]` jumps where u = s, so that no formula has its zeros; those of
-`if [u < s] then [0.3 + 0.5*u < 0.2] else [0.5*u < 0.2]` are two lines. Every controller is such a program: the state
-after n steps is one of 2^n, each an affine function of where it started, but few of them are met within the bounds.
+Owns `lifted`. The surface of `[0.3*[u < s] + 0.5*u < 0.2]` jumps where u = s, so that no formula has its zeros; of
+`if [u < s] then [0.3 + 0.5*u < 0.2] else [0.5*u < 0.2]` each side has one. Every controller is such a program: the
+state after n steps is one of 2^n, each an affine function of where it started, but few are met within the bounds.
 
 A term becomes a tree of decisions with bracket-free terms as its leaves. Trees are combined from the inside out, equal
 ones are one object, and a side that no point of the domain reaches is left out (`regions`).
@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 from potto.calculus.ranges import ranges
 from potto.calculus.regions import Coefficient, Extent, Form, Forms, Number, Region, region_of, scaled
+from potto.calculus.sampling import sample_value
 from potto.core.simplify import normalized_surface
 from potto.core.terms import (
     Branch,
@@ -27,13 +28,10 @@ from potto.core.terms import (
     Proj,
     Sum,
     Term,
-    add,
     branch,
     children,
     const,
     integral,
-    mul,
-    neg,
     outside,
     postorder,
     postorder_by,
@@ -65,6 +63,11 @@ def nested(surface: Term) -> bool:
 def has_nested(term: Term) -> bool:
     """Whether some condition of a term, also one of an integral inside, has a bracket in it."""
     return any(nested(c) for node in postorder(term) for c in _coordinates(node))
+
+
+def closed_value(term: Term) -> float:
+    """What a term is that nothing decides, else nan: for what is to hold whatever the parameters are."""
+    return math.nan if term.free else sample_value(term, {})
 
 
 def _coordinates(node: Term) -> tuple[Term, ...]:
@@ -149,9 +152,12 @@ class _Trees:
         if sum(map(len, met)) > len(set().union(*met)) or any(isinstance(root, Delta) for root in roots):
             return self.write(self.tree(body))  # they are decided together
         memo: dict[Term, Term] = {root: self.write(self.tree(root)) for root in roots}
-        for node in postorder_by(body, lambda node: () if node in memo or isinstance(node, _BINDERS) else children(node)):
-            if node not in memo:
-                memo[node] = node if isinstance(node, _BINDERS) else rebuild(node, tuple(memo[c] for c in children(node)))
+        order = postorder_by(body, lambda node: () if node in memo or isinstance(node, _BINDERS) else children(node))
+        for node in order:
+            if isinstance(node, _BINDERS):
+                memo[node] = node
+            elif node not in memo:
+                memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
         return memo[body]
 
     def nests(self, node: Term) -> bool:

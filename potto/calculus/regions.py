@@ -15,7 +15,23 @@ from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from potto.calculus.ranges import range_of
-from potto.core.terms import ONE, ZERO, Const, Integral, Prim, Term, Var, add, apply, const, div, mul, neg, postorder, var
+from potto.core.terms import (
+    ONE,
+    ZERO,
+    Const,
+    Integral,
+    Prim,
+    Term,
+    Var,
+    add,
+    apply,
+    const,
+    div,
+    mul,
+    neg,
+    postorder,
+    var,
+)
 
 Number = Callable[[Term], float]  # what a plain term is now; nan if that is not known
 MARGIN = 1e-12  # how much of its parts a bound must amount to, to be told from rounding
@@ -258,9 +274,8 @@ def region_of(around: Integral, forms: Forms, outer: Region) -> tuple[Region, Pr
             continue
         found = [range_of(bound, {n: _widest(e) for n, e in box.items()}) for bound in (lo, hi)]
         low, high = min(r.lo for r in found), max(r.hi for r in found)
-        ends = forms.of(lo), forms.of(hi)
-        if ends[0] is not None and ends[1] is not None:
-            first, last = ends
+        first, last = forms.of(lo), forms.of(hi)
+        if first is not None and last is not None:
             turned = Region(box, tuple(conditions)).empty(_sum([first, _opposite(last)]))
             if turned is not None:  # they are never the other way round
                 here = Form(NONE, {name: Coefficient(ONE, 1.0)})

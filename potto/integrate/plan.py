@@ -194,7 +194,9 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve, numb
     surfaces = {f.surface for f in found if f.kind != "center"}
     doublings = sum(min(3, len(surface.free.intersection(term.variables))) for surface in surfaces)
     plain = straight(term, levels, inline) if reaches and not hides else None
-    return Plan(term, levels, groups, body, vanishing, kept, reaches, hides, box, doublings, plain, _premise(premises), confused)
+    return Plan(
+        term, levels, groups, body, vanishing, kept, reaches, hides, box, doublings, plain, _premise(premises), confused
+    )
 
 
 def _may_be_mixed(found: Finding) -> bool:

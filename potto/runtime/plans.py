@@ -21,7 +21,7 @@ from potto.diagnostics import PottoError
 from potto.integrate.eliminated import Eliminated, eliminated
 from potto.integrate.pieces import still
 from potto.integrate.plan import Plan, make
-from potto.kernels.cells import Array, Cell, Value, map_arrays
+from potto.kernels.cells import Array, Bools, Cell, Value, map_arrays
 from potto.runtime.functions import Closure, Derivative
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ def plan_for(machine: Machine, term: Integral, linked: Linked) -> Plan:
 class Mixed(Exception):
     """Members of a batch for which the plan of the first one does not hold. `fits`: for which it does."""
 
-    def __init__(self, fits: Array) -> None:
+    def __init__(self, fits: Bools) -> None:
         self.fits = fits
 
 
@@ -110,13 +110,14 @@ def _holds(plan: Plan, machine: Machine, linked: Linked) -> bool:
     return plan.premise is None or bool(np.all(_fitting(plan, machine, linked)))
 
 
-def _fitting(plan: Plan, machine: Machine, linked: Linked) -> Array:
+def _fitting(plan: Plan, machine: Machine, linked: Linked) -> Bools:
     """The members of a batch for which a plan holds."""
     assert plan.premise is not None
     env = {name: still(linked.env[name]) for name in plan.premise.params}
     found = machine.with_directions(0).evaluate(plan.premise, env, None)
     assert isinstance(found, Cell)
-    return np.asarray(found.v) > 0
+    holds: Bools = np.asarray(found.v) > 0
+    return holds
 
 
 class _Numbers:

@@ -13,6 +13,7 @@ from potto.calculus.deltas import without_deltas
 from potto.calculus.derivative import NotSmooth
 from potto.calculus.dual import Differentiator
 from potto.calculus.expand import expanded
+from potto.calculus.lifted import closed_value, lifted, nested
 from potto.calculus.pivots import NoClosedForm
 from potto.calculus.shifted import shifted
 from potto.calculus.tangents import FUNCTION, NotShifted, Shape, Shapes
@@ -52,8 +53,10 @@ FEW = 4  # branches that one integrand may have before its summands are integrat
 @lru_cache(maxsize=4096)
 def prepared(term: Integral) -> Term:
     """An equal term, or the same one where there is nothing to be done. Raises PottoError (a product of deltas)."""
-    if any(isinstance(node, Delta) for node in postorder(term.body)):
-        return without_deltas(term)
+    deltas = [node for node in postorder(term.body) if isinstance(node, Delta)]
+    if deltas:
+        apart = lifted(term, closed_value) if any(map(nested, (d.coordinates[0] for d in deltas))) else None
+        return without_deltas(term if apart is None else apart.term)
     body = term.body
     if isinstance(body, Sum) and not (body.lo.free | body.hi.free) & set(term.variables):
         return sum_(body.variable, body.lo, body.hi, _over(term, body.body))

@@ -4,13 +4,13 @@ References are pieces by hand: a state as a function of where it started is affi
 rational arithmetic follows step by step; what comes out is a quadratic in the parameters as long as no piece appears,
 so that a central difference of it is its derivative exactly.
 
-Tolerances: 1e-13 of the answer, a few hundred ulp for what a composition of 16 affine maps amplifies, and every reported
-error must cover.
+Tolerances: 1e-13 of the answer, a few hundred ulp for what a composition of 16 affine maps amplifies, and every
+reported error must cover.
 """
 
 from __future__ import annotations
 
-import math
+import itertools
 from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
@@ -20,6 +20,7 @@ import pytest
 import potto
 
 EPS = 2.0**-52
+Map = tuple[Fraction, Fraction]  # gain and shift
 Piece = tuple[Fraction, Fraction, Fraction, Fraction]  # from, to, slope, offset
 H = Fraction(1, 10**15)
 
@@ -33,13 +34,13 @@ def covered(answer: Any, exact: Fraction | float, tangent: bool = False, rtol: f
     assert off <= error + 8 * EPS * abs(float(exact)), (value, float(exact), error)
 
 
-def switched(pieces: list[Piece], at: Fraction, below: tuple[Fraction, Fraction], above: tuple[Fraction, Fraction]) -> list[Piece]:
+def switched(pieces: list[Piece], at: Fraction, below: Map, above: Map) -> list[Piece]:
     """The pieces of a state after one step: one affine map where it is below a threshold, one above it."""
     found = []
     for lo, hi, slope, offset in pieces:
         root = (at - offset) / slope
         cuts = [lo, *([root] if lo < root < hi else []), hi]
-        for a, b in zip(cuts, cuts[1:]):
+        for a, b in itertools.pairwise(cuts):
             gain, shift = below if slope * (a + b) / 2 + offset < at else above
             found.append((a, b, gain * slope, gain * offset + shift))
     return found
