@@ -15,7 +15,8 @@ from potto.primitives import PRIMITIVES
 
 # Builtins with a rule of their own. Those of one argument that only rise, or only fall, need none.
 WITH_RULES = frozenset((
-    "abs", "add", "atan2", "clamp", "cos", "cosh", "div", "hypot", "max", "min", "mul", "neg", "pow", "sign", "sin", "tan",
+    "abs", "add", "atan2", "clamp", "cos", "cosh", "div", "hypot",
+    "max", "min", "mul", "neg", "pow", "sign", "sin", "tan",
 ))  # fmt: skip
 
 
