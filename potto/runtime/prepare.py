@@ -13,6 +13,7 @@ from potto.calculus.deltas import without_deltas
 from potto.calculus.derivative import NotSmooth
 from potto.calculus.dual import Differentiator
 from potto.calculus.expand import expanded
+from potto.calculus.joined import joined
 from potto.calculus.lifted import closed_value, lifted, nested
 from potto.calculus.pivots import NoClosedForm
 from potto.calculus.shifted import shifted
@@ -74,9 +75,9 @@ def placed(term: Integral, reach: Reach, shapes: Shapes, again: bool) -> Term:
     derivative under it, of a function that jumps, the deltas count (`_counted`).
 
     shapes: how the values of free variables are built. again: whether it is to be differentiated.
-    Raises PottoError.
+    Integrals inside that can be joined with it are. Raises PottoError.
     """
-    term = _opened(term, reach)
+    term = _opened(joined(term, reach.resolve), reach)
     counted = _counted(term, reach, shapes, again)
     if not isinstance(counted, Integral):
         return counted
