@@ -184,7 +184,7 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve, numb
         found = findings(term.body, known, remember)
         hides = hidden(term, found, resolve)
     reaches = not unknown
-    swept = sweep(term, found, resolve, remember)
+    swept = sweep(term, found, resolve, remember, outermost=True)
     levels, groups = group_levels(swept.levels)
     numbers = {j.path: (g.number, j.orientation) for g in groups for j in g.cut.jumps}
     vanishing = vanishing_of(term.body, numbers)
