@@ -1,8 +1,8 @@
 """Conditions on abs, min, max and clamp as conditions on what is inside of them.
 
-Owns `cased`, `unnested` and `resolved`. The surface of `[max(x, y) < t]` runs along x and along y, so that no variable of
-integration cuts all of it; those of `if [x >= y] then [x < t] else [y < t]` do. The condition that chooses has no jump
-of its own.
+Owns `cased`, `unnested` and `resolved`. The surface of `[max(x, y) < t]` runs along x and along y, so that no
+variable of integration cuts all of it; those of `if [x >= y] then [x < t] else [y < t]` do. The condition that chooses
+has no jump of its own.
 """
 
 from __future__ import annotations

@@ -213,9 +213,7 @@ class _Trees:
         self.premises |= dict.fromkeys(premises)
         return inside
 
-    def split(
-        self, coordinates: tuple[Term, ...], strict: bool, then: Tree, orelse: Tree, region: Region
-    ) -> Tree:
+    def split(self, coordinates: tuple[Term, ...], strict: bool, then: Tree, orelse: Tree, region: Region) -> Tree:
         """The decision by coordinates without brackets, in a region; one of its sides where there is no other."""
         surface = coordinates[0]
         settled = self.settled(surface, strict)

@@ -215,9 +215,12 @@ class Region:
                     continue
                 mine, its = (d, c) if d.value > 0 else (_negative(d), _negative(c))
                 # mine > 0 > its: form * mine - other * its has no `name`
-                yield _without(name, _sum([scaled(form, mine), scaled(other, _negative(its))])), (
-                    *_unless_number(mine.term),
-                    *_unless_number(neg(its.term)),
+                yield (
+                    _without(name, _sum([scaled(form, mine), scaled(other, _negative(its))])),
+                    (
+                        *_unless_number(mine.term),
+                        *_unless_number(neg(its.term)),
+                    ),
                 )
 
 

@@ -301,7 +301,8 @@ def _shadows(cuts: tuple[Cut, ...], variable: str, lo: Term, hi: Term) -> Iterab
         if isinstance(found, Sections):
             for turn in found.turning:
                 yield turn, True
-    solved = [c for n, c in enumerate(cut for cut in cuts if cut.roots) if n < (MOST_JUMPS if c.decides else MOST_PAIRS)]
+    solved = [c for c in cuts if c.roots]
+    solved = [c for n, c in enumerate(solved) if n < (MOST_JUMPS if c.decides else MOST_PAIRS)]
     for first in solved:
         for second in solved:
             if first is not second and first.key.digest < second.key.digest:

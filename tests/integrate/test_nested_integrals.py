@@ -61,8 +61,9 @@ ROWS: list[tuple[str, str, str, float, tuple[float, float]]] = [
     ),
     (
         "eight variables",
-        "integral [0, 1] (integral [0, 1] (integral [0, 1] (integral [0, 1] (integral [0, 1] (integral [0, 1] (integral "
-        "[0, 1] (integral [0, 1] exp(-t*(a + b + c + g + h + p + q + r)) d(r)) d(q)) d(p)) d(h)) d(g)) d(c)) d(b)) d(a)",
+        "(".join(["integral [0, 1] "] * 8)
+        + "exp(-t*(a + b + c + g + h + p + q + r))"
+        + " ".join(f"d({name}))" for name in "rqphgcba")[:-1],
         "integral ([0, 1], [0, 1], [0, 1], [0, 1], [0, 1], [0, 1], [0, 1], [0, 1]) "
         "exp(-t*(a + b + c + g + h + p + q + r)) d(a, b, c, g, h, p, q, r)",
         0.9, EXP8,

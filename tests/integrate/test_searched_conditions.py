@@ -9,8 +9,8 @@ right to 1e-10.
 
 from __future__ import annotations
 
+import itertools
 import random
-import textwrap
 from collections.abc import Callable
 from typing import Any
 
@@ -66,8 +66,8 @@ def roots_of(f: Callable[[Any], Any]) -> list[Any]:
     for k in range(NODES):
         if ys[k] * ys[k + 1] < 0:
             found.append(bisected(f, xs[k], xs[k + 1]))
-        elif 0 < k and abs(ys[k]) < min(abs(ys[k - 1]), abs(ys[k + 1])) and ys[k] * ys[k - 1] > 0:
-            turn = lowest(lambda x, s=mp.sign(ys[k]): s * f(x), xs[k - 1], xs[k + 1])
+        elif k > 0 and abs(ys[k]) < min(abs(ys[k - 1]), abs(ys[k + 1])) and ys[k] * ys[k - 1] > 0:
+            turn = lowest(lambda x, y=ys[k]: mp.sign(y) * f(x), xs[k - 1], xs[k + 1])
             if f(turn) * ys[k] < 0:
                 found += [bisected(f, xs[k - 1], turn), bisected(f, turn, xs[k + 1])]
     return found
@@ -92,13 +92,14 @@ def lowest(f: Callable[[Any], Any], a: Any, b: Any) -> Any:
 @mp.workdps(34)
 def truth(function: Function, t: float) -> tuple[Any, Any, Any]:
     """The integral of exp(x) where function(x, t) < 0, its derivative by t, and the size of what is added up."""
+
     def f(x: Any) -> Any:
         return function(x, mp.mpf(t))
 
     roots = roots_of(f)
     ends = [mp.mpf(LO), *roots, mp.mpf(HI)]
     value = mp.mpf(0)
-    for a, b in zip(ends, ends[1:], strict=False):
+    for a, b in itertools.pairwise(ends):
         if f((a + b) / 2) < 0:
             value += mp.exp(b) - mp.exp(a)
     h = mp.mpf(10) ** -12
