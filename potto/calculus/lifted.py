@@ -245,9 +245,7 @@ class _Trees:
         numbers = all(isinstance(c.term, Const) for c in (form.rest, *form.slopes.values()))
         size = 1 / first.value if numbers else math.copysign(1, first.value)
         same = scaled(form, Coefficient(const(size), size))
-        found = same.term()
-        self.forms.known.setdefault(found, same)
-        return found, 1 if first.value > 0 else -1
+        return self.forms.short(same), 1 if first.value > 0 else -1
 
     def as_leaf(self, parts: tuple[Term, ...], region: Region) -> Tree:
         return self.leaf(parts[0])
@@ -290,9 +288,7 @@ class _Trees:
         if isinstance(term, Prim) and term.op in ("add", "mul", "neg", "div"):
             form = self.forms.of(term)
             if form is not None and form.slopes:
-                short = form.term()
-                self.forms.known.setdefault(short, form)
-                return short
+                return self.forms.short(form)
         return term
 
     def write(self, tree: Tree) -> Term:

@@ -25,11 +25,12 @@ from potto.core.terms import (
     Var,
     add,
     apply,
+    children,
     const,
     div,
     mul,
     neg,
-    postorder,
+    postorder_by,
     var,
 )
 
@@ -71,10 +72,23 @@ class Forms:
     def of(self, term: Term) -> Form | None:
         """The term as an affine function of the variables; None if it is not written as one."""
         if term not in self.known:
-            for node in postorder(term):
+            for node in postorder_by(term, self._below):
                 if node not in self.known:
                     self.known[node] = self._form(node)
         return self.known[term]
+
+    def _below(self, node: Term) -> tuple[Term, ...]:
+        return () if node in self.known or not node.free & self.names else children(node)
+
+    def short(self, form: Form) -> Term:
+        """The term of a form, whose parts are known from now on."""
+        for name, c in form.slopes.items():
+            self.known.setdefault(c.term, Form(c, {}))
+            self.known.setdefault(_product(c, Coefficient(var(name), math.nan)).term, Form(NONE, {name: c}))
+        self.known.setdefault(form.rest.term, Form(form.rest, {}))
+        found = form.term()
+        self.known.setdefault(found, form)
+        return found
 
     def plain(self, term: Term) -> Coefficient:
         return Coefficient(term, self.number(term))

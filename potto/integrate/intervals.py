@@ -120,6 +120,8 @@ def _whole_power(a: Interval, n: int) -> Interval:
 def _pow(node: Prim, args: list[Interval]) -> Interval:
     base, (low, high) = args
     exponent = node.args[1]
+    if isinstance(exponent, Const) and exponent.value == 0:
+        return np.ones_like(base[0]), np.ones_like(base[1])  # also at 0
     if isinstance(exponent, Const) and exponent.value.is_integer() and 0 < abs(exponent.value) < 1e6:
         whole = _whole_power(base, int(abs(exponent.value)))
         return whole if exponent.value > 0 else _inverse(whole)

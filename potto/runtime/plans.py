@@ -127,9 +127,10 @@ class _Numbers:
         self.machine = machine
         self.first = {n: map_arrays(still(v), _first) for n, v in linked.env.items()}
         self.point = {n: v.v for n, v in self.first.items() if isinstance(v, Cell) and isinstance(v.v, float)}
+        self.known: dict[Term, float] = {}
 
     def __call__(self, plain: Term) -> float:
-        found = sample_value(plain, self.point)
+        found = sample_value(plain, self.point, self.known)
         if found == found or not plain.free <= self.first.keys():
             return found
         try:
