@@ -18,10 +18,12 @@ from potto.calculus.cases import cased
 from potto.calculus.hoist import hidden, hoisted
 from potto.calculus.lifted import Lifted, lifted, nested
 from potto.calculus.regions import Number
+from potto.calculus.sides import box_of as extents
 from potto.calculus.surfaces import Decide, Finding, Resolve, findings
 from potto.calculus.sweep import Cut, Level, sweep
 from potto.calculus.trace import layout
 from potto.calculus.unrolled import unrolled
+from potto.calculus.verdict import monotone
 from potto.core.terms import (
     App,
     Branch,
@@ -100,6 +102,7 @@ class Plan:
     straight: its terms where it can be integrated by rules that are proved to do, if the parameters let it.
     premise: what has to be positive for the plan to hold: for these parameters some cases are never met.
     confused: whether there are conditions inside of conditions that were not told apart.
+    folds: whether a surface that is searched for may have folds, of which the variables further out know nothing.
     """
 
     term: Integral
@@ -115,6 +118,7 @@ class Plan:
     straight: Straight | None = None
     premise: Lam | None = None
     confused: bool = False
+    folds: bool = False
 
     def environment(self, env: dict[str, Value], everything: dict[str, Value]) -> dict[str, Value]:
         """What the plan is evaluated in: also what functions have captured, if calls of them were carried out."""
@@ -195,8 +199,18 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve, numb
     doublings = sum(min(3, len(surface.free.intersection(term.variables))) for surface in surfaces)
     plain = straight(term, levels, inline) if reaches and not hides else None
     return Plan(
-        term, levels, groups, body, vanishing, kept, reaches, hides, box, doublings, plain, _premise(premises), confused
-    )
+        term, levels, groups, body, vanishing, kept, reaches, hides, box, doublings, plain, _premise(premises),
+        confused, _may_fold(term, levels),
+    )  # fmt: skip
+
+
+def _may_fold(term: Integral, levels: Sequence[LevelPlan]) -> bool:
+    """Whether roots that are searched for may appear or merge as variables further out vary."""
+    inner = [(cut.surface, level.variable) for level in levels[1:] for cut in level.searched if cut.decides]
+    if not inner:
+        return False
+    bounds = extents(term)
+    return not all(monotone(surface, variable, bounds) for surface, variable in inner)
 
 
 def _may_be_mixed(found: Finding) -> bool:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import operator
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from contextlib import AbstractContextManager
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from potto.calculus.surfaces import TooDeep
-from potto.core.terms import Integral, integral
+from potto.core.terms import Integral
 from potto.diagnostics import PottoError
 from potto.integrate.boxes import uncut
 from potto.integrate.levels import Iteration
@@ -25,8 +25,10 @@ from potto.integrate.plan import Plan
 from potto.integrate.straight import certain
 from potto.kernels import errors
 from potto.kernels.cells import Array, Cell, Ints, Number, Value, all_arrays, map_arrays
+from potto.runtime.choosing import many, orders, preferred, too_many
 from potto.runtime.differences import by_differences
 from potto.runtime.elimination import ACCURATE, WORTH, step_by_step
+from potto.runtime.folds import beside_another
 from potto.runtime.one_sided import beside_axes, beside_folds, from_both_sides, one_direction
 from potto.runtime.plans import Linked, Mixed, link, plan_for, split_by_decisions
 
@@ -38,12 +40,6 @@ ORDERS = (4, 6, 8, 10)
 PILOTS = 64
 BATCH = 4096  # members integrated at once
 FEW = 64  # members for which it does not pay to look for those that nothing cuts
-# Up to how many variables iterated quadrature is never in question; what it takes beyond them, in evaluations, and how
-# much of that is acceptable. From LOOSE on, a relative accuracy is reached by fewer samples.
-MOST_LEVELS = 3
-PER_LEVEL, AFFORDABLE = 12, 1_000_000
-LOOSE = 1e-3
-FEW_NODES = 30_000  # up to which iterated quadrature is no slower
 # From how many errors of the value on an error of a derivative is looked at again from another side, and for how many
 # members at most.
 STEEP = 1e3
@@ -185,6 +181,8 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
                 return plain
         sums = counted(in_parts(plan, machine, plan.environment(env, linked.env), batch), plan, machine)
         if not machine.books.degenerate:
+            if plan.folds:
+                beside_another(machine, order, linked, env, batch, sums, iterated)
             if outermost and machine.books.sided and not machine.side:
                 from_both_sides(machine, plan, plan.environment(env, linked.env), batch, sums, iterated)
             if outermost and machine.books.folds:
@@ -265,23 +263,6 @@ def turned_round(
     return sums
 
 
-def too_many(machine: Machine, term: Integral, linked: Linked) -> bool:
-    """Whether an integral has too many variables and surfaces for quadrature, or too few digits are asked for."""
-    if len(term.variables) <= MOST_LEVELS:
-        return False
-    return machine.settings.rtol >= LOOSE or expected(machine, term, linked) > AFFORDABLE
-
-
-def many(machine: Machine, term: Integral, linked: Linked) -> bool:
-    """Whether it pays to look whether the variables can be eliminated."""
-    return len(term.variables) > MOST_LEVELS and not machine.frozen and expected(machine, term, linked) > FEW_NODES
-
-
-def expected(machine: Machine, term: Integral, linked: Linked) -> int:
-    """About how many evaluations iterated quadrature takes."""
-    return PER_LEVEL ** len(term.variables) * 2 ** plan_for(machine, term, linked).doublings  # type: ignore[no-any-return]
-
-
 def counted(sums: Sums, plan: Plan, machine: Machine) -> Sums:
     """The sums, with derivatives that no one vouches for where not all jumps could be taken account of, and of values
     by quadrature where it is not known where they are."""
@@ -294,42 +275,6 @@ def counted(sums: Sums, plan: Plan, machine: Machine) -> Sums:
         machine.note_unfinished("a condition jumps inside an inner integral where its boundary term is not counted")
         sums.et = np.full_like(sums.et, np.inf)
     return sums
-
-
-def orders(term: Integral) -> Iterator[Integral]:
-    """The integral as it is written, then with other variables innermost, where the bounds allow it.
-
-    A surface that runs along the innermost variable has no section in it; another variable then takes its place.
-    """
-    yield term
-    names = set(term.variables)
-    if any((lo.free | hi.free) & names for lo, hi in term.bounds):
-        return
-    count = len(term.variables)
-    for last in range(count - 1):
-        index = [i for i in range(count) if i != last] + [last]
-        yield integral(
-            tuple(term.variables[i] for i in index),
-            tuple(term.bounds[i] for i in index),
-            term.body,
-            tuple(term.hints[i] for i in index),
-        )
-
-
-def preferred(machine: Machine, term: Integral, linked: Linked) -> Iterator[Integral]:
-    """The orders, those first in which the fewest jumps have to be searched for."""
-    if not searches(machine, term, linked):
-        return orders(term)
-    return iter(sorted(orders(term), key=lambda order: searches(machine, order, linked)))
-
-
-def searches(machine: Machine, term: Integral, linked: Linked) -> int:
-    """How many jumps are searched for, having no closed form in the variable that they cut; 0 where none would be.
-
-    Each leaves, besides what it takes, unknown places further out where its roots merge.
-    """
-    plan = plan_for(machine, term, linked)
-    return sum(cut.decides for level in plan.levels for cut in level.searched)
 
 
 def in_parts(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> Sums:
@@ -353,10 +298,12 @@ def in_parts(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) ->
     return sums
 
 
-def iterated(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> Sums:
+def iterated(
+    plan: Plan, machine: Machine, env: dict[str, Value], batch: int, start_order: int = START_ORDER
+) -> Sums:
     """Iterated quadrature with cuts."""
     if batch <= BATCH:
-        return Iteration(plan, machine, START_ORDER).run(0, env, batch, {}, machine)
+        return Iteration(plan, machine, start_order).run(0, env, batch, {}, machine)
     with one_thread():
         order = best_order(plan, machine, env, batch)
         parts = []

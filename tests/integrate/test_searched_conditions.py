@@ -126,3 +126,48 @@ def test_random_conditions(kind: str, seed: int) -> None:
         assert inside(answer.tangent, answer.tangent_error, rate, size), (text, t, answer, rate)
         assert answer.converged, (text, t, answer.reasons)
         assert answer.value == pytest.approx(float(value), rel=1e-10, abs=1e-12)
+
+
+TWO = [
+    # what folds where no formula says so: the answers of both orders of the variables must be told apart by their bars
+    "0.979*y^2 + 0.612*y^3 - 1.094*x + 0.089*x*y^2 - 1.158*x^2 + 0.868*x^2*y^2 - 0.451*x^3 + 0.691*x^3*y",
+    "x^3 - x + y^5 + y",
+    "x^2*y + y^3*x + x",
+    "x*exp(y) + y*exp(x)",
+    "sin(3*x*y) + x^2",
+]
+
+
+@pytest.mark.parametrize("text", TWO)
+@pytest.mark.parametrize("t", [-0.5424839629313064, 0.2])
+def test_two_variables_in_both_orders(text: str, t: float) -> None:
+    square = "integral ([-1, 1], [-1, 1])"
+    one, other = (potto.compile(f"def f(t) {square} [{text} < t] d({o})").f(t) for o in ("x, y", "y, x"))
+    assert abs(one.value - other.value) <= one.error + other.error
+
+
+@pytest.mark.parametrize(
+    "program",
+    [
+        "def f(t) integral [-1, 1] [x^3 - x < t]*x d(x)",
+        "def cubic(x) x^3 - x\ndef area(g, t) integral [-1, 1] [g(x) < t]*x d(x)\ndef f(t) area(cubic, t)",
+        "def area(g, t) integral [-1, 1] [g(x) < t]*x d(x)\ndef f(t) area(\\x . x^3 - x, t)",
+        "def below(u, t) [u^3 - u < t]\ndef f(t) integral [-1, 1] below(x, t)*x d(x)",
+        "def f(t) integral [-1, 1] (if [x^3 - x < t] then x else 0) d(x)",
+        "def f(t) integral [1, -1] -[not (x^3 - x >= t)]*x d(x)",
+        "def h(p) integral [-1, 1] [x^3 - fst p*x < snd p]*x d(x)\ndef f(t) h((1, t))",
+        "def w(t) integral [-1, 1] [x^3 - x < t]*x d(x)\ndef f(t) fst(deriv(w)((t, 1)))",
+    ],
+)
+def test_however_it_is_written(program: str) -> None:
+    """x^3 - x < 0.1 outside of the two lower roots in [-1, 1] and below the third, which lies beyond 1."""
+    t = 0.1
+    a, b = sorted(float(r.real) for r in mp.polyroots([1, 0, -1, -t]))[:2]
+    exact = ((a * a - 1) + (1 - b * b)) / 2
+    if "deriv" in program:
+        answer = potto.compile(program).f(t)
+    else:
+        answer = potto.deriv(potto.compile(program).f)((t, 1.0))
+        rate = a / abs(3 * a * a - 1) + b / abs(3 * b * b - 1)
+        assert abs(answer.tangent - rate) <= answer.tangent_error + 64 * EPS
+    assert abs(answer.value - exact) <= answer.error + 16 * EPS and answer.converged
