@@ -66,7 +66,7 @@ def _inner(body: Term, around: frozenset[str], resolve: Resolve, calls: int) -> 
     """The body as an integral that varies with the variables around it, and whose bounds do not jump with them."""
     match body:
         case Integral():
-            jumps = any(isinstance(n, Branch) for pair in body.bounds for b in pair for n in postorder(b))
+            jumps = any(isinstance(n, Branch | App) for pair in body.bounds for b in pair for n in postorder(b))
             return body if body.free & around and not jumps else None
         case Prim(op="neg", args=(arg,)):
             inner = _inner(arg, around, resolve, calls)
