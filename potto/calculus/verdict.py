@@ -32,7 +32,7 @@ WRONG_INVERSE = declare("P0403", "the given inverse is wrong")
 COMPONENTS = declare("P0404", "a diffeomorphism with the wrong number of components")
 NOT_DIFFERENTIABLE = declare("P0405", "a diffeomorphism that is not differentiable")
 MEASURE_ZERO = declare("P0406", "a condition that holds on no area", "warning")
-SEARCHED = declare("P0615", "a surface that is searched for", "hint")
+SEARCHED = declare("P0616", "a surface that is searched for", "hint")
 
 Box = Mapping[str, tuple[float, float]]
 

@@ -85,4 +85,4 @@ def test_the_condition_is_seen_and_searched_for_where_it_cannot_be_inverted(call
         def f(c) integral ([0, 1], [0, 1]) (let p = x*y + sin(x + y^3) in CALL) d(x, y)
     """
     found = potto.compile(dedent(text).replace("CALL", call)).diagnostics
-    assert [d.code for d in found] == ["P0615"]
+    assert [d.code for d in found] == ["P0616"]
