@@ -1,14 +1,15 @@
 """Conditions on abs, min, max and clamp as conditions on what is inside of them.
 
-Owns `cased` and `resolved`. The surface of `[max(x, y) < t]` runs along x and along y, so that no variable of
-integration cuts all of it; those of `if [x >= y] then [x < t] else [y < t]` do. The condition that chooses has no jump
-of its own.
+Owns `cased`, `unnested` and `resolved`. The surface of `[max(x, y) < t]` runs along x and along y, so that no
+variable of integration cuts all of it; those of `if [x >= y] then [x < t] else [y < t]` do. The condition that chooses
+has no jump of its own.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
+from potto.calculus.lifted import closed_value, has_nested, lifted
 from potto.core.terms import (
     Branch,
     Integral,
@@ -43,15 +44,23 @@ def cased(term: Integral) -> Integral:
 
 
 def resolved(term: Term) -> Term:
-    """A term whose integrals are taken apart like that, and along the factors of their conditions, too.
+    """A term whose integrals are taken apart like that, with no bracket inside of a condition, and along the factors of
+    their conditions, too.
 
     [x*y > 0] is [y > 0] where x > 0, and [y < 0] where it is not: a formula for its roots in y says nothing of x = 0.
     """
     memo: dict[Term, Term] = {}
     for node in postorder(term):
         new = rebuild(node, tuple(memo[c] for c in children(node)))
-        memo[node] = _by_factors(cased(new)) if isinstance(new, Integral) else new
+        memo[node] = _by_factors(cased(unnested(new))) if isinstance(new, Integral) else new
     return memo[term]
+
+
+def unnested(term: Integral) -> Integral:
+    """The integral with no bracket inside of a condition, whatever its parameters are; the same one if that takes too
+    many cases."""
+    found = lifted(term, closed_value) if has_nested(term.body) else None
+    return term if found is None else found.term
 
 
 def _by_factors(term: Integral) -> Integral:

@@ -28,9 +28,12 @@ from potto.calculus.verdict import (
     NO_INVERSE,
     WRONG_INVERSE,
     Problem,
+    Role,
+    Verdict,
     failure,
     judge,
     listed,
+    searched,
     singular,
 )
 from potto.calculus.verify import Refuted, Untested, Verified, verify
@@ -54,6 +57,7 @@ from potto.modules import definition
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import nodes
+from potto.syntax.walk import walk
 from potto.types import check_definition, interface
 
 Box = Mapping[str, tuple[float, float]]
@@ -99,8 +103,9 @@ def check_conditions(db: Database, file: str, name: str) -> tuple[Diagnostic, ..
     found = conditions_of(elaborated.term, lambda g: exported(db, g.module, g.name), lambda g: _faultless(db, g))
     spans = dict(elaborated.origins)
     fallback = Span(0, 0) if item is None else item.name_span
+    maps = () if item is None else (node.span for node in walk(item) if isinstance(node, nodes.InlineDiffeo))
     products = _products(db, elaborated.term, found, spans, fallback)
-    return (*_judged(found, spans, fallback), *products)
+    return (*_judged(found, spans, fallback, frozenset(maps)), *products)
 
 
 @query
@@ -151,16 +156,20 @@ def _faultless(db: Database, target: Global) -> Term | None:
 # Conditions under integrals
 
 
-def _judged(found: Iterable[Condition], spans: Mapping[Term, Span], fallback: Span) -> Iterable[Diagnostic]:
+def _judged(
+    found: Iterable[Condition], spans: Mapping[Term, Span], fallback: Span, maps: frozenset[Span]
+) -> Iterable[Diagnostic]:
+    """What is said of conditions; `maps` is where the text says `diffeo(...)`."""
     said: set[tuple[str, Span, str]] = set()
     for condition in found:
         if any(isinstance(n, Hole) for c in condition.coordinates for n in postorder(c)):
             continue  # a diagnostic has said what is wrong there
         condition = _readable(condition)
         own = isinstance(condition.anchor, Branch) and condition.anchor.coordinates == condition.coordinates
-        problem = _verdict(condition.coordinates, condition.variables, tuple(condition.box.items()), own)
+        span = spans.get(condition.anchor, fallback)
+        role: Role = "delta" if condition.delta else "map" if span in maps else "bracket"
+        problem = _verdict(condition.coordinates, condition.variables, tuple(condition.box.items()), own, role)
         if problem is not None:
-            span = spans.get(condition.anchor, fallback)
             key = (problem.kind.code, span, problem.message)
             if key not in said:
                 said.add(key)
@@ -168,9 +177,13 @@ def _judged(found: Iterable[Condition], spans: Mapping[Term, Span], fallback: Sp
 
 
 @lru_cache(maxsize=4096)
-def _verdict(coordinates: tuple[Term, ...], variables: tuple[str, ...], box: _Bounds, whole: bool) -> Problem | None:
-    """What is wrong with a condition. Most edits leave most conditions as they are."""
-    found = judge(coordinates, variables, dict(box), whole)
+def _verdict(
+    coordinates: tuple[Term, ...], variables: tuple[str, ...], box: _Bounds, whole: bool, role: Role
+) -> Problem | None:
+    """What there is to say of a condition. Most edits leave most conditions as they are."""
+    found = judge(coordinates, variables, dict(box), whole, role)
+    if isinstance(found, Verdict) and found.searched:
+        return searched(found.searched, [v for v in variables if v in coordinates[0].free], found.pivot)
     return found if isinstance(found, Problem) else None
 
 

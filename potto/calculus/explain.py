@@ -14,6 +14,7 @@ from dataclasses import replace
 from potto.calculus.again import moving_deltas
 from potto.calculus.boundary import at_bounds, at_surfaces, jumps
 from potto.calculus.branch_cuts import opened
+from potto.calculus.cases import unnested
 from potto.calculus.deltas import without_deltas
 from potto.calculus.derivative import NotSmooth
 from potto.calculus.dual import Differentiator, heads_of
@@ -127,7 +128,7 @@ def describe(term: Term, name: str, type_text: str, resolve: Resolve) -> Derivat
     except PottoError as problem:
         problems.extend(d.message for d in problem.diagnostics)
     known = [work.carried_out(i) for i in _outermost(body)]
-    integrals = tuple(_integral(i, work, tangents, functions) for i in known if isinstance(i, Integral))
+    integrals = tuple(_integral(unnested(i), work, tangents, functions) for i in known if isinstance(i, Integral))
     found = DerivativeText(name, type_text, tangent, isinstance(body, Integral), integrals, conditions)
     found = replace(found, problems=tuple(problems), smooth=tangent)
     if not integrals and not problems:

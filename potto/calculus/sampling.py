@@ -10,7 +10,7 @@ import math
 import random
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
-from potto.core.terms import Branch, Const, If, Prim, Proj, Term, Tuple, Var, postorder
+from potto.core.terms import Branch, Const, If, Prim, Proj, Term, Tuple, Var, children, postorder_by
 
 NAN = math.nan
 
@@ -52,11 +52,15 @@ _FUNCTIONS: dict[str, Callable[..., float]] = {
 }
 
 
-def sample_value(term: Term, point: Mapping[str, float]) -> float:
-    """The value of a number-valued term at a point; nan where it is not defined or cannot be told."""
-    values: dict[Term, float] = {}
-    for node in postorder(term):
-        values[node] = _value(node, values, point)
+def sample_value(term: Term, point: Mapping[str, float], known: dict[Term, float] | None = None) -> float:
+    """The value of a number-valued term at a point; nan where it is not defined or cannot be told.
+
+    known: the values there of terms that were met before.
+    """
+    values = {} if known is None else known
+    for node in postorder_by(term, lambda node: () if node in values else children(node)):
+        if node not in values:
+            values[node] = _value(node, values, point)
     return values[term]
 
 

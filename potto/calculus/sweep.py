@@ -20,9 +20,10 @@ from potto.calculus.surfaces import Decide, Finding, Kind, Resolve, findings
 from potto.core.simplify import normalized_surface, simplify
 from potto.core.terms import Const, Integral, Prim, Term, postorder, prim, substitute
 
-MOST_CUTS = 48  # per variable; what is beyond it only costs adaptive refinement
+MOST_CUTS = 1200  # per variable; refinement doesn't see every weak kink that is left out
 MOST_CENTERS = 6
-MOST_PAIRS = 12  # surfaces whose crossings are worked out
+MOST_PAIRS = 12  # surfaces whose crossings are worked out, if they are kinks: those of crossings come to hundreds
+MOST_JUMPS = 48  # the same, if they are jumps
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,8 +161,10 @@ class Sweep:
     outer: tuple[Finding, ...]
 
 
-def sweep(term: Integral, found: Iterable[Finding], resolve: Resolve, decide: Decide) -> Sweep:
-    """Place every surface of an integral's body at the variable that it cuts."""
+def sweep(
+    term: Integral, found: Iterable[Finding], resolve: Resolve, decide: Decide, outermost: bool = False
+) -> Sweep:
+    """Place every surface of an integral's body at the variable that it cuts. outermost: nobody asks for the rest."""
     pool = _Pool()
     centers: dict[Term, None] = {}
     for f in found:
@@ -177,7 +180,8 @@ def sweep(term: Integral, found: Iterable[Finding], resolve: Resolve, decide: De
         here = [c for c in centers if variable in c.free]
         centers = {c: None for c in centers if variable not in c.free}
         levels.append(Level(variable, lo, hi, (*hints, *points_of(here, variable)[:MOST_CENTERS]), cuts))
-        for surface, turning in _shadows(cuts, variable, lo, hi):
+        shadows = () if outermost and variable == term.variables[0] else _shadows(cuts, variable, lo, hi)
+        for surface, turning in shadows:
             pool.put(surface, None, turning)
         for bound in (lo, hi):
             for f in findings(bound, resolve, decide):
@@ -297,7 +301,8 @@ def _shadows(cuts: tuple[Cut, ...], variable: str, lo: Term, hi: Term) -> Iterab
         if isinstance(found, Sections):
             for turn in found.turning:
                 yield turn, True
-    solved = [c for c in cuts if c.roots][:MOST_PAIRS]
+    solved = [c for c in cuts if c.roots]
+    solved = [c for n, c in enumerate(solved) if n < (MOST_JUMPS if c.decides else MOST_PAIRS)]
     for first in solved:
         for second in solved:
             if first is not second and first.key.digest < second.key.digest:

@@ -2,20 +2,25 @@
 
 Owns `judge`, a pure function of a condition's coordinates, and the kinds of diagnostics that say no. For a condition
 under an integral it is enough that its first coordinate can be solved for one variable of integration with all roots,
-or that it is strictly monotone in one; a map with as many coordinates as variables must also not be singular.
+or that it is strictly monotone in one; a map with as many coordinates as variables must also not be singular. A bracket
+needs no inverse: it is enough that its zeros can be searched for. What is declared a diffeomorphism must be one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 from potto.calculus.derivative import NotSmooth, partial
+from potto.calculus.enclosable import searchable
 from potto.calculus.invert import Failure, Inverse, dependence, invert, jacobian
+from potto.calculus.lifted import nested
 from potto.calculus.linear import determinant
 from potto.calculus.normal import is_zero
 from potto.calculus.ranges import ranges
 from potto.calculus.solve import Sections, sections
+from potto.calculus.surfaces import pieces
 from potto.core.printer import format_term
 from potto.core.terms import Branch, If, Integral, Prim, Term, postorder, var
 from potto.diagnostics import Kind, declare
@@ -27,6 +32,7 @@ WRONG_INVERSE = declare("P0403", "the given inverse is wrong")
 COMPONENTS = declare("P0404", "a diffeomorphism with the wrong number of components")
 NOT_DIFFERENTIABLE = declare("P0405", "a diffeomorphism that is not differentiable")
 MEASURE_ZERO = declare("P0406", "a condition that holds on no area", "warning")
+SEARCHED = declare("P0616", "a surface that is searched for", "hint")
 
 Box = Mapping[str, tuple[float, float]]
 
@@ -48,7 +54,8 @@ class Verdict:
 
     pivot: the variable that its first coordinate is solved for.
     completion: the coordinates that were left out and were added to make the map invertible.
-    roots: the sections in the pivot; None where the coordinate is only known to be monotone.
+    roots: the sections in the pivot; None where the coordinate is only known to be monotone, or is searched.
+    searched: the surfaces whose zeros have to be searched for.
     """
 
     pivot: str
@@ -56,10 +63,59 @@ class Verdict:
     determinant: Term | None
     roots: Sections | None
     inverse: Inverse | None = None
+    searched: tuple[Term, ...] = ()
 
 
-def judge(coordinates: Sequence[Term], variables: Sequence[str], box: Box, whole: bool = False) -> Verdict | Problem:
-    """The verdict on a condition; `whole`: its author wrote all coordinates, as many as variables."""
+Role = Literal["bracket", "delta", "map"]
+
+
+def judge(
+    coordinates: Sequence[Term], variables: Sequence[str], box: Box, whole: bool = False, role: Role = "bracket"
+) -> Verdict | Problem:
+    """The verdict on a condition; `whole`: its author wrote all coordinates, as many as variables. What is a map or has
+    several coordinates is declared a diffeomorphism; that and what a delta is of must have an inverse."""
+    if len(coordinates) > 1:
+        role = "map"
+    if any(map(nested, coordinates)):
+        return _broken(coordinates) if role == "map" else _in_cases(coordinates[0], variables, box, role)
+    return _judged(coordinates, variables, box, whole, role)
+
+
+def _in_cases(surface: Term, variables: Sequence[str], box: Box, role: Role) -> Verdict | Problem:
+    """The verdict on a condition with brackets inside: on each of its cases."""
+    verdicts: list[Verdict] = []
+    empty: Problem | None = None
+    for case in pieces(surface):
+        if nested(case) or not case.free.intersection(variables):
+            continue
+        found = _judged((case,), variables, box, False, role)
+        if isinstance(found, Verdict):
+            verdicts.append(found)
+        elif found.kind is MEASURE_ZERO:
+            empty = found
+        else:
+            return found
+    if not verdicts:
+        return empty or Verdict(next(v for v in variables if v in surface.free), (), None, None)
+    searched = tuple(dict.fromkeys(case for found in verdicts for case in found.searched))
+    return Verdict(verdicts[0].pivot, (), None, None, searched=searched)
+
+
+def _broken(coordinates: Sequence[Term]) -> Problem:
+    inner = next(node for c in coordinates for node in postorder(c) if isinstance(node, Branch))
+    return Problem(
+        NOT_DIFFERENTIABLE,
+        f"the map jumps where `{format_term(inner.surface)}` is 0",
+        "jumps",
+        ("a diffeomorphism is differentiable everywhere, and so is its inverse",),
+        "write it as a bracket, `[... >= 0]`, which may have brackets inside",
+    )
+
+
+def _judged(
+    coordinates: Sequence[Term], variables: Sequence[str], box: Box, whole: bool, role: Role
+) -> Verdict | Problem:
+    """The verdict on a condition without brackets inside."""
     surface = coordinates[0]
     if len(coordinates) > 1:
         if whole and len(coordinates) > len(variables):
@@ -85,10 +141,13 @@ def judge(coordinates: Sequence[Term], variables: Sequence[str], box: Box, whole
         try:
             inverse = invert(coordinates, variables)
         except NotSmooth:
-            return no_inverse(surface, mine, reasons)
+            return no_inverse(surface, mine, reasons, role)
         if isinstance(inverse, Inverse):
             return Verdict(mine[-1], (), inverse.determinant, None, inverse)
-    return no_inverse(surface, mine, reasons)
+    found_by_search = next((name for name in reversed(mine) if searchable(surface, name)), None)
+    if role == "bracket" and found_by_search is not None:
+        return Verdict(found_by_search, (), None, None, searched=(surface,))
+    return no_inverse(surface, mine, reasons, role, found_by_search is not None)
 
 
 def _solved(
@@ -171,8 +230,17 @@ def _empty(surface: Term, box: Box) -> Problem | None:
     )
 
 
-def no_inverse(surface: Term, variables: Sequence[str], reasons: Sequence[str]) -> Problem:
-    help = "write the condition so that one variable can be isolated, or name it as a diffeomorphism with its `inverse`"
+_ADVICE: dict[Role, str] = {
+    "bracket": "write the condition so that one variable can be isolated",
+    "delta": "differentiate an integral over the bracket `[{0} >= 0]`, which needs no inverse",
+    "map": "write the bracket `[{0} >= 0]`, which needs no inverse",
+}
+
+
+def no_inverse(
+    surface: Term, variables: Sequence[str], reasons: Sequence[str], role: Role = "bracket", searchable: bool = False
+) -> Problem:
+    help = _ADVICE[role if searchable else "bracket"].format(format_term(surface))
     inner = next((node for node in postorder(surface) if isinstance(node, Integral)), None)
     if inner is not None:  # neither can be done: an inverse is a formula, and is verified as one
         reasons = (*reasons, "what an integral comes to is found by numbers, and the surface has to be known before")
@@ -184,6 +252,19 @@ def no_inverse(surface: Term, variables: Sequence[str], reasons: Sequence[str]) 
         "cannot be solved for where it is 0",
         tuple(reasons),
         help,
+    )
+
+
+def searched(surfaces: Sequence[Term], variables: Sequence[str], roots: str) -> Problem:
+    """What to say of surfaces that have no closed form along any variable."""
+    further = [v for v in variables if v != roots]
+    cost = f"once for each node in {listed(further)}" if further else "once for each value of the integral"
+    return Problem(
+        SEARCHED,
+        f"where {shown(surfaces)} {'is' if len(surfaces) == 1 else 'are'} 0 has no closed form: it is searched for",
+        "searched for",
+        (f"`{roots}` is halved until interval arithmetic has told all roots apart, {cost}",),
+        "nothing has to be done; a condition that can be solved for a variable is faster",
     )
 
 

@@ -55,7 +55,7 @@ class ConditionInfo:
     """What is known of a condition over variables of integration. `span` is relative to the definition's chunk.
 
     `problem` says why it can't be integrated over; then the rest is empty. `missing` are the coordinates that were left
-    out. `equation` says where it changes.
+    out. `equation` says where it changes; if it is `searched` for, there is no diffeomorphism.
     """
 
     span: Span
@@ -72,6 +72,7 @@ class ConditionInfo:
     notes: tuple[str, ...] = ()
     moved_by: tuple[str, ...] = ()
     calls: tuple[str, ...] = ()
+    searched: bool = False
 
 
 @query
@@ -91,7 +92,9 @@ def condition_infos(db: Database, file: str, name: str) -> tuple[ConditionInfo, 
         if span is None or any(isinstance(n, Hole) for c in condition.coordinates for n in postorder(c)):
             continue
         moved = tuple(p for p in parameters if p in condition.surface.free)
-        verdict = judge(condition.coordinates, condition.variables, condition.box)
+        verdict = judge(
+            condition.coordinates, condition.variables, condition.box, role="delta" if condition.delta else "bracket"
+        )
         out[_info(span, condition.coordinates, condition.variables, verdict, moved, condition.calls)] = None
     return tuple(sorted(out, key=lambda info: info.span))
 
@@ -137,6 +140,7 @@ def _info(
         "" if verdict.determinant is None else _term(verdict.determinant),
         moved_by=moved,
         calls=calls,
+        searched=bool(verdict.searched),
     )
 
 
@@ -221,10 +225,17 @@ def condition_markdown(info: ConditionInfo) -> str:
     if info.problem:
         first = f"**no diffeomorphism** over {code(over)}: {info.problem}"
         return "\n".join([first, *(f"\n{note}" for note in info.notes)])
+    if info.searched:
+        first = f"**no diffeomorphism** over {code(over)}: where {code(info.equation)} has no closed form"
+        return "\n".join([first, "", *_facts(info)])
     all_of_it = ", ".join((*info.coordinates, *info.missing))
     lines = [fence(f"diffeo({all_of_it})"), f"a diffeomorphism of {code(over)}"]
     if info.missing:
         lines[-1] += f", completed by {code(', '.join(info.missing))}"
+    return "\n".join([*lines, "", *_facts(info)])
+
+
+def _facts(info: ConditionInfo) -> list[str]:
     facts = [f"- {_moved(info.moved_by)}" + ("" if info.moved_by else ": it adds nothing to a derivative")]
     for root in info.roots:
         facts.append(f"- surface: {code(f'{info.pivot} = {root}')}")
@@ -236,7 +247,7 @@ def condition_markdown(info: ConditionInfo) -> str:
         facts.append(f"- determinant: {code(info.determinant)}")
     if info.calls:
         facts.append(f"- inside {', called by '.join(code(c) for c in reversed(info.calls))}")
-    return "\n".join([*lines, "", *facts])
+    return facts
 
 
 def inverse_text(values: Iterable[str], branch: Iterable[str]) -> str:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from potto.calculus.verdict import Problem, judge
+from potto.calculus.verdict import Problem, Role, judge
 from potto.core.printer import format_term
 from potto.core.simplify import simplify
 from potto.core.terms import Branch, Hole, Term, postorder
@@ -80,14 +80,16 @@ def _bracket(place: At, chunk: ChunkAt, condition: Expr, said: Diagnostic) -> It
 
 def completed_diffeo(place: At, chunk: ChunkAt, condition: Expr) -> str | None:
     """`diffeo(…)` for a comparison over variables of integration, with the coordinates that complete it."""
-    verdict = judged(place.db, chunk, condition)
+    verdict = judged(place.db, chunk, condition, "map")
     if not isinstance(verdict, tuple):
         return None
     shown = [format_term(simplify(part)) for part in verdict]
     return f"diffeo({', '.join(shown)})"
 
 
-def judged(db: Database, chunk: ChunkAt, condition: Expr) -> tuple[Term, ...] | Problem | None:
+def judged(
+    db: Database, chunk: ChunkAt, condition: Expr, role: Role = "bracket"
+) -> tuple[Term, ...] | Problem | None:
     """The coordinates of a comparison over variables of integration, completed, or why there are none; None for what is
     no comparison over them."""
     term = compared(db, chunk, condition)
@@ -98,7 +100,7 @@ def judged(db: Database, chunk: ChunkAt, condition: Expr) -> tuple[Term, ...] | 
     used = tuple(v for v in variables if any(v in c.free for c in term.coordinates))
     if not used:
         return None
-    verdict = judge(term.coordinates, variables, {})
+    verdict = judge(term.coordinates, variables, {}, role=role)
     return verdict if isinstance(verdict, Problem) else (*term.coordinates, *verdict.completion)
 
 

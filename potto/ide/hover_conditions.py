@@ -115,7 +115,7 @@ def _plain(db: Database, chunk: ChunkAt, name: str, condition: nodes.Expr) -> st
 
 def _judged(db: Database, chunk: ChunkAt, comparison: nodes.Expr) -> str | None:
     """What a comparison over variables of integration is in brackets."""
-    verdict = judged(db, chunk, comparison)
+    verdict = judged(db, chunk, comparison, "map")
     if isinstance(verdict, Problem):
         return "\n\n".join([f"**no diffeomorphism**: {verdict.message}", *verdict.notes])
     if verdict is None:

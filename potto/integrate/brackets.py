@@ -8,14 +8,11 @@ what brings it forth; what is given up on, once there are too many cells, is tol
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
-from potto.calculus.derivative import NotSmooth, partial
-from potto.core.simplify import simplify
-from potto.core.terms import Term
-from potto.integrate.intervals import Interval, enclosure, known
+from potto.core.terms import Proj, Term, Var, children, postorder, rebuild, var
+from potto.integrate.intervals import Interval, enclosure
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 
 FINEST = 48  # halvings of the whole
@@ -34,20 +31,9 @@ class Brackets:
     complete: bool
 
 
-@lru_cache(maxsize=4096)
-def slope_of(surface: Term, variable: str) -> Term | None:
-    """The surface's derivative along the variable if both can be enclosed."""
-    if not known(surface):
-        return None
-    try:
-        slope = simplify(partial(surface, variable))
-    except NotSmooth:
-        return None
-    return slope if known(slope, jumps=True) else None
-
-
 def isolated(surface: Term, slope: Term, variable: str, env: dict[str, Value], low: Array, high: Array) -> Brackets:
     """The sign changes of a surface between bounds (B,), which may be infinite."""
+    (surface, slope), env = _flat((surface, slope), env)
     fixed: dict[str, Interval] = {}
     for name in surface.free - {variable}:
         value = env[name]
@@ -100,6 +86,22 @@ def _around_poles(
         for i in np.nonzero(crossed)[0]:
             crossed[i] = not ((o == owner[i]) & (b >= s0[i]) & (a <= s1[i])).any()
     return owner[crossed], s0[crossed], s1[crossed]
+
+
+def _flat(terms: tuple[Term, ...], env: dict[str, Value]) -> tuple[list[Term], dict[str, Value]]:
+    """Terms with a name of its own for each component of a tuple, and their values."""
+    parts: dict[Term, Value] = {}
+    memo: dict[Term, Term] = {}
+    for node in postorder(*terms):
+        if isinstance(node, Var) and isinstance(env.get(node.name), tuple):
+            parts[node] = env[node.name]
+        if isinstance(node, Proj) and node.term in parts:
+            parts[node] = parts[node.term][node.index]  # type: ignore[index]
+            memo[node] = var(f"component {len(parts)}")
+        else:
+            memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
+    named = {new.name: parts[old] for old, new in memo.items() if old in parts and isinstance(new, Var)}
+    return [memo[term] for term in terms], {**env, **named}
 
 
 @dataclass

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from potto.calculus.enclosable import monotone
 from potto.core.terms import Branch, Const, If, Prim, Term, Var, postorder
 from potto.integrate.rules import EPS
 from potto.kernels.support import function
@@ -23,18 +24,8 @@ ANYTHING: Interval = (-np.inf, np.inf)
 ROUNDING = 4 * EPS  # of one operation, functions of libraries included, relative
 
 
-def known(term: Term, jumps: bool = False) -> bool:
-    """Whether a term can be enclosed: arithmetic and builtins, and conditionals if it may jump."""
-    return all(
-        isinstance(node, Const | Var)
-        or (isinstance(node, Prim) and (node.op in _RULES or _monotone(node.op)))
-        or (jumps and isinstance(node, Branch | If))
-        for node in postorder(term)
-    )
-
-
 def enclosure(terms: tuple[Term, ...], box: Mapping[str, Interval]) -> list[Interval]:
-    """Bounds of the values of terms, which are `known`, for variables in a box."""
+    """Bounds of the values of terms, which are `enclosable`, for variables in a box."""
     found: dict[Term, Interval] = {}
     with np.errstate(all="ignore"):
         for node in postorder(*terms):
@@ -50,7 +41,7 @@ def _node(node: Term, found: Mapping[Term, Interval], box: Mapping[str, Interval
             return box[name]
         case Prim(op=op, args=args) if op in _RULES:
             return _outwards(*_RULES[op](node, [found[a] for a in args]))
-        case Prim(op=op, args=(arg,)) if _monotone(op):
+        case Prim(op=op, args=(arg,)) if monotone(op):
             return _outwards(*_along(op, found[arg]))
         case Branch() | If():
             a, b = found[node.then], found[node.orelse]
@@ -65,11 +56,6 @@ def _outwards(lo: Any, hi: Any) -> Interval:
         np.where(np.isnan(lo), -np.inf, lo - ROUNDING * np.abs(lo)),
         np.where(np.isnan(hi), np.inf, hi + ROUNDING * np.abs(hi)),
     )
-
-
-def _monotone(op: str) -> bool:
-    entry = PRIMITIVES.get(op)
-    return entry is not None and entry.increasing != 0 and entry.arity == 1
 
 
 def _along(op: str, a: Interval) -> Interval:
@@ -134,6 +120,8 @@ def _whole_power(a: Interval, n: int) -> Interval:
 def _pow(node: Prim, args: list[Interval]) -> Interval:
     base, (low, high) = args
     exponent = node.args[1]
+    if isinstance(exponent, Const) and exponent.value == 0:
+        return np.ones_like(base[0]), np.ones_like(base[1])  # also at 0
     if isinstance(exponent, Const) and exponent.value.is_integer() and 0 < abs(exponent.value) < 1e6:
         whole = _whole_power(base, int(abs(exponent.value)))
         return whole if exponent.value > 0 else _inverse(whole)

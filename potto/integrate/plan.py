@@ -16,10 +16,16 @@ import numpy as np
 
 from potto.calculus.cases import cased
 from potto.calculus.hoist import hidden, hoisted
-from potto.calculus.surfaces import Decide, Resolve, findings
+from potto.calculus.lifted import Lifted, lifted, nested
+from potto.calculus.regions import Number
+from potto.calculus.sides import box_of as extents
+from potto.calculus.surfaces import Decide, Finding, Resolve, findings
 from potto.calculus.sweep import Cut, Level, sweep
 from potto.calculus.trace import layout
+from potto.calculus.unrolled import unrolled
+from potto.calculus.verdict import monotone
 from potto.core.terms import (
+    App,
     Branch,
     Const,
     Deriv,
@@ -29,10 +35,13 @@ from potto.core.terms import (
     ListOf,
     Prim,
     Proj,
+    Sum,
     Term,
     Tuple,
+    integral,
     lam,
     neg,
+    outside,
     postorder,
     prim,
     tuple_,
@@ -91,6 +100,9 @@ class Plan:
     box: how members of a batch are recognized that no surface cuts, where that can be told.
     doublings: how often its surfaces double what quadrature takes, about: up to three times each.
     straight: its terms where it can be integrated by rules that are proved to do, if the parameters let it.
+    premise: what has to be positive for the plan to hold: for these parameters some cases are never met.
+    confused: whether there are conditions inside of conditions that were not told apart.
+    folds: whether a surface that is searched for may have folds, of which the variables further out know nothing.
     """
 
     term: Integral
@@ -104,6 +116,9 @@ class Plan:
     box: Box | None = None
     doublings: int = 0
     straight: Straight | None = None
+    premise: Lam | None = None
+    confused: bool = False
+    folds: bool = False
 
     def environment(self, env: dict[str, Value], everything: dict[str, Value]) -> dict[str, Value]:
         """What the plan is evaluated in: also what functions have captured, if calls of them were carried out."""
@@ -135,10 +150,11 @@ def function_of(term: Term) -> Lam:
     return lam(tuple(sorted(term.free)), term)
 
 
-def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve) -> Plan:
+def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve, number: Number) -> Plan:
     """The plan of an integral. `resolve` gives the functions that it calls, `decide` the values of plain terms.
 
-    `inline` gives those of the functions that a call of them may be replaced by.
+    `inline` gives those of the functions that a call of them may be replaced by. `number` gives what a plain term is
+    for some of the parameters, or nan.
     """
     decisions: dict[Term, float | None] = {}
     unknown: set[Term] = set()
@@ -156,6 +172,15 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve) -> P
 
     term = cased(term)
     found = findings(term.body, known, remember)
+    premises: tuple[Term, ...] = ()
+    confused = False
+    if any(map(_may_be_mixed, found)):
+        apart = _apart(term, inline, remember, number)
+        if apart is not None:
+            term, premises = apart.term, apart.premises
+            unknown.clear()
+            found = findings(term.body, known, remember)
+        confused = apart is None or any(nested(f.surface) for f in found if f.kind == "jump")
     hides = hidden(term, found, resolve)
     if unknown or hides:
         unknown.clear()
@@ -163,7 +188,7 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve) -> P
         found = findings(term.body, known, remember)
         hides = hidden(term, found, resolve)
     reaches = not unknown
-    swept = sweep(term, found, resolve, remember)
+    swept = sweep(term, found, resolve, remember, outermost=True)
     levels, groups = group_levels(swept.levels)
     numbers = {j.path: (g.number, j.orientation) for g in groups for j in g.cut.jumps}
     vanishing = vanishing_of(term.body, numbers)
@@ -173,7 +198,40 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve) -> P
     surfaces = {f.surface for f in found if f.kind != "center"}
     doublings = sum(min(3, len(surface.free.intersection(term.variables))) for surface in surfaces)
     plain = straight(term, levels, inline) if reaches and not hides else None
-    return Plan(term, levels, groups, body, vanishing, kept, reaches, hides, box, doublings, plain)
+    return Plan(
+        term, levels, groups, body, vanishing, kept, reaches, hides, box, doublings, plain, _premise(premises),
+        confused, _may_fold(term, levels),
+    )  # fmt: skip
+
+
+def _may_fold(term: Integral, levels: Sequence[LevelPlan]) -> bool:
+    """Whether roots that are searched for may appear or merge as variables further out vary."""
+    inner = [(cut.surface, level.variable) for level in levels[1:] for cut in level.searched if cut.decides]
+    if not inner:
+        return False
+    bounds = extents(term)
+    return not all(monotone(surface, variable, bounds) for surface, variable in inner)
+
+
+def _may_be_mixed(found: Finding) -> bool:
+    """Whether a surface may be several, as conditions inside of it fall."""
+    parts = outside(found.surface, (Integral, Sum, Lam)) if found.kind == "jump" else ()
+    return any(isinstance(part, Branch | App) for part in parts)
+
+
+def _apart(term: Integral, inline: Resolve, decide: Decide, number: Number) -> Lifted | None:
+    """The integral with the conditions that stand in conditions taken out of them; None if there are too many cases."""
+    body = unrolled(term.body, inline, decide)
+    if body is None:
+        return None
+    return lifted(integral(term.variables, term.bounds, body, term.hints), number)
+
+
+def _premise(premises: tuple[Term, ...]) -> Lam | None:
+    """The least of what has to be positive."""
+    if not premises:
+        return None
+    return function_of(premises[0] if len(premises) == 1 else prim("min", *premises))
 
 
 def group_levels(levels: Sequence[Level]) -> tuple[tuple[LevelPlan, ...], tuple[Group, ...]]:

@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from potto.calculus.enclosable import slope_of
 from potto.core.terms import Lam, Term, lam
-from potto.integrate.brackets import Brackets, isolated, slope_of
+from potto.integrate.brackets import Brackets, isolated
 from potto.integrate.cuts import SEARCHED, Row, as_array
 from potto.integrate.pieces import still
 from potto.integrate.plan import LevelPlan, function_of

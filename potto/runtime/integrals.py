@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import operator
+from collections.abc import Iterable
 from contextlib import AbstractContextManager
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
@@ -28,9 +29,10 @@ from potto.runtime.choices import many, orders, preferred, too_many
 from potto.runtime.convergence import allowance, missing, widest
 from potto.runtime.differences import by_differences
 from potto.runtime.elimination import ACCURATE, WORTH, step_by_step
+from potto.runtime.folds import beside_another
 from potto.runtime.members import Ways, Whole, by_members
 from potto.runtime.one_sided import beside_axes, beside_folds, from_both_sides, one_direction
-from potto.runtime.plans import Linked, link, plan_for, split_by_decisions
+from potto.runtime.plans import Linked, Mixed, link, plan_for, split_by_decisions
 
 if TYPE_CHECKING:
     from potto.runtime.machine import Machine
@@ -93,14 +95,41 @@ def _grouped(
     """What an integral amounts to; members for which recursions take different courses apart from one another."""
     groups = split_by_decisions(machine, term, linked, batch)
     if groups is None:
-        return _vouched(machine, term, linked, batch, outermost)
+        return _in_cases(machine, term, linked, flat, batch, outermost)
+    return _in_groups(machine, term, flat, batch, groups, outermost)
+
+
+def _in_groups(
+    machine: Machine, term: Integral, flat: dict[str, Value], batch: int, groups: Iterable[Ints], outermost: bool
+) -> Sums:
+    """The integrals of a batch, group by group."""
     found = Whole(batch)
     for index in groups:
-        there = link({n: map_arrays(v, operator.itemgetter(index)) for n, v in flat.items()})
+        here = {n: map_arrays(v, operator.itemgetter(index)) for n, v in flat.items()}
         with machine.books.among(index) as met:
-            found.put(index, _vouched(machine, term, there, index.size, outermost))
+            found.put(index, _in_cases(machine, term, link(here), here, index.size, outermost))
         machine.books.met.take(met, index)
     return found.sums
+
+
+def _in_cases(
+    machine: Machine, term: Integral, linked: Linked, flat: dict[str, Value], batch: int, outermost: bool
+) -> Sums:
+    """The integrals of a batch, those together that meet the same cases of conditions inside of conditions."""
+    try:
+        with machine.books.apart() as met:
+            sums = _vouched(machine, term, linked, batch, outermost)
+        machine.books.met.take(met, np.arange(batch))
+        return sums
+    except Mixed as mixed:
+        fits = np.asarray(mixed.fits)
+    if batch == 1:
+        raise AssertionError("a plan that does not hold for what it was made for")
+    if fits.shape != (batch,):  # it was found out about a part of them
+        fits = np.arange(batch) < batch // 2
+    fits[0] = True  # the plan was made for it
+    groups = (np.nonzero(fits)[0], np.nonzero(~fits)[0]) if not fits.all() else np.array_split(np.arange(batch), 2)
+    return _in_groups(machine, term, flat, batch, groups, outermost)
 
 
 def _vouched(machine: Machine, term: Integral, linked: Linked, batch: int, outermost: bool) -> Sums:
@@ -167,8 +196,10 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
             plain = certain(plan.straight, machine, linked.env)
             if plain is not None:
                 return plain
-        sums = counted(in_parts(plan, machine, plan.environment(env, linked.env), batch), plan.reaches, machine)
+        sums = counted(in_parts(plan, machine, plan.environment(env, linked.env), batch), plan, machine)
         if not met.degenerate:
+            if plan.folds:
+                beside_another(machine, order, linked, env, batch, sums, iterated)
             if outermost and met.sided and not machine.side:
                 from_both_sides(machine, plan, plan.environment(env, linked.env), batch, sums, iterated)
             if outermost and met.folds:
@@ -206,7 +237,9 @@ def _batch(machine: Machine, term: Integral, linked: Linked, batch: int) -> Sums
 
     def settled(order: Integral, here: Linked, size: int, sums: Sums) -> Sums:
         plan = plan_for(machine, order, here)
-        sums = counted(sums, plan.reaches, machine)
+        sums = counted(sums, plan, machine)
+        if plan.folds:
+            beside_another(machine, order, here, here.env, size, sums, iterated)
         if machine.books.met.sided and not machine.side:
             from_both_sides(machine, plan, plan.environment(here.env, here.env), size, sums, iterated)
         return turned_round(machine, order, here, here.env, size, sums)
@@ -227,7 +260,7 @@ def _sampled(machine: Machine, term: Integral, linked: Linked, env: dict[str, Va
     from potto.integrate.sampling import sample
 
     plan, method = plan_for(machine, term, linked), machine.settings.method
-    sums = counted(sample(plan, machine, plan.environment(env, linked.env), batch, method), plan.reaches, machine)
+    sums = counted(sample(plan, machine, plan.environment(env, linked.env), batch, method), plan, machine)
     machine.books.methods.add("mc" if method == "mc" else "qmc")
     sums.et[:, :, _left_out(machine, batch)] = np.inf  # what crosses those that were left out is not known
     return sums
@@ -271,9 +304,15 @@ def turned_round(
     return sums
 
 
-def counted(sums: Sums, known: bool, machine: Machine) -> Sums:
-    """The sums, with derivatives that no one vouches for where not all jumps could be taken account of."""
-    if machine.directions and not known:
+def counted(sums: Sums, plan: Plan, machine: Machine) -> Sums:
+    """The sums, with derivatives that no one vouches for where not all jumps could be taken account of, and of values
+    by quadrature where it is not known where they are."""
+    if plan.confused:
+        machine.note_unfinished("conditions inside of conditions make more cases than can be told apart")
+        sums.et = np.full_like(sums.et, np.inf)
+        if "quadrature" in machine.books.methods:
+            sums.e = np.full_like(sums.e, np.inf)
+    elif machine.directions and not plan.reaches:
         machine.note_unfinished("a condition jumps inside an inner integral where its boundary term is not counted")
         sums.et = np.full_like(sums.et, np.inf)
     return sums
@@ -305,10 +344,12 @@ def in_parts(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) ->
     return sums
 
 
-def iterated(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> Sums:
+def iterated(
+    plan: Plan, machine: Machine, env: dict[str, Value], batch: int, start_order: int = START_ORDER
+) -> Sums:
     """Iterated quadrature with cuts."""
     if batch <= BATCH:
-        return Iteration(plan, machine, START_ORDER).run(0, env, batch, {}, machine)
+        return Iteration(plan, machine, start_order).run(0, env, batch, {}, machine)
     with one_thread():
         order = best_order(plan, machine, env, batch)
         parts = []

@@ -6,6 +6,7 @@ the course that recursions and sums take in it; members of a batch that take dif
 
 from __future__ import annotations
 
+import math
 import threading
 from collections import OrderedDict
 from dataclasses import dataclass
@@ -14,11 +15,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from potto.calculus.deciding import deciding
+from potto.calculus.sampling import sample_value
 from potto.core.terms import Deriv, Integral, Lam, Term, Var, deriv, substitute, var
 from potto.diagnostics import PottoError
 from potto.integrate.eliminated import Eliminated, eliminated
+from potto.integrate.pieces import still
 from potto.integrate.plan import Plan, make
-from potto.kernels.cells import Cell, Value
+from potto.kernels.cells import Array, Bools, Cell, Value, map_arrays
 from potto.runtime.functions import Closure, Derivative
 
 if TYPE_CHECKING:
@@ -77,20 +80,68 @@ def plan_for(machine: Machine, term: Integral, linked: Linked) -> Plan:
     with _lock:
         candidates = list(_plans.get(key, ()))
     for plan in candidates:
-        if all(decide(machine, t, linked) == value for t, value in plan.decisions):
+        if all(decide(machine, t, linked) == value for t, value in plan.decisions) and _holds(plan, machine, linked):
             return plan
     plan = make(
         term,
         lambda head: linked.functions.get(head.name) if isinstance(head, Var) else machine.linker.function(head),
         lambda plain: decide(machine, plain, linked),
         lambda head: _plainly(head, linked) if isinstance(head, Var) else machine.linker.function(head),
+        _Numbers(machine, linked),
     )
     with _lock:
         _plans.setdefault(key, []).append(plan)
         _plans.move_to_end(key)
         if len(_plans) > MOST_PLANS:
             _plans.popitem(last=False)
+    if not _holds(plan, machine, linked):
+        raise Mixed(_fitting(plan, machine, linked))
     return plan
+
+
+class Mixed(Exception):
+    """Members of a batch for which the plan of the first one does not hold. `fits`: for which it does."""
+
+    def __init__(self, fits: Bools) -> None:
+        self.fits = fits
+
+
+def _holds(plan: Plan, machine: Machine, linked: Linked) -> bool:
+    return plan.premise is None or bool(np.all(_fitting(plan, machine, linked)))
+
+
+def _fitting(plan: Plan, machine: Machine, linked: Linked) -> Bools:
+    """The members of a batch for which a plan holds."""
+    assert plan.premise is not None
+    env = {name: still(linked.env[name]) for name in plan.premise.params}
+    found = machine.with_directions(0).evaluate(plan.premise, env, None)
+    assert isinstance(found, Cell)
+    holds: Bools = np.asarray(found.v) > 0
+    return holds
+
+
+class _Numbers:
+    """What plain terms are for the first member of a batch, or nan."""
+
+    def __init__(self, machine: Machine, linked: Linked) -> None:
+        self.machine = machine
+        self.first = {n: map_arrays(still(v), _first) for n, v in linked.env.items()}
+        self.point = {n: v.v for n, v in self.first.items() if isinstance(v, Cell) and isinstance(v.v, float)}
+        self.known: dict[Term, float] = {}
+
+    def __call__(self, plain: Term) -> float:
+        found = sample_value(plain, self.point, self.known)
+        if found == found or not plain.free <= self.first.keys():
+            return found
+        try:
+            value = self.machine.with_directions(0).term(plain, {name: self.first[name] for name in plain.free})
+        except PottoError:
+            return math.nan
+        return value.v if isinstance(value, Cell) and isinstance(value.v, float) else math.nan
+
+
+def _first(numbers: Array) -> Any:
+    return float(numbers.reshape(-1)[0])
 
 
 def eliminated_for(machine: Machine, term: Integral, linked: Linked) -> Eliminated | None:

@@ -13,6 +13,8 @@ from potto.calculus.deltas import without_deltas
 from potto.calculus.derivative import NotSmooth
 from potto.calculus.dual import Differentiator
 from potto.calculus.expand import expanded
+from potto.calculus.joined import joined
+from potto.calculus.lifted import closed_value, lifted, nested
 from potto.calculus.pivots import NoClosedForm
 from potto.calculus.shifted import shifted
 from potto.calculus.tangents import FUNCTION, NotShifted, Shape, Shapes
@@ -52,8 +54,10 @@ FEW = 4  # branches that one integrand may have before its summands are integrat
 @lru_cache(maxsize=4096)
 def prepared(term: Integral) -> Term:
     """An equal term, or the same one where there is nothing to be done. Raises PottoError (a product of deltas)."""
-    if any(isinstance(node, Delta) for node in postorder(term.body)):
-        return without_deltas(term)
+    deltas = [node for node in postorder(term.body) if isinstance(node, Delta)]
+    if deltas:
+        apart = lifted(term, closed_value) if any(map(nested, (d.coordinates[0] for d in deltas))) else None
+        return without_deltas(term if apart is None else apart.term)
     body = term.body
     if isinstance(body, Sum) and not (body.lo.free | body.hi.free) & set(term.variables):
         return sum_(body.variable, body.lo, body.hi, _over(term, body.body))
@@ -71,9 +75,9 @@ def placed(term: Integral, reach: Reach, shapes: Shapes, again: bool) -> Term:
     derivative under it, of a function that jumps, the deltas count (`_counted`).
 
     shapes: how the values of free variables are built. again: whether it is to be differentiated.
-    Raises PottoError.
+    Integrals inside that can be joined with it are. Raises PottoError.
     """
-    term = _opened(term, reach)
+    term = _opened(joined(term, reach.resolve), reach)
     counted = _counted(term, reach, shapes, again)
     if not isinstance(counted, Integral):
         return counted

@@ -75,7 +75,9 @@ def test_condition_shows_what_completes_it(needle):
 def test_condition_without_a_diffeomorphism_says_why():
     f = fixture("def f(t)\n    integral ([0, 1], [0, 1]) [x^5 + x*y^3 + sin(x*y) + y^5 < t] d(x, y)\n")
     text = f.hover(" < t", 1)
-    assert text.startswith("**no diffeomorphism** over `x, y`: ")
+    assert text.startswith("**no diffeomorphism** over `x, y`: where ") and "the surface is found by numbers" in text
+    f = fixture("def f(t)\n    integral [0, 1] [0.3*[x < t] + x^3 - x $0< t] d(x)\n")
+    assert f.hover().startswith("**no diffeomorphism** over `x`: where ")
 
 
 def test_variable_of_integration_shows_its_domain_and_what_varies_with_it():

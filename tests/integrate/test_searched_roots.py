@@ -17,8 +17,9 @@ import pytest
 from scipy import special
 
 import potto
+from potto.calculus.enclosable import slope_of
 from potto.core.terms import add, const, mul, prim, sub, var
-from potto.integrate.brackets import isolated, slope_of
+from potto.integrate.brackets import isolated
 from potto.integrate.intervals import enclosure
 from potto.kernels.cells import Cell
 

@@ -1,0 +1,59 @@
+"""Which terms interval arithmetic can evaluate: their zeros can be searched for with certainty.
+
+Owns `enclosable` and `searchable`. The rules themselves, over batches of numbers, are in `integrate/intervals`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+from potto.calculus.derivative import NotSmooth, partial
+from potto.core.simplify import simplify
+from potto.core.terms import Branch, Const, If, Prim, Proj, Term, Var, children, postorder_by
+from potto.primitives import PRIMITIVES
+
+# Builtins with a rule of their own. Those of one argument that only rise, or only fall, need none.
+WITH_RULES = frozenset((
+    "abs", "add", "atan2", "clamp", "cos", "cosh", "div", "hypot",
+    "max", "min", "mul", "neg", "pow", "sign", "sin", "tan",
+))  # fmt: skip
+
+
+def enclosable(term: Term, jumps: bool = False) -> bool:
+    """Whether a term can be enclosed: arithmetic and builtins, and conditionals if it may jump."""
+    return all(
+        isinstance(node, Const | Var)
+        or (isinstance(node, Proj) and isinstance(node.term, Proj | Var))
+        or (isinstance(node, Prim) and (node.op in WITH_RULES or monotone(node.op)))
+        or (jumps and isinstance(node, Branch | If))
+        for node in postorder_by(term, _values)
+    )
+
+
+def _values(node: Term) -> Sequence[Term]:
+    """What a term's value is made of: of a conditional both sides, whatever decides."""
+    return (node.then, node.orelse) if isinstance(node, Branch | If) else children(node)
+
+
+def monotone(op: str) -> bool:
+    """Whether a builtin of one argument rises or falls all over its domain."""
+    entry = PRIMITIVES.get(op)
+    return entry is not None and entry.increasing != 0 and entry.arity == 1
+
+
+@lru_cache(maxsize=4096)
+def slope_of(surface: Term, variable: str) -> Term | None:
+    """The surface's derivative along the variable if both can be enclosed."""
+    if not enclosable(surface):
+        return None
+    try:
+        slope = simplify(partial(surface, variable))
+    except NotSmooth:
+        return None
+    return slope if enclosable(slope, jumps=True) else None
+
+
+def searchable(surface: Term, variable: str) -> bool:
+    """Whether the zeros of a surface along a variable can be searched for so that none is missed."""
+    return slope_of(surface, variable) is not None
