@@ -15,7 +15,7 @@ import numpy as np
 from potto.calculus.derivative import NotSmooth, partial
 from potto.core.simplify import simplify
 from potto.core.terms import Term
-from potto.integrate.intervals import Interval, enclosure, known
+from potto.integrate.intervals import Interval, enclosure, everywhere, known
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 
 FINEST = 48  # halvings of the whole
@@ -102,6 +102,18 @@ def _around_poles(
     return owner[crossed], s0[crossed], s1[crossed]
 
 
+def at_label(low: Array, high: Array, s: Array) -> Array:
+    """The places of labels in [0, 1] between bounds that may be infinite."""
+    with np.errstate(all="ignore"):
+        x = low + (high - low) * s
+        if np.isfinite(x).all():
+            return np.where(s == 1, high, x)
+        up, down = low + s / (1 - s), high - (1 - s) / s
+        whole = (2 * s - 1) / (4 * s * (1 - s))
+    x = np.where(np.isinf(high), np.where(np.isinf(low), whole, up), np.where(np.isinf(low), down, x))
+    return np.where(s == 0, low, np.where(s == 1, high, x))
+
+
 @dataclass
 class _Cells:
     surface: Term
@@ -111,17 +123,12 @@ class _Cells:
     low: Array
     high: Array
 
+    def __post_init__(self) -> None:
+        self.total = everywhere(self.surface)
+
     def x(self, owner: Ints, s: Array) -> Array:
         """The places of labels in [0, 1], also where a bound is infinite."""
-        low, high = self.low[owner], self.high[owner]
-        with np.errstate(all="ignore"):
-            x = low + (high - low) * s
-            if np.isfinite(x).all():
-                return np.where(s == 1, high, x)
-            up, down = low + s / (1 - s), high - (1 - s) / s
-            whole = (2 * s - 1) / (4 * s * (1 - s))
-        x = np.where(np.isinf(high), np.where(np.isinf(low), whole, up), np.where(np.isinf(low), down, x))
-        return np.where(s == 0, low, np.where(s == 1, high, x))
+        return at_label(self.low[owner], self.high[owner], s)
 
     def at(self, owner: Ints) -> dict[str, Interval]:
         return {n: (v[0][owner], v[1][owner]) if isinstance(v[0], np.ndarray) else v for n, v in self.fixed.items()}
@@ -139,10 +146,18 @@ class _Cells:
         with np.errstate(invalid="ignore", over="ignore"):  # mean values: closer than the enclosure in small cells
             far = np.maximum(np.abs(least), np.abs(most)) * reach
             apart = (here[0] - far > 0) | (here[1] + far < 0)
-        free = (lo > 0) | (hi < 0) | apart
-        settled = ~free & ((least >= 0) | (most <= 0))
+            steady = (least >= 0) | (most <= 0)
+        if not self.total:  # a slope says nothing across the edge of where the surface has a value
+            whole = ~(self.nowhere(owner, a) | self.nowhere(owner, b))
+            apart, steady = apart & whole, steady & whole
+        free = (lo > 0) | (hi < 0) | np.isnan(lo) | apart
+        settled = ~free & steady
         index = np.nonzero(settled)[0]
         return index, self.crossed(owner[index], s0[index], s1[index]), np.nonzero(~free & ~settled)[0]
+
+    def nowhere(self, owner: Ints, x: Array) -> Bools:
+        lo, _ = enclosure((self.surface,), {**self.at(owner), self.variable: (x, x)})[0]
+        return np.broadcast_to(np.isnan(lo), x.shape)
 
     def value(self, owner: Ints, x: Array) -> Array:
         """The surface at places, nan where nothing is known of it."""

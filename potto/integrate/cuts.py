@@ -96,7 +96,7 @@ class Cuts:
     """The outcome for one variable: orientation (B,), segments, whether anything moves, edges.
 
     brushes: edges at which only something further in changes. folds: where roots of one surface are at one place.
-    slivers: what may lie between cuts that are taken for one.
+    slivers: what may lie between cuts that are taken for one. lost: the most that cuts left out may matter.
     conflict: cuts that coincide move differently, which is harmless only where the integrand does not jump there.
     """
 
@@ -110,6 +110,7 @@ class Cuts:
     brushes: list[Edge] = field(default_factory=list)
     folds: list[Fold] = field(default_factory=list)
     slivers: list[Sliver] = field(default_factory=list)
+    lost: Array | None = None
 
 
 def as_array(x: Any, batch: int) -> Array:

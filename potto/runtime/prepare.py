@@ -16,6 +16,7 @@ from potto.calculus.expand import expanded
 from potto.calculus.pivots import NoClosedForm
 from potto.calculus.shifted import shifted
 from potto.calculus.tangents import FUNCTION, NotShifted, Shape, Shapes
+from potto.calculus.trace import spine
 from potto.core.terms import (
     App,
     Branch,
@@ -53,7 +54,13 @@ FEW = 4  # branches that one integrand may have before its summands are integrat
 def prepared(term: Integral) -> Term:
     """An equal term, or the same one where there is nothing to be done. Raises PottoError (a product of deltas)."""
     if any(isinstance(node, Delta) for node in postorder(term.body)):
-        return without_deltas(term)
+        try:
+            return without_deltas(term)
+        except (NoClosedForm, NotSmooth) as problem:
+            raise PottoError([NOT_COUNTED(
+                errors.NOWHERE, f"a delta under this integral was not integrated out: {problem}",
+                help="let its argument be smooth, and solvable for one of the variables of integration",
+            )]) from None  # fmt: skip
     body = term.body
     if isinstance(body, Sum) and not (body.lo.free | body.hi.free) & set(term.variables):
         return sum_(body.variable, body.lo, body.hi, _over(term, body.body))
@@ -78,7 +85,8 @@ def placed(term: Integral, reach: Reach, shapes: Shapes, again: bool) -> Term:
     if not isinstance(counted, Integral):
         return counted
     term, nodes = counted, postorder(counted)
-    if not any(isinstance(n, Delta) and any(isinstance(g, Global) for g in postorder(*n.coordinates)) for n in nodes):
+    if not any(isinstance(n, Delta) and any(isinstance(g, Global | App) for g in postorder(*n.coordinates))
+               for n in nodes):  # fmt: skip
         return term
     memo: dict[Term, Term] = {}
     for node in nodes:
@@ -96,8 +104,8 @@ def _opened(term: Integral, reach: Reach) -> Integral:
 
 
 def filled(term: Integral, env: dict[str, Value], reach: Reach) -> tuple[Integral, dict[str, Value]]:
-    """With the functions in the place of those parameters whose derivatives are taken in the integrand, or that lead to
-    derivatives themselves; what they have captured joins the environment under names of its own."""
+    """With the functions in the place of those parameters whose derivatives are taken in the integrand, that place its
+    deltas, or that lead to derivatives themselves; what they have captured joins the environment, renamed."""
     given = {name: value for name in term.free if isinstance(value := env[name], Closure)}
     derived = _derived_parameters(term) if given else ()
     while given:
@@ -121,8 +129,12 @@ def filled(term: Integral, env: dict[str, Value], reach: Reach) -> tuple[Integra
 
 @lru_cache(maxsize=4096)
 def _derived_parameters(term: Integral) -> tuple[str, ...]:
-    """The functions among the parameters whose derivatives are taken in an integrand."""
-    derived = (node.function for node in postorder(term.body) if isinstance(node, Deriv))
+    """The functions among the parameters whose derivatives are taken in an integrand, or that place its deltas."""
+    nodes = postorder(term.body)
+    derived = {node.function for node in nodes if isinstance(node, Deriv)}
+    for node in nodes:
+        if isinstance(node, Delta):
+            derived |= {spine(part)[0] for part in postorder(*node.coordinates) if isinstance(part, App)}
     return tuple(sorted({inner.name for inner in derived if isinstance(inner, Var)} & term.free))
 
 
