@@ -14,7 +14,7 @@ import numpy as np
 
 from potto.calculus.derivative import NotSmooth, partial
 from potto.core.simplify import simplify
-from potto.core.terms import Term
+from potto.core.terms import Branch, Term, postorder
 from potto.integrate.intervals import Interval, enclosure, everywhere, known
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 
@@ -43,7 +43,7 @@ def slope_of(surface: Term, variable: str) -> Term | None:
         slope = simplify(partial(surface, variable))
     except NotSmooth:
         return None
-    return slope if known(slope, jumps=True) else None
+    return slope if known(slope) else None
 
 
 def isolated(surface: Term, slope: Term, variable: str, env: dict[str, Value], low: Array, high: Array) -> Brackets:
@@ -125,6 +125,7 @@ class _Cells:
 
     def __post_init__(self) -> None:
         self.total = everywhere(self.surface)
+        self.branches = tuple(node.surface for node in postorder(self.surface) if isinstance(node, Branch))
 
     def x(self, owner: Ints, s: Array) -> Array:
         """The places of labels in [0, 1], also where a bound is infinite."""
@@ -150,6 +151,9 @@ class _Cells:
         if not self.total:  # a slope says nothing across the edge of where the surface has a value
             whole = ~(self.nowhere(owner, a) | self.nowhere(owner, b))
             apart, steady = apart & whole, steady & whole
+        for low, high in enclosure(self.branches, box):  # nor across a jump
+            one = (low > 0) | (high < 0)
+            apart, steady = apart & one, steady & one
         free = (lo > 0) | (hi < 0) | np.isnan(lo) | apart
         settled = ~free & steady
         index = np.nonzero(settled)[0]

@@ -25,12 +25,11 @@ NOWHERE: Interval = (np.nan, np.nan)  # of a term that has no value on a box
 ROUNDING = 4 * EPS  # of one operation, functions of libraries included, relative
 
 
-def known(term: Term, jumps: bool = False) -> bool:
-    """Whether a term can be enclosed: arithmetic and builtins, and conditionals if it may jump."""
+def known(term: Term) -> bool:
+    """Whether a term can be enclosed: arithmetic, builtins and conditionals."""
     return all(
-        isinstance(node, Const | Var)
+        isinstance(node, Const | Var | Branch | If)
         or (isinstance(node, Prim) and (node.op in _RULES or _monotone(node.op)))
-        or (jumps and isinstance(node, Branch | If))
         for node in postorder(term)
     )
 
@@ -64,7 +63,15 @@ def _node(node: Term, found: Mapping[Term, Interval], box: Mapping[str, Interval
             return _defined([found[a] for a in args], _RULES[op](node, [found[a] for a in args]))
         case Prim(op=op, args=(arg,)) if _monotone(op):
             return _defined([found[arg]], _along(op, found[arg]))
-        case Branch() | If():
+        case Branch():
+            a, b = found[node.then], found[node.orelse]
+            lo, hi = found[node.surface]
+            either = np.fmin(a[0], b[0]), np.fmax(a[1], b[1])
+            least, most = (
+                np.where(lo > 0, x, np.where(hi < 0, y, z)) for x, y, z in zip(a, b, either, strict=True)
+            )
+            return least, most
+        case If():
             a, b = found[node.then], found[node.orelse]
             return np.fmin(a[0], b[0]), np.fmax(a[1], b[1])
         case _:

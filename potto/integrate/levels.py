@@ -138,7 +138,8 @@ class Iteration:
         crossings = level.level.crossings
         if not (level.families or level.searched or crossings):
             return [], None
-        near = concentrated(self.plan, self.plan.levels.index(level), env, lo, hi, batch)
+        number = next((n for n, own in enumerate(self.plan.levels) if own is level), None)
+        near = None if number is None else concentrated(self.plan, number, env, lo, hi, batch)
         lo, hi, lost = near or (lo, hi, None)
         rows = searched_rows(level, env, lo, hi, batch, machine)
         return (rows + crossing_rows(level, env, lo, hi, batch, machine) if crossings else rows), lost

@@ -51,7 +51,7 @@ FEW = 4  # branches that one integrand may have before its summands are integrat
 
 
 @lru_cache(maxsize=4096)
-def prepared(term: Integral) -> Term:
+def prepared(term: Integral, reach: Reach) -> Term:
     """An equal term, or the same one where there is nothing to be done. Raises PottoError (a product of deltas)."""
     if any(isinstance(node, Delta) for node in postorder(term.body)):
         try:
@@ -66,10 +66,10 @@ def prepared(term: Integral) -> Term:
         return sum_(body.variable, body.lo, body.hi, _over(term, body.body))
     if isinstance(body, Prim) and body.op == "neg":
         inner = _over(term, body.args[0])
-        ready = prepared(inner)
+        ready = prepared(inner, reach)
         return neg(ready) if ready is not inner else term
     if isinstance(body, Prim) and body.op == "add":
-        return _apart(term, body)
+        return _apart(term, body, reach)
     return term
 
 
@@ -229,9 +229,9 @@ def _over(term: Integral, body: Term) -> Integral:
     return integral(term.variables, term.bounds, body, term.hints)
 
 
-def _apart(term: Integral, body: Prim) -> Term:
+def _apart(term: Integral, body: Prim, reach: Reach) -> Term:
     """Summands with surfaces of their own integrated by themselves, the others together."""
-    counts = [_branches(arg, frozenset(term.variables)) for arg in body.args]
+    counts = [_branches(arg, frozenset(term.variables), reach) for arg in body.args]
     if sum(counts) <= FEW and not any(isinstance(arg, Sum) for arg in body.args):
         return term
     smooth = [arg for arg, count in zip(body.args, counts, strict=True) if not count and not isinstance(arg, Sum)]
@@ -242,5 +242,12 @@ def _apart(term: Integral, body: Prim) -> Term:
     return add(*parts, *(_over(term, arg) for arg in rest))
 
 
-def _branches(term: Term, variables: frozenset[str]) -> int:
-    return sum(1 for node in postorder(term) if isinstance(node, Branch) and node.surface.free & variables)
+def _branches(term: Term, variables: frozenset[str], reach: Reach) -> int:
+    """The conditions that vary with some variables: written here, or in definitions that are called with them."""
+    count = 0
+    for node in postorder(term):
+        if isinstance(node, Branch):
+            count += bool(node.surface.free & variables)
+        elif isinstance(node, App) and isinstance(head := spine(node)[0], Global) and node.free & variables:
+            count += reach.branches(head)
+    return count

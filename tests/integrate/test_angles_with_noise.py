@@ -64,6 +64,13 @@ CASES: list[tuple[str, float, Callable[[Any], Any]]] = [
      lambda w: mp.sqrt(2*mp.pi)*cosine(w, normal(mp.mpf(0), mp.mpf(1)))),
     ("integral [0, inf] exp(-a)*[cos(a) > w] d(a)", 0.8,
      lambda w: cosine(w, lambda a, b: mp.exp(-a) - mp.exp(-b), 0, 20, mp.mpf(0))),
+    ("integral [0, inf] [sin(a) < w]*exp(-a) d(a)", 0.5,  # all but a geometric series
+     lambda w: 1 - (mp.exp(-mp.asin(w)) - mp.exp(mp.asin(w) - mp.pi))/(1 - mp.exp(-2*mp.pi))),
+    ("integral [0, inf] [tan(a) < w]*exp(-a) d(a)", 0.5,
+     lambda w: 1 - (mp.exp(-mp.atan(w)) - mp.exp(-mp.pi/2))/(1 - mp.exp(-mp.pi))),
+    ("integral [0, inf] [cos(a^2) < w]*exp(-a) d(a)", 0.3,  # 70^2/(2 pi) periods matter
+     lambda w: sum(mp.exp(-mp.sqrt(2*mp.pi*k + mp.acos(w))) - mp.exp(-mp.sqrt(2*mp.pi*(k + 1) - mp.acos(w)))
+                   for k in range(1000))),
     ("lit(w, 0.2)", 0.8, lambda w: cosine(w, NOISE)),
     ("integral (a ~ normal(0.6, 0.2)) above(cos(a), w) d(a)", 0.8, lambda w: cosine(w, NOISE)),
     ("exp(integral (a ~ normal(0.6, 0.2)) (if [cos(a) > w] then 1 else 0) d(a))", 0.8,
