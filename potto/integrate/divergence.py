@@ -14,6 +14,7 @@ import numpy as np
 
 from potto.integrate import maps
 from potto.integrate.forms import Totals
+from potto.integrate.maps import Segments
 from potto.integrate.pieces import Pieces, Sums
 from potto.integrate.rules import EPS, gauss
 from potto.kernels.cells import Array, Bools, Ints
@@ -31,6 +32,8 @@ NEAR, NEAR_TURNING = (1e-9, 1e-10, 1e-11, 0.3, 0.5, 0.8), (1e-4, 1e-5, 1e-6, 0.3
 POWER = 1e-5
 # Pieces that lie so close to an end are at it.
 AT = 1e-6
+# How many roundings of its ends a segment is long, at the least, whose values count.
+SLIVER = 256
 # A piece within a segment that is as small as this and still errs lies at a pole.
 SMALLEST = 1e-12
 
@@ -45,14 +48,15 @@ def given_up(work: Work, p: Pieces, found: Totals, sums: Sums) -> Sums:
     owner = work.seg.owner[p.segment]
     errors = p.error.reshape(work.width, -1, p.segment.size)[:, 0]
     blamed = (~(errors <= BLAMED * size[:, owner]) & hopeless[:, owner]).any(axis=0)
-    blamed &= ~_noise(work, p, errors, blamed)
+    sharp = _sharp(work.seg)
+    blamed &= ~_noise(work, p, errors, blamed) & sharp[p.segment]
     grows: Any = np.zeros((work.width, work.batch, 2), dtype=bool)  # to inf, to -inf
     lost: Any = np.zeros((work.width, work.batch), dtype=bool)
     low, high = p.u0 < AT, p.u1 > 1 - AT
     inside = blamed & (p.u1 - p.u0 < SMALLEST) & ~low & ~high
     if not inside.any() and not (blamed & (low | high)).any():
         return sums
-    index = np.nonzero(hopeless.any(axis=0)[work.seg.owner])[0]
+    index = np.nonzero(hopeless.any(axis=0)[work.seg.owner] & sharp)[0]
     for upper in (False, True):
         guilty = np.isin(index, p.segment[blamed & (high if upper else low)])
         if index.size:
@@ -72,6 +76,12 @@ def given_up(work: Work, p: Pieces, found: Totals, sums: Sums) -> Sums:
     gone = ~np.isfinite(v) & hopeless
     return Sums(v, np.where(gone, np.inf, sums.e), np.where(gone[:, None], np.nan, sums.t),
                 np.where(gone[:, None], np.inf, sums.et), gross=sums.gross)  # fmt: skip
+
+
+def _sharp(seg: Segments) -> Bools:
+    """Segments that are longer than a few roundings of their ends: on others nodes say nothing of how values grow."""
+    size = np.maximum(np.abs(seg.a), np.abs(seg.b))
+    return np.asarray((seg.b - seg.a > SLIVER * EPS * size) | ~np.isfinite(size))
 
 
 def _noise(work: Work, p: Pieces, errors: Array, blamed: Array) -> Bools:

@@ -39,11 +39,11 @@ def by_differences(
 
     evaluated: the integral for other parameters, of one member, without tangents.
     """
+    if batch > FEW or machine.exhausted():
+        return
     rough = ~(sums.et <= ROUGH * np.abs(sums.t)) & np.isfinite(sums.v)[:, None] & ~(sums.et <= machine.atol)
     if sums.gross is not None:
         rough &= ~(sums.et <= CANCELLED * np.where(np.isfinite(sums.gross), sums.gross, 0.0))
-    if batch > FEW or not rough.any() or machine.exhausted():
-        return
     for member in np.nonzero(rough.any(axis=(0, 1)))[0]:
         env = {n: map_arrays(v, lambda a, m=member: a[m]) for n, v in linked.env.items()}
         for d in np.nonzero(rough[:, :, member].any(axis=0))[0]:

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import itertools
 import operator
-from collections.abc import Iterator
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from potto.calculus.surfaces import TooDeep
-from potto.core.terms import Integral, integral
+from potto.core.terms import Integral
 from potto.diagnostics import PottoError
 from potto.integrate.boxes import uncut
 from potto.integrate.levels import Iteration
@@ -28,6 +28,7 @@ from potto.kernels.cells import Array, Cell, Number, Value, all_arrays, map_arra
 from potto.runtime.differences import by_differences
 from potto.runtime.elimination import ACCURATE, WORTH, step_by_step
 from potto.runtime.one_sided import beside_axes, beside_folds, from_both_sides, one_direction
+from potto.runtime.orders import orders, trials
 from potto.runtime.plans import Linked, link, plan_for, split_by_decisions
 
 if TYPE_CHECKING:
@@ -156,14 +157,17 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
     if outermost and (method in ("mc", "qmc") or (method == "auto" and too_many(machine, term, linked))):
         return _sampled(machine, term, linked, env, batch)
     machine.books.methods.add("quadrature")
-    for order in preferred(machine, term, linked):
+    for order, most in trials(machine, term, linked, outermost):
         machine.books.degenerate.clear()
         plan = plan_for(machine, order, linked)
         if batch == 1 and plan.straight is not None:
             plain = certain(plan.straight, machine, linked.env)
             if plain is not None:
                 return plain
-        sums = counted(in_parts(plan, machine, plan.environment(env, linked.env), batch), plan.reaches, machine)
+        found = within(most, plan, machine, plan.environment(env, linked.env), batch)
+        if found is None:
+            continue
+        sums = counted(found, plan.reaches, machine)
         if not machine.books.degenerate:
             if outermost and machine.books.sided and not machine.side:
                 from_both_sides(machine, plan, plan.environment(env, linked.env), batch, sums, iterated)
@@ -270,40 +274,21 @@ def counted(sums: Sums, known: bool, machine: Machine) -> Sums:
     return sums
 
 
-def orders(term: Integral) -> Iterator[Integral]:
-    """The integral as it is written, then with other variables innermost, where the bounds allow it.
-
-    A surface that runs along the innermost variable has no section in it; another variable then takes its place.
-    """
-    yield term
-    names = set(term.variables)
-    if any((lo.free | hi.free) & names for lo, hi in term.bounds):
-        return
-    count = len(term.variables)
-    for last in range(count - 1):
-        index = [i for i in range(count) if i != last] + [last]
-        yield integral(
-            tuple(term.variables[i] for i in index),
-            tuple(term.bounds[i] for i in index),
-            term.body,
-            tuple(term.hints[i] for i in index),
-        )
-
-
-def preferred(machine: Machine, term: Integral, linked: Linked) -> Iterator[Integral]:
-    """The orders, those first in which the fewest jumps have to be searched for."""
-    if not searches(machine, term, linked):
-        return orders(term)
-    return iter(sorted(orders(term), key=lambda order: searches(machine, order, linked)))
-
-
-def searches(machine: Machine, term: Integral, linked: Linked) -> int:
-    """How many jumps are searched for, having no closed form in the variable that they cut; 0 where none would be.
-
-    Each leaves, besides what it takes, unknown places further out where its roots merge.
-    """
-    plan = plan_for(machine, term, linked)
-    return sum(cut.decides for level in plan.levels for cut in level.searched)
+def within(most: int | None, plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> Sums | None:
+    """Quadrature; None where it takes more than so many evaluations a member."""
+    if most is None:
+        return in_parts(plan, machine, env, batch)
+    books = machine.books
+    kept = list(books.unfinished), dict(books.sided), dict(books.folds)
+    most += books.evaluations // books.members
+    if most >= machine.settings.max_evals:
+        return in_parts(plan, machine, env, batch)
+    tight = replace(machine, settings=replace(machine.settings, max_evals=most))
+    sums = in_parts(plan, tight, env, batch)
+    if not tight.exhausted():
+        return sums
+    books.unfinished[:], books.sided, books.folds = kept
+    return None
 
 
 def in_parts(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> Sums:

@@ -1,0 +1,63 @@
+"""In which orders the variables of an integral can be integrated, and which are tried first.
+
+Owns `orders` and `trials`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from potto.core.terms import Integral, integral
+from potto.runtime.plans import Linked, plan_for
+
+if TYPE_CHECKING:
+    from potto.runtime.machine import Machine
+
+TRIAL = 12_000  # evaluations that are spent on one order of variables before another one is tried
+
+
+def trials(machine: Machine, term: Integral, linked: Linked, outermost: bool) -> Iterator[tuple[Integral, int | None]]:
+    """Orders, and how many evaluations may go into trying them: where a jump is searched for, roots that merge further
+    out at places that are not known may make one order a hundred times as expensive as another."""
+    if outermost and machine.directions and len(term.variables) > 1:
+        found = list(preferred(machine, term, linked))
+        if len(found) > 1 and searches(machine, found[0], linked):
+            yield from ((order, TRIAL) for order in found)
+    yield from ((order, None) for order in preferred(machine, term, linked))
+
+
+def preferred(machine: Machine, term: Integral, linked: Linked) -> Iterator[Integral]:
+    """The orders, those first in which the fewest jumps have to be searched for."""
+    if not searches(machine, term, linked):
+        return orders(term)
+    return iter(sorted(orders(term), key=lambda order: searches(machine, order, linked)))
+
+
+def orders(term: Integral) -> Iterator[Integral]:
+    """The integral as it is written, then with other variables innermost, where the bounds allow it.
+
+    A surface that runs along the innermost variable has no section in it; another variable then takes its place.
+    """
+    yield term
+    names = set(term.variables)
+    if any((lo.free | hi.free) & names for lo, hi in term.bounds):
+        return
+    count = len(term.variables)
+    for last in range(count - 1):
+        index = [i for i in range(count) if i != last] + [last]
+        yield integral(
+            tuple(term.variables[i] for i in index),
+            tuple(term.bounds[i] for i in index),
+            term.body,
+            tuple(term.hints[i] for i in index),
+        )
+
+
+def searches(machine: Machine, term: Integral, linked: Linked) -> int:
+    """How many jumps are searched for, having no closed form in the variable that they cut; 0 where none would be.
+
+    Each leaves, besides what it takes, unknown places further out where its roots merge.
+    """
+    plan = plan_for(machine, term, linked)
+    return sum(cut.decides for level in plan.levels for cut in level.searched)
