@@ -25,7 +25,8 @@ P, Q = 0.998, 1.003
 def exact(pixel: Pixel, p: float = P, q: float = Q) -> tuple[Fraction, list[Fraction]]:
     """The area of p x + q y < c in the pixel, and its derivatives by a, b, c, w, for positive p and q."""
     a, b, c, w, p_, q_ = map(Fraction, (*pixel, p, q))
-    corners = [(sx, sy, max(c - p_ * (a + sx * w) - q_ * (b + sy * w), Fraction(0))) for sx in (-1, 1) for sy in (-1, 1)]
+    signs = [(sx, sy) for sx in (-1, 1) for sy in (-1, 1)]
+    corners = [(sx, sy, max(c - p_ * (a + sx * w) - q_ * (b + sy * w), Fraction(0))) for sx, sy in signs]
     area = sum(sx * sy * d * d for sx, sy, d in corners) / (2 * p_ * q_)
     slopes = [
         sum(sx * sy * d * rate(sx, sy) for sx, sy, d in corners) / (p_ * q_)
