@@ -24,7 +24,7 @@ from potto.integrate.roots import searched_rows
 from potto.integrate.steps import brush
 from potto.integrate.undefined import lost_members, sides_at
 from potto.integrate.work import Work
-from potto.kernels.cells import Array, Bools, Ints, Mask, Value
+from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value
 
 NARROW = 1e-4  # the part of the range of a variable up to which a stretch may lie on either side of a surface
 
