@@ -171,11 +171,11 @@ def at_bounds(node: Integral, rate: Rate) -> list[Term]:
 def between(at: Term, lo: Term, hi: Term, value: Term) -> Term:
     """`value` where lo < at < hi, minus it where hi < at < lo, 0 elsewhere and where `at` is not a number."""
     upward = value
-    if _finite(hi):
+    if finite(hi):
         upward = above(sub(hi, at), upward)
-    if _finite(lo):
+    if finite(lo):
         upward = above(sub(at, lo), upward)
-    if not (_finite(lo) and _finite(hi)) or range_of(sub(hi, lo)).lo >= 0:
+    if not (finite(lo) and finite(hi)) or range_of(sub(hi, lo)).lo >= 0:
         return exists(at, upward)
     downward = above(sub(lo, at), above(sub(at, hi), scaled(value, neg(ONE))))
     return exists(at, branch((sub(hi, lo),), False, upward, downward))
@@ -203,7 +203,8 @@ def above(surface: Term, value: Term) -> Term:
     return branch((surface,), True, value, zero_like(value))
 
 
-def _finite(bound: Term) -> bool:
+def finite(bound: Term) -> bool:
+    """Whether a bound is not known to be infinite."""
     bounds = range_of(bound)
     return not (bounds.lo == bounds.hi and abs(bounds.lo) == float("inf"))
 

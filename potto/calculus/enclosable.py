@@ -45,7 +45,7 @@ def monotone(op: str) -> bool:
 @lru_cache(maxsize=4096)
 def slope_of(surface: Term, variable: str) -> Term | None:
     """The surface's derivative along the variable if both can be enclosed."""
-    if not enclosable(surface):
+    if not enclosable(surface, jumps=True):
         return None
     try:
         slope = simplify(partial(surface, variable))
@@ -56,4 +56,4 @@ def slope_of(surface: Term, variable: str) -> Term | None:
 
 def searchable(surface: Term, variable: str) -> bool:
     """Whether the zeros of a surface along a variable can be searched for so that none is missed."""
-    return slope_of(surface, variable) is not None
+    return enclosable(surface) and slope_of(surface, variable) is not None

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from potto.calculus.boundary import total, vanishes
+from potto.calculus.deltas import STEP
 from potto.calculus.derivative import zero_like
 from potto.calculus.expand import Resolve, expanded, named
 from potto.calculus.tangents import NotShifted, Shapes, Site, Sites
@@ -46,7 +47,6 @@ from potto.core.terms import (
     var,
 )
 
-STEP = "step@"  # what the names of steps begin with, as no other does
 LINEAR, BEYOND = 1, 2  # how a term depends on tangents; 0: not at all
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal
 
+from potto.calculus.crossing import Crossing
 from potto.calculus.currying import arguments_of, groups_of, sizes_of, uncurry
 from potto.calculus.ranges import nonnegative
 from potto.calculus.trace import CallSite, Part, Side, layout, spine
@@ -43,7 +44,7 @@ from potto.primitives import PRIMITIVES
 DEEPEST = 2000
 _DEEPEST_SURFACE = 12
 
-Kind = Literal["jump", "kink", "edge", "center"]
+Kind = Literal["jump", "kink", "edge", "center", "crossing"]
 # Where a part of the program gets its functions from: a Lam for the head of a call, or None if it is not known here.
 Resolve = Callable[[Term], "Lam | Deriv | None"]
 # The value of a plain term (a condition: 1 or 0), or None where it is not decided.
@@ -55,7 +56,8 @@ class Finding:
     """One surface `surface = 0`, over the variables of the term that was searched.
 
     kind: a jump (a branch), a kink (abs, max), an edge, where the term stops being smooth or defined (sqrt at 0), or a
-        center, around which a smooth term may be concentrated (x - m in exp(-(x - m)^2), u in 1/(1 + exp(u))).
+        center, around which a smooth term may be concentrated (x - m in exp(-(x - m)^2), u in 1/(1 + exp(u))), or a
+        crossing: of `surface` and another one, inside an integral.
     path: for a jump, the sites of the trace that lead to the branch.
     calls: the calls on that path, for messages.
     """
@@ -66,6 +68,7 @@ class Finding:
     strict: bool = False
     coordinates: tuple[Term, ...] = ()
     calls: tuple[App, ...] = ()
+    crossing: Crossing | None = None
 
 
 class TooDeep(Exception):
@@ -91,7 +94,7 @@ def underlying(head: Term, resolve: Resolve) -> tuple[Lam | None, int]:
 def findings(term: Term, resolve: Resolve, decide: Decide = undecided) -> tuple[Finding, ...]:
     """All surfaces of a term, jumps with the trace that forces them. Raises TooDeep."""
     searched = _Search(resolve, decide).term(term, {}, (), (), 0)
-    found = tuple(replace(f, surface=carried_out(f.surface, resolve)) for f in searched)
+    found = tuple(_carried_out(f, resolve) for f in searched)
     ends = {end: None for f in found if f.kind == "jump" for end in _ends_of_domain(f.surface)}
     return (*found, *(Finding("kink", end) for end in ends))
 
@@ -107,6 +110,13 @@ def _ends_of_domain(surface: Term) -> Iterator[Term]:
             for end in () if entry.period else entry.edges(*node.args):
                 if not nonnegative(end):
                     yield from (piece for piece in pieces(end) if piece.free)
+
+
+def _carried_out(f: Finding, resolve: Resolve) -> Finding:
+    surface, crossing = carried_out(f.surface, resolve), f.crossing
+    if crossing is not None:
+        crossing = replace(crossing, first=surface, second=carried_out(crossing.second, resolve))
+    return replace(f, surface=surface, crossing=crossing)
 
 
 def carried_out(surface: Term, resolve: Resolve, depth: int = 0) -> Term:

@@ -8,11 +8,12 @@ decomposition in the manner of Collins, of the surfaces that a scene has, and of
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
 
 from potto.calculus.cases import cased
+from potto.calculus.crossing import Crossing
 from potto.calculus.radicals import minus
 from potto.calculus.ranges import positive
 from potto.calculus.solve import Family, Sections, Unsolvable, sections
@@ -84,13 +85,17 @@ class Product:
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """One variable of the iteration, with everything that cuts it."""
+    """One variable of the iteration, with everything that cuts it.
+
+    crossings: kinks where surfaces meet further in, if that has no closed form there.
+    """
 
     variable: str
     lo: Term
     hi: Term
     hints: tuple[Term, ...]
     cuts: tuple[Cut, ...]
+    crossings: tuple[Crossing, ...] = ()
 
 
 @dataclass(slots=True)
@@ -167,11 +172,18 @@ def sweep(
     """Place every surface of an integral's body at the variable that it cuts. outermost: nobody asks for the rest."""
     pool = _Pool()
     centers: dict[Term, None] = {}
+    crossings: dict[Crossing, None] = {}
+
+    def place(f: Finding) -> None:
+        if f.crossing is not None:
+            crossings[f.crossing] = None
+        elif f.kind != "center":
+            pool.put(f.surface, (f.path, f.strict) if f.kind == "jump" else None, f.kind == "edge")
+
     for f in found:
+        place(f)
         if f.kind == "center":
             centers[f.surface] = None
-            continue
-        pool.put(f.surface, (f.path, f.strict) if f.kind == "jump" else None, f.kind == "edge")
     levels: list[Level] = []
     rows = list(zip(term.variables, term.bounds, term.hints, strict=True))
     for variable, (lo, hi), hints in reversed(rows):
@@ -179,17 +191,24 @@ def sweep(
         cuts = (*(c for c in cuts if c.decides), *[c for c in cuts if not c.decides][:MOST_CUTS])
         here = [c for c in centers if variable in c.free]
         centers = {c: None for c in centers if variable not in c.free}
-        levels.append(Level(variable, lo, hi, (*hints, *points_of(here, variable)[:MOST_CENTERS]), cuts))
-        shadows = () if outermost and variable == term.variables[0] else _shadows(cuts, variable, lo, hi)
-        for surface, turning in shadows:
-            pool.put(surface, None, turning)
+        meeting = tuple(c for c in crossings if variable in c.free)
+        crossings = {c: None for c in crossings if variable not in c.free}
+        levels.append(Level(variable, lo, hi, (*hints, *points_of(here, variable)[:MOST_CENTERS]), cuts, meeting))
+        for shadow in () if outermost and variable == term.variables[0] else _shadows(cuts, variable, lo, hi):
+            if isinstance(shadow, Crossing):
+                crossings[shadow] = None
+            else:
+                pool.put(shadow[0], None, shadow[1])
         for bound in (lo, hi):
             for f in findings(bound, resolve, decide):
-                if f.kind != "center":
-                    pool.put(f.surface, None, f.kind == "edge")
+                if f.kind != "jump":
+                    place(f)
+                else:
+                    pool.put(f.surface, None, False)
     outer = (
         *(Finding(_kind(placed), placed.face.form) for placed in pool.surfaces.values()),
         *(Finding("center", surface) for surface in centers),
+        *(Finding("crossing", c.first, crossing=c) for c in crossings),
     )
     return Sweep(tuple(reversed(levels)), outer)
 
@@ -288,8 +307,8 @@ def points_of(centers: Iterable[Term], variable: str) -> tuple[Term, ...]:
     return tuple(points)
 
 
-def _shadows(cuts: tuple[Cut, ...], variable: str, lo: Term, hi: Term) -> Iterable[tuple[Term, bool]]:
-    """What the cuts of one variable leave in those further out: (surface, whether like a square root)."""
+def _shadows(cuts: tuple[Cut, ...], variable: str, lo: Term, hi: Term) -> Iterator[tuple[Term, bool] | Crossing]:
+    """What the cuts of one variable leave in those further out: (surface, whether like a square root), or crossings."""
     for cut in cuts:
         along = cut.surface if cut.product is None else cut.product.along
         for bound in (lo, hi):
@@ -301,17 +320,27 @@ def _shadows(cuts: tuple[Cut, ...], variable: str, lo: Term, hi: Term) -> Iterab
         if isinstance(found, Sections):
             for turn in found.turning:
                 yield turn, True
-    solved = [c for c in cuts if c.roots]
-    solved = [c for n, c in enumerate(solved) if n < (MOST_JUMPS if c.decides else MOST_PAIRS)]
-    for first in solved:
-        for second in solved:
+            for stop in dict.fromkeys(stop for family in found.families for stop in family.stops):
+                yield substitute(along, {variable: stop}), True
+    meeting = [c for c in cuts if c.roots or c.families or c.roots is None]
+    meeting = [c for n, c in enumerate(meeting) if n < (MOST_JUMPS if c.decides else MOST_PAIRS)]
+    for first in meeting:
+        for second in meeting:
             if first is not second and first.key.digest < second.key.digest:
-                yield from _crossings(first, second, variable)
+                yield from _crossings(first, second, variable, lo, hi)
 
 
-def _crossings(first: Cut, second: Cut, variable: str) -> Iterable[tuple[Term, bool]]:
-    """Where two sections meet: the simpler one's roots put into the other's surface."""
-    a, b = sorted((first, second), key=lambda c: (len(c.roots or ()), sum(_size(r) for r in c.roots or ())))
+def _crossings(
+    first: Cut, second: Cut, variable: str, lo: Term, hi: Term
+) -> Iterator[tuple[Term, bool] | Crossing]:
+    """Where two sections meet: the simpler one's roots put into the other's surface, where they are all known."""
+    solved = [c for c in (first, second) if c.roots is not None and not c.families]
+    if not solved:
+        one, other = (c.surface if c.product is None else c.product.along for c in (first, second))
+        yield Crossing(one, other, variable, lo, hi)
+        return
+    a = min(solved, key=lambda c: (len(c.roots or ()), sum(_size(r) for r in c.roots or ())))
+    b = second if a is first else first
     for root in a.roots or ():
         meeting = simplify(substitute(b.surface, {variable: root}))
         if meeting.free:

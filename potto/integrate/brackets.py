@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from potto.core.terms import Proj, Term, Var, children, postorder, rebuild, var
-from potto.integrate.intervals import Interval, enclosure
+from potto.core.terms import Branch, Proj, Term, Var, children, postorder, rebuild, var
+from potto.integrate.intervals import Interval, enclosure, everywhere
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 
 FINEST = 48  # halvings of the whole
@@ -104,6 +104,18 @@ def _flat(terms: tuple[Term, ...], env: dict[str, Value]) -> tuple[list[Term], d
     return [memo[term] for term in terms], {**env, **named}
 
 
+def at_label(low: Array, high: Array, s: Array) -> Array:
+    """The places of labels in [0, 1] between bounds that may be infinite."""
+    with np.errstate(all="ignore"):
+        x = low + (high - low) * s
+        if np.isfinite(x).all():
+            return np.where(s == 1, high, x)
+        up, down = low + s / (1 - s), high - (1 - s) / s
+        whole = (2 * s - 1) / (4 * s * (1 - s))
+    x = np.where(np.isinf(high), np.where(np.isinf(low), whole, up), np.where(np.isinf(low), down, x))
+    return np.where(s == 0, low, np.where(s == 1, high, x))
+
+
 @dataclass
 class _Cells:
     surface: Term
@@ -113,17 +125,13 @@ class _Cells:
     low: Array
     high: Array
 
+    def __post_init__(self) -> None:
+        self.total = everywhere(self.surface)
+        self.branches = tuple(node.surface for node in postorder(self.surface) if isinstance(node, Branch))
+
     def x(self, owner: Ints, s: Array) -> Array:
         """The places of labels in [0, 1], also where a bound is infinite."""
-        low, high = self.low[owner], self.high[owner]
-        with np.errstate(all="ignore"):
-            x = low + (high - low) * s
-            if np.isfinite(x).all():
-                return np.where(s == 1, high, x)
-            up, down = low + s / (1 - s), high - (1 - s) / s
-            whole = (2 * s - 1) / (4 * s * (1 - s))
-        x = np.where(np.isinf(high), np.where(np.isinf(low), whole, up), np.where(np.isinf(low), down, x))
-        return np.where(s == 0, low, np.where(s == 1, high, x))
+        return at_label(self.low[owner], self.high[owner], s)
 
     def at(self, owner: Ints) -> dict[str, Interval]:
         return {n: (v[0][owner], v[1][owner]) if isinstance(v[0], np.ndarray) else v for n, v in self.fixed.items()}
@@ -141,10 +149,21 @@ class _Cells:
         with np.errstate(invalid="ignore", over="ignore"):  # mean values: closer than the enclosure in small cells
             far = np.maximum(np.abs(least), np.abs(most)) * reach
             apart = (here[0] - far > 0) | (here[1] + far < 0)
-        free = (lo > 0) | (hi < 0) | apart
-        settled = ~free & ((least >= 0) | (most <= 0))
+            steady = (least >= 0) | (most <= 0)
+        if not self.total:  # a slope says nothing across the edge of where the surface has a value
+            whole = ~(self.nowhere(owner, a) | self.nowhere(owner, b))
+            apart, steady = apart & whole, steady & whole
+        for low, high in enclosure(self.branches, box):  # nor across a jump
+            one = (low > 0) | (high < 0)
+            apart, steady = apart & one, steady & one
+        free = (lo > 0) | (hi < 0) | np.isnan(lo) | apart
+        settled = ~free & steady
         index = np.nonzero(settled)[0]
         return index, self.crossed(owner[index], s0[index], s1[index]), np.nonzero(~free & ~settled)[0]
+
+    def nowhere(self, owner: Ints, x: Array) -> Bools:
+        lo, _ = enclosure((self.surface,), {**self.at(owner), self.variable: (x, x)})[0]
+        return np.broadcast_to(np.isnan(lo), x.shape)
 
     def value(self, owner: Ints, x: Array) -> Array:
         """The surface at places, nan where nothing is known of it."""

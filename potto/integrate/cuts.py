@@ -20,6 +20,8 @@ from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 
 # How far off, in units of the last place, a root may be that was found by numbers.
 SEARCHED = 4
+# How far beside cuts that are taken for one a place is clear of all of them, in terms of how far off they may be.
+BLUR = 8
 
 
 @dataclass
@@ -102,7 +104,7 @@ class Cuts:
     """The outcome for one variable: orientation (B,), segments, whether anything moves, edges.
 
     brushes: edges at which only something further in changes. folds: where roots of one surface are at one place.
-    slivers: what may lie between cuts that are taken for one.
+    slivers: what may lie between cuts that are taken for one. lost: the most that cuts left out may matter.
     conflict: cuts that coincide move differently, which is harmless only where the integrand does not jump there.
     """
 
@@ -116,6 +118,7 @@ class Cuts:
     brushes: list[Edge] = field(default_factory=list)
     folds: list[Fold] = field(default_factory=list)
     slivers: list[Sliver] = field(default_factory=list)
+    lost: Array | None = None
 
 
 def as_array(x: Any, batch: int) -> Array:
@@ -188,11 +191,13 @@ def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, d
             found.extend(_edges(row, root, low, high, tl, th, directions, batch))
     rank = np.zeros((count + 2, batch), dtype=np.int64)
     conflict = merged = False
+    blur = np.zeros_like(x)
     if count == 1:  # in order already
         rank[1] = _rank(plan, rows[0]) * inside[1]
     elif count:
-        x, e, t, rank, conflict, merged = _sorted(plan, rows, x, e, t, inside)
-    cuts = _pieces(x, e, t, rank, sign, beyond, edges)
+        x, e, t, rank, conflict, blur = _sorted(plan, rows, x, e, t, inside)
+        merged = bool(blur.any())
+    cuts = _pieces(x, e, t, rank, blur, sign, beyond, edges)
     cuts.conflict, cuts.brushes = conflict, brushes
     if merged or not nested:
         cuts.slivers = _slivers(plan, rows, low, high, (el, eh), directions, batch)
@@ -309,8 +314,8 @@ def _edges(
 
 def _sorted(
     plan: LevelPlan, rows: list[Row], x: Array, e: Array, t: Array, inside: Bools
-) -> tuple[Array, Array, Array, Ints, bool, bool]:
-    conflict = False
+) -> tuple[Array, Array, Array, Ints, bool, Array]:
+    conflict, blur = False, np.zeros_like(x)
     order = np.argsort(x, axis=0, kind="stable")
     # the bounds stay first and last even among equals: candidates were clipped to the upper bound
     member = np.arange(x.shape[1])
@@ -319,6 +324,8 @@ def _sorted(
     if close.any():  # to rounding they are at one place
         for i in np.nonzero(close.any(axis=1))[0]:
             x[i + 1] = np.where(close[i], x[i], x[i + 1])
+            wide = np.where(close[i], BLUR * (e[i] + e[i + 1] + EPS * np.abs(x[i])), 0.0)
+            blur[i], blur[i + 1] = np.maximum(blur[i], wide), np.maximum(blur[i + 1], wide)
     rank: Ints = np.where(inside, np.array([0, *(_rank(plan, r) for r in rows), 0])[order], 0)
     if t.shape[0]:
         t = t[:, order, member]
@@ -327,7 +334,7 @@ def _sorted(
             apart = np.abs(t[:, 1:] - t[:, :-1]) > 1e-9 * (np.abs(t[:, 1:]) + np.abs(t[:, :-1]))
             conflict = bool((same & apart.any(axis=0)).any())
             _agree(t, same, rank)
-    return x, e, t, rank, conflict, bool(close.any())
+    return x, e, t, rank, conflict, blur
 
 
 def _rank(plan: LevelPlan, row: Row) -> int:
@@ -349,8 +356,9 @@ def _agree(t: Array, same: Bools, rank: Ints) -> None:
 
 
 def _pieces(
-    x: Array, e: Array, t: Array, rank: Ints, sign: Array, beyond: list[tuple[Array, bool]], edges: list[Edge]
-) -> Cuts:
+    x: Array, e: Array, t: Array, rank: Ints, blur: Array, sign: Array, beyond: list[tuple[Array, bool]],
+    edges: list[Edge],
+) -> Cuts:  # fmt: skip
     a, b = x[:-1], x[1:]
     full = b > a
     owner, place = np.nonzero(full.T)
@@ -364,5 +372,6 @@ def _pieces(
     moving = bool(ta.any() or tb.any())
     bad = np.isnan(x[0]) | np.isnan(x[-1])
     ea, eb = e[place, owner], e[place + 1, owner]
-    made = Segments(owner, a, b, ta, tb, choose(a, b, left, right), left, right, rank[place, owner], ea, eb)
+    near = np.stack((blur[place, owner], blur[place + 1, owner]))
+    made = Segments(owner, a, b, ta, tb, choose(a, b, left, right), left, right, rank[place, owner], ea, eb, near)
     return Cuts(sign, made, moving, edges, bad if bad.any() else None)

@@ -17,6 +17,7 @@ import numpy as np
 
 from potto.integrate import maps
 from potto.integrate.forms import Totals
+from potto.integrate.maps import Segments
 from potto.integrate.pieces import Pieces, Sums
 from potto.integrate.rules import EPS, gauss
 from potto.kernels.cells import Array, Bools, Ints
@@ -39,6 +40,8 @@ AT = 1e-6
 # end on, in lengths of the segment, and down to how far, in them and in units of the last place, it is; how many times.
 SETTLED = 1e-2
 NEAREST, LEAST, STEPS_OFF, LOOKS = 1e-9, 1e-200, 8, 5
+# How many roundings of its ends a segment is long, at the least, whose values count.
+SLIVER = 256
 # A piece within a segment that is as small as this and still errs lies at a pole.
 SMALLEST = 1e-12
 
@@ -53,14 +56,15 @@ def given_up(work: Work, p: Pieces, found: Totals, sums: Sums) -> Sums:
     owner = work.seg.owner[p.segment]
     errors = p.error.reshape(work.width, -1, p.segment.size)[:, 0]
     blamed = (~(errors <= BLAMED * size[:, owner]) & hopeless[:, owner]).any(axis=0)
-    blamed &= ~_noise(work, p, errors, blamed)
+    sharp = _sharp(work.seg)
+    blamed &= ~_noise(work, p, errors, blamed) & sharp[p.segment]
     grows: Any = np.zeros((work.width, work.batch, 2), dtype=bool)  # to inf, to -inf
     lost: Any = np.zeros((work.width, work.batch), dtype=bool)
     low, high = p.u0 < AT, p.u1 > 1 - AT
     inside = blamed & (p.u1 - p.u0 < SMALLEST) & ~low & ~high
     if not inside.any() and not (blamed & (low | high)).any():
         return sums
-    index = np.nonzero(hopeless.any(axis=0)[work.seg.owner])[0]
+    index = np.nonzero(hopeless.any(axis=0)[work.seg.owner] & sharp)[0]
     for upper in (False, True):
         guilty = np.isin(index, p.segment[blamed & (high if upper else low)])
         if index.size:
@@ -128,6 +132,12 @@ def _without_end(work: Work, index: Ints, high: bool) -> list[Array]:
         sign = np.where(np.logical_and.reduce(steady), np.sign(forms[0][..., -1]), 0.0)
         signs.append(sign[np.abs(sign).argmax(axis=0), np.arange(index.size)])
     return signs
+
+
+def _sharp(seg: Segments) -> Bools:
+    """Segments that are longer than a few roundings of their ends: on others nodes say nothing of how values grow."""
+    size = np.maximum(np.abs(seg.a), np.abs(seg.b))
+    return np.asarray((seg.b - seg.a > SLIVER * EPS * size) | ~np.isfinite(size))
 
 
 def _noise(work: Work, p: Pieces, errors: Array, blamed: Array) -> Bools:

@@ -1,8 +1,9 @@
 """Interval arithmetic over batches: which values a term can take on boxes.
 
 Owns `enclosure`. Bounds are wide enough to hold every value that the term takes, rounding included, and get closer as
-the boxes get smaller; where nothing is known they are infinite. (Moore, Kearfott and Cloud, Introduction to Interval
-Analysis, 2009.)
+the boxes get smaller; where nothing is known they are infinite, and where the term has no value anywhere on a box
+(the root of what is negative all over) they are nan. (Moore, Kearfott and Cloud, Introduction to Interval Analysis,
+2009.)
 """
 
 from __future__ import annotations
@@ -21,7 +22,18 @@ from potto.primitives import PRIMITIVES
 Interval = tuple[Any, Any]  # lower and upper bounds, numbers or arrays
 
 ANYTHING: Interval = (-np.inf, np.inf)
+NOWHERE: Interval = (np.nan, np.nan)  # of a term that has no value on a box
 ROUNDING = 4 * EPS  # of one operation, functions of libraries included, relative
+
+
+def everywhere(term: Term) -> bool:
+    """Whether a term has a value wherever it is evaluated, poles aside."""
+    return not any(isinstance(n, Prim) and (n.op in _DOMAINS or _fractional(n)) for n in postorder(term))
+
+
+def _fractional(node: Prim) -> bool:
+    exponent = node.args[-1]
+    return node.op == "pow" and not (isinstance(exponent, Const) and exponent.value.is_integer())
 
 
 def enclosure(terms: tuple[Term, ...], box: Mapping[str, Interval]) -> list[Interval]:
@@ -36,36 +48,62 @@ def enclosure(terms: tuple[Term, ...], box: Mapping[str, Interval]) -> list[Inte
 def _node(node: Term, found: Mapping[Term, Interval], box: Mapping[str, Interval]) -> Interval:
     match node:
         case Const(value=value):
-            return (value, value) if value == value else ANYTHING
+            return value, value  # nan is what a guard leaves where there is no value
         case Var(name=name):
             return box[name]
         case Prim(op=op, args=args) if op in _RULES:
-            return _outwards(*_RULES[op](node, [found[a] for a in args]))
+            return _defined([found[a] for a in args], _RULES[op](node, [found[a] for a in args]))
         case Prim(op=op, args=(arg,)) if monotone(op):
-            return _outwards(*_along(op, found[arg]))
-        case Branch() | If():
+            return _defined([found[arg]], _along(op, found[arg]))
+        case Branch():
             a, b = found[node.then], found[node.orelse]
-            return np.minimum(a[0], b[0]), np.maximum(a[1], b[1])
+            lo, hi = found[node.surface]
+            either = np.fmin(a[0], b[0]), np.fmax(a[1], b[1])
+            least, most = (
+                np.where(lo > 0, x, np.where(hi < 0, y, z)) for x, y, z in zip(a, b, either, strict=True)
+            )
+            return least, most
+        case If():
+            a, b = found[node.then], found[node.orelse]
+            return np.fmin(a[0], b[0]), np.fmax(a[1], b[1])
         case _:
             return ANYTHING
 
 
-def _outwards(lo: Any, hi: Any) -> Interval:
-    """Rounded outwards; nan (inf - inf, a root of something negative) becomes no bound."""
-    return (
-        np.where(np.isnan(lo), -np.inf, lo - ROUNDING * np.abs(lo)),
-        np.where(np.isnan(hi), np.inf, hi + ROUNDING * np.abs(hi)),
-    )
+def _defined(args: list[Interval], result: tuple[Any, Any] | tuple[Any, Any, Any]) -> Interval:
+    """Rounded outwards; nan (inf - inf) becomes no bound, but where an argument has no value, neither has the result.
+
+    Neither has what is infinite all over. A third item of the result says where the builtin itself is not defined.
+    """
+    lo, hi = result[0], result[1]
+    nowhere = (lo == np.inf) | (hi == -np.inf)
+    lo = np.where(np.isnan(lo), -np.inf, lo - ROUNDING * np.abs(lo))
+    hi = np.where(np.isnan(hi), np.inf, hi + ROUNDING * np.abs(hi))
+    if len(result) == 3:
+        nowhere = nowhere | result[2]
+    for a in args:
+        nowhere = nowhere | np.isnan(a[0])
+    if np.any(nowhere):
+        lo, hi = np.where(nowhere, np.nan, lo), np.where(nowhere, np.nan, hi)
+    return lo, hi
 
 
-def _along(op: str, a: Interval) -> Interval:
+# Where the monotone builtins that are not defined everywhere are; the others are everywhere.
+_DOMAINS = {
+    "sqrt": (0.0, np.inf), "log": (0.0, np.inf), "log1p": (-1.0, np.inf), "acosh": (1.0, np.inf),
+    "asin": (-1.0, 1.0), "acos": (-1.0, 1.0), "atanh": (-1.0, 1.0), "erfinv": (-1.0, 1.0), "erfcinv": (0.0, 2.0),
+}  # fmt: skip
+
+
+def _along(op: str, a: Interval) -> tuple[Any, Any, Any]:
+    """A monotone builtin of the part of an interval on which it is defined."""
     entry = PRIMITIVES[op]
+    least, most = _DOMAINS.get(op, ANYTHING)
     f = function(entry.numpy)
-    ends = f(a[0]), f(a[1])
+    ends = f(np.clip(a[0], least, most)), f(np.clip(a[1], least, most))
     if entry.increasing < 0:
         ends = ends[1], ends[0]
-    bad = np.isnan(ends[0]) | np.isnan(ends[1])  # beyond an edge of the domain: what is on it, is not told apart
-    return np.where(bad, -np.inf, ends[0]), np.where(bad, np.inf, ends[1])
+    return ends[0], ends[1], (a[1] < least) | (a[0] > most)
 
 
 def _add(node: Prim, args: list[Interval]) -> Interval:
@@ -100,11 +138,16 @@ def _mul(node: Prim, args: list[Interval]) -> Interval:
 
 def _inverse(a: Interval) -> Interval:
     apart = (a[0] > 0) | (a[1] < 0)
-    return np.where(apart, 1 / a[1], -np.inf), np.where(apart, 1 / a[0], np.inf)
+    return np.where(apart, np.divide(1.0, a[1]), -np.inf), np.where(apart, np.divide(1.0, a[0]), np.inf)
 
 
-def _div(node: Prim, args: list[Interval]) -> Interval:
-    return _times(args[0], _inverse(args[1]))
+def _div(node: Prim, args: list[Interval]) -> tuple[Any, Any, Any]:
+    return *_times(args[0], _inverse(args[1])), _zero(args[1])
+
+
+def _zero(a: Interval) -> Any:
+    """Where a divisor is 0 all over: the quotient is no number anywhere."""
+    return (np.asarray(a[0]) == 0) & (np.asarray(a[1]) == 0)
 
 
 def _whole_power(a: Interval, n: int) -> Interval:
@@ -117,14 +160,17 @@ def _whole_power(a: Interval, n: int) -> Interval:
     return np.where(inside, 0.0, np.minimum(p, q)), np.maximum(p, q)
 
 
-def _pow(node: Prim, args: list[Interval]) -> Interval:
+def _pow(node: Prim, args: list[Interval]) -> tuple[Any, Any] | tuple[Any, Any, Any]:
     base, (low, high) = args
     exponent = node.args[1]
     if isinstance(exponent, Const) and exponent.value == 0:
         return np.ones_like(base[0]), np.ones_like(base[1])  # also at 0
     if isinstance(exponent, Const) and exponent.value.is_integer() and 0 < abs(exponent.value) < 1e6:
         whole = _whole_power(base, int(abs(exponent.value)))
-        return whole if exponent.value > 0 else _inverse(whole)
+        return whole if exponent.value > 0 else (*_inverse(whole), _zero(whole))
+    if isinstance(exponent, Const) and exponent.value > 0:
+        least, most = (np.power(np.maximum(end, 0.0), exponent.value) for end in base)
+        return least, most, base[1] < 0
     corners = np.stack(np.broadcast_arrays(*(np.power(b, e) for b in base for e in (low, high))))
     fine = base[0] > 0
     return np.where(fine, corners.min(axis=0), -np.inf), np.where(fine, corners.max(axis=0), np.inf)
@@ -200,7 +246,7 @@ def _clamp(node: Prim, args: list[Interval]) -> Interval:
     return np.minimum(np.maximum(x[0], lo[0]), hi[0]), np.minimum(np.maximum(x[1], lo[1]), hi[1])
 
 
-_RULES: dict[str, Callable[[Prim, list[Interval]], Interval]] = {
+_RULES: dict[str, Callable[[Prim, list[Interval]], tuple[Any, Any] | tuple[Any, Any, Any]]] = {
     "add": _add,
     "neg": _neg,
     "mul": _mul,

@@ -13,16 +13,18 @@ import numpy as np
 
 from potto.core.terms import Term
 from potto.integrate.collapsed import Collapsed, collapsed_ranges, count_collapsed
-from potto.integrate.cuts import Cuts, frame_rows, segments, standing
+from potto.integrate.crossings import crossing_rows
+from potto.integrate.cuts import Cuts, Row, frame_rows, segments, standing
 from potto.integrate.edges import Scene, count_places, count_slivers, note_folds
 from potto.integrate.maps import Segments
+from potto.integrate.mass import concentrated
 from potto.integrate.pieces import Evaluator, Sums, components, take
 from potto.integrate.plan import LevelPlan, Plan, vanishes
 from potto.integrate.roots import searched_rows
 from potto.integrate.steps import brush
 from potto.integrate.undefined import lost_members, sides_at
 from potto.integrate.work import Work
-from potto.kernels.cells import Array, Bools, Ints, Mask, Value
+from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value
 
 NARROW = 1e-4  # the part of the range of a variable up to which a stretch may lie on either side of a surface
 
@@ -90,6 +92,9 @@ class Iteration:
             count_slivers(scene, cuts, sums)
         if k and cuts.folds:
             note_folds(scene, cuts)
+        if cuts.lost is not None:
+            sums.e += cuts.lost
+            sums.et += cuts.lost
         sums.v *= cuts.sign
         sums.t *= cuts.sign
         for gone in (cuts.bound_nan, lost):
@@ -114,7 +119,8 @@ class Iteration:
         values = machine.tracking().evaluate(level.frame, env, None)
         assert isinstance(values, tuple)
         lo, hi, rows = frame_rows(level, values)
-        rows += searched_rows(level, env, lo, hi, batch, machine)
+        found, lost = self.searched(level, env, lo, hi, batch, machine)
+        rows += found
         if machine.costs is not None:
             asked = self.machine.directions > 0 and not machine.frozen  # others are by variables further out
             for number, cut in enumerate(level.level.cuts):
@@ -125,10 +131,24 @@ class Iteration:
             if row.cut >= 0 and level.level.cuts[row.cut].surface in self.still:
                 row.t = ()
         cuts = segments(level, lo, hi, rows, batch, machine.directions, level is not self.plan.levels[0])
+        cuts.lost = lost
         collapsed = collapsed_ranges(level, lo, hi, rows, batch, machine.directions)
         if machine.frozen:
             return standing(cuts), [ranges.at_rest() for ranges in collapsed]
         return cuts, collapsed
+
+    def searched(
+        self, level: LevelPlan, env: dict[str, Value], lo: Cell, hi: Cell, batch: int, machine: Evaluator
+    ) -> tuple[list[Row], Array | None]:
+        """The cuts that numbers find, and the most that those may matter which lie where a density leaves nothing."""
+        crossings = level.level.crossings
+        if not (level.families or level.searched or crossings):
+            return [], None
+        number = next((n for n, own in enumerate(self.plan.levels) if own is level), None)
+        near = None if number is None else concentrated(self.plan, number, env, lo, hi, batch)
+        lo, hi, lost = near or (lo, hi, None)
+        rows = searched_rows(level, env, lo, hi, batch, machine)
+        return (rows + crossing_rows(level, env, lo, hi, batch, machine) if crossings else rows), lost
 
     def sides_of(
         self, level: LevelPlan, env: dict[str, Value], seg: Segments, sides: dict[int, Mask], machine: Evaluator

@@ -31,6 +31,7 @@ class Segments:
     left, right: (S,) turning points that the map resolves (where `kind` says so).
     ea, eb: (S,) how far off the ends may be by rounding.
     rank: (S,) what lies at the left end: 2 a jump, 1 a place where something further in changes, 0 neither.
+    blur: (2, S) within which distance of the ends other cuts lie that rounding does not tell apart from these.
     """
 
     owner: Ints
@@ -44,11 +45,12 @@ class Segments:
     rank: Ints
     ea: Array
     eb: Array
+    blur: Array
 
     def pick(self, index: Any) -> Segments:
         return Segments(self.owner[index], self.a[index], self.b[index], self.ta[:, index], self.tb[:, index],
                         self.kind[index], self.left[index], self.right[index], self.rank[index],
-                        self.ea[index], self.eb[index])  # fmt: skip
+                        self.ea[index], self.eb[index], self.blur[:, index])  # fmt: skip
 
 
 def choose(a: Array, b: Array, left: Array, right: Array) -> Ints:

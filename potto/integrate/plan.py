@@ -195,7 +195,7 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve, numb
     kept = tuple((t, v) for t, v in decisions.items() if not isinstance(t, Const))
     body = function_of(term.body)
     box = box_of(term, found, body) if reaches and not hides else None
-    surfaces = {f.surface for f in found if f.kind != "center"}
+    surfaces = {f.surface for f in found if f.kind not in ("center", "crossing")}
     doublings = sum(min(3, len(surface.free.intersection(term.variables))) for surface in surfaces)
     plain = straight(term, levels, inline) if reaches and not hides else None
     return Plan(

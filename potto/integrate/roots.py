@@ -155,6 +155,7 @@ def _brackets(psi: Any, x: Array) -> tuple[Array, Array]:
             extra.append(x[:, columns] + s * (x[:, columns + 1] - x[:, columns]))
         x = np.sort(np.concatenate(extra, axis=1), axis=1)
         y = psi(x)
+    x, y = _to_the_edges(psi, x, y)
     change = (y[:, :-1] * np.sign(y[:, 1:]) < 0) | ((y[:, :-1] == 0) & (y[:, 1:] != 0))
     most = int(change.sum(axis=1).max()) if change.size else 0
     a = np.full((x.shape[0], most), np.nan)
@@ -163,6 +164,22 @@ def _brackets(psi: Any, x: Array) -> tuple[Array, Array]:
     slot = (np.cumsum(change, axis=1) - 1)[row, column]
     a[row, slot], b[row, slot] = x[row, column], x[row, column + 1]
     return a, b
+
+
+def _to_the_edges(psi: Any, x: Array, y: Array) -> tuple[Array, Array]:
+    """With the last places before those where psi has no value: between these and the grid a sign may change."""
+    defined = ~np.isnan(y)
+    columns = np.nonzero((defined[:, 1:] != defined[:, :-1]).any(axis=0))[0]
+    if not columns.size:
+        return x, y
+    there = np.where(defined[:, columns], x[:, columns], x[:, columns + 1])
+    beyond = np.where(defined[:, columns], x[:, columns + 1], x[:, columns])
+    for _ in range(BISECTIONS):
+        middle = _between(there, beyond)
+        inside = ~np.isnan(psi(middle))
+        there, beyond = np.where(inside, middle, there), np.where(inside, beyond, middle)
+    x = np.sort(np.concatenate((x, there), axis=1), axis=1)
+    return x, psi(x)
 
 
 def _polished(function: Lam, variable: str, env: dict[str, Value], a: Array, b: Array, machine: Any) -> Array:

@@ -367,7 +367,7 @@ class Work:
         names = plan.body.params if self.last else self.env
         both = np.concatenate((seg.owner, seg.owner))
         here = gather({n: still(v) for n, v in self.env.items() if n in names}, both)
-        here[self.level.variable] = Cell(np.concatenate(self.just_inside() if plan.hides else (seg.a, seg.b)))
+        here[self.level.variable] = Cell(np.concatenate(self.just_inside()))
         sides = {g: np.concatenate((m, m)) if isinstance(m, np.ndarray) else m for g, m in self.sides.items()}
         costs = self.machine.costs
         with nullcontext() if costs is None else costs.ends(seg.ta, seg.tb, self.parent.machine.directions):
@@ -377,10 +377,15 @@ class Work:
         return Ends(f[:, :count], f[:, count:], e[:, :count], e[:, count:])
 
     def just_inside(self) -> tuple[Array, Array]:
-        """Points next to the ends of segments, on the side of the cut that the segment is on."""
+        """The ends of segments; points next to them where on the ends themselves it is not known what is further in."""
         seg = self.seg
-        width = np.where(np.isfinite(seg.b - seg.a), seg.b - seg.a, 0.0)
-        return seg.a + BESIDE * width, seg.b - BESIDE * width
+        if self.parent.plan.hides:
+            width = np.where(np.isfinite(seg.b - seg.a), seg.b - seg.a, 0.0)
+            return seg.a + BESIDE * width, seg.b - BESIDE * width
+        if self.last or not seg.blur.any():
+            return seg.a, seg.b
+        aside = np.where((seg.kind == maps.LINEAR) & (seg.blur < BESIDE * (seg.b - seg.a)), seg.blur, 0.0)
+        return seg.a + aside[0], seg.b - aside[1]
 
     def sweeps(self) -> bool:
         """Whether an end moves at which the integrand may jump: not where only something further in changes."""

@@ -1,6 +1,6 @@
 """What is tried for an integral: variables eliminated, cut along, or sampled, and which of them innermost.
 
-Owns `too_many`, `many`, `orders` and `preferred`.
+Owns `too_many`, `many`, `orders`, `preferred` and `trials`.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ MOST_LEVELS = 3
 PER_LEVEL, AFFORDABLE = 12, 1_000_000
 LOOSE = 1e-3
 FEW_NODES = 30_000  # up to which iterated quadrature is no slower
+TRIAL = 12_000  # evaluations that are spent on one order of variables before another one is tried
 
 
 def too_many(machine: Machine, term: Integral, linked: Linked) -> bool:
@@ -57,6 +58,16 @@ def orders(term: Integral) -> Iterator[Integral]:
             term.body,
             tuple(term.hints[i] for i in index),
         )
+
+
+def trials(machine: Machine, term: Integral, linked: Linked, outermost: bool) -> Iterator[tuple[Integral, int | None]]:
+    """Orders, and how many evaluations may go into trying them: where a jump is searched for, roots that merge further
+    out at places that are not known may make one order a hundred times as expensive as another."""
+    if outermost and machine.directions and len(term.variables) > 1:
+        found = list(preferred(machine, term, linked))
+        if len(found) > 1 and searches(machine, found[0], linked):
+            yield from ((order, TRIAL) for order in found)
+    yield from ((order, None) for order in preferred(machine, term, linked))
 
 
 def preferred(machine: Machine, term: Integral, linked: Linked) -> Iterator[Integral]:

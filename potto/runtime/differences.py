@@ -29,6 +29,7 @@ SHRINKS = 0.6  # what a gap may be of itself when the step is halved
 WEIGHTS = np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280])  # of v(ih) - v(-ih), over h, exact up to degree 8
 LOWER = np.array([3 / 4, -3 / 20, 1 / 60, 0.0])  # up to degree 6
 SURE = 4.0  # times what two estimates differ by
+CANCELLED = 1e-9  # the part of what was added up that a derivative may be uncertain by: a zero that is known for one
 
 
 def by_differences(
@@ -38,16 +39,20 @@ def by_differences(
 
     evaluated: the integral for other parameters, of one member, without tangents.
     """
-    rough = ~(sums.et <= ROUGH * np.abs(sums.t)) & np.isfinite(sums.v)[:, None] & ~(sums.et <= machine.atol)
-    rough &= ~(sums.et <= 1e3 * sums.e[:, None])
-    if batch > FEW or not rough.any() or machine.exhausted():
+    if batch > FEW or machine.exhausted():
         return
+    rough = ~(sums.et <= ROUGH * np.abs(sums.t)) & np.isfinite(sums.v)[:, None] & ~(sums.et <= machine.atol)
+    if sums.gross is not None:
+        rough &= ~(sums.et <= CANCELLED * np.where(np.isfinite(sums.gross[1]), sums.gross[1], 0.0))
     for member in np.nonzero(rough.any(axis=(0, 1)))[0]:
         env = {n: map_arrays(v, lambda a, m=member: a[m]) for n, v in linked.env.items()}
         for d in np.nonzero(rough[:, :, member].any(axis=0))[0]:
             step = min(_reaches(env.values(), int(d)), default=0.0) * REACH / 4
             if not 0 < step < np.inf:
                 continue
+            noise = 2 * np.abs(WEIGHTS).sum() / (step / 2) * sums.e[:, member]
+            if (sums.et[:, d, member] <= noise).all():
+                continue  # differences of values have no more digits
             with machine.books.apart():
                 found = _derivative(env, int(d), step, evaluated)
             if found is None:

@@ -7,9 +7,11 @@ shape of the batch again.
 from __future__ import annotations
 
 import itertools
+import math
 import operator
 from collections.abc import Iterable
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +27,7 @@ from potto.integrate.plan import Plan
 from potto.integrate.straight import certain
 from potto.kernels import errors
 from potto.kernels.cells import Array, Cell, Ints, Number, Value, all_arrays, map_arrays
-from potto.runtime.choices import many, orders, preferred, too_many
+from potto.runtime.choices import many, orders, preferred, too_many, trials
 from potto.runtime.convergence import allowance, missing, widest
 from potto.runtime.differences import by_differences
 from potto.runtime.elimination import ACCURATE, WORTH, step_by_step
@@ -189,14 +191,17 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
             return _batch(machine, term, linked, batch)
     machine.books.methods.add("quadrature")
     met = machine.books.met
-    for order in preferred(machine, term, linked):
+    for order, most in trials(machine, term, linked, outermost):
         met.degenerate.clear()
         plan = plan_for(machine, order, linked)
         if batch == 1 and plan.straight is not None:
             plain = certain(plan.straight, machine, linked.env)
             if plain is not None:
                 return plain
-        sums = counted(in_parts(plan, machine, plan.environment(env, linked.env), batch), plan, machine)
+        found = within(most, plan, machine, plan.environment(env, linked.env), batch)
+        if found is None:
+            continue
+        sums = counted(found, plan, machine)
         if not met.degenerate:
             if plan.folds:
                 beside_another(machine, order, linked, env, batch, sums, iterated)
@@ -315,6 +320,19 @@ def counted(sums: Sums, plan: Plan, machine: Machine) -> Sums:
     elif machine.directions and not plan.reaches:
         machine.note_unfinished("a condition jumps inside an inner integral where its boundary term is not counted")
         sums.et = np.full_like(sums.et, np.inf)
+    return sums
+
+
+def within(most: int | None, plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> Sums | None:
+    """Quadrature; None where it takes more than so many evaluations a member."""
+    if most is None or machine.books.spent + most >= machine.settings.max_evals:
+        return in_parts(plan, machine, env, batch)
+    tight = replace(machine, settings=replace(machine.settings, max_evals=math.ceil(machine.books.spent + most)))
+    with machine.books.apart() as met:
+        sums = in_parts(plan, tight, env, batch)
+    if tight.exhausted():
+        return None
+    machine.books.met.take(met, np.arange(batch))
     return sums
 
 

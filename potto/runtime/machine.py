@@ -366,7 +366,7 @@ class Machine:
         if self.frozen:
             term, stopped = held(term)
             env = {**env, **{new: pad(still(env[old]), self.directions) for old, new in stopped}}
-        ready = prepared(term)
+        ready = prepared(term, self.linker.reach)
         if ready is not term:
             return self.evaluate(lam(tuple(sorted(ready.free)), ready), {n: env[n] for n in ready.free}, None)
         return integrate(self, term, env)

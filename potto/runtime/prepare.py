@@ -18,6 +18,7 @@ from potto.calculus.lifted import closed_value, lifted, nested
 from potto.calculus.pivots import NoClosedForm
 from potto.calculus.shifted import shifted
 from potto.calculus.tangents import FUNCTION, NotShifted, Shape, Shapes
+from potto.calculus.trace import spine
 from potto.core.terms import (
     App,
     Branch,
@@ -52,21 +53,27 @@ FEW = 4  # branches that one integrand may have before its summands are integrat
 
 
 @lru_cache(maxsize=4096)
-def prepared(term: Integral) -> Term:
+def prepared(term: Integral, reach: Reach) -> Term:
     """An equal term, or the same one where there is nothing to be done. Raises PottoError (a product of deltas)."""
     deltas = [node for node in postorder(term.body) if isinstance(node, Delta)]
     if deltas:
         apart = lifted(term, closed_value) if any(map(nested, (d.coordinates[0] for d in deltas))) else None
-        return without_deltas(term if apart is None else apart.term)
+        try:
+            return without_deltas(term if apart is None else apart.term)
+        except (NoClosedForm, NotSmooth) as problem:
+            raise PottoError([NOT_COUNTED(
+                errors.NOWHERE, f"a delta under this integral was not integrated out: {problem}",
+                help="let its argument be smooth, and solvable for one of the variables of integration",
+            )]) from None  # fmt: skip
     body = term.body
     if isinstance(body, Sum) and not (body.lo.free | body.hi.free) & set(term.variables):
         return sum_(body.variable, body.lo, body.hi, _over(term, body.body))
     if isinstance(body, Prim) and body.op == "neg":
         inner = _over(term, body.args[0])
-        ready = prepared(inner)
+        ready = prepared(inner, reach)
         return neg(ready) if ready is not inner else term
     if isinstance(body, Prim) and body.op == "add":
-        return _apart(term, body)
+        return _apart(term, body, reach)
     return term
 
 
@@ -82,7 +89,8 @@ def placed(term: Integral, reach: Reach, shapes: Shapes, again: bool) -> Term:
     if not isinstance(counted, Integral):
         return counted
     term, nodes = counted, postorder(counted)
-    if not any(isinstance(n, Delta) and any(isinstance(g, Global) for g in postorder(*n.coordinates)) for n in nodes):
+    if not any(isinstance(n, Delta) and any(isinstance(g, Global | App) for g in postorder(*n.coordinates))
+               for n in nodes):  # fmt: skip
         return term
     memo: dict[Term, Term] = {}
     for node in nodes:
@@ -100,8 +108,8 @@ def _opened(term: Integral, reach: Reach) -> Integral:
 
 
 def filled(term: Integral, env: dict[str, Value], reach: Reach) -> tuple[Integral, dict[str, Value]]:
-    """With the functions in the place of those parameters whose derivatives are taken in the integrand, or that lead to
-    derivatives themselves; what they have captured joins the environment under names of its own."""
+    """With the functions in the place of those parameters whose derivatives are taken in the integrand, that place its
+    deltas, or that lead to derivatives themselves; what they have captured joins the environment, renamed."""
     given = {name: value for name in term.free if isinstance(value := env[name], Closure)}
     derived = _derived_parameters(term) if given else ()
     while given:
@@ -125,8 +133,12 @@ def filled(term: Integral, env: dict[str, Value], reach: Reach) -> tuple[Integra
 
 @lru_cache(maxsize=4096)
 def _derived_parameters(term: Integral) -> tuple[str, ...]:
-    """The functions among the parameters whose derivatives are taken in an integrand."""
-    derived = (node.function for node in postorder(term.body) if isinstance(node, Deriv))
+    """The functions among the parameters whose derivatives are taken in an integrand, or that place its deltas."""
+    nodes = postorder(term.body)
+    derived = {node.function for node in nodes if isinstance(node, Deriv)}
+    for node in nodes:
+        if isinstance(node, Delta):
+            derived |= {spine(part)[0] for part in postorder(*node.coordinates) if isinstance(part, App)}
     return tuple(sorted({inner.name for inner in derived if isinstance(inner, Var)} & term.free))
 
 
@@ -221,9 +233,9 @@ def _over(term: Integral, body: Term) -> Integral:
     return integral(term.variables, term.bounds, body, term.hints)
 
 
-def _apart(term: Integral, body: Prim) -> Term:
+def _apart(term: Integral, body: Prim, reach: Reach) -> Term:
     """Summands with surfaces of their own integrated by themselves, the others together."""
-    counts = [_branches(arg, frozenset(term.variables)) for arg in body.args]
+    counts = [_branches(arg, frozenset(term.variables), reach) for arg in body.args]
     if sum(counts) <= FEW and not any(isinstance(arg, Sum) for arg in body.args):
         return term
     smooth = [arg for arg, count in zip(body.args, counts, strict=True) if not count and not isinstance(arg, Sum)]
@@ -234,5 +246,12 @@ def _apart(term: Integral, body: Prim) -> Term:
     return add(*parts, *(_over(term, arg) for arg in rest))
 
 
-def _branches(term: Term, variables: frozenset[str]) -> int:
-    return sum(1 for node in postorder(term) if isinstance(node, Branch) and node.surface.free & variables)
+def _branches(term: Term, variables: frozenset[str], reach: Reach) -> int:
+    """The conditions that vary with some variables: written here, or in definitions that are called with them."""
+    count = 0
+    for node in postorder(term):
+        if isinstance(node, Branch):
+            count += bool(node.surface.free & variables)
+        elif isinstance(node, App) and isinstance(head := spine(node)[0], Global) and node.free & variables:
+            count += reach.branches(head)
+    return count

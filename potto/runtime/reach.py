@@ -18,6 +18,7 @@ class Reach:
     def __init__(self, resolve: Resolve) -> None:
         self.resolve = resolve
         self.known: dict[Term, frozenset[type]] = {}
+        self.known_branches: dict[Term, int] = {}
         self.known_derived: dict[Term, frozenset[type]] = {}
         self.known_spikes: dict[Term, bool] = {}
 
@@ -26,6 +27,13 @@ class Reach:
         found = self.known.get(term)
         if found is None:
             found = self.known[term] = frozenset(self._found(term))
+        return found
+
+    def branches(self, term: Term) -> int:
+        """How many conditions there are, those of each definition once."""
+        found = self.known_branches.get(term)
+        if found is None:
+            found = self.known_branches[term] = sum(isinstance(node, Branch) for node in self._all(term))
         return found
 
     def derived(self, term: Term) -> frozenset[type]:

@@ -10,8 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from potto.calculus.deltas import PRODUCT_OF_DELTAS
-from potto.calculus.shifted import STEP
+from potto.calculus.deltas import PRODUCT_OF_DELTAS, STEP
 from potto.core.printer import format_term
 from potto.core.terms import ZERO, Term, substitute
 from potto.diagnostics import PottoError
