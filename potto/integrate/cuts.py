@@ -76,7 +76,8 @@ class Sliver:
     """Jumps that rounding does not tell apart, from one another or from a bound, for some of the batch.
 
     `owner` (m,), place (m,), width (m,): how far apart they may be all the same; speed (m,): that of the fastest, over
-    the range of the variable; upper: whether seen from below.
+    the range of the variable; upper: whether seen from below. passes: (k, m) how fast a jump that rounding puts beside
+    a bound goes across it, so that it may be on either side: 0 where it is on the bound.
     """
 
     cuts: tuple[int, ...]
@@ -85,9 +86,11 @@ class Sliver:
     width: Array
     speed: Array
     upper: bool
+    passes: Array
 
     def pick(self, index: Any) -> Sliver:
-        return Sliver(self.cuts, self.owner[index], self.x[index], self.width[index], self.speed[index], self.upper)
+        return Sliver(self.cuts, self.owner[index], self.x[index], self.width[index], self.speed[index], self.upper,
+                      self.passes[:, index])  # fmt: skip
 
 
 @dataclass
@@ -199,8 +202,8 @@ def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, d
         merged = bool(blur.any())
     cuts = _pieces(x, e, t, rank, blur, sign, beyond, edges)
     cuts.conflict, cuts.brushes = conflict, brushes
-    if merged or not nested:
-        cuts.slivers = _slivers(plan, rows, low, high, (el, eh), directions, batch)
+    if merged or edges or not nested:
+        cuts.slivers = _slivers(plan, rows, low, high, ((tl, el), (th, eh)), directions, batch)
     if directions:
         cuts.folds = _folds(plan, rows, low, high, directions, batch)
     if conflict:
@@ -241,14 +244,19 @@ def _slivers(
     fast = [np.abs(tangents(row.t, batch, directions)).max(axis=0, initial=0.0) / (high - low) for row in jumps]
     out: list[Sliver] = []
 
-    def put(cuts: tuple[int, ...], x: Array, gap: Any, width: Any, speed: Array, upper: bool) -> None:
+    def put(
+        cuts: tuple[int, ...], x: Array, gap: Any, width: Any, speed: Array, upper: bool, passes: Any = 0.0
+    ) -> None:
         owner = np.nonzero((gap <= width) & (width > 0) & (low < high))[0]
         if owner.size:
-            out.append(Sliver(cuts, owner, x[owner], np.broadcast_to(width, batch)[owner], speed[owner], upper))
+            every = np.broadcast_to(np.where(gap > 0, passes, 0.0), (directions, batch))[:, owner]
+            wide = np.broadcast_to(width, batch)[owner]
+            out.append(Sliver(cuts, owner, x[owner], wide, speed[owner], upper, every))
 
     for i, x in enumerate(places):
-        put((jumps[i].cut,), low, np.where(x <= low, low - x, np.inf), off[i] + ends[0], fast[i], False)
-        put((jumps[i].cut,), high, np.where(x >= high, x - high, np.inf), off[i] + ends[1], fast[i], True)
+        t = tangents(jumps[i].t, batch, directions)
+        for bound, (moves, e), upper in ((low, ends[0], False), (high, ends[1], True)):
+            put((jumps[i].cut,), bound, np.abs(x - bound), off[i] + e, fast[i], upper, np.abs(t - moves))
         for j in range(i):
             if jumps[j].cut != jumps[i].cut:
                 gap = np.where((x > low) & (x < high), np.abs(x - places[j]), np.inf)

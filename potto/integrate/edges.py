@@ -136,11 +136,13 @@ def count_slivers(scene: Scene, cuts: Cuts, sums: Sums) -> None:
         if not sliver.owner.size:
             continue
         f, _ = scene.flips(sliver.cuts, sliver.owner, sliver.x, not sliver.upper)
-        lost = SURE * np.abs(f - f[0]).max(axis=0) * sliver.width
+        apart = np.abs(f - f[0]).max(axis=0)
+        lost = SURE * apart * sliver.width
         lost = np.where(np.isfinite(lost), lost, 0.0)
         at = (slice(None), sliver.owner)
         swept = lost * np.where(np.isfinite(sliver.speed), sliver.speed, 0.0)
-        sums.et[:, :, sliver.owner] += swept[:, None]
+        either = apart[:, None] * np.where(np.isfinite(sliver.passes), sliver.passes, 0.0)
+        sums.et[:, :, sliver.owner] += swept[:, None] + np.where(np.isfinite(either), either, 0.0)
         sums.e[at] += lost
         if len(sliver.cuts) == 1 and sums.gross is not None:
             # What lies between two roundings of a bound is rounding of the bound, if there is nothing else, and what
