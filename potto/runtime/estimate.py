@@ -7,7 +7,7 @@ None with its text in `text`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -43,6 +43,10 @@ class OneSided:
             f"{which} {place}: the one-sided derivatives differ "
             f"({_number(self.backward)} backward, {_number(self.forward)} forward)"
         )
+
+
+def _empty(value: Any) -> bool:
+    return isinstance(value, tuple | Mapping) and not value
 
 
 def _number(x: Any) -> str:
@@ -85,6 +89,12 @@ class Estimate:
     def reasons_of(self, index: Any) -> tuple[str, ...]:
         """Why one member of a batch is not as accurate as was asked: none, if it is."""
         return tuple(why for why, where in self.reason_members.items() if where[index])
+
+    def summary(self) -> str:
+        """All that is known, a line each."""
+        shown = {item.name: getattr(self, item.name) for item in fields(self) if item.name not in ("notes", "stats")}
+        lines = [f"{name}: {value}" for name, value in shown.items() if value is not None and not _empty(value)]
+        return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])
 
     def __float__(self) -> float:
         return float(self.value)

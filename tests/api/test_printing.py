@@ -261,3 +261,10 @@ def test_as_many_printed_intervals_hold_as_computed_ones(method: str) -> None:
         value, bar = (Fraction(part) for part in read(interval(r).removesuffix(MISSED)))
         printed += abs(value - truth) <= bar
     assert printed >= computed
+
+
+def test_a_summary_shows_every_field_and_note() -> None:
+    answer = potto.deriv(potto.compile("def f(t) integral [0, 1] [x < t] d(x)").f)((0.0, 1.0))
+    lines = answer.summary().split("\n")
+    assert lines[:2] == ["value: 0.0", "error: 0.0"] and "converged: True" in lines
+    assert lines[-1].startswith("note: the surface") and "0 backward, 1 forward" in lines[-1]

@@ -1,6 +1,6 @@
 """Holding an answer of Potto's against exact values and one-sided derivatives.
 
-Owns `Rates` and `compare`. No allowance is made but for rounding of the answer itself.
+Owns `Rates` and `held_against`. No allowance is made but for rounding of the answer itself.
 """
 
 from __future__ import annotations
@@ -10,6 +10,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
+
+import numpy as np
+
+import potto
 
 ULP = 2.0**-52
 STEP = Fraction(1, 10**40)  # of a piecewise polynomial: some 35 digits of its derivative
@@ -38,6 +42,24 @@ class Rates:
 
 def rounding(x: float) -> float:
     return 8 * ULP * max(1.0, abs(x))
+
+
+def held_against(
+    text: str, t: float, value: Fraction, rate: Callable[[Fraction, Fraction], Fraction], many: bool
+) -> str:
+    """What came of comparing f(t), as a number and, if so wanted, as a member of an array."""
+    dual = potto.deriv(potto.compile(text).f)
+    answer, rates = dual((t, 1.0)), Rates.of(rate, Fraction(t))
+    context = f"at t = {t!r}:\n{text}\nis {float(value)!r}, {rates}\n"
+    outcome = compare(answer, float(value), rates, context + answer.summary())
+    if many:
+        array = dual((np.array([t, 0.375, t]), np.ones(3)))
+        context += f"as an array {array.value}, {array.error}, {array.tangent}, {array.tangent_error}"
+        assert abs(array.value[2] - value) <= array.error[2] + rounding(float(value)), context
+        if outcome == "compared":
+            off = abs(array.tangent[2] - rates.forward)
+            assert off <= array.tangent_error[2] + rounding(rates.forward), context
+    return outcome
 
 
 def compare(answer: Any, value: float, rates: Rates, context: str) -> str:
