@@ -12,6 +12,7 @@ integral is not a number, and it is told where.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Container, Iterator
 from typing import TYPE_CHECKING
 
@@ -162,13 +163,19 @@ def guarded_samples(
 def _tell(
     plan: Plan, group: int, env: dict[str, Value], member: int, machine: Evaluator, members: Ints | None = None
 ) -> None:
-    """Note that the surface of a group is not defined at one of the places of an environment."""
+    """Note that the surface of a group is not defined at one of the places of an environment.
+
+    At infinity nothing needs to be defined: there is no sample there, and no node of a rule.
+    """
     surface = plan.groups[group].cut.surface
     places = []
     for level in plan.levels:
         cell = env.get(level.variable)
         if level.variable in surface.free and isinstance(cell, Cell):
             values = np.ravel(cell.v)
-            places.append(f"{level.variable} = {values[member % values.size]:.6g}")
+            place = float(values[member % values.size])
+            if math.isinf(place):
+                return
+            places.append(f"{level.variable} = {place:.6g}")
     where = f" at {', '.join(places)}" if places else ""
     machine.note_unfinished(f"{UNDEFINED}{where}: it asks for the sign of {format_term(surface)}", members, UNDEFINED)

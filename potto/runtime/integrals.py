@@ -195,7 +195,7 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
         sums = counted(found, plan, machine)
         if not met.degenerate:
             if plan.folds:
-                beside_another(machine, order, linked, env, batch, sums, iterated)
+                beside_another(machine, order, linked, env, batch, sums)
             if outermost and met.sided and not machine.side:
                 from_both_sides(machine, plan, plan.environment(env, linked.env), batch, sums, iterated)
             if outermost and met.folds:
@@ -235,7 +235,7 @@ def _batch(machine: Machine, term: Integral, linked: Linked, batch: int) -> Sums
         plan = plan_for(machine, order, here)
         sums = counted(sums, plan, machine)
         if plan.folds:
-            beside_another(machine, order, here, here.env, size, sums, iterated)
+            beside_another(machine, order, here, here.env, size, sums)
         if machine.books.met.sided and not machine.side:
             from_both_sides(machine, plan, plan.environment(here.env, here.env), size, sums, iterated)
         return turned_round(machine, order, here, here.env, size, sums)
