@@ -5,7 +5,7 @@ Owns `too_many`, `many`, `orders`, `preferred` and `trials`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
 from potto.core.terms import Integral, integral
@@ -63,18 +63,17 @@ def orders(term: Integral) -> Iterator[Integral]:
 def trials(machine: Machine, term: Integral, linked: Linked, outermost: bool) -> Iterator[tuple[Integral, int | None]]:
     """Orders, and how many evaluations may go into trying them: where a jump is searched for, roots that merge further
     out at places that are not known may make one order a hundred times as expensive as another."""
-    if outermost and machine.directions and len(term.variables) > 1:
-        found = list(preferred(machine, term, linked))
-        if len(found) > 1 and searches(machine, found[0], linked):
-            yield from ((order, TRIAL) for order in found)
-    yield from ((order, None) for order in preferred(machine, term, linked))
+    found = preferred(machine, term, linked)
+    if isinstance(found, list) and outermost and len(found) > 1 and searches(machine, found[0], linked):
+        yield from ((order, TRIAL) for order in found)
+    yield from ((order, None) for order in found)
 
 
-def preferred(machine: Machine, term: Integral, linked: Linked) -> Iterator[Integral]:
-    """The orders, those first in which the fewest jumps have to be searched for."""
+def preferred(machine: Machine, term: Integral, linked: Linked) -> Iterable[Integral]:
+    """The orders, those first in which the fewest jumps have to be searched for; a list where any have."""
     if not searches(machine, term, linked):
         return orders(term)
-    return iter(sorted(orders(term), key=lambda order: searches(machine, order, linked)))
+    return sorted(orders(term), key=lambda order: searches(machine, order, linked))
 
 
 def searches(machine: Machine, term: Integral, linked: Linked) -> int:

@@ -56,7 +56,7 @@ def allowance(term: Integral, sums: Sums, rtol: float) -> Any:
     most = np.inf if adds_nothing(term.body) else UNIT
     share = min(rtol, CANCELS)
     if sums.v.size == 1 and sums.gross is not None:  # numpy takes its time over a single number
-        gross, rates = float(sums.gross[0, 0]), float(max(sums.gross[1, 0], *np.abs(sums.t).flat, 0.0))
+        gross, rates = float(sums.gross[0, 0]), float(max(sums.gross[1, 0], *map(abs, sums.t.flat), 0.0))
         return share * max(min(gross, most) if gross < np.inf else 0.0, min(rates, UNIT) if rates < np.inf else 0.0)
     value, rate = np.abs(sums.v).max(axis=0), np.abs(sums.t).max(axis=(0, 1), initial=0.0)
     if sums.gross is not None:
@@ -80,6 +80,8 @@ def missing(term: Integral, sums: Sums, settings: Settings) -> Bools:
 
 def widest(before: Any, after: Any) -> Any:
     """Two allowances, numbers or arrays over batches, as one; of batches that do not go together the least."""
+    if isinstance(before, float) and isinstance(after, float):
+        return max(before, after)
     try:
         return np.maximum(before, after)
     except ValueError:

@@ -7,6 +7,7 @@ shape of the batch again.
 from __future__ import annotations
 
 import itertools
+import math
 import operator
 from collections.abc import Iterable
 from functools import partial
@@ -75,7 +76,8 @@ def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermos
             within = allowance(term, sums, machine.rtol)
     if outermost:
         machine.books.tell(met, batch, shape)
-        within = within.reshape(shape) if np.ndim(within) and shape else float(np.max(within))
+        if not isinstance(within, float):
+            within = within.reshape(shape) if np.ndim(within) and shape else float(np.max(within))
         machine.books.within = widest(machine.books.within, within)
     else:
         machine.books.met.take(met, None)
@@ -109,6 +111,8 @@ def _in_cases(
     machine: Machine, term: Integral, linked: Linked, flat: dict[str, Value], batch: int, outermost: bool
 ) -> Sums:
     """The integrals of a batch, those together that meet the same cases of conditions inside of conditions."""
+    if batch == 1:
+        return _vouched(machine, term, linked, batch, outermost)
     try:
         with machine.books.apart() as met:
             sums = _vouched(machine, term, linked, batch, outermost)
@@ -116,8 +120,6 @@ def _in_cases(
         return sums
     except Mixed as mixed:
         fits = np.asarray(mixed.fits)
-    if batch == 1:
-        raise AssertionError("a plan that does not hold for what it was made for")
     if fits.shape != (batch,):  # it was found out about a part of them
         fits = np.arange(batch) < batch // 2
     fits[0] = True  # the plan was made for it
@@ -158,6 +160,8 @@ def poisoned(sums: Sums, env: dict[str, Value]) -> Sums:
     if np.any(bad):
         where = np.broadcast_to(bad, sums.v.shape[-1:])
         sums.v[:, where] = np.nan
+    if sums.v.size == 1 and math.isfinite(sums.v[0, 0]):  # numpy takes its time over a single number
+        return sums
     undefined = np.isnan(sums.v)
     if undefined.any():  # nor is its derivative one
         sums.t = np.where(undefined[:, None], np.nan, sums.t)
