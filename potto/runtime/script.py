@@ -13,6 +13,7 @@ from typing import Any
 
 from potto.diagnostics import Diagnostic, PottoError, declare
 from potto.elaborate import elaborate_expression
+from potto.integrate.undefined import UNDEFINED
 from potto.kernels.cells import Value
 from potto.kernels.errors import wrong_call
 from potto.modules import statements
@@ -161,10 +162,12 @@ def remarks(estimate: Estimate, place: Span, settings: Settings) -> Iterator[Dia
     Of an answer by sampling nobody expects the accuracy of quadrature; its digits say how good it is.
     """
     if (_has_nan(estimate.value) or _has_nan(estimate.tangent)) and not DIVERGENT & {*estimate.reasons}:
+        why = [reason for reason in estimate.reasons if reason.startswith(UNDEFINED)]
         yield NO_NUMBER(
             place,
-            "this is not a number",
-            help="a builtin was used where it is not defined, or a parameter is not a number itself",
+            f"this is not a number: {'; '.join(why)}" if why else "this is not a number",
+            help=advice(why) if why else "a builtin was used where it is not defined, or a parameter is not a number"
+            " itself",
         )
     elif not estimate.converged and settings.method in ("auto", "quadrature") and estimate.reasons != (ROUGH,):
         reason = "; ".join(estimate.reasons)

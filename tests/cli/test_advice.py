@@ -19,3 +19,12 @@ def test_the_hint_suits_the_reason(potto: Potto, program: str, expression: str, 
     ran = potto("eval", "main.po", expression, "--max-evals", "2000", main=program + "\n")
     assert ran.status == 0 and "warning[P0501]" in ran.err
     assert says in ran.err and f"--{not_}" not in ran.err and (not_ == "max" or not_ not in ran.err)
+
+
+@pytest.mark.parametrize("method", ["quadrature", "mc"])
+def test_a_condition_without_a_value_is_told_with_its_place(potto: Potto, method: str) -> None:
+    program = "def f(a) integral [-3, 3] [sqrt(1 + x) < a] d(x)\n"
+    ran = potto("eval", "--method", method, "main.po", "f(2)", main=program)
+    assert ran.status == 0 and ran.out.startswith("nan")
+    assert "warning[P0524]: this is not a number: a condition has no value at x = -" in ran.err
+    assert "sign of a - sqrt(x + 1)" in ran.err and "guard the condition" in ran.err
