@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import potto
-from potto.runtime import integrals
+from potto.runtime import quadrature
 
 PROGRAM = """
 def line(a, b, t) integral ([a, a + 1/16], [b, b + 1/16]) exp(x*y)*[x + 2*y >= t] d(x, y)
@@ -44,7 +44,7 @@ def test_a_picture_is_the_same_without_looking_for_whole_pixels(
     name: str, t: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with_boxes = picture(name, t)
-    monkeypatch.setattr(integrals, "FEW", 10**9)
+    monkeypatch.setattr(quadrature, "FEW", 10**9)
     without = picture(name, t)
     for (v, e), (w, f) in zip(parts(with_boxes), parts(without), strict=True):
         # Two methods, each within its own bound of the same truth; 1e-18 is the rounding of a pixel's area.
