@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal
 
-from potto.calculus.crossing import Crossing
+from potto.calculus.critical import Critical
 from potto.calculus.currying import arguments_of, groups_of, sizes_of, uncurry
 from potto.calculus.ranges import nonnegative
 from potto.calculus.trace import CallSite, Part, Side, layout, spine
@@ -44,7 +44,7 @@ from potto.primitives import PRIMITIVES
 DEEPEST = 2000
 _DEEPEST_SURFACE = 12
 
-Kind = Literal["jump", "kink", "edge", "center", "crossing"]
+Kind = Literal["jump", "kink", "edge", "center", "critical"]
 # Where a part of the program gets its functions from: a Lam for the head of a call, or None if it is not known here.
 Resolve = Callable[[Term], "Lam | Deriv | None"]
 # The value of a plain term (a condition: 1 or 0), or None where it is not decided.
@@ -57,7 +57,7 @@ class Finding:
 
     kind: a jump (a branch), a kink (abs, max), an edge, where the term stops being smooth or defined (sqrt at 0), or a
         center, around which a smooth term may be concentrated (x - m in exp(-(x - m)^2), u in 1/(1 + exp(u))), or a
-        crossing: of `surface` and another one, inside an integral.
+        critical place of an integral: of `surface` and others, somewhere inside.
     path: for a jump, the sites of the trace that lead to the branch.
     calls: the calls on that path, for messages.
     """
@@ -68,7 +68,7 @@ class Finding:
     strict: bool = False
     coordinates: tuple[Term, ...] = ()
     calls: tuple[App, ...] = ()
-    crossing: Crossing | None = None
+    critical: Critical | None = None
 
 
 class TooDeep(Exception):
@@ -113,10 +113,10 @@ def _ends_of_domain(surface: Term) -> Iterator[Term]:
 
 
 def _carried_out(f: Finding, resolve: Resolve) -> Finding:
-    surface, crossing = carried_out(f.surface, resolve), f.crossing
-    if crossing is not None:
-        crossing = replace(crossing, first=surface, second=carried_out(crossing.second, resolve))
-    return replace(f, surface=surface, crossing=crossing)
+    critical = f.critical
+    if critical is not None:
+        critical = critical.mapped(lambda equation: carried_out(equation, resolve))
+    return replace(f, surface=carried_out(f.surface, resolve), critical=critical)
 
 
 def carried_out(surface: Term, resolve: Resolve, depth: int = 0) -> Term:

@@ -13,18 +13,20 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 
 from potto.calculus.cases import cased
-from potto.calculus.crossing import Crossing
+from potto.calculus.critical import Critical, Within, folds, shadows
+from potto.calculus.enclosable import slope_of
 from potto.calculus.radicals import minus
 from potto.calculus.ranges import positive
 from potto.calculus.solve import Family, Sections, Unsolvable, sections
 from potto.calculus.surfaces import Decide, Finding, Kind, Resolve, findings
 from potto.core.simplify import normalized_surface, simplify
-from potto.core.terms import Const, Integral, Prim, Term, postorder, prim, substitute
+from potto.core.terms import Branch, Const, Integral, Prim, Term, postorder, prim, substitute
 
 MOST_CUTS = 1200  # per variable; refinement doesn't see every weak kink that is left out
 MOST_CENTERS = 6
 MOST_PAIRS = 12  # surfaces whose crossings are worked out, if they are kinks: those of crossings come to hundreds
 MOST_JUMPS = 48  # the same, if they are jumps
+_RATIONAL = frozenset(("add", "neg", "mul", "div"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +89,7 @@ class Product:
 class Level:
     """One variable of the iteration, with everything that cuts it.
 
-    crossings: kinks where surfaces meet further in, if that has no closed form there.
+    critical: where what lies further in meets, appears or turns, if that has no closed form there.
     """
 
     variable: str
@@ -95,7 +97,7 @@ class Level:
     hi: Term
     hints: tuple[Term, ...]
     cuts: tuple[Cut, ...]
-    crossings: tuple[Crossing, ...] = ()
+    critical: tuple[Critical, ...] = ()
 
 
 @dataclass(slots=True)
@@ -172,11 +174,11 @@ def sweep(
     """Place every surface of an integral's body at the variable that it cuts. outermost: nobody asks for the rest."""
     pool = _Pool()
     centers: dict[Term, None] = {}
-    crossings: dict[Crossing, None] = {}
+    critical: dict[Critical, None] = {}
 
     def place(f: Finding) -> None:
-        if f.crossing is not None:
-            crossings[f.crossing] = None
+        if f.critical is not None:
+            critical[f.critical] = None
         elif f.kind != "center":
             pool.put(f.surface, (f.path, f.strict) if f.kind == "jump" else None, f.kind == "edge")
 
@@ -191,14 +193,17 @@ def sweep(
         cuts = (*(c for c in cuts if c.decides), *[c for c in cuts if not c.decides][:MOST_CUTS])
         here = [c for c in centers if variable in c.free]
         centers = {c: None for c in centers if variable not in c.free}
-        meeting = tuple(c for c in crossings if variable in c.free)
-        crossings = {c: None for c in crossings if variable not in c.free}
-        levels.append(Level(variable, lo, hi, (*hints, *points_of(here, variable)[:MOST_CENTERS]), cuts, meeting))
-        for shadow in () if outermost and variable == term.variables[0] else _shadows(cuts, variable, lo, hi):
-            if isinstance(shadow, Crossing):
-                crossings[shadow] = None
-            else:
-                pool.put(shadow[0], None, shadow[1])
+        systems = tuple(c for c in critical if variable in c.free)
+        critical = {c: None for c in critical if variable not in c.free}
+        levels.append(Level(variable, lo, hi, (*hints, *points_of(here, variable)[:MOST_CENTERS]), cuts, systems))
+        if not (outermost and variable == term.variables[0]):
+            further = frozenset(term.variables[: term.variables.index(variable)])
+            for shadow in _shadows(cuts, variable, lo, hi, further):
+                if isinstance(shadow, Critical):
+                    critical[shadow] = None
+                else:
+                    pool.put(shadow[0], None, shadow[1])
+            critical.update(dict.fromkeys(_further(systems, cuts, variable, lo, hi)))
         for bound in (lo, hi):
             for f in findings(bound, resolve, decide):
                 if f.kind != "jump":
@@ -208,7 +213,7 @@ def sweep(
     outer = (
         *(Finding(_kind(placed), placed.face.form) for placed in pool.surfaces.values()),
         *(Finding("center", surface) for surface in centers),
-        *(Finding("crossing", c.first, crossing=c) for c in crossings),
+        *(Finding("critical", c.equations[0], critical=c) for c in critical),
     )
     return Sweep(tuple(reversed(levels)), outer)
 
@@ -307,44 +312,84 @@ def points_of(centers: Iterable[Term], variable: str) -> tuple[Term, ...]:
     return tuple(points)
 
 
-def _shadows(cuts: tuple[Cut, ...], variable: str, lo: Term, hi: Term) -> Iterator[tuple[Term, bool] | Crossing]:
-    """What the cuts of one variable leave in those further out: (surface, whether like a square root), or crossings."""
+def along(cut: Cut) -> Term:
+    """What of a cut's surface varies with the variable that it cuts."""
+    return cut.surface if cut.product is None else cut.product.along
+
+
+def _further(
+    systems: tuple[Critical, ...], cuts: tuple[Cut, ...], variable: str, lo: Term, hi: Term
+) -> Iterator[Critical]:
+    """What the critical places along one variable leave in those further out."""
+    if not systems:
+        return
+    roots = [root for cut in cuts if cut.decides for root in cut.roots or ()]
+    searched = [cut.surface for cut in cuts if cut.decides and cut.roots is None]
+    yield from shadows(systems[:MOST_PAIRS], variable, lo, hi, roots, searched)
+
+
+def _shadows(
+    cuts: tuple[Cut, ...], variable: str, lo: Term, hi: Term, further: frozenset[str]
+) -> Iterator[tuple[Term, bool] | Critical]:
+    """What the cuts of one variable leave in those further out: (surface, whether like a square root), or systems.
+
+    further: those variables. Formulas of formulas grow from one to the next; where there are two or more, systems in
+    the surfaces as they are take the place of what is more than a radical.
+    """
     for cut in cuts:
-        along = cut.surface if cut.product is None else cut.product.along
+        surface = along(cut)
         for bound in (lo, hi):
             if not (isinstance(bound, Const) and bound.value in (float("inf"), float("-inf"))):
-                yield substitute(along, {variable: bound}), False
-        found = _sections(along, variable)
+                yield substitute(surface, {variable: bound}), False
+        if cut.roots is None or (cut.families and _by_numbers(surface, variable, further)):
+            yield from folds(surface, variable, lo, hi)
+            if cut.roots is not None:
+                continue
+        found = _sections(surface, variable)
         if cut.product is None and not (isinstance(found, Sections) and found.complete):
             found = _sections(cut.key, variable)
         if isinstance(found, Sections):
             for turn in found.turning:
                 yield turn, True
             for stop in dict.fromkeys(stop for family in found.families for stop in family.stops):
-                yield substitute(along, {variable: stop}), True
+                yield substitute(surface, {variable: stop}), True
     meeting = [c for c in cuts if c.roots or c.families or c.roots is None]
     meeting = [c for n, c in enumerate(meeting) if n < (MOST_JUMPS if c.decides else MOST_PAIRS)]
     for first in meeting:
         for second in meeting:
             if first is not second and first.key.digest < second.key.digest:
-                yield from _crossings(first, second, variable, lo, hi)
+                yield from _crossings(first, second, Within(variable, lo, hi), further)
+
+
+def _by_numbers(surface: Term, variable: str, further: frozenset[str]) -> bool:
+    """Whether what a surface leaves in variables further out is better searched for."""
+    return len(surface.free & further) >= 2 and slope_of(surface, variable) is not None
 
 
 def _crossings(
-    first: Cut, second: Cut, variable: str, lo: Term, hi: Term
-) -> Iterator[tuple[Term, bool] | Crossing]:
+    first: Cut, second: Cut, within: Within, further: frozenset[str]
+) -> Iterator[tuple[Term, bool] | Critical]:
     """Where two sections meet: the simpler one's roots put into the other's surface, where they are all known."""
     solved = [c for c in (first, second) if c.roots is not None and not c.families]
-    if not solved:
-        one, other = (c.surface if c.product is None else c.product.along for c in (first, second))
-        yield Crossing(one, other, variable, lo, hi)
+    a = min(solved, key=lambda c: (len(c.roots or ()), sum(_size(r) for r in c.roots or ())), default=None)
+    searched = a is None or (
+        any(_radical(root) for root in a.roots or ())
+        and all(_by_numbers(along(c), within.variable, further) for c in (first, second))
+    )
+    if a is None or searched:
+        yield Critical((along(first), along(second)), (within,))
         return
-    a = min(solved, key=lambda c: (len(c.roots or ()), sum(_size(r) for r in c.roots or ())))
     b = second if a is first else first
     for root in a.roots or ():
-        meeting = simplify(substitute(b.surface, {variable: root}))
+        meeting = simplify(substitute(b.surface, {within.variable: root}))
         if meeting.free:
             yield meeting, False
+
+
+def _radical(root: Term) -> bool:
+    """Whether a root is more than a quotient of polynomials."""
+    return any(isinstance(node, Branch) or (isinstance(node, Prim) and node.op not in _RATIONAL)
+               for node in postorder(root))  # fmt: skip
 
 
 @lru_cache(maxsize=8192)

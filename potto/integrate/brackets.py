@@ -1,8 +1,8 @@
 """Intervals with one root each: of a surface along one variable, for a whole batch at once.
 
-Owns `isolated`. A cell over which the enclosure of the surface leaves out 0 has no root; one over which that of its
-slope does has at most one, and the signs at its ends tell. All others are halved. So no root is missed, however narrow
-what brings it forth; what is given up on, once there are too many cells, is told.
+Owns `isolated`, `flat`, `between` and `at_label`. A cell over which the enclosure of the surface leaves out 0 has no
+root; one over which that of its slope does has at most one, and the signs at its ends tell. All others are halved. So
+no root is missed, however narrow what brings it forth; what is given up on, once there are too many cells, is told.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Brackets:
 
 def isolated(surface: Term, slope: Term, variable: str, env: dict[str, Value], low: Array, high: Array) -> Brackets:
     """The sign changes of a surface between bounds (B,), which may be infinite."""
-    (surface, slope), env = _flat((surface, slope), env)
+    (surface, slope), env = flat((surface, slope), env)
     fixed: dict[str, Interval] = {}
     for name in surface.free - {variable}:
         value = env[name]
@@ -88,7 +88,7 @@ def _around_poles(
     return owner[crossed], s0[crossed], s1[crossed]
 
 
-def _flat(terms: tuple[Term, ...], env: dict[str, Value]) -> tuple[list[Term], dict[str, Value]]:
+def flat(terms: tuple[Term, ...], env: dict[str, Value]) -> tuple[list[Term], dict[str, Value]]:
     """Terms with a name of its own for each component of a tuple, and their values."""
     parts: dict[Term, Value] = {}
     memo: dict[Term, Term] = {}
@@ -102,6 +102,14 @@ def _flat(terms: tuple[Term, ...], env: dict[str, Value]) -> tuple[list[Term], d
             memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
     named = {new.name: parts[old] for old, new in memo.items() if old in parts and isinstance(new, Var)}
     return [memo[term] for term in terms], {**env, **named}
+
+
+def between(a: Array, b: Array) -> Array:
+    """A point between the ends, also of what is not finite."""
+    middle = 0.5 * (a + b)
+    up, down = np.maximum(2 * np.abs(a), 1.0), -np.maximum(2 * np.abs(b), 1.0)
+    far = np.where(np.isinf(b), up, np.where(np.isinf(a), down, middle))
+    return np.where(np.isinf(a) & np.isinf(b), 0.0, far)
 
 
 def at_label(low: Array, high: Array, s: Array) -> Array:

@@ -160,7 +160,7 @@ def note_folds(scene: Scene, cuts: Cuts) -> None:
         if not counts.any():
             continue
         owner, x = fold.owner[counts], float(fold.x[counts][0])
-        here = [scene.env[level.variable] for level in levels[:number]]
+        here = [scene.env.get(level.variable) for level in levels[:number]]
         outer = [as_array(cell.v, cuts.sign.size)[owner[0]] for cell in here if isinstance(cell, Cell)]
         named = Sided(levels[number].variable, levels[number].level.cuts[fold.cut].surface, fold=True)
         all_of_it = None if number else tuple(map(int, owner))

@@ -109,7 +109,7 @@ def _planned(
     numbers = {j.path: (g.number, j.orientation) for g in groups for j in g.cut.jumps}
     vanishing = vanishing_of(body, numbers, weight)
     plan = Plan(term, levels, groups, function_of(body), vanishing, (), hides=hides)
-    places = (f for f in (*steps, *swept.outer) if f.crossing is None)
+    places = (f for f in (*steps, *swept.outer) if f.critical is None)
     return plan, tuple((f.surface, f.kind) for f in places if step.state in f.surface.free)
 
 

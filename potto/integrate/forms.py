@@ -56,6 +56,9 @@ def totals(work: Work, p: Pieces, ends: Ends | None) -> Totals:
     if ends is not None:
         swept, rounding = boundary(work, ends)
         value, bound = value + swept, bound + rounding
+    if work.misplaced is not None:
+        rows = work.misplaced.reshape(-1, work.seg.a.size)
+        bound = bound + np.stack([np.bincount(work.seg.owner, row, work.batch) for row in rows]).reshape(bound.shape)
     apart = np.abs(moving[0] - value)
     return Totals(integral, error, size, moving, (value, bound), np.where(np.isfinite(apart), apart, 0.0))
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from potto.core.terms import Term
 from potto.integrate.collapsed import Collapsed, collapsed_ranges, count_collapsed
-from potto.integrate.crossings import crossing_rows
+from potto.integrate.critical_places import critical_rows
 from potto.integrate.cuts import Cuts, Row, frame_rows, segments, standing
 from potto.integrate.edges import Scene, count_places, count_slivers, note_folds
 from potto.integrate.maps import Segments
@@ -127,8 +127,9 @@ class Iteration:
                 if cut.jumps:
                     roots = [(row.x, row.t[: self.machine.directions]) for row in rows if row.cut == number]
                     machine.costs.saw(cut.surface, roots, lo.v, hi.v, asked)
-        for row in rows if self.still else ():
-            if row.cut >= 0 and level.level.cuts[row.cut].surface in self.still:
+        resting = self.resting(level, lo, hi)
+        for row in rows if self.still or resting else ():
+            if resting or (row.cut >= 0 and level.level.cuts[row.cut].surface in self.still):
                 row.t = ()
         cuts = segments(level, lo, hi, rows, batch, machine.directions, level is not self.plan.levels[0])
         cuts.lost = lost
@@ -137,18 +138,29 @@ class Iteration:
             return standing(cuts), [ranges.at_rest() for ranges in collapsed]
         return cuts, collapsed
 
+    def resting(self, level: LevelPlan, lo: Cell, hi: Cell) -> bool:
+        """Whether nothing needs to move with the cuts of a variable: what is integrated is continuous there.
+
+        Then the derivative along it, which nodes that move would need, is best left alone: near critical places it is
+        the hardest of all. Where there is but one variable further in it costs little, and serves as a check.
+        """
+        levels = self.plan.levels
+        if len(levels) < 3 or any(own is level for own in levels[-2:]) or any(c.decides for c in level.level.cuts):
+            return False
+        return not any(np.any(t) for bound in (lo, hi) for t in bound.t if t is not None)
+
     def searched(
         self, level: LevelPlan, env: dict[str, Value], lo: Cell, hi: Cell, batch: int, machine: Evaluator
     ) -> tuple[list[Row], Array | None]:
         """The cuts that numbers find, and the most that those may matter which lie where a density leaves nothing."""
-        crossings = level.level.crossings
-        if not (level.families or level.searched or crossings):
+        critical = level.level.critical
+        if not (level.families or level.searched or critical):
             return [], None
         number = next((n for n, own in enumerate(self.plan.levels) if own is level), None)
         near = None if number is None else concentrated(self.plan, number, env, lo, hi, batch)
         lo, hi, lost = near or (lo, hi, None)
         rows = searched_rows(level, env, lo, hi, batch, machine)
-        return (rows + crossing_rows(level, env, lo, hi, batch, machine) if crossings else rows), lost
+        return (rows + critical_rows(level, env, lo, hi, batch, machine) if critical else rows), lost
 
     def sides_of(
         self, level: LevelPlan, env: dict[str, Value], seg: Segments, sides: dict[int, Mask], machine: Evaluator

@@ -98,12 +98,18 @@ def off_the_ends(seg: Segments, x: Array) -> Array:
 def trembling(seg: Segments, x: Array) -> Array:
     """How much values next to a turning point change as points are rounded, relatively: (P, n), 0 on other segments.
 
-    Values like the power -3/2 of the distance, which second derivatives have there, and half a unit of the last place.
+    Values like the power -3/2 of the distance, which second derivatives have there, and half a unit of the last place,
+    or as far as the point itself may be off: the integrand, too, knows it no better.
     """
-    left, right = seg.left[:, None], seg.right[:, None]
-    near = np.where(np.isin(seg.kind, (LEFT, BOTH))[:, None], x - left, np.inf)
-    near = np.minimum(near, np.where(np.isin(seg.kind, (RIGHT, BOTH))[:, None], right - x, np.inf))
-    return np.minimum(0.75 * EPS * np.abs(x) / np.maximum(near, EPS * np.abs(x)), 1.0)
+    least = 0.5 * EPS * np.abs(x)
+    found = np.zeros(x.shape)
+    for kinds, turn, end, off in (
+        ((LEFT, BOTH), seg.left, seg.a, seg.ea), ((RIGHT, BOTH), seg.right, seg.b, seg.eb)
+    ):  # fmt: skip
+        rounded = np.maximum(least, np.where(turn == end, off, 0.0)[:, None])
+        near = np.where(np.isin(seg.kind, kinds)[:, None], np.abs(x - turn[:, None]), np.inf)
+        found = np.maximum(found, 1.5 * rounded / np.maximum(near, 2 * least))
+    return np.minimum(found, 1.0)
 
 
 def displaced(seg: Segments, x: Array, label: Array) -> tuple[Array, Array]:

@@ -33,6 +33,7 @@ class Sided:
 
 INNER = -1
 STRAY = 8
+TELLING = 4  # nodes, from which on values tell where a singularity is; a polynomial may need fewer
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,7 @@ class Evaluator(Protocol):
     def note_fold(self, what: Sided, where: Folded, members: Ints | None = None) -> None: ...
     def note_unfinished(self, reason: str, members: Ints | None = None, once: str = ...) -> None: ...
     def note_degenerate(self, variable: str, members: Ints | None = None) -> None: ...
+    def note_incomplete(self, what: str) -> None: ...
 
 
 @dataclass
@@ -128,9 +130,12 @@ class Pieces:
         """The pieces with what only refinement asks for, which is worked out when it does."""
         if self.coefficients is not None:
             worst, all_of_them = self.error.argmax(axis=0), np.arange(self.u0.size)
-            lean = leaning(self.coefficients[worst, all_of_them])
             assert self.heights is not None
-            self.lean = lean * _power(self.heights[worst, all_of_them], lean, self.end)
+            if self.coefficients.shape[-1] >= TELLING:
+                lean = leaning(self.coefficients[worst, all_of_them])
+                self.lean = lean * _power(self.heights[worst, all_of_them], lean, self.end)
+            else:
+                self.lean = np.zeros(self.u0.size, dtype=np.int64)
             self.coefficients = self.heights = None
         return self
 

@@ -15,12 +15,16 @@ from typing import Any
 import numpy as np
 
 from potto.calculus.cases import cased
+from potto.calculus.critical import MOST_EQUATIONS, slopes_of
+from potto.calculus.degree import degree
+from potto.calculus.enclosable import slope_of
+from potto.calculus.expand import expanded
 from potto.calculus.hoist import hidden, hoisted
 from potto.calculus.lifted import Lifted, lifted, nested
 from potto.calculus.regions import Number
 from potto.calculus.sides import box_of as extents
 from potto.calculus.surfaces import Decide, Finding, Resolve, findings
-from potto.calculus.sweep import Cut, Level, sweep
+from potto.calculus.sweep import Cut, Level, along, sweep
 from potto.calculus.trace import layout
 from potto.calculus.unrolled import unrolled
 from potto.calculus.verdict import monotone
@@ -38,12 +42,14 @@ from potto.core.terms import (
     Sum,
     Term,
     Tuple,
+    Var,
     integral,
     lam,
     neg,
     outside,
     postorder,
     prim,
+    substitute,
     tuple_,
 )  # fmt: skip
 from potto.integrate.boxes import Box, box_of
@@ -102,7 +108,8 @@ class Plan:
     straight: its terms where it can be integrated by rules that are proved to do, if the parameters let it.
     premise: what has to be positive for the plan to hold: for these parameters some cases are never met.
     confused: whether there are conditions inside of conditions that were not told apart.
-    folds: whether a surface that is searched for may have folds, of which the variables further out know nothing.
+    folds: whether a surface that is searched for may have folds where the variables further out can't be cut.
+    degree: of the integrand between its cuts, where it is a polynomial in the innermost variable.
     """
 
     term: Integral
@@ -119,6 +126,7 @@ class Plan:
     premise: Lam | None = None
     confused: bool = False
     folds: bool = False
+    degree: int | None = None
 
     def environment(self, env: dict[str, Value], everything: dict[str, Value]) -> dict[str, Value]:
         """What the plan is evaluated in: also what functions have captured, if calls of them were carried out."""
@@ -195,22 +203,36 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve, numb
     kept = tuple((t, v) for t, v in decisions.items() if not isinstance(t, Const))
     body = function_of(term.body)
     box = box_of(term, found, body) if reaches and not hides else None
-    surfaces = {f.surface for f in found if f.kind not in ("center", "crossing")}
+    surfaces = {f.surface for f in found if f.kind not in ("center", "critical")}
     doublings = sum(min(3, len(surface.free.intersection(term.variables))) for surface in surfaces)
-    plain = straight(term, levels, inline) if reaches and not hides else None
+    inlined = _inlined(term, inline) if reaches and not hides else None
+    plain = None if inlined is None else straight(term, inlined, levels)
+    high = None if inlined is None else degree(inlined, term.variables[-1])
     return Plan(
         term, levels, groups, body, vanishing, kept, reaches, hides, box, doublings, plain, _premise(premises),
-        confused, _may_fold(term, levels),
+        confused, _may_fold(term, levels), high,
     )  # fmt: skip
 
 
+def _inlined(term: Integral, inline: Resolve) -> Term:
+    """The integrand with calls of known functions carried out."""
+    passed = {n.name: f for n in postorder(term.body) if isinstance(n, Var) and (f := inline(n)) is not None}
+    return expanded(substitute(term.body, passed), inline)
+
+
 def _may_fold(term: Integral, levels: Sequence[LevelPlan]) -> bool:
-    """Whether roots that are searched for may appear or merge as variables further out vary."""
-    inner = [(cut.surface, level.variable) for level in levels[1:] for cut in level.searched if cut.decides]
-    if not inner:
+    """Whether roots that are searched for may appear or merge at places of variables further out that can't be found."""
+    number = max((n for n, level in enumerate(levels) if any(cut.decides for cut in level.searched)), default=0)
+    if not number:
         return False
     bounds = extents(term)
-    return not all(monotone(surface, variable, bounds) for surface, variable in inner)
+    inner = [(cut, level.variable) for level in levels[1:] for cut in level.searched if cut.decides]
+    if all(monotone(cut.surface, variable, bounds) for cut, variable in inner):
+        return False
+    systems = [(system, level.variable) for level in levels[:number] for system in level.level.critical]
+    return number >= MOST_EQUATIONS or any(slope_of(along(cut), variable) is None for cut, variable in inner) or any(
+        slopes_of(system, variable) is None for system, variable in systems
+    )
 
 
 def _may_be_mixed(found: Finding) -> bool:

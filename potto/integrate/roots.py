@@ -14,7 +14,7 @@ import numpy as np
 
 from potto.calculus.enclosable import slope_of
 from potto.core.terms import Lam, Term, lam
-from potto.integrate.brackets import Brackets, isolated
+from potto.integrate.brackets import Brackets, between, isolated
 from potto.integrate.cuts import SEARCHED, Row, as_array
 from potto.integrate.pieces import still
 from potto.integrate.plan import LevelPlan, function_of
@@ -175,7 +175,7 @@ def _to_the_edges(psi: Any, x: Array, y: Array) -> tuple[Array, Array]:
     there = np.where(defined[:, columns], x[:, columns], x[:, columns + 1])
     beyond = np.where(defined[:, columns], x[:, columns + 1], x[:, columns])
     for _ in range(BISECTIONS):
-        middle = _between(there, beyond)
+        middle = between(there, beyond)
         inside = ~np.isnan(psi(middle))
         there, beyond = np.where(inside, middle, there), np.where(inside, beyond, middle)
     x = np.sort(np.concatenate((x, there), axis=1), axis=1)
@@ -198,27 +198,19 @@ def _polished(function: Lam, variable: str, env: dict[str, Value], a: Array, b: 
         left = np.sign(psi(a)[0])
         right = np.sign(psi(b)[0])
         left = np.where((left == 0) | np.isnan(left), -right, left)
-        x = _between(a, b)
+        x = between(a, b)
         for turn in range(BISECTIONS):
             f, slope = psi(x)
             below = left * f > 0
             a, b = np.where(below, x, a), np.where(below, b, x)
             step = x - f / slope
             good = (step > a) & (step < b) & (turn % 3 < 2)
-            new = np.where(f == 0, x, np.where(good, step, _between(a, b)))
+            new = np.where(f == 0, x, np.where(good, step, between(a, b)))
             still = (np.abs(new - x) <= EPS * np.abs(x)) | np.isnan(x) | (np.abs(b - a) <= EPS * np.abs(x))
             x = new
             if still.all():
                 break
     return x
-
-
-def _between(a: Array, b: Array) -> Array:
-    """A point between the ends, also of what is not finite."""
-    middle = 0.5 * (a + b)
-    up, down = np.maximum(2 * np.abs(a), 1.0), -np.maximum(2 * np.abs(b), 1.0)
-    far = np.where(np.isinf(b), up, np.where(np.isinf(a), down, middle))
-    return np.where(np.isinf(a) & np.isinf(b), 0.0, far)
 
 
 def _moving(cut: int, function: Lam, variable: str, env: dict[str, Value], root: Array, machine: Any) -> Row:

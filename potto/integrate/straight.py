@@ -18,20 +18,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from potto.calculus.expand import expanded
-from potto.calculus.surfaces import Resolve
 from potto.core.terms import (
     Branch,
     Const,
     Integral,
     Lam,
     Term,
-    Var,
     children,
     postorder,
     prim,
     rebuild,
-    substitute,
     tuple_,
 )
 from potto.integrate.discs import enclosable
@@ -95,12 +91,13 @@ class Straight:
         return found
 
 
-def straight(term: Integral, levels: Sequence[LevelPlan], inline: Resolve) -> Straight | None:
-    """The terms for this way; None if a cut has no closed form, or the integrand no formula that can be bounded."""
+def straight(term: Integral, body: Term, levels: Sequence[LevelPlan]) -> Straight | None:
+    """The terms for this way; None if a cut has no closed form, or the integrand no formula that can be bounded.
+
+    body: the integrand with calls carried out.
+    """
     if len(levels) > MOST_VARIABLES or any(_not_plain(level) for level in levels):
         return None
-    passed = {n.name: f for n in postorder(term.body) if isinstance(n, Var) and (f := inline(n)) is not None}
-    body = expanded(substitute(term.body, passed), inline)
     nodes = postorder(body)
     if len(nodes) > MOST_TERMS:
         return None

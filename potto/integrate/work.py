@@ -71,6 +71,7 @@ class Work:
     cancels: Array = field(init=False)
     hidden: Array = field(init=False)  # what is added up further in, on the average, where it comes to nothing
     endless: Array | None = None  # (k, B) the tangents that are infinite, with their signs; 0 for others
+    misplaced: Array | None = None  # (m, k, S) what the rounding of the ends of segments means for the fixed form
 
     def __post_init__(self) -> None:
         self.k = self.machine.directions
@@ -91,7 +92,7 @@ class Work:
         zero, one = np.zeros(count), np.ones(count)
         ends = self.ends = self.end_values()
         whole = Pieces(np.arange(count), zero, one, np.zeros(count, dtype=np.int64))
-        fresh = self.measure(whole, self.parent.order, True)
+        fresh = self.measure(whole, self.enough() or self.parent.order, True)
         if self.conflict and not self.last:
             look_for_steps(self, fresh)
         found = totals(self, fresh, ends)
@@ -111,6 +112,12 @@ class Work:
         else:
             found = totals(self, done, ends)
         return given_up(self, done, found, sums(self, found, ends))
+
+    def enough(self) -> int | None:
+        """How many nodes do for an integrand that is a polynomial between its cuts: so many that it is 0 if it is at all
+        of them, since they also tell its size."""
+        degree = self.parent.plan.degree if self.last and not self.seg.kind.any() else None
+        return None if degree is None or degree >= self.parent.order else degree + 1
 
     def good_enough(self, p: Pieces, found: Totals, ends: Ends | None) -> bool:
         """Whether whole segments do as they are for every member, by the strictest reading of what is asked for."""
@@ -251,7 +258,8 @@ class Work:
         coefficients = h @ rule.transform
         size, height = np.abs(coefficients), np.abs(h)
         p.integral = coefficients[..., 0]
-        p.error = truncation(size)
+        exact = self.enough()
+        p.error = truncation(size) if exact is None or rule.nodes.size < exact else np.zeros(size.shape[:-1])
         p.coefficients, p.heights = coefficients, height
         p.size = height @ rule.weights
         if self.ends is not None:
@@ -269,11 +277,32 @@ class Work:
             place = np.maximum(seg.ea, seg.eb) / (seg.b - seg.a)
             place = np.where(np.isfinite(place), place, 0.0)
             tangents = p.floor.reshape(self.width, -1, p.u0.size)[:, 1:]
-            tangents *= 3
+            tangents *= 4
             tangents += place * p.size.reshape(self.width, -1, p.u0.size)[:, 1:]
+            if self.both and not self.last:
+                self.misplace(p, seg, coefficients @ rule.ends)
         broken = ~np.isfinite(p.integral)
         if broken.any():
             p.error = np.where(broken, np.inf, p.error)
+
+    def misplace(self, p: Pieces, seg: Segments, at_ends: Array) -> None:
+        """Note what is gained or lost in the fixed form as the ends of whole segments are off by a rounding.
+
+        The interior derivative jumps where the integrand has a kink; next to a place where sections turn it is as large
+        as one likes. at_ends: the channels at both ends (C, P, 2).
+        """
+        index = np.nonzero((p.u0 == 0) & (p.u1 == 1) & (p.end == 0))[0]
+        if not index.size:
+            return
+        part, u = seg.pick(index), np.array([[0.0, 1.0]])
+        slope = np.abs(np.broadcast_to(maps.points(part, u)[1], (index.size, 2)))
+        turn = EPS * np.stack((np.abs(part.left), np.abs(part.right)), axis=1)
+        off = np.stack((part.ea, part.eb), axis=1) + np.where(np.isfinite(turn), turn, 0.0)
+        share = np.divide(off, slope, out=np.zeros_like(off), where=(slope > 0) & np.isfinite(slope))
+        fixed = at_ends.reshape(self.width, -1, p.u0.size, 2)[:, 1 + self.k :, index]
+        if self.misplaced is None:
+            self.misplaced = np.zeros((self.width, self.k, self.seg.a.size))
+        self.misplaced[:, :, p.segment[index]] = np.nan_to_num((np.abs(fixed) * np.minimum(share, 1.0)).sum(axis=-1))
 
     def noise(self, p: Pieces, seg: Segments) -> Array:
         """What the integrand's own rounding, kept track of at the ends of segments, comes to in each channel: (C, P).

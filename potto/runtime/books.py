@@ -77,6 +77,7 @@ class Met:
     """What integrals have met, and which members of the batch did; None: nobody knows which, so any of them may have.
 
     edges: one-sided derivatives, (..., members) each. sided, folds, degenerate: what is still to be looked into.
+    incomplete: searches for places to cut at that were given up.
     """
 
     unfinished: dict[str, Ints | None] = field(default_factory=dict)
@@ -84,12 +85,13 @@ class Met:
     sided: dict[Sided, Ints | None] = field(default_factory=dict)
     folds: dict[Sided, tuple[Folded, Ints | None]] = field(default_factory=dict)
     degenerate: dict[str, Ints | None] = field(default_factory=dict)
+    incomplete: dict[str, Ints | None] = field(default_factory=dict)
 
     def nothing(self, size: int) -> Bools:
         """The members of a batch that have met nothing."""
         mask = np.ones(size, dtype=bool)
         folds = {what: members for what, (_, members) in self.folds.items()}
-        for event in (self.unfinished, self.degenerate, self.sided, folds):
+        for event in (self.unfinished, self.degenerate, self.incomplete, self.sided, folds):
             for members in event.values():
                 mask[slice(None) if members is None else members] = False
         return mask
@@ -118,6 +120,8 @@ class Met:
 
         for name, members in other.degenerate.items():
             note(self.degenerate, name, here(members))
+        for what, members in other.incomplete.items():
+            note(self.incomplete, what, here(members))
         for reason, members in other.unfinished.items():
             self.note_unfinished(reason, here(members), UNDEFINED if reason.startswith(UNDEFINED) else "")
         for what, members in other.sided.items():

@@ -20,7 +20,9 @@ MOST_LEVELS = 3
 PER_LEVEL, AFFORDABLE = 12, 1_000_000
 LOOSE = 1e-3
 FEW_NODES = 30_000  # up to which iterated quadrature is no slower
-TRIAL = 12_000  # evaluations that are spent on one order of variables before another one is tried
+# Evaluations that are spent on one order of two variables before another one is tried; how many times those of one
+# variable more.
+TRIAL, TRIAL_FACTOR = 12_000, 25
 
 
 def too_many(machine: Machine, term: Integral, linked: Linked) -> bool:
@@ -65,7 +67,8 @@ def trials(machine: Machine, term: Integral, linked: Linked, outermost: bool) ->
     out at places that are not known may make one order a hundred times as expensive as another."""
     found = preferred(machine, term, linked)
     if isinstance(found, list) and outermost and len(found) > 1 and searches(machine, found[0], linked):
-        yield from ((order, TRIAL) for order in found)
+        most = TRIAL * TRIAL_FACTOR ** max(len(term.variables) - 2, 0)
+        yield from ((order, most) for order in found)
     yield from ((order, None) for order in found)
 
 

@@ -198,7 +198,7 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
             continue
         sums = counted(found, plan, machine)
         if not met.degenerate:
-            if plan.folds:
+            if plan.folds or met.incomplete:
                 beside_another(machine, order, linked, env, batch, sums)
             if outermost and met.sided and not machine.side:
                 from_both_sides(machine, plan, plan.environment(env, linked.env), batch, sums, iterated)

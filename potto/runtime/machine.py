@@ -17,19 +17,7 @@ from potto.calculus.branch_cuts import opened
 from potto.calculus.currying import sizes_of, uncurry
 from potto.calculus.deltas import PRODUCT_OF_DELTAS
 from potto.calculus.tangents import Shape
-from potto.core.terms import (
-    Branch,
-    Deriv,
-    Global,
-    Hole,
-    If,
-    Integral,
-    Lam,
-    Sum,
-    Term,
-    lam,
-    postorder,
-)  # fmt: skip
+from potto.core.terms import Branch, Deriv, Global, Hole, If, Integral, Lam, Sum, Term, lam, postorder
 from potto.core.terms import Delta as DeltaTerm
 from potto.diagnostics import PottoError
 from potto.integrate.costs import Costs
@@ -198,6 +186,9 @@ class Machine:
     def note_unfinished(self, reason: str, members: Ints | None = None, once: str = "") -> None:
         """Why the answer is not as accurate as was asked; of reasons that begin with `once`, the first will do."""
         self.books.met.note_unfinished(reason, members, once)
+
+    def note_incomplete(self, what: str) -> None:
+        note(self.books.met.incomplete, what, None)
 
     def note_degenerate(self, variable: str, members: Ints | None = None) -> None:
         note(self.books.met.degenerate, variable, members)

@@ -140,7 +140,7 @@ def _kinds(met: Met, size: int) -> tuple[Bools, Bools, Bools] | None:
     knows of something which of them met it."""
     folds = {what: members for what, (_, members) in met.folds.items()}
     masks = []
-    for events in ((met.degenerate,), (met.unfinished, folds), (met.sided,)):
+    for events in ((met.degenerate,), (met.unfinished, met.incomplete, folds), (met.sided,)):
         mask = np.zeros(size, dtype=bool)
         for event in events:
             for members in event.values():

@@ -9,7 +9,7 @@ import potto
 
 M = potto.compile("""
 def step(t, a) integral [0, 1] a*[x < t] d(x)
-def bent(t, a) integral [0, 1] a*abs(x - 2)*[x < t] d(x)
+def bent(t, a) integral [0, 1] a*exp(abs(x - 2))*[x < t] d(x)
 def scene(c, s, a) integral ([0, 1], [0, 1]) a*x*[x + y + c >= 0]*[x < s]*[y < 5*a] d(x, y)
 def rough(c, s, a) integral ([0, 1], [0, 1]) a*abs(x - 2)*[x + y + c >= 0]*[x < s]*[y < 5*a] d(x, y)
 def still(a) integral ([0, 1], [0, 1]) a*x*[x + y >= 1] d(x, y)

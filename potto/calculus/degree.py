@@ -1,0 +1,46 @@
+"""How high the degree of an integrand is in one variable, between the surfaces that cut it.
+
+Owns `degree`. A Gauss rule with n nodes is exact up to degree 2n - 1: of a length, an area or a volume one node along
+the innermost variable says everything.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from potto.core.terms import Branch, Const, If, Prim, Proj, Term, Tuple, Var, children, postorder_by
+
+MOST = 40  # more nodes than these ask for are no saving
+
+
+def degree(term: Term, variable: str) -> int | None:
+    """The largest degree that a term has in a variable on any side of its surfaces; None if it is no polynomial."""
+    found: dict[Term, int | None] = {}
+    for node in postorder_by(term, _values):
+        found[node] = 0 if variable not in node.free else _node(node, [found[part] for part in _values(node)])
+    return found[term]
+
+
+def _values(node: Term) -> Sequence[Term]:
+    """What a term's value is made of: of a conditional both sides, whatever decides."""
+    return (node.then, node.orelse) if isinstance(node, Branch | If) else children(node)
+
+
+def _node(node: Term, parts: Sequence[int | None]) -> int | None:
+    known = [part for part in parts if part is not None]
+    if len(known) < len(parts):
+        return None
+    match node:
+        case Var():
+            return 1
+        case Branch() | Tuple() | Proj() | Prim(op="add" | "neg" | "abs" | "min" | "max"):
+            total = max(known)
+        case Prim(op="mul"):
+            total = sum(known)
+        case Prim(op="div") if known[1] == 0:
+            total = known[0]
+        case Prim(op="pow", args=(_, Const(value=exponent))) if exponent >= 0 and exponent.is_integer():
+            total = known[0] * int(exponent)
+        case _:
+            return None
+    return total if total <= MOST else None
