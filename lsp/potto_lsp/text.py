@@ -18,7 +18,7 @@ from typing import Literal
 Encoding = Literal["utf-8", "utf-16", "utf-32"]
 ENCODINGS: tuple[Encoding, ...] = ("utf-8", "utf-16", "utf-32")
 _LINE_END = re.compile(r"\r\n?|\n")
-_BEYOND_ASCII, _ASTRAL = re.compile(r"[^\x00-\x7f]"), re.compile(r"[^\x00-\uffff]")
+_BEYOND_ASCII, _ASTRAL = "[^\x00-\x7f]", "[\U00010000-\U0010ffff]"  # for `re` to compile where there are any
 
 
 def line_starts(text: str) -> list[int]:
@@ -99,7 +99,7 @@ class Text:
         if self.encoding == "utf-32" or self.text.isascii():
             return [], [0]
         pattern = _BEYOND_ASCII if self.encoding == "utf-8" else _ASTRAL
-        wide = [found.start() for found in pattern.finditer(self.text)]
+        wide = [found.start() for found in re.finditer(pattern, self.text)]
         longer = (units(self.text[at], self.encoding) - 1 for at in wide)
         return wide, list(accumulate(longer, initial=0))
 
