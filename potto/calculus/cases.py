@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from potto.calculus.lifted import closed_value, has_nested, lifted
+from potto.calculus.nested import has_nested
 from potto.core.terms import (
     Branch,
     Integral,
@@ -59,7 +59,11 @@ def resolved(term: Term) -> Term:
 def unnested(term: Integral) -> Integral:
     """The integral with no bracket inside of a condition, whatever its parameters are; the same one if that takes too
     many cases."""
-    found = lifted(term, closed_value) if has_nested(term.body) else None
+    if not has_nested(term.body):
+        return term
+    from potto.calculus.lifted import closed_value, lifted
+
+    found = lifted(term, closed_value)
     return term if found is None else found.term
 
 

@@ -14,6 +14,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
+from potto.calculus.nested import BINDERS, coordinates_of, nested
 from potto.calculus.ranges import ranges
 from potto.calculus.regions import Coefficient, Extent, Form, Forms, Number, Region, region_of, scaled
 from potto.calculus.sampling import sample_value
@@ -23,24 +24,20 @@ from potto.core.terms import (
     Const,
     Delta,
     Integral,
-    Lam,
     Prim,
     Proj,
-    Sum,
     Term,
     branch,
     children,
     const,
     integral,
     outside,
-    postorder,
     postorder_by,
     proj,
     rebuild,
 )
 
 MOST_CASES = 400  # decisions of one tree; what is beyond it is not taken apart
-_BINDERS = (Integral, Sum, Lam)
 
 
 class TooManyCases(Exception):
@@ -55,23 +52,9 @@ class Lifted:
     premises: tuple[Term, ...]
 
 
-def nested(surface: Term) -> bool:
-    """Whether a condition has a bracket inside that is its own, not one of an integral in it."""
-    return any(isinstance(node, Branch) for node in outside(surface, _BINDERS))
-
-
-def has_nested(term: Term) -> bool:
-    """Whether some condition of a term, also one of an integral inside, has a bracket in it."""
-    return any(nested(c) for node in postorder(term) for c in _coordinates(node))
-
-
 def closed_value(term: Term) -> float:
     """What a term is that nothing decides, else nan: for what is to hold whatever the parameters are."""
     return math.nan if term.free else sample_value(term, {})
-
-
-def _coordinates(node: Term) -> tuple[Term, ...]:
-    return node.coordinates if isinstance(node, Branch | Delta) else ()
 
 
 def lifted(term: Integral, number: Number) -> Lifted | None:
@@ -101,7 +84,7 @@ def _of_integral(
         else:
             memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
     body = memo[term.body]
-    if any(nested(c) for node in outside(body, (Integral,)) for c in _coordinates(node)):
+    if any(nested(c) for node in outside(body, (Integral,)) for c in coordinates_of(node)):
         trees = _Trees(body, forms, region)
         body = trees.apart(body)
         premises |= dict.fromkeys((*ordered, *trees.premises))
@@ -142,26 +125,26 @@ class _Trees:
         self.leaves: dict[Term, Leaf] = {}
         self.memo: dict[Term, Tree] = {}
         self.written: dict[Tree, Term] = {}
-        surfaces = [c for node in outside(body, (Integral,)) for c in _coordinates(node)]
-        self.inner = {node for s in surfaces for node in outside(s, _BINDERS) if isinstance(node, Branch)}
+        surfaces = [c for node in outside(body, (Integral,)) for c in coordinates_of(node)]
+        self.inner = {node for s in surfaces for node in outside(s, BINDERS) if isinstance(node, Branch)}
 
     def apart(self, body: Term) -> Term:
         """The body with each part that has nested conditions written as decisions."""
         roots = [node for node in _outermost(body) if self.nests(node)]
-        met = [self.inner.intersection(outside(root, _BINDERS)) for root in roots]
+        met = [self.inner.intersection(outside(root, BINDERS)) for root in roots]
         if sum(map(len, met)) > len(set().union(*met)) or any(isinstance(root, Delta) for root in roots):
             return self.write(self.tree(body))  # they are decided together
         memo: dict[Term, Term] = {root: self.write(self.tree(root)) for root in roots}
-        order = postorder_by(body, lambda node: () if node in memo or isinstance(node, _BINDERS) else children(node))
+        order = postorder_by(body, lambda node: () if node in memo or isinstance(node, BINDERS) else children(node))
         for node in order:
-            if isinstance(node, _BINDERS):
+            if isinstance(node, BINDERS):
                 memo[node] = node
             elif node not in memo:
                 memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
         return memo[body]
 
     def nests(self, node: Term) -> bool:
-        return any(nested(c) for c in _coordinates(node))
+        return any(nested(c) for c in coordinates_of(node))
 
     def tree(self, root: Term) -> Tree:
         for node in postorder_by(root, self.below):
@@ -171,10 +154,10 @@ class _Trees:
         return self.memo[root]
 
     def below(self, node: Term) -> Sequence[Term]:
-        return () if node in self.memo or isinstance(node, _BINDERS) else children(node)
+        return () if node in self.memo or isinstance(node, BINDERS) else children(node)
 
     def of(self, node: Term) -> Tree:
-        if isinstance(node, _BINDERS) or not children(node):
+        if isinstance(node, BINDERS) or not children(node):
             return self.leaf(node)
         if isinstance(node, Branch) and (node in self.inner or self.nests(node)):
             then, orelse = self.memo[node.then], self.memo[node.orelse]
@@ -312,7 +295,7 @@ class _Trees:
 
 def _outermost(body: Term) -> Iterable[Term]:
     """The conditions and deltas of a body that stand in no other one, and the parts that are none."""
-    return outside(body, (Branch, Delta, *_BINDERS))
+    return outside(body, (Branch, Delta, *BINDERS))
 
 
 def _restricted(tree: Tree, key: tuple[Term, bool], up: bool) -> Tree:

@@ -15,11 +15,11 @@ from typing import Literal
 
 from potto.calculus.critical import Critical
 from potto.calculus.currying import arguments_of, groups_of, sizes_of, uncurry
+from potto.calculus.nested import BINDERS, pieces
 from potto.calculus.ranges import nonnegative
 from potto.calculus.trace import CallSite, Part, Side, layout, spine
 from potto.core.terms import (
     App,
-    Branch,
     Const,
     Delta,
     Deriv,
@@ -104,7 +104,7 @@ def _ends_of_domain(surface: Term) -> Iterator[Term]:
 
     An edge that is a period's is a pole, on both sides of which there is a value.
     """
-    for node in outside(surface, _BINDERS):
+    for node in outside(surface, BINDERS):
         if isinstance(node, Prim) and node.free and node.op != "div":
             entry = PRIMITIVES[node.op]
             for end in () if entry.period else entry.edges(*node.args):
@@ -260,33 +260,6 @@ class _Search:
         return None if function is None else (function, before, order)
 
 
-_MOST_PIECES = 16
-
-
-def pieces(surface: Term) -> tuple[Term, ...]:
-    """What a surface is on either side of the conditions inside of it: where it is 0, one of these is."""
-    done: dict[Term, None] = {}
-    waiting = [surface]
-    while waiting:
-        term = waiting.pop()
-        inner = next((node for node in outside(term, _BINDERS) if isinstance(node, Branch | If)), None)
-        if inner is None or len(done) + len(waiting) >= _MOST_PIECES:
-            done[term] = None
-        else:
-            waiting.extend(_in_place(term, inner, case) for case in (inner.orelse, inner.then))
-    return tuple(done)
-
-
-def _in_place(term: Term, old: Term, new: Term) -> Term:
-    memo: dict[Term, Term] = {old: new}
-    for node in postorder(term):
-        if node not in memo:
-            memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
-    return memo[term]
-
-
-_BINDERS = (Integral, Sum, Lam)
-
 # Builtins whose values change fast where a part of their argument is near 0, if that part is steep.
 _CONCENTRATING = frozenset({"exp", "div", "tanh", "erf", "erfc", "atan"})
 
@@ -302,7 +275,7 @@ def centers(node: Prim) -> tuple[Term, ...]:
     if node.op == "div" and isinstance(where, Prim) and where.op in ("pow", "mul"):
         return ()  # a pole there, not a center
     found: dict[Term, None] = {}
-    for part in outside(where, _BINDERS):
+    for part in outside(where, BINDERS):
         if not isinstance(part, Prim) or not part.free:
             continue
         if part.op == "pow" and isinstance(part.args[1], Const) and part.args[1].value % 2 == 0:

@@ -15,12 +15,11 @@ from typing import Literal
 from potto.calculus.derivative import NotSmooth, partial
 from potto.calculus.enclosable import searchable
 from potto.calculus.invert import Failure, Inverse, dependence, invert, jacobian
-from potto.calculus.lifted import nested
 from potto.calculus.linear import determinant
+from potto.calculus.nested import nested, pieces
 from potto.calculus.normal import is_zero
 from potto.calculus.ranges import ranges
 from potto.calculus.solve import Sections, sections
-from potto.calculus.surfaces import pieces
 from potto.core.printer import format_term
 from potto.core.terms import Branch, If, Integral, Prim, Term, postorder, var
 from potto.diagnostics import Kind, declare

@@ -20,7 +20,8 @@ from potto.calculus.degree import degree
 from potto.calculus.enclosable import slope_of
 from potto.calculus.expand import expanded
 from potto.calculus.hoist import hidden, hoisted
-from potto.calculus.lifted import Lifted, lifted, nested
+from potto.calculus.lifted import Lifted, lifted
+from potto.calculus.nested import nested
 from potto.calculus.regions import Number
 from potto.calculus.sides import box_of as extents
 from potto.calculus.surfaces import Decide, Finding, Resolve, findings

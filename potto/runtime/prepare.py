@@ -14,7 +14,8 @@ from potto.calculus.derivative import NotSmooth
 from potto.calculus.dual import Differentiator
 from potto.calculus.expand import expanded
 from potto.calculus.joined import joined
-from potto.calculus.lifted import closed_value, lifted, nested
+from potto.calculus.lifted import closed_value, lifted
+from potto.calculus.nested import nested
 from potto.calculus.pivots import NoClosedForm
 from potto.calculus.shifted import shifted
 from potto.calculus.tangents import FUNCTION, NotShifted, Shape, Shapes

@@ -1,0 +1,49 @@
+"""Brackets inside of conditions: whether there are any, and what a surface is on either side of them.
+
+Owns `nested`, `has_nested` and `pieces`. Every condition is asked; what takes the brackets out (`lifted`) is large, and
+only loaded for those that have some.
+"""
+
+from __future__ import annotations
+
+from potto.core.terms import Branch, Delta, If, Integral, Lam, Sum, Term, children, outside, postorder, rebuild
+
+BINDERS = (Integral, Sum, Lam)
+_MOST_PIECES = 16
+
+
+def nested(surface: Term) -> bool:
+    """Whether a condition has a bracket inside that is its own, not one of an integral in it."""
+    return any(isinstance(node, Branch) for node in outside(surface, BINDERS))
+
+
+def has_nested(term: Term) -> bool:
+    """Whether some condition of a term, also one of an integral inside, has a bracket in it."""
+    return any(nested(c) for node in postorder(term) for c in coordinates_of(node))
+
+
+def coordinates_of(node: Term) -> tuple[Term, ...]:
+    """What a condition is on; nothing of what is none."""
+    return node.coordinates if isinstance(node, Branch | Delta) else ()
+
+
+def pieces(surface: Term) -> tuple[Term, ...]:
+    """What a surface is on either side of the conditions inside of it: where it is 0, one of these is."""
+    done: dict[Term, None] = {}
+    waiting = [surface]
+    while waiting:
+        term = waiting.pop()
+        inner = next((node for node in outside(term, BINDERS) if isinstance(node, Branch | If)), None)
+        if inner is None or len(done) + len(waiting) >= _MOST_PIECES:
+            done[term] = None
+        else:
+            waiting.extend(_in_place(term, inner, case) for case in (inner.orelse, inner.then))
+    return tuple(done)
+
+
+def _in_place(term: Term, old: Term, new: Term) -> Term:
+    memo: dict[Term, Term] = {old: new}
+    for node in postorder(term):
+        if node not in memo:
+            memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
+    return memo[term]
