@@ -53,7 +53,7 @@ from potto.core.terms import (
 )
 from potto.diagnostics import Diagnostic, PottoError
 from potto.elaborate import core, core_term, diffeo_core
-from potto.modules import definition
+from potto.modules import chunk_text, definition
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import nodes
@@ -103,9 +103,15 @@ def check_conditions(db: Database, file: str, name: str) -> tuple[Diagnostic, ..
     found = conditions_of(elaborated.term, lambda g: exported(db, g.module, g.name), lambda g: _faultless(db, g))
     spans = dict(elaborated.origins)
     fallback = Span(0, 0) if item is None else item.name_span
-    maps = () if item is None else (node.span for node in walk(item) if isinstance(node, nodes.InlineDiffeo))
     products = _products(db, elaborated.term, found, spans, fallback)
-    return (*_judged(found, spans, fallback, frozenset(maps)), *products)
+    return (*_judged(found, spans, fallback, _maps(item, chunk_text(db, file, name))), *products)
+
+
+def _maps(item: nodes.Definition | None, text: str | None) -> frozenset[Span]:
+    """Where a definition says `diffeo(...)`: most do not, and are not looked through."""
+    if item is None or text is None or "diffeo" not in text:
+        return frozenset()
+    return frozenset(node.span for node in walk(item) if isinstance(node, nodes.InlineDiffeo))
 
 
 @query
