@@ -40,7 +40,7 @@ def split(text: str) -> tuple[Chunk, ...]:
     """The chunks of a file, in order."""
     starts = _starts(text)
     ends = [*starts[1:], len(text)]
-    return tuple(Chunk(start, text[start:end].rstrip()) for start, end in zip(starts, ends))
+    return tuple([Chunk(start, text[start:end].rstrip()) for start, end in zip(starts, ends)])
 
 
 def _starts(text: str) -> list[int]:
@@ -60,11 +60,9 @@ def _starts(text: str) -> list[int]:
         if first == "#":
             end = text.find("\n", found.end())
             end = len(text) if end < 0 else end
-        elif starts and (
-            first in ")]" or found.end() < closed or _is_body(text, starts[-1], start, found.start(1))
-        ):
+        elif starts and (first in ")]" or found.end() < closed):
             comments = []
-        elif starts and (close := lookahead.closes(starts[-1], found.start(1))):
+        elif starts and (close := lookahead.goes_on(starts[-1], start, found.end() - 1)):
             comments, closed = [], close
         else:
             starts += comments
@@ -98,20 +96,26 @@ def _is_body(text: str, chunk: int, end: int, line: int) -> bool:
 
 
 class _Lookahead:
-    """Finds where open brackets are closed. What it reads in vain is bounded, so that a file of nothing but opening
-    brackets costs no more than its length."""
+    """Finds what goes on with the chunk above it. What it reads in vain is bounded, so that a file of nothing but
+    opening brackets costs no more than its length."""
 
     def __init__(self, text: str) -> None:
         self.text = text
+        self.lets = "let" in text
         self.wasted = 0
 
-    def closes(self, start: int, line: int) -> int:
-        """Where the brackets end that a chunk has left open above a line; 0 if none is, or an item starts before."""
-        text = self.text
-        opened = text.count("(", start, line) + text.count("[", start, line)
-        if opened <= text.count(")", start, line) + text.count("]", start, line) or self.wasted > MOST_WASTED:
+    def goes_on(self, start: int, end: int, line: int) -> int:
+        """Up to where goes on what a chunk has begun that ends above a line; 0 if that is complete, as mostly."""
+        above = self.text[start:line]
+        if self.lets and "let" in above and _is_body(self.text, start, end, line):
+            return line
+        if above.count("(") + above.count("[") <= above.count(")") + above.count("]") or self.wasted > MOST_WASTED:
             return 0
-        depth, at = 0, line
+        return self.closes(start, line)
+
+    def closes(self, start: int, line: int) -> int:
+        """Where the brackets end that a chunk has left open above a line; 0 if an item starts before."""
+        text, depth, at = self.text, 0, line
         for found in _BRACKETS.finditer(text, start):
             char, at = found.group(), found.end()
             if char in ("(", "["):
