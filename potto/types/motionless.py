@@ -29,7 +29,10 @@ GENERAL = "give the number that moves as a pair, `(value, tangent)`"
 def takes_duals(parameters: Sequence[Parameter]) -> bool:
     """Whether a plain number may be given for one of the parameters where a dual is meant."""
     for parameter in parameters:
-        found = resolve(parameter.type)
+        found = parameter.type
+        if isinstance(found, Real):
+            continue  # most are
+        found = resolve(found)
         if isinstance(found, TupleOf) and found.dual:
             return True
     return False
