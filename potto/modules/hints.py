@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import os.path
 from collections.abc import Iterable
 
@@ -74,6 +73,8 @@ def near_names(name: str, candidates: Iterable[str], count: int = 2) -> tuple[st
     exact = [candidate for candidate in known if candidate.casefold() == name.casefold()]
     if exact or len(name) < 2:
         return tuple(exact[:count])
+    import difflib  # most programs name what there is
+
     cutoff = 0.6 if len(name) > 3 else 0.5
     return tuple(difflib.get_close_matches(name, list(known), n=count, cutoff=cutoff))
 
