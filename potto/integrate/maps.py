@@ -140,9 +140,10 @@ def _left(seg: Segments, u: Array, rest: Array) -> tuple[Array, Array, Array]:
 
 
 def _right(seg: Segments, u: Array, rest: Array) -> tuple[Array, Array, Array]:
+    """The same from the right: what is left of u, so that q next to c, however small, has all its digits."""
     c = seg.right[:, None]
     q0, q1 = np.sqrt(c - seg.a[:, None]), np.sqrt(c - seg.b[:, None])
-    q = q0 + (q1 - q0) * u
+    q = q1 + (q0 - q1) * rest
     x = c - q * q
     return x, -2 * q * (q1 - q0), _label(seg, x)
 
@@ -150,10 +151,11 @@ def _right(seg: Segments, u: Array, rest: Array) -> tuple[Array, Array, Array]:
 def _both(seg: Segments, u: Array, rest: Array) -> tuple[Array, Array, Array]:
     """x = c + (d - c) sin²(φ/2), φ linear in u: square roots at both c <= a and d >= b become smooth."""
     c, d = seg.left[:, None], seg.right[:, None]
-    half0 = np.arctan2(np.sqrt(seg.a[:, None] - c), np.sqrt(d - seg.a[:, None]))
-    half1 = np.arctan2(np.sqrt(seg.b[:, None] - c), np.sqrt(d - seg.b[:, None]))
-    half = half0 + (half1 - half0) * u
-    sine, cosine = np.sin(half), np.cos(half)
+    legs = [(np.sqrt(end[:, None] - c), np.sqrt(d - end[:, None])) for end in (seg.a, seg.b)]
+    half0, half1 = (np.arctan2(low, high) for low, high in legs)
+    rest0, rest1 = (np.arctan2(high, low) for low, high in legs)
+    half, other = half0 + (half1 - half0) * u, rest1 + (rest0 - rest1) * rest  # each from the end that it is 0 at
+    sine, cosine = np.sin(half), np.sin(other)
     x = np.where(half < np.pi / 4, c + (d - c) * sine**2, d - (d - c) * cosine**2)
     return x, 2 * (d - c) * sine * cosine * (half1 - half0), _label(seg, x)
 

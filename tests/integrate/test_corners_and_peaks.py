@@ -39,3 +39,14 @@ def test_a_peak_far_narrower_than_the_range(body: str, size: float, ends: str) -
     exact = size * 1e-4
     slack = 3e-11 if body.startswith("1/(1") and ends != "-inf, inf" else 1e-15  # what its tails lack
     assert abs(answer.value - exact) <= answer.error + slack and answer.error <= 1e-7 * exact + slack
+
+
+@pytest.mark.parametrize("t", [1e-15, 1e-12, 1e-9, -1e-9, 1e-6, 1e-3])
+@pytest.mark.parametrize("box", ["[-1, 1], [-1, 1]", "[0, 1], [0, 1]", "[-1, 0], [-1, 0]", "[-1, 0], [0, 1]"])
+def test_a_hyperbola_close_to_its_asymptotes(t: float, box: str) -> None:
+    """Where x y > 0 the area is |t| (1 - ln |t|) a quarter, seen from either side of 0 with the same digits."""
+    f = potto.compile(f"def f(t)\n    integral ({box}) [x*y < t] d(x, y)").f
+    found = potto.deriv(f)((t, 1.0))
+    quarters = {"[-1, 1], [-1, 1]": 2, "[-1, 0], [0, 1]": int(t < 0)}.get(box, int(t > 0))
+    exact = -quarters * math.log(abs(t))
+    assert abs(found.tangent - exact) <= found.tangent_error <= 1e-11 and found.converged
