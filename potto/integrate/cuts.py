@@ -20,6 +20,9 @@ from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 
 # How far off, in units of the last place, a root may be that was found by numbers.
 SEARCHED = 4
+# The part of a range up to which cuts that rounding does not tell apart are taken for one: what is further off, however
+# little is known of where it is, is not to be lost.
+ONE_PLACE = 1e-6
 # How far beside cuts that are taken for one a place is clear of all of them, in terms of how far off they may be.
 BLUR = 8
 
@@ -189,9 +192,11 @@ def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, d
             t[d, i] = np.where(inner, speed, th[d])
         if row.turning or (row.cut >= 0 and _any_turning(plan, row)):
             beyond.append((root, True))
-        if directions and row.cut >= 0:
-            found = edges if plan.level.cuts[row.cut].decides else brushes
-            found.extend(_edges(row, root, low, high, tl, th, directions, batch))
+        if directions and row.cut >= 0 and plan.level.cuts[row.cut].decides:
+            edges += _edges(row, root, (low, tl, 0.0), (high, th, 0.0), directions, batch)
+        elif directions and row.cut >= 0:  # what only bends may be beside the bound by rounding
+            off = 0.0 if row.e is None else row.e
+            brushes += _edges(row, root, (low, tl, el + off), (high, th, eh + off), directions, batch)
     rank = np.zeros((count + 2, batch), dtype=np.int64)
     conflict = merged = False
     blur = np.zeros_like(x)
@@ -302,21 +307,20 @@ def tangents(t: tuple[Any, ...], batch: int, directions: int) -> Array:
     return out
 
 
-def _edges(
-    row: Row, root: Array, low: Array, high: Array, tl: Array, th: Array, directions: int, batch: int
-) -> list[Edge]:
-    """Where a jump lies on a bound (to rounding) and does not move with it."""
+def _edges(row: Row, root: Array, lower: _End, upper: _End, directions: int, batch: int) -> list[Edge]:
+    """Where a cut lies on a bound, or as far beside it as the bounds say, and does not move with it."""
     out: list[Edge] = []
-    for upper, bound, tb in ((False, low, tl), (True, high, th)):
-        on = root == bound
+    for above, (bound, tb, off) in ((False, lower), (True, upper)):
+        with np.errstate(invalid="ignore"):
+            on = (root == bound) | (np.abs(root - bound) <= off)
         if not on.any():
             continue
-        on = on & np.isfinite(bound) & (low < high)
+        on = on & np.isfinite(bound) & (lower[0] < upper[0])
         speed = tangents(row.t, batch, directions)
         moves = np.abs(speed - tb) > 64 * EPS * np.maximum(np.abs(speed), np.abs(tb))
         owner = np.nonzero(on & moves.any(axis=0))[0]
         if owner.size:
-            out.append(Edge(row.cut, owner, upper, bound[owner], speed[:, owner], tb[:, owner]))
+            out.append(Edge(row.cut, owner, above, bound[owner], speed[:, owner], tb[:, owner]))
     return out
 
 
@@ -328,7 +332,7 @@ def _sorted(
     # the bounds stay first and last even among equals: candidates were clipped to the upper bound
     member = np.arange(x.shape[1])
     x, e, inside = x[order, member], e[order, member], inside[order, member]
-    close = (x[1:] - x[:-1] <= e[1:] + e[:-1]) & inside[1:] & inside[:-1]
+    close = (x[1:] - x[:-1] <= np.minimum(e[1:] + e[:-1], ONE_PLACE * (x[-1] - x[0]))) & inside[1:] & inside[:-1]
     if close.any():  # to rounding they are at one place
         for i in np.nonzero(close.any(axis=1))[0]:
             x[i + 1] = np.where(close[i], x[i], x[i + 1])

@@ -24,6 +24,7 @@ from potto.kernels.cells import Array, Cell, Value, map_arrays, pad
 GRID = 64
 MOST_IN_FAMILY = 100_000
 BISECTIONS = 64
+JUMP = 8.0  # a surface that is so many times its rounding, and that of the place, where its sign changes jumps there
 BESIDE = 2.0**-27  # how far from a pole, as a part of where it is, it is asked how it moves
 
 
@@ -94,8 +95,9 @@ def _search(
         if not brackets.complete:
             machine.note_unfinished("a condition without a closed form has too many roots, or roots too close together")
         a, b = _padded(brackets, batch)
-    roots = _polished(function, variable, env, a, b, machine)
-    return [_moving(cut, function, variable, env, roots[:, i], machine) for i in range(roots.shape[1])]
+    roots, within = _polished(function, variable, env, a, b, machine)
+    columns = zip(roots.T, within.T, strict=True)
+    return [_moving(cut, function, variable, env, root, wide, machine) for root, wide in columns]
 
 
 def _padded(found: Brackets, batch: int) -> tuple[Array, Array]:
@@ -182,10 +184,13 @@ def _to_the_edges(psi: Any, x: Array, y: Array) -> tuple[Array, Array]:
     return x, psi(x)
 
 
-def _polished(function: Lam, variable: str, env: dict[str, Value], a: Array, b: Array, machine: Any) -> Array:
-    """The roots in brackets (B, r): Newton's steps where they stay inside and shrink, halves elsewhere."""
+def _polished(
+    function: Lam, variable: str, env: dict[str, Value], a: Array, b: Array, machine: Any
+) -> tuple[Array, Array]:
+    """The roots in brackets (B, r): Newton's steps where they stay inside and shrink, halves elsewhere. And how wide
+    the brackets are in the end, which is all that is known where the sign changes by a jump."""
     if a.shape[1] == 0:
-        return a
+        return a, a
     columns = {n: pad(v, 1) for n, v in _columns(function, env).items()}
     one = machine.with_directions(1)
 
@@ -210,19 +215,27 @@ def _polished(function: Lam, variable: str, env: dict[str, Value], a: Array, b: 
             x = new
             if still.all():
                 break
-    return x
+    return x, b - a
 
 
-def _moving(cut: int, function: Lam, variable: str, env: dict[str, Value], root: Array, machine: Any) -> Row:
-    """The root as a candidate cut: dx = -psi_theta / psi_x; how far it is off is psi's own rounding over psi_x."""
+def _moving(
+    cut: int, function: Lam, variable: str, env: dict[str, Value], root: Array, within: Array, machine: Any
+) -> Row:
+    """The root as a candidate cut: dx = -psi_theta / psi_x; how far it is off is psi's own rounding over psi_x.
+
+    Where psi changes its sign by a jump, or a pole, it is off by no more than the bracket is wide.
+    """
     k = machine.directions
     here = {n: pad(v, k + 1) for n, v in env.items()}
     here[variable] = Cell(root, None, (None,) * k + (1.0,))
     value = _call(function, here, machine.tracking().with_directions(k + 1))
     slope = 0.0 if value.t[k] is None else value.t[k]
     with np.errstate(all="ignore"):
-        off = (np.abs(value.v) + (0.0 if value.e is None else value.e)) / np.abs(slope)
-        off = np.where(np.isfinite(off), off, 0.0) + SEARCHED * EPS * np.abs(root)
+        rounding, step = 0.0 if value.e is None else value.e, SEARCHED * EPS * np.abs(root)
+        off = (np.abs(value.v) + rounding) / np.abs(slope)
+        jumps = np.abs(value.v) > JUMP * (rounding + step * np.abs(slope))
+        off = np.where(jumps, np.minimum(off, within), off)
+        off = np.where(np.isfinite(off), off, 0.0) + step
         # What stands still does so also where the surface is flat, and 0/0 would say nothing.
         t = tuple(None if x is None else np.where(np.asarray(x) == 0, 0.0, -np.asarray(x) / slope) for x in value.t[:k])
     poles = np.isfinite(root) & ~np.isfinite(np.broadcast_to(value.v, root.shape))

@@ -12,7 +12,8 @@ from fractions import Fraction
 
 from exact_answers import held_against
 from exact_polygons import Line, Scene, Truth
-from hypothesis import HealthCheck, given, seed, settings
+from how_many import examples, the_same
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 NUMBERS = (0.0, 1.0, -1.0, 0.5, 0.25, 2.0, 1.0, 1e-8, 0.3, -0.7, 1 + 1e-8, 1 - 1e-9, 6e-17)
@@ -95,8 +96,13 @@ def check(number: int) -> str:
     return held_against(text, t, s.value(Fraction(t)), s.rate, pick.random() < 0.3)
 
 
-@seed(20261)
-@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+@the_same(20261)
+@settings(max_examples=examples(60), deadline=None, suppress_health_check=list(HealthCheck))
 @given(st.integers(0, 10**9))
 def test_half_planes_in_awkward_places(number: int) -> None:
     check(number)
+
+
+def test_a_line_all_but_parallel_to_a_bound_that_moves_onto_it() -> None:
+    """6e-17 off parallel, and a unit in the last place away: there are other derivatives to both sides of that."""
+    check(20056)

@@ -12,7 +12,8 @@ from fractions import Fraction
 
 from exact_answers import held_against
 from exact_stretches import random_stretch
-from hypothesis import HealthCheck, given, seed, settings
+from how_many import examples, the_same
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 
@@ -25,8 +26,8 @@ def check(number: int) -> str:
     return held_against(text, t, stretch.value(Fraction(t)), stretch.rate, pick.random() < 0.3)
 
 
-@seed(20262)
-@settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
+@the_same(20262)
+@settings(max_examples=examples(100), deadline=None, suppress_health_check=list(HealthCheck))
 @given(st.integers(0, 10**9))
 def test_stretches_in_awkward_places(number: int) -> None:
     check(number)

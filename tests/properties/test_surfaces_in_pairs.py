@@ -9,7 +9,8 @@ from __future__ import annotations
 import random
 import warnings
 
-from hypothesis import given, settings
+from how_many import examples
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from plain_sections import Answer
 from two_conics import two_conics
@@ -55,16 +56,21 @@ def conics(number: int) -> bool:
     return compared(scene.source, t, Answer(value, slope, value_error, slope_error))
 
 
-@settings(max_examples=40)
+@settings(max_examples=examples(40), suppress_health_check=list(HealthCheck))
 @given(st.integers(0, 10**6))
 def test_periodic_and_searched_sections_beside_others(number: int) -> None:
     periodic_or_searched(number)
 
 
-@settings(max_examples=40)
+@settings(max_examples=examples(40), suppress_health_check=list(HealthCheck))
 @given(st.integers(0, 10**6))
 def test_two_conics(number: int) -> None:
     conics(number)
+
+
+def test_cuts_are_kept_beside_a_formula_that_changes_sides() -> None:
+    """The crossing at y = 0.93066 of two ellipses whose roots are written otherwise on the two sides of y = 0.51."""
+    assert conics(550182)
 
 
 def test_nearly_all_of_them_converge() -> None:

@@ -2,7 +2,8 @@
 
 Owns `two_conics` and `Scene`. Along x the length of the section is smooth between the places where one of the conics
 turns, leaves the box, or meets the other one (roots of the resultant); there it goes like a square root, which a cubic
-substitution smooths. The derivative by t adds up the speeds of the ends of the sections.
+substitution smooths. The derivative by t adds up the speeds of the ends of the sections. Where a conic turns on the
+edge of the box, to rounding, nothing is vouched for.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 ORDERS = (60, 140)
+CLOSE = 1e-7
 Coefficients = tuple[float, float, float, float, float, float]
 
 
@@ -42,7 +44,11 @@ class Scene:
     def area(self, t: float) -> tuple[float, float, float, float]:
         """The area, its derivative by t, and what fewer nodes change of either."""
         (rough, slope), (value, rate) = (self.by_gauss(t, order) for order in ORDERS)
-        return value, rate, abs(value - rough), abs(rate - slope)
+        return value, rate, abs(value - rough), np.inf if self.turns_on_the_edge(t) else abs(rate - slope)
+
+    def turns_on_the_edge(self, t: float) -> bool:
+        roots = [(b * b - 4 * a * c).trim(1e-13).roots() for a, b, c in (conic.along(t) for conic in self.conics)]
+        return bool((np.abs(np.abs(np.concatenate(roots)) - 1) < CLOSE).any())
 
     def by_gauss(self, t: float, order: int) -> tuple[float, float]:
         places = self.places(t)
