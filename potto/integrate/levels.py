@@ -6,8 +6,7 @@ leaves out the segments on which the integrand vanishes, and hands the rest to `
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -16,8 +15,10 @@ from potto.integrate.collapsed import Collapsed, collapsed_ranges, count_collaps
 from potto.integrate.critical_places import critical_rows
 from potto.integrate.cuts import Cuts, Row, frame_rows, segments, standing
 from potto.integrate.edges import Scene, count_places, count_slivers, note_folds
+from potto.integrate.extent import Extent
 from potto.integrate.maps import Segments
 from potto.integrate.mass import concentrated
+from potto.integrate.narrow import count_narrow
 from potto.integrate.pieces import Evaluator, Sums, components, take
 from potto.integrate.plan import LevelPlan, Plan, vanishes
 from potto.integrate.roots import searched_rows
@@ -27,6 +28,18 @@ from potto.integrate.work import Work
 from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value
 
 NARROW = 1e-4  # the part of the range of a variable up to which a stretch may lie on either side of a surface
+
+
+@dataclass(frozen=True)
+class Settled:
+    """The sides of surfaces, per segment, and by group the segments on which a surface is not defined, so that it has
+    none. unsure: the members, if any, of which that is rounding for a stretch that matters. doubtful: by group, the
+    narrow stretches of which it is."""
+
+    sides: dict[int, Mask]
+    undefined: dict[int, Bools] = field(default_factory=dict)
+    unsure: Ints | None = None
+    doubtful: dict[int, Bools] = field(default_factory=dict)
 
 
 @dataclass
@@ -42,6 +55,14 @@ class Iteration:
     order: int
     still: frozenset[Term] = frozenset()
     tracked: bool = False
+    extent: Extent | None = None
+
+    def whole(self, env: dict[str, Value], batch: int) -> Sums:
+        """The integrals of a batch over all variables, with what they could come to at most counted as added up."""
+        self.extent = Extent(len(self.plan.levels), batch)
+        sums = self.run(0, env, batch, {}, self.machine)
+        self.extent.count(sums)
+        return sums
 
     def run(
         self, number: int, env: dict[str, Value], batch: int, sides: dict[int, Mask], machine: Evaluator,
@@ -52,46 +73,30 @@ class Iteration:
         `root` says, of a batch of nodes, which member of the outermost batch each belongs to; None if there is one.
         """
         level = self.plan.levels[number]
-        k = machine.directions
         cuts, collapsed = self.cut(level, env, batch, machine)
         seg = cuts.segments
-        outer = sides
-        sides, unsure, undefined = self.sides_of(level, env, seg, sides, machine)
-        keep = self.alive(sides, seg, undefined)
-        lost = None
-        if undefined:
-            lost = lost_members(Scene(self, number, level, env, sides, machine, batch, root), seg, undefined, keep)
-            rest = np.nonzero(~np.isin(seg.owner, lost))[0]
-            keep = rest if keep is None else np.intersect1d(keep, rest)
+        if self.extent is not None:
+            self.extent.saw_range(number, seg, batch, root)
+        scene = Scene(self, number, level, env, sides, machine, batch, root)
+        settled = self.sides_of(scene, seg)
+        keep, lost = self.kept(scene, seg, settled)
         if machine.costs is not None and number + 1 == len(self.plan.levels):
             machine.costs.stretches(seg.a.size, seg.a.size if keep is None else keep.size)
+        here, sides = seg, settled.sides
         if keep is not None:
-            seg, sides = seg.pick(keep), {g: take(m, keep) for g, m in sides.items()}
-        work = Work(self, number, level, env, seg, sides, machine, cuts.moving and k > 0, batch, root, cuts.conflict)
+            here, sides = seg.pick(keep), {g: take(m, keep) for g, m in sides.items()}
+        moving = cuts.moving and machine.directions > 0
+        work = Work(self, number, level, env, here, sides, machine, moving, batch, root, cuts.conflict)
         sums = work.integrate()
-        scene = Scene(self, number, level, env, outer, machine, batch, root)
         if collapsed:
             sums = count_collapsed(scene, collapsed, sums)
-        if k and (cuts.meetings or cuts.edges):
-            if self.plan.hides:
-                places = [*(place.owner for place in cuts.meetings), *(place.owner for place in cuts.edges)]
-                met = np.unique(np.concatenate(places))
-                machine.note_unfinished(
-                    "surfaces meet, or lie on a bound, that an inner integral jumps at", work.below(met)
-                )
-                sums.et[:, :, met] = np.inf
-            else:
-                count_places(scene, cuts, sums)
-        if k and cuts.brushes and number + 1 < len(self.plan.levels):
-            brush(scene, cuts)
-        if unsure is not None and not number:  # single nodes of variables further out may lie on a surface
+        self.count_events(scene, cuts, sums)
+        if settled.doubtful and not self.plan.hides:
+            count_narrow(scene, seg, settled.sides, settled.doubtful, sums)
+        if settled.unsure is not None and not number:  # single nodes of variables further out may lie on a surface
             reason = f"rounding hides on which side of a surface stretches of `{level.variable}` lie"
-            machine.note_unfinished(reason, work.below(unsure))
-            sums.e[:, unsure] = sums.et[:, :, unsure] = np.inf
-        if cuts.slivers and not machine.frozen and not self.plan.hides:
-            count_slivers(scene, cuts, sums)
-        if k and cuts.folds:
-            note_folds(scene, cuts)
+            machine.note_unfinished(reason, work.below(settled.unsure))
+            sums.e[:, settled.unsure] = sums.et[:, :, settled.unsure] = np.inf
         if cuts.lost is not None:
             sums.e += cuts.lost
             sums.et += cuts.lost
@@ -102,6 +107,35 @@ class Iteration:
                 sums.v[:, gone] = sums.t[:, :, gone] = np.nan
                 sums.e[:, gone] = sums.et[:, :, gone] = np.inf
         return sums
+
+    def count_events(self, scene: Scene, cuts: Cuts, sums: Sums) -> None:
+        """Add, or say, what cuts matter that lie on a bound or on one another, and surfaces that fold here."""
+        machine = scene.machine
+        if machine.directions and (cuts.meetings or cuts.edges):
+            if self.plan.hides:
+                places = [*(place.owner for place in cuts.meetings), *(place.owner for place in cuts.edges)]
+                met = np.unique(np.concatenate(places))
+                machine.note_unfinished(
+                    "surfaces meet, or lie on a bound, that an inner integral jumps at", scene.below(met)
+                )
+                sums.et[:, :, met] = np.inf
+            else:
+                count_places(scene, cuts, sums)
+        if machine.directions and cuts.brushes and scene.number + 1 < len(self.plan.levels):
+            brush(scene, cuts)
+        if cuts.slivers and not machine.frozen and not self.plan.hides:
+            count_slivers(scene, cuts, sums)
+        if machine.directions and cuts.folds:
+            note_folds(scene, cuts)
+
+    def kept(self, scene: Scene, seg: Segments, settled: Settled) -> tuple[Ints | None, Ints | None]:
+        """The segments to integrate over, None for all; and the members that have no value."""
+        keep = self.alive(settled.sides, seg, settled.undefined)
+        if not settled.undefined:
+            return keep, None
+        lost = lost_members(scene, seg, settled.undefined, keep)
+        rest = np.nonzero(~np.isin(seg.owner, lost))[0]
+        return (rest if keep is None else np.intersect1d(keep, rest)), lost
 
     @staticmethod
     def siblings(scale: Array, root: Ints | None) -> Array:
@@ -162,20 +196,15 @@ class Iteration:
         rows = searched_rows(level, env, lo, hi, batch, machine)
         return (rows + critical_rows(level, env, lo, hi, batch, machine) if critical else rows), lost
 
-    def sides_of(
-        self, level: LevelPlan, env: dict[str, Value], seg: Segments, sides: dict[int, Mask], machine: Evaluator
-    ) -> tuple[dict[int, Mask], Ints | None, dict[int, Bools]]:
-        """The sides of all surfaces decided so far, per segment: those of this variable from the segment's middle.
-
-        And the members, if any, of which that is rounding for a stretch that matters; and the segments on which a
-        surface is not defined, so that it has no side.
-        """
-        sides = {g: take(mask, seg.owner) for g, mask in sides.items()}
+    def sides_of(self, scene: Scene, seg: Segments) -> Settled:
+        """The sides of all surfaces decided so far: those of this variable from the segments' middles."""
+        level = scene.level
+        sides = {g: take(mask, seg.owner) for g, mask in scene.sides.items()}
         if not level.decided:
-            return sides, None, {}
-        unsure: Any = False
+            return Settled(sides)
+        unsure: dict[int, Bools] = {}
         undefined: dict[int, Bools] = {}
-        values = sides_at(level, env, seg, machine)
+        values = sides_at(level, scene.env, seg, scene.machine)
         for group, (at_middle, off), turned in zip(level.decided, values, level.turned, strict=True):
             if any(outer not in sides for outer in turned):
                 continue  # one that is not defined
@@ -185,12 +214,14 @@ class Iteration:
             sides[group] = side
             if np.isnan(at_middle).any():
                 undefined[group] = np.isnan(at_middle)
-            unsure = unsure | (np.abs(at_middle) < off)
-        if not np.any(unsure):
-            return sides, None, undefined
-        reach = np.bincount(seg.owner, seg.b - seg.a)[seg.owner]
-        members = np.unique(seg.owner[unsure & (seg.b - seg.a > NARROW * reach)])
-        return sides, members if members.size else None, undefined
+            if (hidden := np.abs(at_middle) < off).any():
+                unsure[group] = hidden
+        if not unsure:
+            return Settled(sides, undefined)
+        wide = seg.b - seg.a > NARROW * np.bincount(seg.owner, seg.b - seg.a)[seg.owner]
+        members = np.unique(seg.owner[wide & np.any(list(unsure.values()), axis=0)])
+        doubtful = {group: hidden & ~wide for group, hidden in unsure.items() if (hidden & ~wide).any()}
+        return Settled(sides, undefined, members if members.size else None, doubtful)
 
     def alive(self, sides: dict[int, Mask], seg: Segments, undefined: dict[int, Bools]) -> Ints | None:
         """The segments on which the integrand is not known to vanish; None for all of them."""

@@ -93,6 +93,8 @@ class Work:
         ends = self.ends = self.end_values()
         whole = Pieces(np.arange(count), zero, one, np.zeros(count, dtype=np.int64))
         fresh = self.measure(whole, self.enough() or self.parent.order, True)
+        if self.last and self.parent.extent is not None:
+            self.parent.extent.saw_values(self, fresh)
         if self.conflict and not self.last:
             look_for_steps(self, fresh)
         found = totals(self, fresh, ends)

@@ -74,7 +74,7 @@ def iterated(
 ) -> Sums:
     """Iterated quadrature with cuts."""
     if batch <= BATCH:
-        return Iteration(plan, machine, start_order).run(0, env, batch, {}, machine)
+        return Iteration(plan, machine, start_order).whole(env, batch)
     with one_thread():
         order = best_order(plan, machine, env, batch)
         parts = []
@@ -82,7 +82,7 @@ def iterated(
             index = slice(start, min(start + BATCH, batch))
             here = {n: map_arrays(v, operator.itemgetter(index)) for n, v in env.items()}
             with machine.books.apart() as met:
-                parts.append(Iteration(plan, machine, order).run(0, here, index.stop - start, {}, machine))
+                parts.append(Iteration(plan, machine, order).whole(here, index.stop - start))
             machine.books.met.take(met, np.arange(index.start, index.stop))
     m = max(p.v.shape[0] for p in parts)
 

@@ -1,6 +1,7 @@
 """What doubles cannot tell apart: surfaces closer together than their rounding, and answers that are all rounding.
 
-The error covers what lies between, and an answer without digits is not called accurate, at any scale.
+The error covers what lies between. An answer without digits is not called accurate, unless it is 0 to one rounding of
+what the domain could hold; that goes for any scale.
 """
 
 from __future__ import annotations
@@ -43,10 +44,41 @@ def test_a_surface_that_rounding_puts_on_the_bound() -> None:
 
 @pytest.mark.parametrize("scale", [1.0, 1e-30, 1e-200, 1e30])
 def test_accurate_is_what_has_digits_at_any_scale(scale: float) -> None:
-    """The corner above x + y = 2 - 1e-15, of a few units in the last place in each direction, has no digits."""
+    """The corner above x + y = 2 - 1e-15, of a few units in the last place in each direction, is 0 in the square."""
     f = potto.compile(f"def f(t)\n    integral ([0, 1], [0, 1]) {scale!r}*[x + y > t] d(x, y)").f
     answer = f(2 - 1e-15)
     exact = (2 - mp.mpf(2 - 1e-15)) ** 2 / 2 * mp.mpf(scale)
-    assert abs(answer.value - exact) <= answer.error and not answer.converged
+    assert abs(answer.value - exact) <= answer.error <= 1e-29 * scale and answer.converged
     odd = potto.compile(f"def f(t)\n    integral [-1, 1] {scale!r}*t*x^3*cos(x) d(x)").f(1.0)
     assert abs(odd.value) <= odd.error and odd.converged  # 0 by cancellation: that is all that can be known of it
+
+
+def test_a_stretch_whose_side_is_rounding() -> None:
+    """Between 0 and 1e-17, ends that move at -1/2 and 2, |x - 1/4| < 1/4 is a matter of rounding, and so is 4 or 0."""
+    inside, far = "[abs(x - 1/4) < 1/4 + t/2]", "[x >= 1e-17 + 2*t]*[x < 1e-8 - t]"
+    f = potto.compile(f"def f(t)\n    integral [-1, 1] ({far} - 2*{inside})^2 d(x)").f
+    found = potto.deriv(f)((0.0, 1.0))
+    exact = 4 * (0.5 + 0.5) + (1 - 4) * (-1 - 2)  # 4 inside of the one, 1 where both are
+    assert abs(found.tangent - exact) <= found.tangent_error and not found.converged
+
+
+PIXELS = [  # where its corner is, by how much the line passes that, whether the answer is as good as asked for
+    (0.0, 1e-3, True),
+    (0.9, 1e-3, True),
+    (0.9, 1e-16, True),  # 0, to one rounding of what the pixel could hold
+    (0.9, -1e-16, True),
+    (0.9, 1e-12, False),  # 4 digits
+    (1e4, 1e-11, False),  # the same a little further from the origin is no more 0 than that
+]
+
+
+@pytest.mark.parametrize(("at", "beyond", "converged"), PIXELS)
+@pytest.mark.parametrize("scale", [1.0, 1e-30, 1e30])
+def test_what_a_line_cuts_off_a_pixel(at: float, beyond: float, converged: bool, scale: float) -> None:
+    body = f"integral ([{at!r}, {at + 0.01!r}], [{at!r}, {at + 0.01!r}]) {scale!r}*[x + y < c] d(x, y)"
+    level = 2 * at + beyond
+    found = potto.compile(f"def f(c)\n    {body}").f(level)
+    with mp.workdps(50):
+        exact = mp.mpf(scale) * max(mp.mpf(level) - 2 * mp.mpf(at), 0) ** 2 / 2
+        assert abs(found.value - exact) <= found.error
+    assert found.converged == converged, found.summary()
