@@ -21,6 +21,9 @@ from potto.integrate.undefined import UNDEFINED
 from potto.kernels.cells import Array, Bools, Ints, Value
 from potto.runtime.convergence import merged
 
+# The derivatives backward and forward, and how far off each may be.
+Sides = tuple[Array, Array, Array, Array]
+
 
 @dataclass(slots=True)
 class Gauge:
@@ -76,12 +79,12 @@ def _begun() -> Gauge | None:
 class Met:
     """What integrals have met, and which members of the batch did; None: nobody knows which, so any of them may have.
 
-    edges: one-sided derivatives, (..., members) each. sided, folds, degenerate: what is still to be looked into.
-    incomplete: searches for places to cut at that were given up.
+    edges: one-sided derivatives and their errors, (..., members) each. sided, folds, degenerate: what is still
+    to be looked into. incomplete: searches for places to cut at that were given up.
     """
 
     unfinished: dict[str, Ints | None] = field(default_factory=dict)
-    edges: list[tuple[Sided, Array, Array, Ints | None]] = field(default_factory=list)
+    edges: list[tuple[Sided, Sides, Ints | None]] = field(default_factory=list)
     sided: dict[Sided, Ints | None] = field(default_factory=dict)
     folds: dict[Sided, tuple[Folded, Ints | None]] = field(default_factory=dict)
     degenerate: dict[str, Ints | None] = field(default_factory=dict)
@@ -128,7 +131,7 @@ class Met:
             note(self.sided, what, here(members))
         for what, (fold, members) in other.folds.items():
             self.note_fold(what, fold, here(members))
-        self.edges += [(what, back, forth, here(members)) for what, back, forth, members in other.edges]
+        self.edges += [(what, sides, here(members)) for what, sides, members in other.edges]
 
 
     def of(self, index: Ints) -> Met:
@@ -142,11 +145,12 @@ class Met:
             there = own(members)
             if there is None or there.size:
                 found.unfinished[name] = there
-        for what, backward, forward, members in self.edges:
+        for what, (backward, forward, back, forth), members in self.edges:
             if members is None:
-                found.edges.append((what, backward, forward, None))
+                found.edges.append((what, (backward, forward, back, forth), None))
             elif (kept := np.isin(members, index)).any():
-                found.edges.append((what, backward[..., kept], forward[..., kept], own(members)))
+                sides = backward[..., kept], forward[..., kept], back[..., kept], forth[..., kept]
+                found.edges.append((what, sides, own(members)))
         return found
 
 
@@ -173,7 +177,7 @@ class Books:
     depth: int = 0
     met: Met = field(default_factory=Met)
     reasons: dict[str, Any] = field(default_factory=dict)
-    edges: list[tuple[Sided, Array, Array]] = field(default_factory=list)
+    edges: list[tuple[Sided, Sides]] = field(default_factory=list)
     methods: set[str] = field(default_factory=set)
     second: bool = False
     within: Any = 0.0
@@ -199,15 +203,16 @@ class Books:
                 where = where.reshape(shape)
             merged(self.reasons, {reason: where})
         edges: dict[Sided, list[Array]] = {}
-        for what, *sides, members in met.edges:
+        for what, sides, members in met.edges:
             count = batch if members is None else members.size
             for number, side in enumerate(sides):
                 rows = side.reshape(-1, count)
                 known = edges.setdefault(what, [np.full((rows.shape[0], batch), np.nan) for _ in sides])[number]
                 if known.shape[0] == rows.shape[0]:
                     known[:, slice(None) if members is None else members] = rows
-        for what, (backward, forward) in edges.items():
-            self.edges.append((what, backward.reshape(-1, *shape), forward.reshape(-1, *shape)))
+        for what, found in edges.items():
+            backward, forward, back, forth = (side.reshape(-1, *shape) for side in found)
+            self.edges.append((what, (backward, forward, back, forth)))
 
     @contextmanager
     def apart(self) -> Iterator[Met]:

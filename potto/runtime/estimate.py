@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from potto.runtime.printing import concisely, format_digits, format_seconds, format_tuple
+from potto.runtime.printing import concisely, format_number, format_seconds, format_tuple
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,8 @@ class OneSided:
     """A surface lies on an edge of the domain, or on another surface that moves otherwise, or folds just here.
 
     The derivatives on the two sides of the parameters differ, or are infinite. other: the other surface, if there is
-    one. fold: whether sections of the surface along the variable appear or merge here.
+    one. fold: whether sections of the surface along the variable appear or merge here. backward_error,
+    forward_error: how far off they may be.
     """
 
     variable: str
@@ -29,6 +30,8 @@ class OneSided:
     forward: Any
     other: str | None = None
     fold: bool = False
+    backward_error: Any = 0.0
+    forward_error: Any = 0.0
 
     def __str__(self) -> str:
         which = f"the surface {self.surface}"
@@ -37,24 +40,22 @@ class OneSided:
             which, place = "surfaces", f"run along `{self.variable}`"
         elif self.fold:
             place = f"folds along `{self.variable}`"
+        backward, forward = _number(self.backward, self.backward_error), _number(self.forward, self.forward_error)
         if np.array_equal(self.backward, self.forward, equal_nan=True):
-            return f"{which} {place}: the derivative does not exist ({_number(self.forward)})"
-        return (
-            f"{which} {place}: the one-sided derivatives differ "
-            f"({_number(self.backward)} backward, {_number(self.forward)} forward)"
-        )
+            return f"{which} {place}: the derivative does not exist ({forward})"
+        return f"{which} {place}: the one-sided derivatives differ ({backward} backward, {forward} forward)"
 
 
 def _empty(value: Any) -> bool:
     return isinstance(value, tuple | Mapping) and not value
 
 
-def _number(x: Any) -> str:
-    flat = np.asarray(x, dtype=float).ravel()
-    flat = flat[~np.isnan(flat)]  # members of a batch that have no such sides
-    if not flat.size:
+def _number(x: Any, error: Any) -> str:
+    flat, off = (a.ravel() for a in np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(error, dtype=float)))
+    there = np.nonzero(~np.isnan(flat))[0]  # others are members of a batch that have no such sides
+    if not there.size:
         return "not known"
-    return f"{format_digits(flat[0], 12)}{', ...' if flat.size > 1 else ''}"
+    return f"{format_number(flat[there[0]], off[there[0]])}{', ...' if there.size > 1 else ''}"
 
 
 @dataclass(frozen=True, repr=False)

@@ -167,10 +167,11 @@ def _reasons(flat: list[tuple[Any, Any]], books: Books, settings: Settings) -> R
 
 def _notes(books: Books) -> list[OneSided]:
     out: list[OneSided] = []
-    for what, backward, forward in books.edges:
+    for what, sides in books.edges:
         other = None if what.other is None else f"{format_term(what.other)} = 0"
         surface = None if what.surface is None else f"{format_term(what.surface)} = 0"
-        note = OneSided(what.variable, surface, np.squeeze(backward), np.squeeze(forward), other, what.fold)
+        backward, forward, *off = map(np.squeeze, sides)
+        note = OneSided(what.variable, surface, backward, forward, other, what.fold, *off)
         if not any((o.surface, o.variable, o.other) == (surface, what.variable, other) for o in out):
             out.append(note)
     return out

@@ -170,20 +170,11 @@ def poisoned(sums: Sums, env: dict[str, Value]) -> Sums:
 
 
 def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value], batch: int, outermost: bool) -> Sums:
+    """What an integral amounts to, by the method that suits it and in an order of its variables that does."""
     if outermost:
-        machine.books.members = max(machine.books.members, batch)
-        sampled = machine.settings.method in ("mc", "qmc")
-        if not sampled and many(machine, term, linked):
-            sampled = machine.settings.method == "auto" and too_many(machine, term, linked)
-            found = step_by_step(machine, term, linked, batch, WORTH if sampled else ACCURATE)
-            if found is not None:
-                return found
-        elif machine.settings.method == "auto":
-            sampled = too_many(machine, term, linked)
-        if sampled:
-            return _sampled(machine, term, linked, env, batch)
-        if batch > 1:
-            return _batch(machine, term, linked, batch)
+        found = _by_other_means(machine, term, linked, env, batch)
+        if found is not None:
+            return found
     machine.books.methods.add("quadrature")
     met = machine.books.met
     for order, most in trials(machine, term, linked, outermost):
@@ -194,23 +185,10 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
             if plain is not None:
                 return plain
         found = within(most, plan, machine, plan.environment(env, linked.env), batch)
-        if found is None:
-            continue
-        sums = counted(found, plan, machine)
-        if not met.degenerate:
-            if plan.folds or met.incomplete:
-                beside_another(machine, order, linked, env, batch, sums)
-            if outermost and met.sided and not machine.side:
-                from_both_sides(machine, plan, plan.environment(env, linked.env), batch, sums, iterated)
-            if outermost and met.folds:
-                beside_folds(machine, plan, linked, batch, sums, partial(_beside, machine, term))
-            if not outermost:
-                met.forget_places_of_folds()
-                return sums
-            sums = turned_round(machine, order, linked, env, batch, sums)
-            if machine.directions and not (met.edges or machine.side):
-                by_differences(machine, linked, batch, sums, partial(_beside, machine.with_directions(0), term))
-            return sums
+        if found is not None:
+            sums = counted(found, plan, machine)
+            if not met.degenerate:
+                return _looked_into(machine, term, order, plan, linked, batch, sums, outermost)
     if outermost and machine.directions > 1:
         return one_by_one(machine, term, linked, batch)
     if outermost:
@@ -225,6 +203,45 @@ def solve(machine: Machine, term: Integral, linked: Linked, env: dict[str, Value
         "their boundary terms are not all counted"
     )
     sums.et = np.full_like(sums.et, np.inf)
+    return sums
+
+
+def _by_other_means(
+    machine: Machine, term: Integral, linked: Linked, env: dict[str, Value], batch: int
+) -> Sums | None:
+    """An integral by elimination, by samples, or as a batch; None where it is one for iterated quadrature."""
+    machine.books.members = max(machine.books.members, batch)
+    sampled = machine.settings.method in ("mc", "qmc")
+    if not sampled and many(machine, term, linked):
+        sampled = machine.settings.method == "auto" and too_many(machine, term, linked)
+        found = step_by_step(machine, term, linked, batch, WORTH if sampled else ACCURATE)
+        if found is not None:
+            return found
+    elif machine.settings.method == "auto":
+        sampled = too_many(machine, term, linked)
+    if sampled:
+        return _sampled(machine, term, linked, env, batch)
+    return _batch(machine, term, linked, batch) if batch > 1 else None
+
+
+def _looked_into(
+    machine: Machine, term: Integral, order: Integral, plan: Plan, linked: Linked, batch: int, sums: Sums,
+    outermost: bool,
+) -> Sums:  # fmt: skip
+    """The sums of an iterated quadrature, with what was met on the way looked into, and another side where it helps."""
+    met, env = machine.books.met, linked.env
+    if plan.folds or machine.books.met.incomplete:
+        beside_another(machine, order, linked, env, batch, sums)
+    if outermost and met.sided and not machine.side:
+        from_both_sides(machine, plan, plan.environment(env, env), batch, sums, iterated)
+    if outermost and met.folds:
+        beside_folds(machine, plan, linked, batch, sums, partial(_beside, machine, term))
+    if not outermost:
+        met.forget_places_of_folds()
+        return sums
+    sums = turned_round(machine, order, linked, env, batch, sums)
+    if machine.directions and not (met.edges or machine.side):
+        by_differences(machine, linked, batch, sums, partial(_beside, machine.with_directions(0), term))
     return sums
 
 

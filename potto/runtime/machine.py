@@ -172,8 +172,10 @@ class Machine:
         """Whether integrals inside of integrals have spent far more than the budget: what is left is given up."""
         return self.books.spent > OVERDRAFT * self.settings.max_evals
 
-    def note_edge(self, what: Sided, backward: Array, forward: Array, members: Ints | None = None) -> None:
-        self.books.met.edges.append((what, backward, forward, members))
+    def note_edge(
+        self, what: Sided, backward: Array, forward: Array, off: tuple[Array, Array], members: Ints | None = None
+    ) -> None:
+        self.books.met.edges.append((what, (backward, forward, *off), members))
 
     def note_sided(self, what: Sided, members: Ints | None = None) -> None:
         """What an integral finds that stands in another one: how much it comes to, that one will say."""

@@ -35,6 +35,7 @@ APART = 2.0**-8
 CLOSER = 2.0**-8  # each step by this part of the one before
 # What successive differences may be of the one before where there is a limit, and what is no difference at all.
 SETTLING, SAME = 0.75, 1e-6
+MISSED = 1 / 16  # the least part of what is extrapolated that may be wrong
 # What is nearer to a fold than this lies at it, as far as steps that parameters notice can tell.
 TOGETHER = 1e-9
 MOST_MEMBERS = 16  # of a batch that are looked at
@@ -50,13 +51,15 @@ def from_both_sides(
     with machine.books.apart():
         found = [iterated(plan, replace(machine, side=side), env, batch) for side in (-1, 1)]
     backward, forward = (np.where(np.isfinite(part.et), part.t, np.nan) for part in found)
+    before, beyond = (np.where(np.isfinite(part.et), part.et, 0.0) for part in found)
     same = np.abs(forward - backward) <= 1e-12 * (np.abs(forward) + np.abs(backward))
     sums.t = np.where(same, forward, sums.t)
     differ = np.nonzero(~same.all(axis=(0, 1)))[0]
     for what, members in reasons.items():
         there = differ if members is None else np.intersect1d(differ, members)
         if there.size:
-            machine.note_edge(what, backward[..., there], forward[..., there], there)
+            off = before[..., there], beyond[..., there]
+            machine.note_edge(what, backward[..., there], forward[..., there], off, there)
 
 
 def beside_folds(
@@ -75,17 +78,18 @@ def beside_folds(
         ]
     for what, (member, d, backward, forward, off) in found:
         t, et = sums.t[:, d, member], sums.et[:, d, member]
-        for _, before, beyond, _ in machine.books.met.edges:
-            if np.shape(before) == sums.t.shape:
-                before[:, d, member], beyond[:, d, member] = backward, forward
-        if _same(backward, forward, off) and np.isfinite(forward).all():
+        for _, sides, _ in machine.books.met.edges:
+            for side, one in zip(sides, (backward, forward, *off), strict=True):
+                if np.shape(side) == sums.t.shape:
+                    side[:, d, member] = one
+        if _same(backward, forward, off[0] + off[1]) and np.isfinite(forward).all():
             known = np.isfinite(t) & (np.abs(t - forward) <= SAME * np.abs(forward) + et)
-            t[:], et[:] = np.where(known, t, forward), np.where(known, et, off)
+            t[:], et[:] = np.where(known, t, forward), np.where(known, et, off[0] + off[1])
             continue
         t[:] = np.where(np.isfinite(t), t, np.where(np.isfinite(backward), backward, forward))
         et[:] = np.where(np.isfinite(t), np.where(np.isfinite(et), et, 0.0), np.inf)
         _endless(machine, backward, forward, t, et)
-        machine.note_edge(what, backward, forward)
+        machine.note_edge(what, backward, forward, off)
     machine.books.met.folds.clear()
 
 
@@ -108,12 +112,12 @@ def beside_axes(
         t, et = sums.t[:, d, member], sums.et[:, d, member]
         if np.isnan(backward).any() or np.isnan(forward).any():
             return False
-        if _same(backward, forward, off) and np.isfinite(forward).all():
-            t[:], et[:] = 0.5 * (backward + forward), np.abs(forward - backward) + off
+        if _same(backward, forward, off[0] + off[1]) and np.isfinite(forward).all():
+            t[:], et[:] = 0.5 * (backward + forward), np.abs(forward - backward) + off[0] + off[1]
         else:
             et[:] = np.abs(t)
             _endless(machine, backward, forward, t, et)
-            machine.note_edge(what, backward, forward)
+            machine.note_edge(what, backward, forward, off)
     return True
 
 
@@ -135,8 +139,8 @@ def _same(backward: Array, forward: Array, off: Array) -> bool:
 def _sides(
     machine: Machine, plan: Plan, linked: Linked, members: Sequence[int], where: Folded | None,
     evaluated: Callable[[Linked], Sums],
-) -> Iterator[tuple[int, int, Array, Array, Array]]:  # fmt: skip
-    """Member, direction, the derivatives before and behind the parameters, of all components, and how far off."""
+) -> Iterator[tuple[int, int, Array, Array, tuple[Array, Array]]]:  # fmt: skip
+    """Member, direction, the derivatives before and behind the parameters, of all components, and how far off each."""
     for member in members[:MOST_MEMBERS]:
         env = {n: map_arrays(v, lambda a, m=member: a[m]) for n, v in linked.env.items()}
         for d in range(machine.directions):
@@ -148,20 +152,22 @@ def _sides(
 def _both(
     machine: Machine, plan: Plan, env: dict[str, Value], d: int, where: Folded | None,
     evaluated: Callable[[Linked], Sums],
-) -> tuple[Array, Array, Array] | None:  # fmt: skip
-    """The derivatives before and behind the parameters, of all components; None if nothing moves in this direction."""
+) -> tuple[Array, Array, tuple[Array, Array]] | None:  # fmt: skip
+    """The derivatives before and behind the parameters, of all components, and how far off each may be; None if nothing
+    moves in this direction."""
     step = _step(machine, plan, env, d, where)
     if step is None:
         return None
-    sides, off = [], np.zeros(1)
+    sides, off = [], []
     for sign in (-1.0, 1.0):
         steps = [sign * step * CLOSER**i for i in range(3)]
         found = [evaluated(link({n: moved(v, h, d) for n, v in env.items()})) for h in steps]
         values = [np.where(np.isfinite(part.et[:, d, 0]), part.t[:, d, 0], np.nan) for part in found]
         noise = np.sum([part.et[:, d, 0] for part in found], axis=0)
-        sides.append(np.array([_limit(*three) for three in zip(*values, noise, strict=True)]))
-        off = off + np.abs(values[2] - values[1]) * CLOSER + found[2].et[:, d, 0]
-    return sides[0], sides[1], off
+        limits, missed = np.array([_limit(*three) for three in zip(*values, noise, strict=True)]).T
+        sides.append(limits)
+        off.append(np.where(np.isfinite(limits), missed + found[2].et[:, d, 0], 0.0))
+    return sides[0], sides[1], (off[0], off[1])
 
 
 def _step(machine: Machine, plan: Plan, env: dict[str, Value], d: int, where: Folded | None) -> float | None:
@@ -253,15 +259,19 @@ def one_direction(value: Value, d: int) -> Value:
     return value.change(lambda inner: one_direction(inner, d)) if isinstance(value, Closure) else value
 
 
-def _limit(far: float, nearer: float, nearest: float, noise: float) -> float:
-    """Where three values at steps that shrink lead to: a number, an infinity, or nan where that does not show."""
+def _limit(far: float, nearer: float, nearest: float, noise: float) -> tuple[float, float]:
+    """Where three values at steps that shrink lead to, a number, an infinity, or nan where that does not show, and how
+    far off it may be: what is still to come, or what extrapolation may have missed of it."""
     if not np.isfinite([far, nearer, nearest]).all():
-        return float("nan")
+        return math.nan, 0.0
     first, second = nearer - far, nearest - nearer
+    rate = min(max(abs(second / first), CLOSER), SETTLING) if first else CLOSER
+    coming = 2 * abs(second) * rate / (1 - rate)
     if abs(second) <= max(SAME * abs(nearest), noise):
-        return nearest
+        return nearest, coming
     if abs(second) <= SETTLING * abs(first):
         limit = nearest + second * second / (first - second)
-        return limit if abs(limit) > SAME * (abs(far) + abs(nearer)) else 0.0
+        zero = abs(limit) <= SAME * (abs(far) + abs(nearer))
+        return (0.0, abs(limit) + coming) if zero else (limit, coming * max(rate, MISSED))
     grows = first * second > 0 and nearest * second > 0 and abs(first) > SAME * abs(nearest)
-    return math.copysign(math.inf, nearest) if grows else math.nan
+    return (math.copysign(math.inf, nearest) if grows else math.nan), 0.0

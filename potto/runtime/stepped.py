@@ -27,8 +27,8 @@ def stepped(machine: Machine, term: Term, env: dict[str, Value]) -> Value:
     edges = machine.books.edges
     before = len(edges)
     value = machine.term(term, env)
-    for place, (what, backward, forward) in enumerate(edges[before:], before):
-        edges[place] = (_without_step(what), backward, forward)
+    for place, (what, sides) in enumerate(edges[before:], before):
+        edges[place] = (_without_step(what), sides)
     return value
 
 

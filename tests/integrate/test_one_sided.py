@@ -65,8 +65,10 @@ def test_sections_that_appear_have_two_sides(body: str, t: float, backward: floa
     answer = rate(body, t)
     note = answer.notes[0]
     assert ("folds along" in str(note)) == note.fold != (note.other is not None)
-    for found, exact in ((note.backward, backward), (note.forward, forward)):
+    sides = (note.backward, note.backward_error, backward), (note.forward, note.forward_error, forward)
+    for found, off, exact in sides:
         assert float(found) == pytest.approx(exact, rel=1e-6, abs=0)
+        assert found == exact or abs(found - exact) <= off + 1e-15 * abs(exact)
 
 
 def test_the_other_direction_turns_the_sides_round() -> None:
