@@ -1,6 +1,6 @@
 """Calls carried out: a term in which known functions are replaced by what they do.
 
-Owns `expanded`, `known_function` and `named`.
+Owns `expanded`, `Calls`, `known_function` and `named`.
 """
 
 from __future__ import annotations
@@ -30,13 +30,33 @@ def expanded(term: Term, resolve: Resolve, derive: Derive | None = None) -> Term
     return apart(_Expansion(resolve, derive).run(term, ()))
 
 
+class Calls:
+    """Calls that were carried out, each with the same arguments once."""
+
+    def __init__(self) -> None:
+        self.known: dict[tuple[Lam, tuple[Term, ...]], Term] = {}
+
+    def carried_out(
+        self, call: App, function: Lam, groups: tuple[tuple[Term, ...], ...], run: Callable[[Term], Term]
+    ) -> Term:
+        """What `run` makes of the function's body with the arguments in it; the call, if they don't fit."""
+        params, body = uncurry(function, sizes_of(groups))
+        args = arguments_of(function, groups)
+        if len(args) != len(params):
+            return call
+        key = (function, args)
+        if key not in self.known:
+            self.known[key] = run(substitute(body, dict(zip(params, args, strict=True))))
+        return self.known[key]
+
+
 class _Expansion:
-    """One expansion; a call with the same arguments is carried out once."""
+    """One expansion."""
 
     def __init__(self, resolve: Resolve, derive: Derive | None) -> None:
         self.resolve = resolve
         self.derive = derive
-        self.known: dict[tuple[Lam, tuple[Term, ...]], Term] = {}
+        self.calls = Calls()
 
     def run(self, term: Term, path: tuple[Term, ...]) -> Term:
         memo: dict[Term, Term] = {}
@@ -58,15 +78,8 @@ class _Expansion:
         function = known_function(head, self.resolve, self.derive)
         if function is None:
             return call
-        params, body = uncurry(function, sizes_of(groups))
-        args = arguments_of(function, groups)
-        if len(args) != len(params):
-            return call
-        key = (function, args)
-        if key not in self.known:
-            inner = (*path, named) if isinstance(named, Global) else path
-            self.known[key] = self.run(substitute(body, dict(zip(params, args, strict=True))), inner)
-        return self.known[key]
+        inner = (*path, named) if isinstance(named, Global) else path
+        return self.calls.carried_out(call, function, groups, lambda body: self.run(body, inner))
 
 
 def known_function(head: Term, resolve: Resolve, derive: Derive | None) -> Lam | None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from potto.calculus.currying import arguments_of, sizes_of, uncurry
+from potto.calculus.expand import Calls
 from potto.calculus.surfaces import Decide, Resolve
 from potto.calculus.trace import spine
 from potto.core.binders import apart
@@ -52,12 +52,12 @@ def unrolled(term: Term, resolve: Resolve, decide: Decide) -> Term | None:
 
 
 class _Unrolling:
-    """One unrolling; a call with the same arguments is carried out once."""
+    """One unrolling."""
 
     def __init__(self, resolve: Resolve, decide: Decide) -> None:
         self.resolve = resolve
         self.decide = decide
-        self.known: dict[tuple[Lam, tuple[Term, ...]], Term] = {}
+        self.calls = Calls()
 
     def run(self, term: Term, depth: int) -> Term:
         taken: dict[Term, Term] = {}  # plain conditionals, and the sides that they take
@@ -97,16 +97,13 @@ class _Unrolling:
         function = head if isinstance(head, Lam) else self.resolve(head)
         if not isinstance(function, Lam):
             return call
-        params, body = uncurry(function, sizes_of(groups))
-        args = arguments_of(function, groups)
-        if len(args) != len(params):
-            return call
-        key = (function, args)
-        if key not in self.known:
-            if depth > DEEPEST or len(self.known) > MOST_CALLS:
+
+        def run(body: Term) -> Term:
+            if depth > DEEPEST or len(self.calls.known) > MOST_CALLS:
                 raise _TooMuch
-            self.known[key] = self.run(substitute(body, dict(zip(params, args, strict=True))), depth + 1)
-        return self.known[key]
+            return self.run(body, depth + 1)
+
+        return self.calls.carried_out(call, function, groups, run)
 
     def summed(self, node: Sum, depth: int) -> Term:
         lo, hi = self.decide(node.lo), self.decide(node.hi)

@@ -159,60 +159,80 @@ def function_of(term: Term) -> Lam:
     return lam(tuple(sorted(term.free)), term)
 
 
+class _Asked:
+    """What is asked of the surroundings while a plan is made: functions that are called, and plain decisions."""
+
+    def __init__(self, resolve: Resolve, decide: Decide) -> None:
+        self.resolve, self.decide = resolve, decide
+        self.decisions: dict[Term, float | None] = {}
+        self.unknown: set[Term] = set()
+
+    def known(self, head: Term) -> Lam | Deriv | None:
+        found = self.resolve(head)
+        if found is None:
+            self.unknown.add(head)
+        return found
+
+    def remember(self, plain: Term) -> float | None:
+        if plain not in self.decisions:
+            self.decisions[plain] = self.decide(plain)
+        return self.decisions[plain]
+
+    def findings(self, term: Integral) -> Sequence[Finding]:
+        """What an integral jumps at, and where it bends; what is not known is what is met on the way."""
+        self.unknown.clear()
+        return findings(term.body, self.known, self.remember)
+
+
 def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve, number: Number) -> Plan:
     """The plan of an integral. `resolve` gives the functions that it calls, `decide` the values of plain terms.
 
     `inline` gives those of the functions that a call of them may be replaced by. `number` gives what a plain term is
     for some of the parameters, or nan.
     """
-    decisions: dict[Term, float | None] = {}
-    unknown: set[Term] = set()
-
-    def known(head: Term) -> Lam | Deriv | None:
-        found = resolve(head)
-        if found is None:
-            unknown.add(head)
-        return found
-
-    def remember(plain: Term) -> float | None:
-        if plain not in decisions:
-            decisions[plain] = decide(plain)
-        return decisions[plain]
-
+    asked = _Asked(resolve, decide)
     term = cased(term)
-    found = findings(term.body, known, remember)
+    found = asked.findings(term)
     premises: tuple[Term, ...] = ()
     confused = False
     if any(map(_may_be_mixed, found)):
-        apart = _apart(term, inline, remember, number)
+        apart = _apart(term, inline, asked.remember, number)
         if apart is not None:
             term, premises = apart.term, apart.premises
-            unknown.clear()
-            found = findings(term.body, known, remember)
+            found = asked.findings(term)
         confused = apart is None or any(nested(f.surface) for f in found if f.kind == "jump")
     hides = hidden(term, found, resolve)
-    if unknown or hides:
-        unknown.clear()
+    if asked.unknown or hides:
         term = hoisted(term, inline)
-        found = findings(term.body, known, remember)
+        found = asked.findings(term)
         hides = hidden(term, found, resolve)
-    reaches = not unknown
-    swept = sweep(term, found, resolve, remember, outermost=True)
-    levels, groups = group_levels(swept.levels)
-    numbers = {j.path: (g.number, j.orientation) for g in groups for j in g.cut.jumps}
-    vanishing = vanishing_of(term.body, numbers)
-    kept = tuple((t, v) for t, v in decisions.items() if not isinstance(t, Const))
+    reaches = not asked.unknown
+    levels, groups = group_levels(sweep(term, found, resolve, asked.remember, outermost=True).levels)
     body = function_of(term.body)
-    box = box_of(term, found, body) if reaches and not hides else None
-    surfaces = {f.surface for f in found if f.kind not in ("center", "critical")}
-    doublings = sum(min(3, len(surface.free.intersection(term.variables))) for surface in surfaces)
     inlined = _inlined(term, inline) if reaches and not hides else None
-    plain = None if inlined is None else straight(term, inlined, levels)
-    high = None if inlined is None else degree(inlined, term.variables[-1])
     return Plan(
-        term, levels, groups, body, vanishing, kept, reaches, hides, box, doublings, plain, _premise(premises),
-        confused, _may_fold(term, levels), high,
-    )  # fmt: skip
+        term,
+        levels,
+        groups,
+        body,
+        vanishing_of(term.body, {j.path: (g.number, j.orientation) for g in groups for j in g.cut.jumps}),
+        tuple((t, v) for t, v in asked.decisions.items() if not isinstance(t, Const)),
+        reaches,
+        hides,
+        box_of(term, found, body) if reaches and not hides else None,
+        _doublings(term, found),
+        None if inlined is None else straight(term, inlined, levels),
+        _premise(premises),
+        confused,
+        _may_fold(term, levels),
+        None if inlined is None else degree(inlined, term.variables[-1]),
+    )
+
+
+def _doublings(term: Integral, found: Sequence[Finding]) -> int:
+    """How often the surfaces of an integral double what quadrature takes, about."""
+    surfaces = {f.surface for f in found if f.kind not in ("center", "critical")}
+    return sum(min(3, len(surface.free.intersection(term.variables))) for surface in surfaces)
 
 
 def _inlined(term: Integral, inline: Resolve) -> Term:
@@ -222,7 +242,7 @@ def _inlined(term: Integral, inline: Resolve) -> Term:
 
 
 def _may_fold(term: Integral, levels: Sequence[LevelPlan]) -> bool:
-    """Whether roots that are searched for may appear or merge at places of variables further out that can't be found."""
+    """Whether roots that are searched for may appear or merge where the variables further out can't be cut."""
     number = max((n for n, level in enumerate(levels) if any(cut.decides for cut in level.searched)), default=0)
     if not number:
         return False
