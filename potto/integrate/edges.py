@@ -34,8 +34,10 @@ if TYPE_CHECKING:
 
 MOST_AT_ONE_PLACE = 4
 SURE = 1.001  # what rounding may add to a bound
-# Beside a place, in its own size: where surfaces that are 0 at it, to so many times their rounding, have a side.
+# Beside a place, in its own size: where surfaces that are 0 at it, to so many times their rounding, have a side. And
+# the part of how they change up to there that the rounding of the place itself comes to.
 BESIDE, CLEAR = 1e-7, 4.0
+MISPLACED = CLEAR * EPS / BESIDE
 
 
 @dataclass(frozen=True)
@@ -262,7 +264,10 @@ def around(
     step = BESIDE * (1 + np.abs(x)) * (1 if above else -1)
     at, beside = (surfaces_at(level, {**here, level.variable: Cell(place)}, owner.size, machine)
                   for place in (x, x + step))  # fmt: skip
-    up = [np.where(np.abs(v) > CLEAR * e, v, w) >= 0 for (v, e), (w, _) in zip(at, beside, strict=True)]
+    up = [
+        np.where(np.abs(v) > CLEAR * e + MISPLACED * np.abs(w - v), v, w) >= 0
+        for (v, e), (w, _) in zip(at, beside, strict=True)
+    ]
     return here, decided(level, inner, up)
 
 

@@ -170,8 +170,8 @@ def test_bars_are_not_much_larger_than_the_error(pair: tuple[float, float]) -> N
     value, error = pair
     _, bar = read(with_error(value, error))
     # rounding up adds less than a unit, rounding of the value half of one, and a unit is a tenth of the error at most;
-    # of errors below the last digits of a double those digits are left
-    assert Fraction(bar) <= Fraction(error) * Fraction(13, 10) + Fraction(abs(value)) * Fraction(1, 10**16)
+    # of errors below the last digits of a double those digits are left, which are half a unit in the last place off
+    assert Fraction(bar) <= (Fraction(error) + Fraction(abs(value)) * Fraction(2) ** -53) * Fraction(13, 10)
 
 
 @given(DOUBLES, st.floats(0, 2.0**-60))

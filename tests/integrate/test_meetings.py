@@ -66,3 +66,15 @@ def test_the_note_names_both_surfaces() -> None:
         "the surface t - x = 0 coincides with 2*t - 0.5 - x = 0: the one-sided derivatives differ "
         "(2 backward, 1 forward)"
     )
+
+
+@pytest.mark.parametrize("level", [0.0, 1e-17, 1e-12, 1e-9, 0.1, 0.25, 0.3])
+@pytest.mark.parametrize("order", ["x, y", "y, x"])
+def test_lines_that_coincide_where_their_place_is_rounded(level: float, order: str) -> None:
+    """The lower one of y - x = a + t/2 and a + t counts: int_0^(1-a) (2 x + a) dx = 1 - a, times its speed."""
+    body = f"[y - x < {level!r} + 0.5*t]*[y - x < {level!r} + t]*(x + y)"
+    f = potto.compile(f"def f(t)\n    integral ([0, 1], [0, 1]) {body} d({order})").f
+    (note,) = potto.deriv(f)((0.0, 1.0)).notes
+    whole = 1 - level
+    assert abs(note.backward - whole) <= note.backward_error + 1e-15
+    assert abs(note.forward - whole / 2) <= note.forward_error + 1e-15

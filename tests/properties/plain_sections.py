@@ -79,12 +79,14 @@ class Region:
         """What the derivative gains where a surface that runs along y moves."""
         total = 0.0
         for g in self.functions:
+            if not places.size:
+                break
             x = np.linspace(self.low, self.high, 7)
             if not np.array_equal(g(x, self.low, t) + 0 * x, g(x, self.high, t) + 0 * x):
                 continue
             slope = np.imag(g(places + 1j * STEP, self.low, t)) / STEP + 0 * places
             here = np.abs(g(places, self.low, t)) <= 1e-9 * (1 + np.abs(slope))
-            x, slope = places[here], slope[here]
+            x, slope, places = places[here], slope[here], places[~here]  # the same surface may be there twice
             moved = np.imag(g(x, self.low, t + 1j * STEP)) / STEP
             before, after = (self.section(x + side * BESIDE, t)[0] for side in (-1, 1))
             total += float(np.sum((before - after) * -moved / slope))
