@@ -186,17 +186,16 @@ def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, d
                     inner &= np.isfinite(speed)
         inside[i] = inner
         x[i] = np.where(inner, root, high)
-        e[i] = np.where(inner, SEARCHED * EPS * np.abs(root) if row.e is None else row.e, eh)
+        off = SEARCHED * EPS * np.abs(root) if row.e is None else row.e
+        e[i] = np.where(inner, off, eh)
         for d in range(directions):
             speed = row.t[d] if d < len(row.t) and row.t[d] is not None else 0.0
             t[d, i] = np.where(inner, speed, th[d])
         if row.turning or (row.cut >= 0 and _any_turning(plan, row)):
             beyond.append((root, True))
-        if directions and row.cut >= 0 and plan.level.cuts[row.cut].decides:
-            edges += _edges(row, root, (low, tl, 0.0), (high, th, 0.0), directions, batch)
-        elif directions and row.cut >= 0:  # what only bends may be beside the bound by rounding
-            off = 0.0 if row.e is None else row.e
-            brushes += _edges(row, root, (low, tl, el + off), (high, th, eh + off), directions, batch)
+        if directions and row.cut >= 0:
+            found, beside = (edges, None) if plan.level.cuts[row.cut].decides else (brushes, off)
+            found += _edges(row, root, beside, (low, tl, el), (high, th, eh), directions, batch)
     rank = np.zeros((count + 2, batch), dtype=np.int64)
     conflict = merged = False
     blur = np.zeros_like(x)
@@ -307,12 +306,15 @@ def tangents(t: tuple[Any, ...], batch: int, directions: int) -> Array:
     return out
 
 
-def _edges(row: Row, root: Array, lower: _End, upper: _End, directions: int, batch: int) -> list[Edge]:
-    """Where a cut lies on a bound, or as far beside it as the bounds say, and does not move with it."""
+def _edges(row: Row, root: Array, off: Any, lower: _End, upper: _End, directions: int, batch: int) -> list[Edge]:
+    """Where a cut lies on a bound, or beside it by rounding, and does not move with it. off: that of the cut's place;
+    None for cuts that must lie on the bound."""
     out: list[Edge] = []
-    for above, (bound, tb, off) in ((False, lower), (True, upper)):
-        with np.errstate(invalid="ignore"):
-            on = (root == bound) | (np.abs(root - bound) <= off)
+    for above, (bound, tb, e) in ((False, lower), (True, upper)):
+        on = root == bound
+        if off is not None:
+            with np.errstate(invalid="ignore"):
+                on = on | (np.abs(root - bound) <= off + e)
         if not on.any():
             continue
         on = on & np.isfinite(bound) & (lower[0] < upper[0])

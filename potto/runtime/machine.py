@@ -23,10 +23,10 @@ from potto.diagnostics import PottoError
 from potto.integrate.costs import Costs
 from potto.integrate.pieces import Folded, Sided, still
 from potto.kernels import errors
-from potto.kernels.cells import Array, Cell, Ints, Number, Pattern, Trace, Value, pad, pattern
+from potto.kernels.cells import Cell, Ints, Number, Pattern, Trace, Value, pad, pattern
 from potto.kernels.chunks import in_chunks, many
 from potto.kernels.compile import Kernel, counts, kernel
-from potto.runtime.books import Books, note
+from potto.runtime.books import Books, Sides, note
 from potto.runtime.functions import Closure, Derivative, Paired
 from potto.runtime.reach import Reach
 from potto.settings import Settings
@@ -172,10 +172,8 @@ class Machine:
         """Whether integrals inside of integrals have spent far more than the budget: what is left is given up."""
         return self.books.spent > OVERDRAFT * self.settings.max_evals
 
-    def note_edge(
-        self, what: Sided, backward: Array, forward: Array, off: tuple[Array, Array], members: Ints | None = None
-    ) -> None:
-        self.books.met.edges.append((what, (backward, forward, *off), members))
+    def note_edge(self, what: Sided, sides: Sides, members: Ints | None = None) -> None:
+        self.books.met.edges.append((what, sides, members))
 
     def note_sided(self, what: Sided, members: Ints | None = None) -> None:
         """What an integral finds that stands in another one: how much it comes to, that one will say."""

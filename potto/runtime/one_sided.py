@@ -58,8 +58,8 @@ def from_both_sides(
     for what, members in reasons.items():
         there = differ if members is None else np.intersect1d(differ, members)
         if there.size:
-            off = before[..., there], beyond[..., there]
-            machine.note_edge(what, backward[..., there], forward[..., there], off, there)
+            backward_, forward_, before_, beyond_ = (x[..., there] for x in (backward, forward, before, beyond))
+            machine.note_edge(what, (backward_, forward_, before_, beyond_), there)
 
 
 def beside_folds(
@@ -89,7 +89,7 @@ def beside_folds(
         t[:] = np.where(np.isfinite(t), t, np.where(np.isfinite(backward), backward, forward))
         et[:] = np.where(np.isfinite(t), np.where(np.isfinite(et), et, 0.0), np.inf)
         _endless(machine, backward, forward, t, et)
-        machine.note_edge(what, backward, forward, off)
+        machine.note_edge(what, (backward, forward, *off))
     machine.books.met.folds.clear()
 
 
@@ -117,7 +117,7 @@ def beside_axes(
         else:
             et[:] = np.abs(t)
             _endless(machine, backward, forward, t, et)
-            machine.note_edge(what, backward, forward, off)
+            machine.note_edge(what, (backward, forward, *off))
     return True
 
 
