@@ -31,7 +31,7 @@ BLUR = 8
 class Row:
     """One candidate cut for the whole batch: where it is, how it moves, which cut of the level it belongs to.
 
-    e: how far off the place may be by rounding; None where that is not known.
+    e, et: how far off the place, and its speeds, may be by rounding; None where that is not known.
     """
 
     x: Array
@@ -39,6 +39,7 @@ class Row:
     cut: int
     turning: bool
     e: Any = None
+    et: tuple[Any, ...] = ()
 
 
 @dataclass
@@ -139,7 +140,7 @@ def frame_rows(plan: LevelPlan, values: tuple[Value, ...]) -> tuple[Cell, Cell, 
         assert isinstance(value, Cell)
         cells.append(value)
     rows = [
-        Row(cell.v, cell.t, cut, turning, 0.0 if cell.e is None else cell.e)  # type: ignore[arg-type]
+        Row(cell.v, cell.t, cut, turning, 0.0 if cell.e is None else cell.e, cell.et)  # type: ignore[arg-type]
         for cell, (cut, turning) in zip(cells[2:], plan.rows, strict=True)
     ]
     return cells[0], cells[1], rows
@@ -168,11 +169,11 @@ def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, d
     (low, tl, el), (high, th, eh), sign = _ends(lo, hi, batch, directions)
     count = len(rows)
     x = np.empty((count + 2, batch))
-    t = np.zeros((directions, count + 2, batch))
+    t = np.zeros((2 * directions, count + 2, batch))  # speeds, then their errors
     e = np.empty((count + 2, batch))
     x[0], x[-1] = low, high
     e[0], e[-1] = el, eh
-    t[:, 0], t[:, -1] = tl, th
+    t[:directions, 0], t[:directions, -1] = tl, th
     inside = np.zeros((count + 2, batch), dtype=bool)
     edges: list[Edge] = []
     brushes: list[Edge] = []
@@ -191,6 +192,8 @@ def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, d
         for d in range(directions):
             speed = row.t[d] if d < len(row.t) and row.t[d] is not None else 0.0
             t[d, i] = np.where(inner, speed, th[d])
+            if d < len(row.et) and row.et[d] is not None:
+                t[directions + d, i] = np.where(inner, row.et[d], 0.0)
         if row.turning or (row.cut >= 0 and _any_turning(plan, row)):
             beyond.append((root, True))
         if directions and row.cut >= 0:
@@ -345,7 +348,8 @@ def _sorted(
         t = t[:, order, member]
         same = (x[1:] == x[:-1]) & inside[1:] & inside[:-1]
         if same.any():
-            apart = np.abs(t[:, 1:] - t[:, :-1]) > 1e-9 * (np.abs(t[:, 1:]) + np.abs(t[:, :-1]))
+            speeds = t[: t.shape[0] // 2]
+            apart = np.abs(speeds[:, 1:] - speeds[:, :-1]) > 1e-9 * (np.abs(speeds[:, 1:]) + np.abs(speeds[:, :-1]))
             conflict = bool((same & apart.any(axis=0)).any())
             _agree(t, same, rank)
     return x, e, t, rank, conflict, blur
@@ -377,7 +381,8 @@ def _pieces(
     full = b > a
     owner, place = np.nonzero(full.T)
     a, b = a[place, owner], b[place, owner]
-    ta, tb = t[:, place, owner], t[:, place + 1, owner]
+    k = t.shape[0] // 2
+    (ta, da), (tb, db) = (np.split(t[:, at, owner], [k]) for at in (place, place + 1))
     left, right = np.full(a.shape, -np.inf), np.full(a.shape, np.inf)
     for root, _ in beyond:
         at = root[owner]
@@ -387,5 +392,6 @@ def _pieces(
     bad = np.isnan(x[0]) | np.isnan(x[-1])
     ea, eb = e[place, owner], e[place + 1, owner]
     near = np.stack((blur[place, owner], blur[place + 1, owner]))
-    made = Segments(owner, a, b, ta, tb, choose(a, b, left, right), left, right, rank[place, owner], ea, eb, near)
+    kind = choose(a, b, left, right)
+    made = Segments(owner, a, b, ta, tb, kind, left, right, rank[place, owner], ea, eb, near, da, db)
     return Cuts(sign, made, moving, edges, bad if bad.any() else None)

@@ -99,11 +99,10 @@ def boundary(work: Work, ends: Ends) -> tuple[Array, Array]:
     return np.where(finite, out, 0.0), np.where(finite, rounding, np.inf)
 
 
-def cut_rounding(work: Work, ends: Ends) -> Array:
-    """What a cut misplaced by rounding costs: the integrand's jump times the rounding of the cut's place; (m, B)."""
-    seg, batch = work.seg, work.batch
-    if not seg.a.size:
-        return np.zeros((work.width, batch))
+def cut_rounding(work: Work, ends: Ends) -> tuple[Array, Array]:
+    """What cuts misplaced by rounding cost, (m, B): the integrand's jump times the rounding of their places. And what
+    cuts cost whose speeds are rounded, (m, k, B)."""
+    seg = work.seg
     low, high = ends.low, ends.high
     follows = np.zeros(seg.a.size, dtype=bool)
     follows[1:] = (seg.owner[1:] == seg.owner[:-1]) & (seg.a[1:] == seg.b[:-1])
@@ -111,9 +110,16 @@ def cut_rounding(work: Work, ends: Ends) -> Array:
     before = np.zeros_like(high)
     before[:, 1:] = high[:, :-1]
     jump = np.abs(low - np.where(follows, before, 0.0))
-    cost = jump * seg.ea + np.where(last, np.abs(high) * seg.eb, 0.0)
-    cost = np.where(np.isfinite(cost), cost, 0.0)
-    return np.stack([np.bincount(seg.owner, row, minlength=batch) for row in cost])
+    end = np.where(last, np.abs(high), 0.0)
+
+    def total(at_a: Array, at_b: Array) -> Array:
+        with np.errstate(invalid="ignore"):
+            cost = jump * at_a + end * at_b
+        cost = np.where(np.isfinite(cost), cost, 0.0)
+        return np.stack([np.bincount(seg.owner, row, minlength=work.batch) for row in cost])
+
+    speeds = [total(a, b) for a, b in zip(seg.da, seg.db, strict=True)]
+    return total(seg.ea, seg.eb), np.stack(speeds, axis=1) if speeds else np.zeros((work.width, 0, work.batch))
 
 
 def added_up(work: Work, found: Totals) -> Array:
@@ -145,8 +151,6 @@ def note_cancelling(work: Work, inner: Sums, added: Array, owner: Ints) -> None:
 def sums(work: Work, found: Totals, ends: Ends | None) -> Sums:
     """The answer: per direction the better of the two forms, or the infinity that it is."""
     v, e = found.integral[:, 0], found.error[:, 0]
-    if ends is not None:
-        e = e + cut_rounding(work, ends)
     moving, fixed = found.moving, found.fixed
     if fixed is None or found.apart is None:
         t, et = moving
@@ -156,6 +160,9 @@ def sums(work: Work, found: Totals, ends: Ends | None) -> Sums:
         # two independent values that differ by more than they admit: neither estimate is believed
         doubt = np.where(found.apart > 4 * (moving[1] + fixed[1]), found.apart, 0.0)
         t, et = np.where(better, fixed[0], moving[0]), np.where(better, fixed[1], moving[1]) + doubt
+    if ends is not None:
+        places, speeds = cut_rounding(work, ends)
+        e, et = e + places, et + speeds
     if work.endless is not None:
         t, et = np.where(work.endless == 0, t, work.endless), np.where(work.endless == 0, et, np.inf)
     return Sums(v, e, t, et, gross=added_up(work, found))

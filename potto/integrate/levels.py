@@ -66,11 +66,12 @@ class Iteration:
 
     def run(
         self, number: int, env: dict[str, Value], batch: int, sides: dict[int, Mask], machine: Evaluator,
-        root: Ints | None = None,
+        root: Ints | None = None, slack: Array | None = None,
     ) -> Sums:  # fmt: skip
         """Integrate over variable `number` and those further in, for a batch of environments.
 
         `root` says, of a batch of nodes, which member of the outermost batch each belongs to; None if there is one.
+        `slack` says how many times the error may be larger of nodes that have less weight than others.
         """
         level = self.plan.levels[number]
         cuts, collapsed = self.cut(level, env, batch, machine)
@@ -86,7 +87,7 @@ class Iteration:
         if keep is not None:
             here, sides = seg.pick(keep), {g: take(m, keep) for g, m in sides.items()}
         moving = cuts.moving and machine.directions > 0
-        work = Work(self, number, level, env, here, sides, machine, moving, batch, root, cuts.conflict)
+        work = Work(self, number, level, env, here, sides, machine, moving, batch, root, slack, cuts.conflict)
         sums = work.integrate()
         if collapsed:
             sums = count_collapsed(scene, collapsed, sums)

@@ -29,7 +29,7 @@ class Segments:
 
     owner: (S,) index of the integral. a, b: (S,) ends, a < b. ta, tb: (k, S) how they move. kind: (S,) the map.
     left, right: (S,) turning points that the map resolves (where `kind` says so).
-    ea, eb: (S,) how far off the ends may be by rounding.
+    ea, eb: (S,) how far off the ends may be by rounding. da, db: (k, S) the same of their speeds.
     rank: (S,) what lies at the left end: 2 a jump, 1 a place where something further in changes, 0 neither.
     blur: (2, S) within which distance of the ends other cuts lie that rounding does not tell apart from these.
     """
@@ -46,11 +46,14 @@ class Segments:
     ea: Array
     eb: Array
     blur: Array
+    da: Array
+    db: Array
 
     def pick(self, index: Any) -> Segments:
         return Segments(self.owner[index], self.a[index], self.b[index], self.ta[:, index], self.tb[:, index],
                         self.kind[index], self.left[index], self.right[index], self.rank[index],
-                        self.ea[index], self.eb[index], self.blur[:, index])  # fmt: skip
+                        self.ea[index], self.eb[index], self.blur[:, index],
+                        self.da[:, index], self.db[:, index])  # fmt: skip
 
 
 def choose(a: Array, b: Array, left: Array, right: Array) -> Ints:

@@ -77,8 +77,8 @@ def _family(
     for j in range(int(count)):
         here = dict(env)
         here[family.index] = pad(Cell(first + j), machine.directions)
-        root = _call(function, here, machine)
-        rows.append(Row(np.where(first + j <= last, root.v, np.nan), root.t, cut, turning))
+        root = _call(function, here, machine.tracking())
+        rows.append(Row(np.where(first + j <= last, root.v, np.nan), root.t, cut, turning, root.e, root.et))
     return rows
 
 
@@ -238,11 +238,30 @@ def _moving(
         off = np.where(np.isfinite(off), off, 0.0) + step
         # What stands still does so also where the surface is flat, and 0/0 would say nothing.
         t = tuple(None if x is None else np.where(np.asarray(x) == 0, 0.0, -np.asarray(x) / slope) for x in value.t[:k])
+    et = _doubt(function, variable, here, root + off, t, value, machine.with_directions(k + 1)) if k else ()
     poles = np.isfinite(root) & ~np.isfinite(np.broadcast_to(value.v, root.shape))
     if k and poles.any():
         near = _beside_poles(function, variable, here, root, machine.with_directions(k + 1))
         t = tuple(np.where(poles, x, 0.0 if y is None else y) for x, y in zip(near, t, strict=True))
-    return Row(root, t, cut, False, off)
+    return Row(root, t, cut, False, off, et)
+
+
+def _doubt(
+    function: Lam, variable: str, env: dict[str, Value], beside: Array, t: tuple[Any, ...], value: Cell, machine: Any
+) -> tuple[Any, ...]:
+    """How far off speeds may be, by the rounding of the derivatives that they are made of (`value`), and as the root is
+    not where it should be, but anywhere as far away as `beside`."""
+    k = len(t)
+    off = _call(function, {**env, variable: Cell(beside, None, (None,) * k + (1.0,))}, machine)
+    slope, steep = (0.0 if cell.t[k] is None else np.asarray(cell.t[k]) for cell in (value, off))
+    found: list[Any] = []
+    with np.errstate(all="ignore"):
+        for speed, x, rounded in zip(t, off.t, value.et, strict=False):
+            there = 0.0 if x is None else -np.asarray(x) / steep
+            part = sum(0.0 if r is None else r * w for r, w in ((rounded, 1.0), (value.et[k], 0.0 if speed is None else np.abs(speed))))
+            doubt = np.abs(there - (0.0 if speed is None else speed)) + part / np.abs(slope)
+            found.append(None if speed is None else np.where(np.isfinite(doubt), doubt, 0.0))
+    return tuple(found)
 
 
 def _beside_poles(function: Lam, variable: str, env: dict[str, Value], root: Array, machine: Any) -> list[Array]:

@@ -63,4 +63,6 @@ class Tally:
                 scale = np.stack([work.parent.siblings(row, work.root) for row in scale])
             self.scale = np.maximum(work.machine.atol, work.machine.rtol * scale)
         shares: Array = self.scale[:, owner] / (2 * self.count[owner])
+        if work.slack is not None:
+            shares = shares * work.slack[owner]
         return shares

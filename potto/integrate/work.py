@@ -47,6 +47,7 @@ MORE = 6  # for graded pieces, on which what is smooth is a polynomial, whose en
 PROMISING = 1e-2
 DOUBTFUL_ROUNDS = 8
 LONG = 8  # after how many halvings it is looked for members that take longer than the others
+MOST_SLACK = 1e6  # how many times the error of a node may be larger that hardly counts
 BESIDE = 1e-9  # how far from the ends of a segment, in parts of it, it is looked at just inside
 
 
@@ -64,6 +65,7 @@ class Work:
     moving: bool
     batch: int
     root: Ints | None = None
+    slack: Array | None = None
     conflict: bool = False
     width: int = 1
     ends: Ends | None = None
@@ -326,7 +328,7 @@ class Work:
 
     def values(self, seg: Segments, index: Ints, x: Array, label: Array, weight: Array) -> tuple[Array, Array | None]:
         """The channels at the nodes, times the weight: (C, P, n), and the errors that came with them."""
-        f, fx, ft, e, et = self.integrand(index, x)
+        f, fx, ft, e, et = self.integrand(index, x, weight)
         m, k = f.shape[0], self.k
         rows = 1 + k + (k if self.both else 0)
         h = np.empty((m, rows, *x.shape))
@@ -356,8 +358,13 @@ class Work:
             bound = (bound * np.abs(weight)).reshape(m * rows, *x.shape)
         return h.reshape(m * rows, *x.shape), bound
 
-    def integrand(self, index: Ints, x: Array) -> tuple[Array, Any, Any, Array | None, Array | None]:
-        """F, dF/dx, D_theta F (each with a leading axis of components) and error bounds, at nodes (P, n)."""
+    def integrand(
+        self, index: Ints, x: Array, weight: Array | None = None
+    ) -> tuple[Array, Any, Any, Array | None, Array | None]:
+        """F, dF/dx, D_theta F (each with a leading axis of components) and error bounds, at nodes (P, n).
+
+        weight: (P, n) or (P, 1), how much the nodes of a rule count, but for its own weights.
+        """
         owner = self.seg.owner[index]
         k, name = self.k, self.level.variable
         tangent: tuple[Number | None, ...] = (None,) * k + ((1.0,) if self.moving else ())
@@ -375,13 +382,24 @@ class Work:
         env[name] = Cell(x.reshape(-1), None, tangent)
         masks = {g: m[index[flat]] if isinstance(m, np.ndarray) else m for g, m in self.sides.items()}
         root = self.below(owner[flat])
-        sums = self.parent.run(self.number + 1, env, x.size, masks, self.inner, root)
+        slack = None if weight is None else self.allowed(owner, np.broadcast_to(np.abs(weight), x.shape))
+        sums = self.parent.run(self.number + 1, env, x.size, masks, self.inner, root, slack)
         if sums.gross is not None:
             note_cancelling(self, sums, sums.gross, owner[flat])
         shape = (sums.v.shape[0], *x.shape)
         t = sums.t.reshape(shape[0], -1, *x.shape)
         et = sums.et.reshape(t.shape)
         return sums.v.reshape(shape), t[:, k] if self.moving else None, t[:, :k], sums.e.reshape(shape), et
+
+    def allowed(self, owner: Ints, weight: Array) -> Array:
+        """How many times the error of integrals further in may be larger at nodes that count less than the mean."""
+        seg, nodes = self.seg, np.bincount(owner, minlength=self.batch) * weight.shape[1]
+        reach = np.bincount(seg.owner, seg.b - seg.a, minlength=self.batch)
+        here = np.bincount(owner, weight.sum(axis=1), minlength=self.batch)
+        mean = (np.where(np.isfinite(reach), reach, here) / np.maximum(nodes, 1))[owner]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            times = np.fmax(1.0, np.fmin(mean[:, None] / weight, MOST_SLACK)).ravel()
+        return times if self.slack is None else times * np.repeat(self.slack[owner], weight.shape[1])
 
     def below(self, owner: Ints) -> Ints | None:
         """For members of the next batch, the members of the outermost one."""
