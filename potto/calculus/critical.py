@@ -33,7 +33,7 @@ class Within:
 
 @dataclass(frozen=True, slots=True)
 class Critical:
-    """Where all equations are 0 for some values of the variables of `within`, innermost first: one fewer than equations.
+    """Where all equations are 0 for some values of the variables of `within`, innermost first: one fewer than those.
 
     turning: what is integrated further in changes there like a square root, or worse.
     """
@@ -133,9 +133,9 @@ def _turns(system: Critical, variable: str) -> Iterator[Term]:
     surface, slope = system.equations[0], system.equations[-1]
     try:
         if len(system.equations) == 2 and slope == slope_of(surface, names[0]):
-            whole = (partial(surface, variable), partial(slope, names[0]))  # on it the slope is 0
+            whole = [partial(surface, variable), partial(slope, names[0])]  # on it the slope is 0
         else:
-            whole = (determinant([[partial(e, name) for name in names] for e in system.equations]),)
+            whole = [determinant(tuple(tuple(partial(e, name) for name in names) for e in system.equations))]
     except NotSmooth:
         return
     for turn in whole:

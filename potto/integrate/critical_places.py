@@ -22,7 +22,7 @@ from potto.integrate.cuts import SEARCHED, Row, as_array
 from potto.integrate.intervals import Interval, enclosure
 from potto.integrate.plan import LevelPlan
 from potto.integrate.rules import EPS
-from potto.kernels.cells import Array, Bools, Cell, Ints, Value
+from potto.kernels.cells import Array, Cell, Ints, Value
 
 ROUNDS = 120  # halvings of one side or all of them
 BOXES, BOXES_EACH = 1 << 14, 1 << 8  # at most so many open at once, or so many for each member
@@ -220,8 +220,8 @@ def _as_rows(owner: Ints, places: Array, width: Array, same: Array, batch: int) 
     """Places in order, one of those at one place for each member, as rows padded with nan."""
     order = np.lexsort((places, owner))
     owner, places, width = owner[order], places[order], width[order]
-    new: Bools = np.ones(owner.size, dtype=bool)
     apart = places[1:] - places[:-1] > width[1:] + width[:-1] + same[owner[1:]] + 8 * EPS * np.abs(places[1:])
+    new: Any = np.ones(owner.size, dtype=bool)
     new[1:] = (owner[1:] != owner[:-1]) | apart
     owner, places, width = owner[new], places[new], width[new]
     count = np.bincount(owner, minlength=batch)

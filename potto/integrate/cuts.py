@@ -292,9 +292,14 @@ def _folds(plan: LevelPlan, rows: list[Row], low: Array, high: Array, directions
 
 def standing(cuts: Cuts) -> Cuts:
     """The same cuts, none of which moves."""
+    return replace(at_rest(cuts), edges=[], conflict=False, meetings=[], brushes=[], folds=[])
+
+
+def at_rest(cuts: Cuts) -> Cuts:
+    """The same cuts, with which no nodes move; what was found of their motion stays."""
     seg = cuts.segments
-    seg.ta, seg.tb = np.zeros_like(seg.ta), np.zeros_like(seg.tb)
-    return replace(cuts, moving=False, edges=[], conflict=False, meetings=[], brushes=[], folds=[])
+    seg.ta, seg.tb, seg.da, seg.db = (np.zeros_like(speed) for speed in (seg.ta, seg.tb, seg.da, seg.db))
+    return replace(cuts, moving=False)
 
 
 def _any_turning(plan: LevelPlan, row: Row) -> bool:

@@ -23,9 +23,10 @@ from potto.core.simplify import simplify
 from potto.core.terms import Deriv, Integral, Lam, Term, Tuple, const, integral, substitute, tuple_
 from potto.integrate.levels import Iteration
 from potto.integrate.pieces import Evaluator, Sums, still
-from potto.integrate.plan import Plan, function_of, group_levels, level_plan, vanishing_of
+from potto.integrate.plan import Plan, function_of, group_levels, level_plan
 from potto.integrate.rules import EPS
 from potto.integrate.tables import Table, finite, tabulated
+from potto.integrate.vanishing import vanishing_of
 from potto.kernels.cells import Array, Cell, Mask, Value, pad
 
 START_ORDER = 16
@@ -33,6 +34,7 @@ START_ORDER = 16
 SHARE = 0.02
 FINEST = 1e-14
 AFFORDABLE = 1_000_000  # evaluations: more than that is no good use of one number
+SLIVER = 16  # roundings of its ends, that a piece of a table is longer than
 MOST_PLACES = 64  # where the integral over one variable is not smooth in the number that it depends on
 
 # A place in the state of a step, as a surface, and what is there.
@@ -177,12 +179,21 @@ def _table(
     level = level_plan(Level(state, const(span[0]), const(span[1]), hints, cuts), (), ())
     found, _ = iteration.cut(level, env, 1, machine)
     segments = found.segments
+    size = np.maximum(np.abs(segments.a), np.abs(segments.b))
+    segments = segments.pick(segments.b - segments.a > SLIVER * EPS * size)  # a span is rounded outwards
 
     def function(x: Array, speeds: Array) -> Sums:
         """Without speeds values alone."""
         wide = machine.with_directions(len(speeds))
         here = {name: pad(value, wide.directions) if len(speeds) else still(value) for name, value in env.items()}
-        return iteration.run(1, {**here, state: Cell(x, None, tuple(speeds))}, x.size, {}, wide)
+        together = np.zeros(x.size, dtype=np.int64)  # what single nodes meet is no matter
+        with machine.books.apart() as met:
+            sums = iteration.run(1, {**here, state: Cell(x, None, tuple(speeds))}, x.size, {}, wide, together)
+        if not len(speeds):  # at the ends of pieces: derivatives are not asked for
+            met.folds.clear()
+            met.sided.clear()
+        machine.books.met.take(met, None)
+        return sums
 
     if found.conflict or not segments.a.size or not finite(segments).all():
         return None

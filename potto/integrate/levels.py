@@ -13,17 +13,18 @@ import numpy as np
 from potto.core.terms import Term
 from potto.integrate.collapsed import Collapsed, collapsed_ranges, count_collapsed
 from potto.integrate.critical_places import critical_rows
-from potto.integrate.cuts import Cuts, Row, frame_rows, segments, standing
+from potto.integrate.cuts import Cuts, Row, at_rest, frame_rows, segments, standing
 from potto.integrate.edges import Scene, count_places, count_slivers, note_folds
 from potto.integrate.extent import Extent
 from potto.integrate.maps import Segments
 from potto.integrate.mass import concentrated
 from potto.integrate.narrow import count_narrow
 from potto.integrate.pieces import Evaluator, Sums, components, take
-from potto.integrate.plan import LevelPlan, Plan, vanishes
+from potto.integrate.plan import LevelPlan, Plan
 from potto.integrate.roots import searched_rows
 from potto.integrate.steps import brush
 from potto.integrate.undefined import lost_members, sides_at
+from potto.integrate.vanishing import vanishes
 from potto.integrate.work import Work
 from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value
 
@@ -162,11 +163,12 @@ class Iteration:
                 if cut.jumps:
                     roots = [(row.x, row.t[: self.machine.directions]) for row in rows if row.cut == number]
                     machine.costs.saw(cut.surface, roots, lo.v, hi.v, asked)
-        resting = self.resting(level, lo, hi)
-        for row in rows if self.still or resting else ():
-            if resting or (row.cut >= 0 and level.level.cuts[row.cut].surface in self.still):
+        for row in rows if self.still else ():
+            if row.cut >= 0 and level.level.cuts[row.cut].surface in self.still:
                 row.t = ()
         cuts = segments(level, lo, hi, rows, batch, machine.directions, level is not self.plan.levels[0])
+        if self.resting(level, lo, hi):
+            cuts = at_rest(cuts)
         cuts.lost = lost
         collapsed = collapsed_ranges(level, lo, hi, rows, batch, machine.directions)
         if machine.frozen:

@@ -21,6 +21,8 @@ LINEAR, LEFT, RIGHT, BOTH, UP, DOWN, WHOLE = range(7)
 GRADE, STEEPEST = 6, 120
 # How near to an infinite end points come: the square of its inverse is still a number.
 FARTHEST = 1e-150
+# What part of a bound of its rounding a turning point is off: bounds add up what in truth cancels.
+TYPICAL = 0.25
 
 
 @dataclass
@@ -109,7 +111,7 @@ def trembling(seg: Segments, x: Array) -> Array:
     for kinds, turn, end, off in (
         ((LEFT, BOTH), seg.left, seg.a, seg.ea), ((RIGHT, BOTH), seg.right, seg.b, seg.eb)
     ):  # fmt: skip
-        rounded = np.maximum(least, np.where(turn == end, off, 0.0)[:, None])
+        rounded = np.maximum(least, np.where(turn == end, TYPICAL * off, 0.0)[:, None])
         near = np.where(np.isin(seg.kind, kinds)[:, None], np.abs(x - turn[:, None]), np.inf)
         found = np.maximum(found, 1.5 * rounded / np.maximum(near, 2 * least))
     return np.minimum(found, 1.0)

@@ -258,9 +258,12 @@ def _doubt(
     with np.errstate(all="ignore"):
         for speed, x, rounded in zip(t, off.t, value.et, strict=False):
             there = 0.0 if x is None else -np.asarray(x) / steep
-            part = sum(0.0 if r is None else r * w for r, w in ((rounded, 1.0), (value.et[k], 0.0 if speed is None else np.abs(speed))))
-            doubt = np.abs(there - (0.0 if speed is None else speed)) + part / np.abs(slope)
-            found.append(None if speed is None else np.where(np.isfinite(doubt), doubt, 0.0))
+            if speed is None:
+                found.append(None)
+                continue
+            part = sum(0.0 if r is None else r * w for r, w in ((rounded, 1.0), (value.et[k], np.abs(speed))))
+            doubt = np.abs(there - speed) + part / np.abs(slope)
+            found.append(np.where(np.isfinite(doubt), doubt, 0.0))
     return tuple(found)
 
 

@@ -1,6 +1,6 @@
 """What the integrals of a batch amount to so far, and so how far off each of their pieces may be.
 
-Owns `Tally`.
+Owns `Tally`, and `slack`: of nodes that hardly count, less is asked.
 """
 
 from __future__ import annotations
@@ -14,6 +14,9 @@ from potto.kernels.cells import Array, Ints
 
 if TYPE_CHECKING:
     from potto.integrate.work import Work
+
+
+MOST_SLACK = 1e6  # how many times the error of a node may be larger that hardly counts
 
 
 class Tally:
@@ -66,3 +69,13 @@ class Tally:
         if work.slack is not None:
             shares = shares * work.slack[owner]
         return shares
+
+
+def slack(work: Work, owner: Ints, weight: Array) -> Array:
+    """How many times the error of integrals further in may be larger at nodes that count less than the mean."""
+    seg, nodes = work.seg, np.bincount(owner, minlength=work.batch) * weight.shape[1]
+    reach = np.bincount(seg.owner, seg.b - seg.a, minlength=work.batch)
+    mean = (np.where(np.isfinite(reach), reach, 0.0) / np.maximum(nodes, 1))[owner]  # far out what counts is small
+    with np.errstate(divide="ignore", invalid="ignore"):
+        times: Array = np.fmax(1.0, np.fmin(mean[:, None] / weight, MOST_SLACK)).ravel()
+    return times if work.slack is None else times * np.repeat(work.slack[owner], weight.shape[1])

@@ -23,7 +23,8 @@ from potto.integrate import maps
 from potto.integrate.edges import Scene, placed, surfaces_at
 from potto.integrate.maps import Segments
 from potto.integrate.pieces import Evaluator, gather, still, take
-from potto.integrate.plan import LevelPlan, Plan, function_of, vanishes
+from potto.integrate.plan import LevelPlan, Plan, function_of
+from potto.integrate.vanishing import vanishes
 from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value
 
 if TYPE_CHECKING:

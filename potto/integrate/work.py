@@ -25,9 +25,10 @@ from potto.integrate.judge import doubtful, missed_peak, stragglers, too_coarse
 from potto.integrate.maps import Segments
 from potto.integrate.pieces import Evaluator, Pieces, Sums, column, gather, joined, spread, still
 from potto.integrate.plan import LevelPlan
+from potto.integrate.roundoff import few_doubles, misplaced, noise, shake
 from potto.integrate.rules import EPS, Rule, gauss, truncation
 from potto.integrate.steps import look_for_steps
-from potto.integrate.tally import Tally
+from potto.integrate.tally import Tally, slack
 from potto.integrate.undefined import mend
 from potto.kernels.cells import Array, Cell, Ints, Mask, Number, Value, pad
 
@@ -35,10 +36,6 @@ if TYPE_CHECKING:
     from potto.integrate.levels import Iteration
 
 CHUNK = 1 << 15  # points per kernel call: a few buffers of this length fit the second-level cache
-# The rounding of a node, in units of the last place, that noise in a steep integrand is blamed on.
-NODE_ROUNDING = 0.5
-# From how many lengths of a piece away from 0 on the rounding of its nodes is put right.
-FAR = 8
 MOST_HALVINGS = 64
 # Nodes for pieces that were too coarse: first more of them on the same piece, then on halves.
 HIGH_ORDER = HALF_ORDER = 14
@@ -47,7 +44,6 @@ MORE = 6  # for graded pieces, on which what is smooth is a polynomial, whose en
 PROMISING = 1e-2
 DOUBTFUL_ROUNDS = 8
 LONG = 8  # after how many halvings it is looked for members that take longer than the others
-MOST_SLACK = 1e6  # how many times the error of a node may be larger that hardly counts
 BESIDE = 1e-9  # how far from the ends of a segment, in parts of it, it is looked at just inside
 
 
@@ -118,8 +114,8 @@ class Work:
         return given_up(self, done, found, sums(self, found, ends))
 
     def enough(self) -> int | None:
-        """How many nodes do for an integrand that is a polynomial between its cuts: so many that it is 0 if it is at all
-        of them, since they also tell its size."""
+        """How many nodes do for an integrand that is a polynomial between its cuts: so many that it is 0 where it is 0
+        at all of them, since they also tell its size."""
         degree = self.parent.plan.degree if self.last and not self.seg.kind.any() else None
         return None if degree is None or degree >= self.parent.order else degree + 1
 
@@ -220,7 +216,7 @@ class Work:
         if seg.kind.any() or p.end.any():
             x = maps.off_the_ends(seg, x)
         off = None
-        if weight.shape[1] == 1 and self.few_doubles(seg, weight):
+        if weight.shape[1] == 1 and few_doubles(seg, weight):
             off, label = maps.displaced(seg, x, label)
         h, inner = self.values(seg, p.segment, x, label, weight)
         if not whole:
@@ -229,33 +225,12 @@ class Work:
             part = off * (seg.b - seg.a)[:, None] / weight
             slope = h @ rule.derivative
             h = np.where(np.isfinite(slope) & (np.abs(part) < 0.1), h - part * slope, h)
-        self.estimate(p, seg, h, rule, self.shake(p, seg, x, weight, off is not None))
+        self.estimate(p, seg, h, rule, shake(p, seg, x, weight, off is not None))
         if self.k and seg.kind.any():
             p.floor = p.floor + (np.abs(h) * maps.trembling(seg, x)) @ rule.weights
         if inner is not None:
             p.floor = p.floor + np.abs(inner) @ rule.weights
         return p
-
-    @staticmethod
-    def few_doubles(seg: Segments, weight: Array) -> bool:
-        """Whether pieces are so far from 0 for their length that the rounding of nodes is worth putting right."""
-        far = np.maximum(np.abs(seg.a), np.abs(seg.b))
-        return bool((NODE_ROUNDING * far > FAR * weight[:, 0]).any())
-
-    @staticmethod
-    def shake(p: Pieces, seg: Segments, x: Array, weight: Array, put_right: bool) -> Array:
-        """The rounding of nodes, as a part of the piece: (P,).
-
-        Far from 0, where few doubles lie in a piece, a node is not where the rule wants it; but how far off it is is
-        known exactly, and the interpolant's slope puts that right but for its square.
-        """
-        if weight.shape[1] > 1:
-            shake = NODE_ROUNDING * EPS * np.abs(x).max(axis=-1) / np.abs(weight).max(axis=-1)
-        else:
-            shake = NODE_ROUNDING * EPS * np.maximum(np.abs(seg.a), np.abs(seg.b)) / weight[:, 0]
-            if put_right:
-                shake = np.minimum(shake, shake * shake + 2 * EPS * p.u1 / (p.u1 - p.u0))
-        return np.where(shake <= 1.0, shake, np.where(np.isfinite(shake), 1.0, 0.0))
 
     def estimate(self, p: Pieces, seg: Segments, h: Array, rule: Rule, shake: Array) -> None:
         """Integrals of pieces from the values of their channels (C, P, n), their errors and rounding floors."""
@@ -275,7 +250,7 @@ class Work:
             p.most = p.ends = p.tail = np.empty((0, p.u0.size))
         p.floor = 4 * EPS * p.size + (size @ rule.slopes) * shake
         if self.ends is not None and self.last and not self.parent.tracked:
-            p.floor += self.noise(p, seg)
+            p.floor += noise(self.ends, self.width, p, seg)
         if self.k:
             # speeds are rounded too, and so are the places of the cuts, which matters where they are close together
             place = np.maximum(seg.ea, seg.eb) / (seg.b - seg.a)
@@ -284,47 +259,14 @@ class Work:
             tangents *= 4
             tangents += place * p.size.reshape(self.width, -1, p.u0.size)[:, 1:]
             if self.both and not self.last:
-                self.misplace(p, seg, coefficients @ rule.ends)
+                at_ends = (coefficients @ rule.ends).reshape(self.width, -1, p.u0.size, 2)[:, 1 + self.k :]
+                index, lost = misplaced(p, seg, at_ends)
+                if self.misplaced is None:
+                    self.misplaced = np.zeros((self.width, self.k, self.seg.a.size))
+                self.misplaced[:, :, p.segment[index]] = lost
         broken = ~np.isfinite(p.integral)
         if broken.any():
             p.error = np.where(broken, np.inf, p.error)
-
-    def misplace(self, p: Pieces, seg: Segments, at_ends: Array) -> None:
-        """Note what is gained or lost in the fixed form as the ends of whole segments are off by a rounding.
-
-        The interior derivative jumps where the integrand has a kink; next to a place where sections turn it is as large
-        as one likes. at_ends: the channels at both ends (C, P, 2).
-        """
-        index = np.nonzero((p.u0 == 0) & (p.u1 == 1) & (p.end == 0))[0]
-        if not index.size:
-            return
-        part, u = seg.pick(index), np.array([[0.0, 1.0]])
-        slope = np.abs(np.broadcast_to(maps.points(part, u)[1], (index.size, 2)))
-        turn = EPS * np.stack((np.abs(part.left), np.abs(part.right)), axis=1)
-        off = np.stack((part.ea, part.eb), axis=1) + np.where(np.isfinite(turn), turn, 0.0)
-        share = np.divide(off, slope, out=np.zeros_like(off), where=(slope > 0) & np.isfinite(slope))
-        fixed = at_ends.reshape(self.width, -1, p.u0.size, 2)[:, 1 + self.k :, index]
-        if self.misplaced is None:
-            self.misplaced = np.zeros((self.width, self.k, self.seg.a.size))
-        self.misplaced[:, :, p.segment[index]] = np.nan_to_num((np.abs(fixed) * np.minimum(share, 1.0)).sum(axis=-1))
-
-    def noise(self, p: Pieces, seg: Segments) -> Array:
-        """What the integrand's own rounding, kept track of at the ends of segments, comes to in each channel: (C, P).
-
-        More than a few units in the last place where terms of parameters cancel, or where sines of them have large
-        arguments. What only grows towards one end is rounding of the variable, which is counted elsewhere.
-        """
-        ends = self.ends
-        assert ends is not None
-        shares = [
-            np.divide(e, np.abs(f), out=np.full(f.shape, np.inf), where=(f != 0) & np.isfinite(f))
-            for f, e in ((ends.low, ends.low_error), (ends.high, ends.high_error))
-        ]
-        share = np.minimum(*shares)
-        share = np.where((share > 4 * EPS) & (share < 1), share, 0.0)[:, p.segment]
-        share = np.where(seg.kind == maps.LINEAR, share, 0.0)  # at a turning point little is left to be rounded
-        sizes = p.size.reshape(self.width, -1, p.u0.size)
-        return np.asarray((share[:, None] * sizes).reshape(p.size.shape))
 
     def values(self, seg: Segments, index: Ints, x: Array, label: Array, weight: Array) -> tuple[Array, Array | None]:
         """The channels at the nodes, times the weight: (C, P, n), and the errors that came with them."""
@@ -382,24 +324,14 @@ class Work:
         env[name] = Cell(x.reshape(-1), None, tangent)
         masks = {g: m[index[flat]] if isinstance(m, np.ndarray) else m for g, m in self.sides.items()}
         root = self.below(owner[flat])
-        slack = None if weight is None else self.allowed(owner, np.broadcast_to(np.abs(weight), x.shape))
-        sums = self.parent.run(self.number + 1, env, x.size, masks, self.inner, root, slack)
+        less = None if weight is None else slack(self, owner, np.broadcast_to(np.abs(weight), x.shape))
+        sums = self.parent.run(self.number + 1, env, x.size, masks, self.inner, root, less)
         if sums.gross is not None:
             note_cancelling(self, sums, sums.gross, owner[flat])
         shape = (sums.v.shape[0], *x.shape)
         t = sums.t.reshape(shape[0], -1, *x.shape)
         et = sums.et.reshape(t.shape)
         return sums.v.reshape(shape), t[:, k] if self.moving else None, t[:, :k], sums.e.reshape(shape), et
-
-    def allowed(self, owner: Ints, weight: Array) -> Array:
-        """How many times the error of integrals further in may be larger at nodes that count less than the mean."""
-        seg, nodes = self.seg, np.bincount(owner, minlength=self.batch) * weight.shape[1]
-        reach = np.bincount(seg.owner, seg.b - seg.a, minlength=self.batch)
-        here = np.bincount(owner, weight.sum(axis=1), minlength=self.batch)
-        mean = (np.where(np.isfinite(reach), reach, here) / np.maximum(nodes, 1))[owner]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            times = np.fmax(1.0, np.fmin(mean[:, None] / weight, MOST_SLACK)).ravel()
-        return times if self.slack is None else times * np.repeat(self.slack[owner], weight.shape[1])
 
     def below(self, owner: Ints) -> Ints | None:
         """For members of the next batch, the members of the outermost one."""

@@ -123,8 +123,8 @@ class Met:
 
         for name, members in other.degenerate.items():
             note(self.degenerate, name, here(members))
-        for what, members in other.incomplete.items():
-            note(self.incomplete, what, here(members))
+        for search, members in other.incomplete.items():
+            note(self.incomplete, search, here(members))
         for reason, members in other.unfinished.items():
             self.note_unfinished(reason, here(members), UNDEFINED if reason.startswith(UNDEFINED) else "")
         for what, members in other.sided.items():
