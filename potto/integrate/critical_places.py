@@ -209,7 +209,7 @@ class _Search:
 def _inverse(matrices: Array) -> Array:
     """The inverse of each matrix (P, n, n); not finite where there is none."""
     n = matrices.shape[-1]
-    fine = np.isfinite(matrices).all(axis=(1, 2))
+    fine: Any = np.isfinite(matrices).all(axis=(1, 2))
     fine[fine] = np.linalg.det(matrices[fine]) != 0
     found = np.full(matrices.shape, np.nan)
     found[fine] = np.linalg.inv(matrices[fine]) if fine.any() else np.zeros((0, n, n))

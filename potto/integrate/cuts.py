@@ -383,8 +383,7 @@ def _pieces(
     edges: list[Edge],
 ) -> Cuts:  # fmt: skip
     a, b = x[:-1], x[1:]
-    full = b > a
-    owner, place = np.nonzero(full.T)
+    owner, place = np.nonzero((b > a).T)
     a, b = a[place, owner], b[place, owner]
     k = t.shape[0] // 2
     (ta, da), (tb, db) = (np.split(t[:, at, owner], [k]) for at in (place, place + 1))
@@ -394,9 +393,8 @@ def _pieces(
         left = np.where((at <= a) & (at > left), at, left)
         right = np.where((at >= b) & (at < right), at, right)
     moving = bool(ta.any() or tb.any())
-    bad = np.isnan(x[0]) | np.isnan(x[-1])
-    ea, eb = e[place, owner], e[place + 1, owner]
+    bad, ea, eb = np.isnan(x[0]) | np.isnan(x[-1]), e[place, owner], e[place + 1, owner]
     near = np.stack((blur[place, owner], blur[place + 1, owner]))
-    kind = choose(a, b, left, right)
-    made = Segments(owner, a, b, ta, tb, kind, left, right, rank[place, owner], ea, eb, near, da, db)
+    rank, kind = rank[place, owner], choose(a, b, left, right)
+    made = Segments(owner, a, b, ta, tb, kind, left, right, rank, ea, eb, near, da, db)
     return Cuts(sign, made, moving, edges, bad if bad.any() else None)
