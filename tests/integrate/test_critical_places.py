@@ -1,0 +1,143 @@
+"""Sections that appear, merge, turn and meet at places of the variables further out, in two variables and in three.
+
+Answers by closed forms, or by mpmath over lengths that are closed forms.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mpmath as mp
+import pytest
+
+import potto
+
+D = mp.sqrt(mp.mpf("0.15") ** 2 + mp.mpf("0.05") ** 2)  # between the centres of two discs
+
+
+def derivative(text: str, by: str = "t", **at: float) -> Any:
+    return potto.grad(potto.compile(text).f, by)(**at)
+
+
+def holds(answer: Any, value: Any, tangent: Any, within: float) -> None:
+    """The errors cover, and are within a part of the value: so many digits there are."""
+    assert abs(answer.value - value) <= answer.error + 4e-16 * abs(value)
+    assert abs(answer.tangent - tangent) <= answer.tangent_error + 4e-16 * abs(tangent)
+    assert answer.error <= within * abs(value)
+    assert answer.tangent_error <= within * abs(tangent)
+
+
+def band(t: Any, a: Any, b: Any) -> Any:
+    """The length of y in [a, b] with cos(4 y) < c, integrated over x in [a, b] with c = t - cos(4 x)."""
+
+    def length(c: Any) -> Any:
+        if c >= 1:
+            return b - a
+        if c <= -1:
+            return mp.mpf(0)
+        w = mp.acos(c)  # cos(u) < c for u in (w, 2 pi - w)
+        pieces = ((w + 2 * mp.pi * k, 2 * mp.pi - w + 2 * mp.pi * k) for k in range(-2, 3))
+        return sum(max(mp.mpf(0), min(b, hi / 4) - max(a, lo / 4)) for lo, hi in pieces)
+
+    places = {a, b}
+    for k in range(-3, 4):
+        for at_end in (mp.cos(4 * a), mp.cos(4 * b), mp.mpf(1), mp.mpf(-1)):
+            c = t - at_end
+            if abs(c) <= 1:
+                places |= {x for x in ((mp.acos(c) + 2 * mp.pi * k) / 4, (-mp.acos(c) + 2 * mp.pi * k) / 4) if a < x < b}
+    return mp.quad(lambda x: length(t - mp.cos(4 * x)), sorted(places))
+
+
+@pytest.mark.parametrize("t", [0.7, -0.4, 1.3])
+def test_an_energy_band(t: float) -> None:
+    """The states below an energy, and their density: cos(4 x) + cos(4 y) < t, searched for as a sum of four."""
+    with mp.workdps(20):
+        a, b = mp.mpf(-1), mp.mpf("1.5")
+        value, tangent = band(mp.mpf(t), a, b), mp.diff(lambda s: band(s, a, b), mp.mpf(t), h=mp.mpf("1e-6"))
+    answer = derivative(
+        "def f(t) integral ([-1, 1.5], [-1, 1.5]) [cos(2*x)^2 - sin(2*x)^2 + cos(4*y) < t] d(x, y)", t=t
+    )
+    assert abs(answer.value - value) <= 1e-11
+    assert abs(answer.tangent - tangent) <= 1e-7  # of the reference: a difference
+
+
+@pytest.mark.parametrize(("n", "r"), [(3, 0.8), (3, 1.0), (4, 0.9), (6, 0.7)])
+def test_superellipses(n: int, r: float) -> None:
+    """|x|^n + |y|^n < r^n, written so that no section has a closed form; the area is a quotient of gammas."""
+    p = mp.mpf(1) / n
+    area = 4 * mp.gamma(1 + p) ** 2 / mp.gamma(1 + 2 * p)
+    text = f"def f(r) integral ([-1.5, 1.5], [-1.5, 1.5]) [abs(x)^{n} + abs(y)^{n} + 0*sin(x*y) < r^{n}] d(x, y)"
+    holds(derivative(text, "r", r=r), area * r**2, 2 * area * r, 1e-8)
+
+
+@pytest.mark.parametrize("t", [0.5, 0.7, 0.9])
+def test_the_loop_of_a_folium(t: float) -> None:
+    """x^3 + y^3 < 3 t x y in the first quadrant: 3/2 t^2."""
+    text = "def f(t) integral ([0, 2], [0, 2]) [x^3 + y^3 - 3*t*x*y < 0] d(x, y)"
+    holds(derivative(text, t=t), 1.5 * t**2, 3 * t, 1e-9)
+
+
+def lens(r1: Any, r2: Any, d: Any) -> Any:
+    """The area that two discs share."""
+    if d >= r1 + r2:
+        return mp.mpf(0)
+    if d <= abs(r1 - r2):
+        return mp.pi * min(r1, r2) ** 2
+    one, two = ((d * d + p * p - q * q) / (2 * d * p) for p, q in ((r1, r2), (r2, r1)))
+    root = (r1 + r2 - d) * (d + r1 - r2) * (d - r1 + r2) * (d + r1 + r2)
+    return r1**2 * mp.acos(one) + r2**2 * mp.acos(two) - mp.sqrt(root) / 2
+
+
+@pytest.mark.parametrize("off", [1e-9, 3e-8, 1e-7, 1e-6, 1e-4, 1e-2, -1e-7, -1e-5])
+def test_beside_a_place_where_circles_meet_in_a_fold(off: float) -> None:
+    """The section of two balls at x: just beside 0.34177793, where the circles meet in the top of one of them. What is
+    integrated over z has a kink there that rounding displaces, next to where it is infinitely steep."""
+    x = 0.34177792998484813 + off
+
+    def area(t: Any) -> Any:
+        r1, r2 = mp.sqrt(t * t - (mp.mpf(x) - mp.mpf(0.4)) ** 2), mp.sqrt(t * t - (mp.mpf(x) - mp.mpf(0.6)) ** 2)
+        return mp.pi * (r1**2 + r2**2) - lens(r1, r2, D)
+
+    with mp.workdps(30):
+        value, tangent = area(mp.mpf(0.3)), mp.diff(area, mp.mpf(0.3))
+    discs = "(x-0.4)^2 + (y-0.4)^2 + (z-0.45)^2 < t*t or (x-0.6)^2 + (y-0.55)^2 + (z-0.5)^2 < t*t"
+    for order in ("y, z", "z, y"):
+        text = f"def f(x, t) integral ([0, 1], [0, 1]) [{discs}] d({order})"
+        answer = derivative(text, x=x, t=0.3)
+        assert abs(answer.value - value) <= answer.error + 1e-16  # the two centres are rounded
+        assert abs(answer.tangent - tangent) <= answer.tangent_error + 1e-14
+        assert answer.tangent_error <= 1e-9
+
+
+def two_balls(r: Any, d: Any) -> Any:
+    return 8 * mp.pi * r**3 / 3 - mp.pi * (2 * r - d) ** 2 * (d**2 + 4 * d * r) / (12 * d)
+
+
+@pytest.mark.parametrize(("how", "r"), [("union", 0.3), ("intersection", 0.3), ("union", 0.2)])
+def test_two_balls(how: str, r: float) -> None:
+    d = mp.sqrt(mp.mpf("0.2") ** 2 + mp.mpf("0.15") ** 2 + mp.mpf("0.05") ** 2)
+
+    def volume(r: Any) -> Any:
+        both = two_balls(r, d)
+        return both if how == "union" else 8 * mp.pi * r**3 / 3 - both
+
+    word = "or" if how == "union" else "and"
+    balls = f"(x-0.4)^2 + (y-0.4)^2 + (z-0.45)^2 < t*t {word} (x-0.6)^2 + (y-0.55)^2 + (z-0.5)^2 < t*t"
+    answer = derivative(f"def f(t) integral ([0, 1], [0, 1], [0, 1]) [{balls}] d(x, y, z)", t=r)
+    with mp.workdps(30):
+        holds(answer, volume(mp.mpf(r)), mp.diff(volume, mp.mpf(r)), 1e-8)
+
+
+def test_a_ball_in_six_dimensions_that_touches_its_box() -> None:
+    names = [f"x{i}" for i in range(6)]
+    condition = " + ".join(f"{name}^2" for name in names)
+    bounds = ", ".join(["[-1, 1]"] * 6)
+    answer = potto.compile(f"def f(r) integral ({bounds}) [{condition} < r^2] d({', '.join(names)})").f(1.0)
+    exact = mp.pi**3 / 6
+    assert abs(answer.value - exact) <= answer.error <= 1e-8
+
+
+def test_a_torus_is_covered_by_its_errors() -> None:
+    text = "def f(r) integral ([-2, 2], [-2, 2], [-1, 1]) [(sqrt(x^2 + y^2) - 1)^2 + z^2 < r^2] d(x, y, z)"
+    answer = potto.compile(text).f(0.4)
+    assert abs(answer.value - 2 * mp.pi**2 * mp.mpf(0.4) ** 2) <= answer.error <= 1e-8
