@@ -44,7 +44,8 @@ def band(t: Any, a: Any, b: Any) -> Any:
         for at_end in (mp.cos(4 * a), mp.cos(4 * b), mp.mpf(1), mp.mpf(-1)):
             c = t - at_end
             if abs(c) <= 1:
-                places |= {x for x in ((mp.acos(c) + 2 * mp.pi * k) / 4, (-mp.acos(c) + 2 * mp.pi * k) / 4) if a < x < b}
+                both = ((sign * mp.acos(c) + 2 * mp.pi * k) / 4 for sign in (1, -1))
+                places |= {x for x in both if a < x < b}
     return mp.quad(lambda x: length(t - mp.cos(4 * x)), sorted(places))
 
 
