@@ -20,6 +20,7 @@ from potto.core.collecting import split
 from potto.core.polynomials import number
 from potto.core.terms import (
     ONE,
+    ZERO,
     App,
     Branch,
     Const,
@@ -133,8 +134,27 @@ def _factors(term: Term) -> Iterable[Term]:
             case Prim(op="div", args=(above, below)) if above is not ONE:
                 waiting.append(above)
                 yield from (div(ONE, factor) for factor in _factors(below))
+            case Branch(then=then, orelse=orelse) if orelse is ZERO and then is not ONE:
+                waiting += (then, branch(item.coordinates, item.strict, ONE, ZERO))
+            case Branch(then=then, orelse=orelse) if then is ZERO and orelse is not ONE:
+                waiting += (orelse, branch(item.coordinates, item.strict, ZERO, ONE))
+            case Branch(then=then) if then is ONE and len(every := _every(item.surface)) > 1:
+                waiting += (branch((surface,), item.strict, ONE, ZERO) for surface in every)
             case _:
                 yield item
+
+
+def _every(surface: Term) -> list[Term]:
+    """The surfaces all of which must be on the upper side for one with a maximum or a minimum to be: c - max(a, b)."""
+    terms = surface.args if isinstance(surface, Prim) and surface.op == "add" else (surface,)
+    for place, term in enumerate(terms):
+        rest = (*terms[:place], *terms[place + 1 :])
+        match term:
+            case Prim(op="min", args=args):
+                return [add(*rest, arg) for arg in args]
+            case Prim(op="neg", args=(Prim(op="max", args=args),)):
+                return [add(*rest, neg(arg)) for arg in args]
+    return [surface]
 
 
 def _summands(term: Term) -> list[Term]:

@@ -118,7 +118,7 @@ def _without_end(work: Work, index: Ints, high: bool) -> list[Array]:
     least = np.maximum(STEPS_OFF * EPS * np.abs(end), LEAST * reach)
     x = end + (-1 if high else 1) * NEAREST * reach * (least / (NEAREST * reach)) ** np.linspace(0, 1, LOOKS)
     u = np.abs(x - end)
-    f, fx, ft, _, _ = work.integrand(index, x)
+    f, fx, ft, *_ = work.integrand(index, x)
     label = 1 - u / reach if high else u / reach
     signs = []
     for d in range(work.k):

@@ -160,9 +160,10 @@ def sums(work: Work, found: Totals, ends: Ends | None) -> Sums:
         # two independent values that differ by more than they admit: neither estimate is believed
         doubt = np.where(found.apart > 4 * (moving[1] + fixed[1]), found.apart, 0.0)
         t, et = np.where(better, fixed[0], moving[0]), np.where(better, fixed[1], moving[1]) + doubt
+    common = None
     if ends is not None:
-        places, speeds = cut_rounding(work, ends)
-        e, et = e + places, et + speeds
+        places, common = cut_rounding(work, ends)
+        e, et = e + places, et + common
     if work.endless is not None:
         t, et = np.where(work.endless == 0, t, work.endless), np.where(work.endless == 0, et, np.inf)
-    return Sums(v, e, t, et, gross=added_up(work, found))
+    return Sums(v, e, t, et, gross=added_up(work, found), common=common)

@@ -111,7 +111,7 @@ def trembling(seg: Segments, x: Array) -> Array:
     for kinds, turn, end, off in (
         ((LEFT, BOTH), seg.left, seg.a, seg.ea), ((RIGHT, BOTH), seg.right, seg.b, seg.eb)
     ):  # fmt: skip
-        rounded = np.maximum(least, np.where(turn == end, TYPICAL * off, 0.0)[:, None])
+        rounded = np.fmax(least, np.where((turn == end) & np.isfinite(off), TYPICAL * off, 0.0)[:, None])
         near = np.where(np.isin(seg.kind, kinds)[:, None], np.abs(x - turn[:, None]), np.inf)
         found = np.maximum(found, 1.5 * rounded / np.maximum(near, 2 * least))
     return np.minimum(found, 1.0)

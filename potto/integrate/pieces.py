@@ -86,7 +86,8 @@ class Sums:
     """Integrals of a batch: value (m, B) and tangents (m, k, B) with their error bounds; m components.
 
     gross: (2, B) the most that is added up for each without regard to sign, for values and for tangents; None where
-    nobody kept track.
+    nobody kept track. common: (m, k, B) the part of the tangents' errors that is one factor of all of them: the slope
+    of a surface by which the speeds of its roots are divided.
     """
 
     v: Array
@@ -94,6 +95,7 @@ class Sums:
     t: Array
     et: Array
     gross: Array | None = field(default=None, kw_only=True)
+    common: Array | None = field(default=None, kw_only=True)
 
 
 @dataclass

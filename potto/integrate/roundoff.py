@@ -1,6 +1,7 @@
 """What rounding does to the integral over a piece.
 
-Owns `shake` and `few_doubles` (of nodes), `noise` (of the integrand) and `misplaced` (of the ends of segments).
+Owns `shake` and `few_doubles` (of nodes), `noise` (of the integrand), `misplaced` (of the ends of segments) and
+`together` (of derivatives that move with the nodes).
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ from potto.kernels.cells import Array, Ints
 NODE_ROUNDING = 0.5
 # From how many lengths of a piece away from 0 on the rounding of its nodes is put right.
 FAR = 8
+# Up to how many times their rounding apart an end and a turning place are one.
+ITSELF = 4.0
 
 
 def few_doubles(seg: Segments, weight: Array) -> bool:
@@ -68,8 +71,24 @@ def misplaced(p: Pieces, seg: Segments, at_ends: Array) -> tuple[Ints, Array]:
     index = np.nonzero((p.u0 == 0) & (p.u1 == 1) & (p.end == 0))[0]
     part, u = seg.pick(index), np.array([[0.0, 1.0]])
     slope = np.abs(np.broadcast_to(maps.points(part, u)[1], (index.size, 2)))
-    turn = EPS * np.stack((np.abs(part.left), np.abs(part.right)), axis=1)
-    off = np.stack((part.ea, part.eb), axis=1) + np.where(np.isfinite(turn), turn, 0.0)
-    share = np.divide(off, slope, out=np.zeros_like(off), where=(slope > 0) & np.isfinite(slope))
+    turn, end = np.stack((part.left, part.right), axis=1), np.stack((part.a, part.b), axis=1)
+    rounded = np.where(np.isfinite(turn), EPS * np.abs(turn), 0.0)
+    off = np.stack((part.ea, part.eb), axis=1) + rounded
+    with np.errstate(invalid="ignore"):  # of an end that is the turning place itself the map takes care
+        counts = (slope > 0) & np.isfinite(slope) & ~(np.abs(end - turn) <= ITSELF * rounded)
+    share = np.divide(off, slope, out=np.zeros_like(off), where=counts)
     lost = np.abs(at_ends[:, :, index]) * np.minimum(share, 1.0)
-    return index, np.nan_to_num(lost.sum(axis=-1))
+    return index, np.where(np.isfinite(lost), lost, 0.0).sum(axis=-1)
+
+
+def together(common: Array, ft: Array, fx: Array, v: Array, d: int) -> Array:
+    """How much less D F/D theta + v dF/dx errs than its two parts by themselves do, by a factor that they share: next to
+    a fold, where both are as large as one likes, what they come to is not.
+
+    common: (m, k + 1, P, n) the errors that are due to such a factor, the last those of dF/dx.
+    """
+    apart = common[:, d] + np.abs(v) * common[:, -1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        factor = np.fmax(common[:, d] / np.abs(ft[:, d]), common[:, -1] / np.abs(fx))
+        joint = np.fmin(factor, 1.0) * np.abs(ft[:, d] + v * fx)
+    return np.where(np.isfinite(joint), np.maximum(apart - joint, 0.0), 0.0)

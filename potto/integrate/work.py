@@ -25,7 +25,7 @@ from potto.integrate.judge import doubtful, missed_peak, stragglers, too_coarse
 from potto.integrate.maps import Segments
 from potto.integrate.pieces import Evaluator, Pieces, Sums, column, gather, joined, spread, still
 from potto.integrate.plan import LevelPlan
-from potto.integrate.roundoff import few_doubles, misplaced, noise, shake
+from potto.integrate.roundoff import few_doubles, misplaced, noise, shake, together
 from potto.integrate.rules import EPS, Rule, gauss, truncation
 from potto.integrate.steps import look_for_steps
 from potto.integrate.tally import Tally, slack
@@ -270,7 +270,7 @@ class Work:
 
     def values(self, seg: Segments, index: Ints, x: Array, label: Array, weight: Array) -> tuple[Array, Array | None]:
         """The channels at the nodes, times the weight: (C, P, n), and the errors that came with them."""
-        f, fx, ft, e, et = self.integrand(index, x, weight)
+        f, fx, ft, e, et, common = self.integrand(index, x, weight)
         m, k = f.shape[0], self.k
         rows = 1 + k + (k if self.both else 0)
         h = np.empty((m, rows, *x.shape))
@@ -295,6 +295,8 @@ class Work:
                     for d in range(k):
                         v, dv = maps.velocity(seg, label, d)
                         bound[:, 1 + d] += np.abs(v) * et[:, k] + np.abs(dv) * e
+                        if common is not None:
+                            bound[:, 1 + d] -= together(common, ft, fx, v, d)
                     if self.both:
                         bound[:, 1 + k :] = et[:, :k]
             bound = (bound * np.abs(weight)).reshape(m * rows, *x.shape)
@@ -302,8 +304,9 @@ class Work:
 
     def integrand(
         self, index: Ints, x: Array, weight: Array | None = None
-    ) -> tuple[Array, Any, Any, Array | None, Array | None]:
-        """F, dF/dx, D_theta F (each with a leading axis of components) and error bounds, at nodes (P, n).
+    ) -> tuple[Array, Any, Any, Array | None, Array | None, Array | None]:
+        """F, dF/dx, D_theta F (each with a leading axis of components), error bounds, and the part of the tangents'
+        that is one factor of all of them, at nodes (P, n).
 
         weight: (P, n) or (P, 1), how much the nodes of a rule count, but for its own weights.
         """
@@ -317,7 +320,7 @@ class Work:
             env[name] = Cell(x, None, tangent)
             masks = {g: m[index][:, None] if isinstance(m, np.ndarray) else m for g, m in self.sides.items()}
             self.machine.count(x.size)
-            return spread(self.parent.body(env, masks, self.inner), x.shape, k, self.moving)
+            return *spread(self.parent.body(env, masks, self.inner), x.shape, k, self.moving), None
         n = x.shape[1]
         flat = np.repeat(np.arange(index.size), n)
         env = gather(here, owner[flat])
@@ -331,7 +334,8 @@ class Work:
         shape = (sums.v.shape[0], *x.shape)
         t = sums.t.reshape(shape[0], -1, *x.shape)
         et = sums.et.reshape(t.shape)
-        return sums.v.reshape(shape), t[:, k] if self.moving else None, t[:, :k], sums.e.reshape(shape), et
+        common = sums.common if sums.common is None else sums.common.reshape(t.shape)
+        return sums.v.reshape(shape), t[:, k] if self.moving else None, t[:, :k], sums.e.reshape(shape), et, common
 
     def below(self, owner: Ints) -> Ints | None:
         """For members of the next batch, the members of the outermost one."""
