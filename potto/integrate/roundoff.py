@@ -82,8 +82,8 @@ def misplaced(p: Pieces, seg: Segments, at_ends: Array) -> tuple[Ints, Array]:
 
 
 def together(common: Array, ft: Array, fx: Array, v: Array, d: int) -> Array:
-    """How much less D F/D theta + v dF/dx errs than its two parts by themselves do, by a factor that they share: next to
-    a fold, where both are as large as one likes, what they come to is not.
+    """How much less D F/D theta + v dF/dx errs than its two parts by themselves, by a factor that they share: next to a
+    fold, where both are as large as one likes, what they come to is not.
 
     common: (m, k + 1, P, n) the errors that are due to such a factor, the last those of dF/dx.
     """
