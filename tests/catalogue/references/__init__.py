@@ -1,0 +1,1 @@
+"""The mathematics behind the answers of the catalogue. Nothing here knows Potto."""
