@@ -18,7 +18,6 @@ import numpy as np
 from installed import as_installed
 
 import potto
-from potto.runtime.printing import with_error
 
 PROGRAM = r"""
 const = \(x, y) . c . 1
@@ -224,6 +223,8 @@ def conditions() -> None:
 
 
 def hard_dimensions() -> None:
+    from potto.runtime.printing import with_error
+
     title("More dimensions")
     m = potto.compile("""
 def plane(t) integral ([0, 1], [0, 1], [0, 1]) [x + y + z < t]/(1 + x + 2*y + 3*z) d(x, y, z)
