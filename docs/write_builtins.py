@@ -1,4 +1,4 @@
-"""Writes `builtins.md` from the tables of builtins and of measures: `python docs/write_builtins.py`.
+"""Writes `builtins.md`, and the builtins in the grammars of editors, from the tables: `python docs/write_builtins.py`.
 
 The values on the page come from the reference evaluator, so that they check the one that people use.
 """
@@ -21,14 +21,9 @@ from potto.query import Database
 from potto.syntax import parse_expression
 
 PAGE = Path(__file__).resolve().parent / "builtins.md"
-SECTIONS = (
-    ("Roots, exponentials, logarithms, powers", ("sqrt", "exp", "log", "log1p", "expm1", "pow")),
-    ("Angles", ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "hypot")),
-    ("Hyperbolic functions", ("sinh", "cosh", "tanh")),
-    ("The error function", ("erf", "erfc")),
-    ("With kinks", ("abs", "min", "max", "clamp")),
-    ("With jumps", ("sign", "floor", "ceil")),
-)
+EDITORS = PAGE.parents[1] / "editors"
+FIRST = ("Roots, exponentials, logarithms, powers", "Angles")  # the other topics as the tables have them
+LAST = ("With kinks", "With jumps")
 NOTES = {
     "With kinks": "They bend where the derivative jumps. The integrator cuts there, so they cost no accuracy.",
     "With jumps": "Their derivative would have deltas that nobody states, so they take plain values only: numbers that "
@@ -47,10 +42,55 @@ Every builtin takes numbers. Derivatives are by each argument in turn.
 def page() -> str:
     """The text of the page."""
     parts = [INTRODUCTION]
-    for title, names in SECTIONS:
+    for title, names in sections().items():
         parts.append(f"## {title}\n\n" + (f"{NOTES[title]}\n\n" if title in NOTES else "") + builtin_table(names))
     parts.append(MEASURE_INTRODUCTION + measure_table())
     return "\n".join(parts)
+
+
+def sections() -> dict[str, tuple[str, ...]]:
+    """The names of builtins under their topics."""
+    found: dict[str, list[str]] = {title: [] for title in FIRST}
+    for entry in PRIMITIVES.values():
+        if entry.surface and entry.topic:
+            found.setdefault(entry.topic, []).append(entry.name)
+    middle = [title for title in found if title not in (*FIRST, *LAST)]
+    return {title: tuple(found[title]) for title in (*FIRST, *middle, *LAST)}
+
+
+def grammars() -> dict[Path, str]:
+    """The grammars of editors with the builtins that there are."""
+    names = sorted(entry.name for entry in PRIMITIVES.values() if entry.surface)
+    rules = {
+        "vim/syntax/potto.vim": (
+            r"(?m)(^syntax keyword pottoBuiltin .*\n)+",
+            lines([*names, "fst", "snd", "print"], "syntax keyword pottoBuiltin ") + "\n",
+        ),
+        "emacs/potto-mode.el": (
+            r"(?<=defconst potto--builtins\n)[^)]*\)",
+            lines([f'"{name}"' for name in (*names, "fst", "snd", "print", "deriv", "delta")], "    ").replace(
+                "    ", "  '(", 1
+            )
+            + ")",
+        ),
+        "vscode/syntaxes/potto.tmLanguage.json": (r"(?<=\(\?:)fst\|snd\|[\w|]*", "|".join(["fst", "snd", *names])),
+    }
+    found = {}
+    for name, (pattern, written) in rules.items():
+        text, count = re.subn(pattern, lambda _, written=written: written, (EDITORS / name).read_text(encoding="utf-8"))
+        assert count == 1, name
+        found[EDITORS / name] = text
+    return found
+
+
+def lines(words: list[str], start: str) -> str:
+    """Words in lines that all start alike."""
+    found = [start.rstrip()]
+    for word in words:
+        if len(found[-1]) + 1 + len(word) > 118:
+            found.append(start.rstrip())
+        found[-1] = f"{found[-1]} {word}" if found[-1].strip() else start + word
+    return "\n".join(found)
 
 
 def builtin_table(names: tuple[str, ...]) -> str:
@@ -122,3 +162,5 @@ def code(text: str) -> str:
 
 if __name__ == "__main__":
     PAGE.write_text(page(), encoding="utf-8")
+    for path, text in grammars().items():
+        path.write_text(text, encoding="utf-8")

@@ -23,8 +23,8 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     ("potto.calculus",),
     ("potto.elaborate",),
     ("potto.types",),
-    ("potto.modules", "potto.primitives", "potto.diffeos", "potto.measures"),
-    ("potto.syntax", "potto.core"),
+    ("potto.modules", "potto.diffeos", "potto.measures"),
+    ("potto.syntax", "potto.core", "potto.primitives"),
     ("potto.png", "potto.render", "potto.excerpt", "potto.settings", "potto.project", "potto.pages"),
     ("potto.source", "potto.quick", "potto.diagnostics", "potto.query"),
 )
@@ -32,6 +32,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
 FORBIDDEN: dict[str, tuple[str, ...]] = {
     "potto.syntax": ("potto.core",),
     "potto.core": ("potto.syntax",),
+    "potto.primitives": ("potto.syntax",),
     "potto.ide": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.api", "potto.world", "potto.live"),
 }
 # Who may import a package that is not ours; nobody else may, at the top of a module or inside of a function.

@@ -7,8 +7,6 @@ has no jump of its own.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from potto.calculus.nested import has_nested
 from potto.core.terms import (
     Branch,
@@ -23,10 +21,9 @@ from potto.core.terms import (
     neg,
     postorder,
     postorder_by,
-    prim,
     rebuild,
-    sub,
 )
+from potto.primitives import PRIMITIVES
 
 _FLAT = ("max", "min", "clamp")
 MOST = 8  # cases that one condition is taken apart into
@@ -103,10 +100,10 @@ def _changes(node: Branch) -> bool:
 
 def _apart(node: Term, most: int) -> Term:
     assert isinstance(node, Branch)
-    bent = next((part for part in _outside(node.surface) if isinstance(part, Prim) and part.op in _CASES), None)
+    bent = next((part for part in _outside(node.surface) if isinstance(part, Prim) and PRIMITIVES[part.op].cases), None)
     if bent is None or most < 2:
         return node
-    margin, first, second = _CASES[bent.op](*bent.args)
+    margin, first, second = PRIMITIVES[bent.op].cases(*bent.args)  # type: ignore[misc]
     cases = []
     for value in (first, second):
         coordinates = tuple(_put(c, bent, value) for c in node.coordinates)
@@ -125,33 +122,3 @@ def _put(term: Term, old: Term, new: Term) -> Term:
         if node not in memo:
             memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
     return memo[term]
-
-
-def _largest(*args: Term) -> tuple[Term, Term, Term]:
-    first, *rest = args
-    other = _joined("max", rest)
-    return sub(first, other), first, other
-
-
-def _least(*args: Term) -> tuple[Term, Term, Term]:
-    first, *rest = args
-    other = _joined("min", rest)
-    return sub(other, first), first, other
-
-
-def _joined(op: str, args: list[Term]) -> Term:
-    return args[0] if len(args) == 1 else prim(op, *args)
-
-
-def _clamped(x: Term, lo: Term, hi: Term) -> tuple[Term, Term, Term]:
-    inner = _joined("max", [x, lo])
-    return sub(hi, inner), inner, hi
-
-
-# A margin, what the builtin is where that is >= 0, and what it is elsewhere
-_CASES: dict[str, Callable[..., tuple[Term, Term, Term]]] = {
-    "abs": lambda x: (x, x, neg(x)),
-    "max": _largest,
-    "min": _least,
-    "clamp": _clamped,
-}

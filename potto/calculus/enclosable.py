@@ -1,6 +1,6 @@
 """Which terms interval arithmetic can evaluate: their zeros can be searched for with certainty.
 
-Owns `enclosable` and `searchable`. The rules themselves, over batches of numbers, are in `integrate/intervals`.
+Owns `enclosable` and `searchable`. The rules are those of the entries; `integrate/intervals` does them to batches.
 """
 
 from __future__ import annotations
@@ -9,15 +9,9 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 from potto.calculus.derivative import NotSmooth, partial
+from potto.calculus.ranges import ARITHMETIC, RANGES
 from potto.core.simplify import simplify
 from potto.core.terms import Branch, Const, If, Prim, Proj, Term, Var, children, postorder_by
-from potto.primitives import PRIMITIVES
-
-# Builtins with a rule of their own. Those of one argument that only rise, or only fall, need none.
-WITH_RULES = frozenset((
-    "abs", "add", "atan2", "clamp", "cos", "cosh", "div", "hypot",
-    "max", "min", "mul", "neg", "pow", "sign", "sin", "tan",
-))  # fmt: skip
 
 
 def enclosable(term: Term, jumps: bool = False) -> bool:
@@ -25,7 +19,7 @@ def enclosable(term: Term, jumps: bool = False) -> bool:
     return all(
         isinstance(node, Const | Var)
         or (isinstance(node, Proj) and isinstance(node.term, Proj | Var))
-        or (isinstance(node, Prim) and (node.op in WITH_RULES or monotone(node.op)))
+        or (isinstance(node, Prim) and (node.op in ARITHMETIC or RANGES.knows(node.op)))
         or (jumps and isinstance(node, Branch | If))
         for node in postorder_by(term, _values)
     )
@@ -34,12 +28,6 @@ def enclosable(term: Term, jumps: bool = False) -> bool:
 def _values(node: Term) -> Sequence[Term]:
     """What a term's value is made of: of a conditional both sides, whatever decides."""
     return (node.then, node.orelse) if isinstance(node, Branch | If) else children(node)
-
-
-def monotone(op: str) -> bool:
-    """Whether a builtin of one argument rises or falls all over its domain."""
-    entry = PRIMITIVES.get(op)
-    return entry is not None and entry.increasing != 0 and entry.arity == 1
 
 
 @lru_cache(maxsize=4096)

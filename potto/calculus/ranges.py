@@ -9,9 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from weakref import WeakKeyDictionary
 
+from potto.calculus.floats import OPS
 from potto.core.terms import Branch, Const, If, Prim, Term, Var, children, postorder
+from potto.primitives import PRIMITIVES
+from potto.primitives.bounds import between_turns
+from potto.primitives.registry import Primitive
+from potto.primitives.walking import Domain
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,13 +94,71 @@ def _node(node: Term, found: Mapping[Term, Range], box: Mapping[str, tuple[float
         case Var(name=name) if name in box:
             lo, hi = min(box[name]), max(box[name])
             return Range(lo, hi, lo <= 0 <= hi)
-        case If() | Branch():
-            then, orelse = found[node.then], found[node.orelse]
-            return Range(min(then.lo, orelse.lo), max(then.hi, orelse.hi), then.zero or orelse.zero)
-        case Prim(op=op, args=args) if op in _RULES:
-            return _RULES[op](node, [found[a] for a in args])
+        case Prim():
+            return RANGES.builtin(node, found)
         case _:
+            return RANGES.other(node, found)
+
+
+class _Ranges(Domain[Range]):
+    """Ranges of builtins: arithmetic as below, everything else by the rules of the entries."""
+
+    def constant(self, node: Const) -> Range:
+        return Range(node.value, node.value, node.value == 0) if node.value == node.value else ANYTHING
+
+    def unknown(self) -> Range:
+        return ANYTHING
+
+    def other(self, node: Term, known: Mapping[Term, Range]) -> Range:
+        if not isinstance(node, If | Branch):
             return ANYTHING
+        then, orelse = known[node.then], known[node.orelse]
+        return Range(min(then.lo, orelse.lo), max(then.hi, orelse.hi), then.zero or orelse.zero)
+
+    def builtin(self, node: Prim, known: Mapping[Term, Range]) -> Range:
+        rule = ARITHMETIC.get(node.op)
+        args = [known[arg] for arg in node.args]
+        return rule(node, args) if rule is not None else self.apply(node.op, args)
+
+    def rule(self, entry: Primitive) -> Callable[..., Range] | None:
+        return _rule(entry.name)
+
+
+RANGES = _Ranges()
+
+
+@lru_cache(maxsize=256)
+def _rule(op: str) -> Callable[..., Range] | None:
+    entry = PRIMITIVES[op]
+    if entry.interval is None and not entry.piecewise_monotone:
+        return None
+    return lambda *args: _bounded(entry, args)
+
+
+def _bounded(entry: Primitive, args: tuple[Range, ...]) -> Range:
+    """By the entry's rule, with room for what a libm may be off; a sign that is certain stays."""
+    bounds = [(a.lo, a.hi) for a in args]
+    if entry.interval is not None:
+        lo, hi = entry.interval(OPS, *bounds)[:2]
+    else:
+        lo, hi, nowhere = between_turns(OPS, entry.name, entry.within, entry.turns or (), bounds[0])
+        if nowhere:
+            return ANYTHING
+    places = max(1.0, *(entry.places(*ends) for ends in zip(*bounds, strict=True)))
+    room = 2e-15 * places if places < math.inf else 0.0  # eight of the last places of a good one
+    low, high = ((e + s * (room * abs(e) + entry.off) if math.isfinite(e) else e) for e, s in ((lo, -1), (hi, 1)))
+    found = _range(low, high, _may_vanish(entry, args))
+    return Range(max(found.lo, entry.image[0]), min(found.hi, entry.image[1]), found.zero)
+
+
+def _may_vanish(entry: Primitive, args: tuple[Range, ...]) -> bool:
+    """Whether 0 may be a value, by where the roots are."""
+    if entry.roots is None:
+        return True
+    if entry.arity == 1:
+        (a,) = args
+        return any(a.zero if root == 0 else a.lo <= root <= a.hi for root in entry.roots)
+    return entry.roots != (0.0,) or all(a.zero for a in args)
 
 
 def _add(node: Prim, args: list[Range]) -> Range:
@@ -164,84 +228,10 @@ def _pow(node: Prim, args: list[Range]) -> Range:
     return _POSITIVE if base.positive else ANYTHING
 
 
-def _monotone(function: Callable[[float], float]) -> Callable[[Prim, list[Range]], Range]:
-    def run(node: Prim, args: list[Range]) -> Range:
-        ends = []
-        for x in (args[0].lo, args[0].hi):
-            try:
-                ends.append(function(x))
-            except OverflowError:
-                ends.append(math.copysign(math.inf, x))
-            except ValueError:
-                ends.append(math.nan)
-        # A libm may be off by a few last places: leave room for eight.
-        slack = [abs(e) * 2e-15 if math.isfinite(e) else 0.0 for e in ends]
-        return _range(ends[0] - slack[0], ends[1] + slack[1], args[0].zero)
-
-    return run
-
-
-def _exp(node: Prim, args: list[Range]) -> Range:
-    wide = _monotone(math.exp)(node, args)
-    return Range(max(wide.lo, 0.0), wide.hi, False)
-
-
-def _cosh(node: Prim, args: list[Range]) -> Range:
-    return Range(1.0, math.inf, False)
-
-
-def _sqrt(node: Prim, args: list[Range]) -> Range:
-    return _POSITIVE if args[0].positive else _NONNEGATIVE
-
-
-def _abs(node: Prim, args: list[Range]) -> Range:
-    (a,) = args
-    inside = a.lo <= 0 <= a.hi
-    return Range(0.0 if inside else min(abs(a.lo), abs(a.hi)), max(abs(a.lo), abs(a.hi)), a.zero)
-
-
-def _hypot(node: Prim, args: list[Range]) -> Range:
-    return Range(0.0, math.inf, all(a.zero for a in args))
-
-
-def _unit(node: Prim, args: list[Range]) -> Range:
-    return Range(-1.0, 1.0)
-
-
-def _min(node: Prim, args: list[Range]) -> Range:
-    return Range(min(a.lo for a in args), min(a.hi for a in args), any(a.zero for a in args))
-
-
-def _max(node: Prim, args: list[Range]) -> Range:
-    return Range(max(a.lo for a in args), max(a.hi for a in args), any(a.zero for a in args))
-
-
-def _log(node: Prim, args: list[Range]) -> Range:
-    lo = math.log(args[0].lo) if args[0].lo > 0 else -math.inf
-    hi = math.log(args[0].hi) if args[0].hi > 0 else math.inf
-    return _range(lo * (1 - 1e-15) if lo > 0 else lo * (1 + 1e-15), hi * (1 + 1e-15) if hi > 0 else hi * (1 - 1e-15))
-
-
-_RULES: dict[str, Callable[[Prim, list[Range]], Range]] = {
+ARITHMETIC: dict[str, Callable[[Prim, list[Range]], Range]] = {
     "add": _add,
     "neg": _neg,
     "mul": _mul,
     "div": _div,
     "pow": _pow,
-    "exp": _exp,
-    "cosh": _cosh,
-    "sqrt": _sqrt,
-    "abs": _abs,
-    "hypot": _hypot,
-    "sin": _unit,
-    "cos": _unit,
-    "tanh": _monotone(math.tanh),
-    "atan": _monotone(math.atan),
-    "sinh": _monotone(math.sinh),
-    "erf": _monotone(math.erf),
-    "expm1": _monotone(math.expm1),
-    "erfc": lambda node, args: Range(0.0, 2.0, False),
-    "min": _min,
-    "max": _max,
-    "log": _log,
 }

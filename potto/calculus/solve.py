@@ -312,7 +312,9 @@ def _factors(term: Term) -> list[Term]:
         match item:
             case Prim(op="mul", args=args):
                 waiting.extend(reversed(args))
-            case Prim(op="neg" | "abs" | "sqrt", args=(inner,)) | Prim(op="div" | "pow", args=(inner, _)):
+            case Prim(op="div" | "pow", args=(inner, _)):
+                waiting.append(inner)
+            case Prim(op=op, args=(inner,)) if PRIMITIVES[op].roots == (0.0,):
                 waiting.append(inner)
             case Branch():
                 pass  # its surface and its cases are looked at on their own
@@ -351,8 +353,10 @@ def _stops(term: Term, name: str) -> tuple[Term, ...] | None:
         entry = PRIMITIVES.get(term.op)
         ends = [edge for edge in entry.edges(*term.args) if name in edge.free] if entry else []
         even = term.op == "pow" and isinstance(term.args[1], Const) and term.args[1].value % 2 == 0
-        if even or term.op in ("abs", "cosh", "hypot"):
+        if even or term.op == "hypot":
             ends.append(inner)
+        elif entry is not None and entry.turns is not None:
+            ends += (sub(inner, const(turn)) for turn in entry.turns)
         elif term.op not in ("add", "neg", "mul", "div", "pow") and not (entry and entry.increasing):
             return None
         for end in ends:

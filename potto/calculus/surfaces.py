@@ -180,9 +180,8 @@ class _Search:
         for kink in entry.kinks(*node.args):
             for piece in self.pieces(kink, mapping):
                 yield Finding("kink", piece)
-        if node.op in _CONCENTRATING:
-            for center in centers(node):
-                yield Finding("center", substitute(center, mapping))
+        for center in centers(node):
+            yield Finding("center", substitute(center, mapping))
         if node.op != "div":  # a pole is no edge to cut at: the integral diverges there or the pole is outside
             for edge in entry.edges(*node.args):
                 for piece in self.pieces(edge, mapping):
@@ -260,17 +259,16 @@ class _Search:
         return None if function is None else (function, before, order)
 
 
-# Builtins whose values change fast where a part of their argument is near 0, if that part is steep.
-_CONCENTRATING = frozenset({"exp", "div", "tanh", "erf", "erfc", "atan"})
-
-
 @lru_cache(maxsize=4096)
 def centers(node: Prim) -> tuple[Term, ...]:
-    """Terms around whose zeros a builtin may be concentrated."""
+    """Terms around whose zeros a builtin may be concentrated, if a part of its argument is steep."""
+    centered = PRIMITIVES[node.op].centered
+    if not centered and node.op not in ("exp", "div"):
+        return ()
     where = node.args[1] if node.op == "div" else node.args[0]
     if not where.free:
         return ()
-    if node.op in ("tanh", "erf", "erfc", "atan"):
+    if centered:
         return (where,)
     if node.op == "div" and isinstance(where, Prim) and where.op in ("pow", "mul"):
         return ()  # a pole there, not a center

@@ -211,10 +211,12 @@ def _registered(op: str, args: tuple[Term, ...], value: Term) -> Steps:
     if entry is None or len(args) != 1:
         return Stuck(f"`{op}` has no inverse")
     (inner,) = args
+    if value is ZERO and entry.roots == ():
+        return ()
     one_to_one = entry.increasing != 0
     if one_to_one and isinstance(value, Prim) and value.op == op and not entry.edges(inner):
         return (Step(inner, value.args[0]),)
-    if value is ZERO and op in _ZERO_AT_ZERO:
+    if value is ZERO and entry.roots == (0.0,):
         return (Step(inner, ZERO, (), entry.period(value)[0] if entry.period else None),)
     if entry.inverse is None:
         return Stuck(f"`{op}` has no inverse in closed form")
@@ -248,9 +250,6 @@ def _turn(start: Term) -> Callable[[tuple[Term, ...], int, Term], Steps]:
 
     return run
 
-
-# Builtins with f(0) = 0, and nowhere else within a period.
-_ZERO_AT_ZERO = frozenset(("erf", "sinh", "tanh", "asinh", "atanh", "atan", "asin", "tan", "expm1", "log1p"))
 
 _SPECIAL: dict[str, Callable[[tuple[Term, ...], int, Term], Steps]] = {
     "add": _add,

@@ -26,11 +26,10 @@ from potto.core.terms import (
     prim,
     rebuild,
 )
+from potto.primitives import PRIMITIVES
 
 _LARGEST = 64  # monomials; an expansion larger than that becomes an atom
 _HIGHEST = 16  # powers of sums that are expanded
-_ODD = frozenset(("sin", "tan", "asin", "atan", "sinh", "tanh", "asinh", "atanh", "erf", "erfinv", "sign"))
-_EVEN = frozenset(("cos", "cosh", "abs"))
 
 
 def normal_form(term: Term) -> Polynomial:
@@ -85,7 +84,7 @@ def _node(node: Term, forms: Mapping[Term, Polynomial]) -> Polynomial:
                 return _RULES[op](*(forms[a] for a in args))
             except TooLarge:
                 return _opaque(node, forms)
-        case Prim(op=op, args=(inner,)) if op in _ODD or op in _EVEN:
+        case Prim(op=op, args=(inner,)) if PRIMITIVES[op].parity:
             return _symmetric(op, inner, forms)
         case _:
             return _opaque(node, forms)
@@ -114,7 +113,7 @@ def _symmetric(op: str, inner: Term, forms: Mapping[Term, Polynomial]) -> Polyno
     written = as_term(_scaled(form, Fraction(-1)) if flipped else form)
     if written is None:
         return _atom(prim(op, inner))
-    return _scaled(_atom(prim(op, written)), Fraction(-1 if flipped and op in _ODD else 1))
+    return _scaled(_atom(prim(op, written)), Fraction(-1 if flipped and PRIMITIVES[op].parity < 0 else 1))
 
 
 # Arithmetic

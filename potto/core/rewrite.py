@@ -34,6 +34,7 @@ from potto.core.terms import (
     rebuild,
     sum_,
 )
+from potto.primitives import EXACT, PRIMITIVES, UNDOES
 
 Surface = Callable[[Term], tuple[Term, int]]
 _NONE: frozenset[Term] = frozenset()
@@ -237,11 +238,12 @@ def _function(node: Prim) -> Term:
     if len(node.args) == 1:
         (inner,) = node.args
         if isinstance(inner, Prim):
-            if _INVERSES.get(node.op) == inner.op:
+            parity = PRIMITIVES[node.op].parity
+            if UNDOES.get(node.op) == inner.op:
                 return inner.args[0]
-            if inner.op == "neg" and node.op in _ODD:
+            if inner.op == "neg" and parity < 0:
                 return neg(prim(node.op, inner.args[0]))
-            if (inner.op == "neg" and node.op in _EVEN) or (node.op == inner.op == "abs"):
+            if (inner.op == "neg" and parity > 0) or (node.op == inner.op == "abs"):
                 return prim(node.op, inner.args[0])
     if node.op in ("min", "max") and all(arg is node.args[0] for arg in node.args):
         return node.args[0]
@@ -253,8 +255,8 @@ def _folded(node: Prim) -> Term | None:
     values = [_value(arg) for arg in node.args]
     if any(v != v or math.isinf(v) for v in values) or any(isinstance(a, Const) and a.name for a in node.args):
         return None
-    if len(values) == 1 and (node.op, values[0]) in _EXACT:
-        return const(_EXACT[node.op, values[0]])
+    if len(values) == 1 and (node.op, values[0]) in EXACT:
+        return const(EXACT[node.op, values[0]])
     match node.op:
         case "abs":
             return const(abs(values[0]))
@@ -275,31 +277,3 @@ def _folded(node: Prim) -> Term | None:
             return const((values[0] > 0) - (values[0] < 0))
         case _:
             return None
-
-
-_ODD = frozenset(("sin", "tan", "asin", "atan", "sinh", "tanh", "asinh", "atanh", "erf", "erfinv", "sign"))
-_EVEN = frozenset(("cos", "cosh", "abs"))
-_INVERSES = {
-    "exp": "log",
-    "log": "exp",
-    "expm1": "log1p",
-    "log1p": "expm1",
-    "sinh": "asinh",
-    "asinh": "sinh",
-    "tanh": "atanh",
-    "atanh": "tanh",
-    "sin": "asin",
-    "cos": "acos",
-    "tan": "atan",
-    "erf": "erfinv",
-    "erfinv": "erf",
-    "cosh": "acosh",
-}
-_EXACT = {(op, 0.0): 0.0 for op in (*_ODD, "expm1", "log1p")} | {
-    ("exp", 0.0): 1.0,
-    ("cos", 0.0): 1.0,
-    ("cosh", 0.0): 1.0,
-    ("erfc", 0.0): 1.0,
-    ("log", 1.0): 0.0,
-    ("acos", 1.0): 0.0,
-}

@@ -17,11 +17,13 @@ from typing import Any
 
 import numpy as np
 
-from potto.core.terms import Const, Prim, Term, Var, postorder
+from potto.core.terms import Const, Prim, Term, Var, postorder, var
 from potto.kernels.cells import Array
+from potto.kernels.support import ARRAYS, OPS
+from potto.primitives import PRIMITIVES, Primitive
+from potto.primitives.bounds import share, slack
+from potto.primitives.walking import Domain
 
-# How near to a singularity of a function a disc may come, as a part of its centre's distance from it.
-NEAREST = 0.95
 HIGHEST_POWER = 64
 
 
@@ -68,92 +70,22 @@ class Form:
         r = np.abs(slope) * self.r + beyond
         return Form(value, g, np.where(np.isfinite(r) & np.isfinite(value), r, np.inf), self.h)
 
-    def share(self) -> Any:
-        """How far the disc reaches, as a part of its centre's distance from 0; nan where it comes too near to it."""
-        q = np.divide(self.spread, np.abs(self.m))
-        return np.where(q <= NEAREST, q, np.nan)
-
 
 def _inverse(x: Form) -> Form:
-    q, one = x.share(), np.divide(1.0, x.m)
+    q, one = share(OPS, x.m, x.spread), np.divide(1.0, x.m)
     return x.through(one, -one * one, np.abs(one) * q * q / (1 - q))
 
 
-def _exp(x: Form) -> Form:
-    e, d = np.exp(x.m), x.spread
-    return x.through(e, e, e * (np.expm1(d) - d + _slack(d)))
-
-
-def _slack(d: Any) -> Any:
-    """More than the rounding of a difference of numbers of the size of d, where d is small: d^2 of the last places."""
-    return 1e-15 * d + 1e-15 * d * d
-
-
-def _expm1(x: Form) -> Form:
-    e, d = np.exp(x.m), x.spread
-    return x.through(np.expm1(x.m), e, e * (np.expm1(d) - d + _slack(d)))
-
-
-def _sqrt(x: Form) -> Form:
-    q, root = x.share(), np.sqrt(x.m)
-    return x.through(root, np.divide(0.5, root), root * (1 - 0.5 * q - np.sqrt(1 - q) + _slack(q)))
-
-
-def _log(x: Form) -> Form:
-    q = x.share()
-    return x.through(np.log(x.m), np.divide(1.0, x.m), -np.log1p(-q) - q + _slack(q))
-
-
-def _log1p(x: Form) -> Form:
-    return _log(x + Form(1.0, None, 0.0, x.h))
-
-
-def _even_and_odd(d: Any) -> tuple[Any, Any]:
-    """cosh d - 1 and sinh d - d."""
-    half = np.sinh(0.5 * d)
-    return 2 * half * half, np.sinh(d) - d + _slack(d)
-
-
-def _sin(x: Form) -> Form:
-    s, c = np.sin(x.m), np.cos(x.m)
-    even, odd = _even_and_odd(x.spread)
-    return x.through(s, c, np.abs(s) * even + np.abs(c) * odd)
-
-
-def _cos(x: Form) -> Form:
-    s, c = np.sin(x.m), np.cos(x.m)
-    even, odd = _even_and_odd(x.spread)
-    return x.through(c, -s, np.abs(c) * even + np.abs(s) * odd)
-
-
-def _sinh(x: Form) -> Form:
-    s, c = np.sinh(x.m), np.cosh(x.m)
-    even, odd = _even_and_odd(x.spread)
-    return x.through(s, c, np.abs(s) * even + c * odd)
-
-
-def _cosh(x: Form) -> Form:
-    s, c = np.sinh(x.m), np.cosh(x.m)
-    even, odd = _even_and_odd(x.spread)
-    return x.through(c, s, c * even + np.abs(s) * odd)
-
-
-def _atan(x: Form) -> Form:
-    """By the second derivative -2z/(1 + z^2)^2, bounded on the disc, whose distance from i and -i is `clear`."""
-    far = np.hypot(x.m, 1.0)
-    clear = np.where(x.spread <= NEAREST * far, far - x.spread, np.nan)
-    return x.through(np.arctan(x.m), 1 / (far * far), (np.abs(x.m) + x.spread) / clear**4 * x.spread**2)
-
-
-def _power(x: Form, exponent: float) -> Form:
+def _power(x: Form, power: Form) -> Form:
     """By the binomial series, whose coefficients are those of (1 - q)^a or (1 + q)^a without their signs."""
+    exponent = power.m  # a constant
     if exponent == int(exponent) and 0 <= exponent <= HIGHEST_POWER:
         return _repeated(x, int(exponent))
     if exponent == int(exponent) and -HIGHEST_POWER <= exponent < 0:
-        a, q, m = exponent, x.share(), x.m
-        value, beyond = np.power(m, a), np.power(1 - q, a) - 1 + a * q + _slack(q) * abs(a)
+        a, q, m = exponent, share(OPS, x.m, x.spread), x.m
+        value, beyond = np.power(m, a), np.power(1 - q, a) - 1 + a * q + slack(q) * abs(a)
         return x.through(value, a * np.divide(value, m), np.abs(value) * beyond)
-    return _exp(_log(x).scaled(exponent))
+    return _exp(DISCS.apply("log", (x,)).scaled(exponent))
 
 
 def _repeated(x: Form, exponent: int) -> Form:
@@ -163,24 +95,6 @@ def _repeated(x: Form, exponent: int) -> Form:
             result = x if result is None else result * x
         x, exponent = x * x if exponent > 1 else x, exponent >> 1
     return Form(1.0, None, 0.0, x.h) if result is None else result
-
-
-_FUNCTIONS: dict[str, Callable[[Form], Form]] = {
-    "neg": lambda x: -x,
-    "sqrt": _sqrt,
-    "exp": _exp,
-    "expm1": _expm1,
-    "log": _log,
-    "log1p": _log1p,
-    "sin": _sin,
-    "cos": _cos,
-    "tan": lambda x: _sin(x) * _inverse(_cos(x)),
-    "sinh": _sinh,
-    "cosh": _cosh,
-    "tanh": lambda x: _sinh(x) * _inverse(_cosh(x)),
-    "atan": _atan,
-}
-_OTHERS = frozenset({"add", "mul", "div", "pow"})
 
 
 @lru_cache(maxsize=4096)
@@ -194,7 +108,7 @@ def enclosable(term: Term) -> bool:
                 if not isinstance(node.args[1], Const):
                     return False
             case Prim():
-                if node.op not in _FUNCTIONS and node.op not in _OTHERS:
+                if not DISCS.knows(node.op):
                     return False
             case _:
                 return False
@@ -203,54 +117,86 @@ def enclosable(term: Term) -> bool:
 
 def enclosed(terms: Sequence[Term], env: Mapping[str, Form], known: dict[Term, Form], h: Array) -> list[Form]:
     """The forms of terms whose variables have those of `env`; `known` has what was worked out before, and grows."""
-    for node in postorder(*terms):
-        if node not in known:
-            known[node] = _node(node, env, known, h)
-    return [known[term] for term in terms]
+    return Discs(h).walk(terms, env, known)
 
 
-def _reciprocal(term: Term, known: Mapping[Term, Form]) -> Form:
-    """1/term, factor by factor: the disc of a square comes nearer to 0 than that of what is squared."""
-    match term:
-        case Prim(op="pow", args=(base, Const(value=exponent))):
-            return _power(known[base], -float(exponent))
-        case Prim(op="mul"):
-            first, *rest = (_reciprocal(a, known) for a in term.args)
-            for form in rest:
-                first = first * form
-            return first
-        case Prim(op="exp"):
-            return _exp(-known[term.args[0]])
-        case _:
-            return _inverse(known[term])
+class Discs(Domain[Form]):
+    """Forms over symbols with the radii h: arithmetic as below, every other builtin by its series."""
+
+    def __init__(self, h: Array) -> None:
+        self.h = h
+
+    def constant(self, node: Const) -> Form:
+        return Form(float(node.value), None, 0.0, self.h)
+
+    def unknown(self) -> Form:
+        return Form(np.nan, None, np.inf, self.h)
+
+    def builtin(self, node: Prim, known: Mapping[Term, Form]) -> Form:
+        return self.quotient(node, known) if node.op == "div" else super().builtin(node, known)
+
+    def rule(self, entry: Primitive) -> Callable[..., Form] | None:
+        return _ARITHMETIC.get(entry.name) or _series(entry.name)
+
+    def quotient(self, node: Prim, known: Mapping[Term, Form]) -> Form:
+        over, under = node.args
+        if isinstance(under, Const):
+            return known[over].scaled(1.0 / under.value if under.value else np.nan)
+        return known[over] * self.reciprocal(under, known)
+
+    def reciprocal(self, term: Term, known: Mapping[Term, Form]) -> Form:
+        """1/term, factor by factor: the disc of a square comes nearer to 0 than that of what is squared."""
+        match term:
+            case Prim(op="pow", args=(base, Const(value=exponent))):
+                return _power(known[base], Form(float(-exponent), None, 0.0, self.h))
+            case Prim(op="mul"):
+                first, *rest = (self.reciprocal(a, known) for a in term.args)
+                return _product(first, *rest)
+            case Prim(op="exp"):
+                return _exp(-known[term.args[0]])
+            case _:
+                return _inverse(known[term])
 
 
-def _node(node: Term, env: Mapping[str, Form], known: Mapping[Term, Form], h: Array) -> Form:
-    match node:
-        case Const():
-            return Form(float(node.value), None, 0.0, h)
-        case Var():
-            return env[node.name]
-        case Prim(op="add"):
-            first, *rest = (known[a] for a in node.args)
-            for form in rest:
-                first = first + form
-            return first
-        case Prim(op="mul"):
-            first, *rest = (known[a] for a in node.args)
-            for form in rest:
-                first = first * form
-            return first
-        case Prim(op="div"):
-            over, under = node.args
-            if isinstance(under, Const):
-                return known[over].scaled(1.0 / under.value if under.value else np.nan)
-            return known[over] * _reciprocal(under, known)
-        case Prim(op="pow"):
-            exponent = node.args[1]
-            assert isinstance(exponent, Const)
-            return _power(known[node.args[0]], float(exponent.value))
-        case Prim():
-            return _FUNCTIONS[node.op](known[node.args[0]])
-        case _:
-            raise TypeError(f"no enclosure of {type(node).__name__}")
+DISCS = Discs(np.zeros((1, 1)))
+
+
+@lru_cache(maxsize=256)
+def _series(op: str) -> Callable[[Form], Form] | None:
+    """A builtin by its value, its slope and the remainder of its series."""
+    entry = PRIMITIVES[op]
+    remainder = entry.remainder
+    if remainder is None or entry.partials is None:
+        return None
+    f, (slope,) = ARRAYS.function(op), entry.partials(var("x"))
+
+    def run(x: Form) -> Form:
+        (steep,) = ARRAYS.walk((slope,), {"x": x.m}, {})
+        return x.through(f(x.m), steep, remainder(OPS, x.m, x.spread))
+
+    return run
+
+
+def _exp(x: Form) -> Form:
+    return DISCS.apply("exp", (x,))
+
+
+def _sum(first: Form, *rest: Form) -> Form:
+    for form in rest:
+        first = first + form
+    return first
+
+
+def _product(first: Form, *rest: Form) -> Form:
+    for form in rest:
+        first = first * form
+    return first
+
+
+_ARITHMETIC: dict[str, Callable[..., Form]] = {
+    "add": _sum,
+    "mul": _product,
+    "neg": lambda x: -x,
+    "div": lambda a, b: a * _inverse(b),
+    "pow": _power,
+}

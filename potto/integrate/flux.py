@@ -37,6 +37,7 @@ from potto.integrate.roots import searched_rows
 from potto.integrate.rules import EPS
 from potto.integrate.transversal import pivots
 from potto.kernels.cells import Array, Bools, Cell, Mask, Value, pad
+from potto.primitives import PRIMITIVES
 
 # A root that phi's own slope puts further away than this (in labels) is not one that phi passes through smoothly.
 OFF = 1e-6
@@ -344,9 +345,11 @@ class Surface:
             match node:
                 case Prim(op="pow", args=(_, Const(value=value))) if value > 0:
                     continue
-                case App() | Prim(op="pow" | "tan" | "atan2" | "log"):
+                case Prim(op="div", args=(_, below)) if not below.free:
+                    continue
+                case App():
                     return True
-                case Prim(op="div", args=(_, below)) if below.free:
+                case Prim(op=op) if PRIMITIVES[op].broken:
                     return True
         return False
 

@@ -13,6 +13,7 @@ import numpy as np
 from potto.calculus.trace import layout
 from potto.core.terms import Branch, Const, If, ListOf, Prim, Proj, Term, Tuple, postorder
 from potto.kernels.cells import Mask
+from potto.primitives import EXACT
 
 
 def vanishing_of(body: Term, numbers: Mapping[tuple[int, ...], tuple[int, int]], part: Term | None = None) -> Any:
@@ -35,8 +36,10 @@ def _zero(node: Term, memo: dict[Term, Any], index: Mapping[tuple[Term, int], in
             return _join("or", [memo[a] for a in node.args], True)
         case Prim(op="add"):
             return _join("and", [memo[a] for a in node.args], False)
-        case Prim(op="div" | "neg" | "sqrt" | "sin" | "abs"):
+        case Prim(op="div"):
             return memo[node.args[0]]
+        case Prim(op=op, args=(inner,)) if EXACT.get((op, 0.0)) == 0:
+            return memo[inner]
         case Branch():
             place = numbers.get((index.get((node, 2), -1),))
             then, orelse = memo[node.then], memo[node.orelse]

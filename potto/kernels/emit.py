@@ -15,8 +15,9 @@ from functools import lru_cache
 
 from potto.calculus.derivative import partial
 from potto.core.terms import Branch, Const, If, Prim, Term, Var, postorder, var
-from potto.kernels.whole import ROUNDING, SELECTING, UNIT_ROUNDOFF
+from potto.kernels.whole import ROUNDING, UNIT_ROUNDOFF
 from potto.primitives import PRIMITIVES
+from potto.primitives.walking import formula_of
 
 ZERO = "0.0"
 ONE = "1.0"
@@ -166,7 +167,12 @@ class Lines:
             return self.let(f"{self.ufunc('power')}({a[0]}, {a[1]})")
         if op == "div":
             return self.let(f"{self.ufunc('divide')}({a[0]}, {a[1]})")
-        return self.let(f"{self.ufunc(PRIMITIVES[op].numpy)}({', '.join(a)})")
+        entry = PRIMITIVES[op]
+        if not entry.numpy:
+            whole, names = formula_of(op, len(a))
+            return self.smooth(whole, {n: self.plain(x) for n, x in zip(names, a, strict=True)}, {}).v
+        name = "builtin." + op if entry.guarded else entry.numpy
+        return self.let(f"{self.ufunc(name)}({', '.join(a)})")
 
     def add(self, args: Sequence[Scalar]) -> Scalar:
         v = self.total([a.v for a in args]) or ZERO
@@ -234,10 +240,15 @@ class Lines:
         if not self.rounding:
             return x
         e = x.e
-        if op not in SELECTING:
-            unit = f"{UNIT_ROUNDOFF!r}*abs({x.v})"
+        entry = PRIMITIVES[op]
+        if entry.ulp:
+            unit = f"{(1.0 if callable(entry.ulp) else entry.ulp) * UNIT_ROUNDOFF!r}*abs({x.v})"
             if op in ROUNDING:
                 unit = f"{self.ufunc('whole.' + op)}({', '.join((x.v, *(a.v for a in args)))})"
+            elif callable(entry.ulp):
+                unit = f"{self.ufunc('places.' + op)}({', '.join(a.v for a in args)})*{unit}"
+            if entry.off:
+                unit += f" + {entry.off!r}"
             e = self.let(f"{e + ' + ' if e else ''}{unit}", "e")
         et = tuple(
             self.let(f"{old + ' + ' if old else ''}{2 * UNIT_ROUNDOFF!r}*abs({t})", "e") if t else old

@@ -1,21 +1,27 @@
 """The functions that generated kernels call by name.
 
 Owns `function`, which finds them: "sqrt" is numpy's, "special.erf" scipy's (imported at the first use), "potto.clamp"
-one of `potto.kernels.ufuncs`, "whole.add" one of `potto.kernels.whole`, "support.select" one of those below.
+one of `potto.kernels.ufuncs`, "whole.add" one of `potto.kernels.whole`, "support.select" one of those below,
+"builtin.gamma" the numeric form
+of a builtin and "places.erfc" what it may be off. `OPS` is the arithmetic of arrays for the rules of entries.
 """
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
-from functools import lru_cache
+from collections.abc import Callable, Mapping
+from functools import lru_cache, reduce
 from typing import Any
 
 import numpy as np
 
+from potto.core.terms import Branch, Const, If, Term
 from potto.kernels.cells import Cell, Mask, Number, Value
 from potto.kernels.errors import wrong_call
 from potto.kernels.whole import ROUNDING
+from potto.primitives import PRIMITIVES, Primitive
+from potto.primitives.registry import Elementwise
+from potto.primitives.walking import Domain
 
 
 @lru_cache(maxsize=256)
@@ -28,9 +34,69 @@ def function(path: str) -> Callable[..., Any]:
         return getattr(importlib.import_module("potto.kernels.ufuncs"), name)  # type: ignore[no-any-return]
     if where == "whole":
         return ROUNDING[name]
+    if where == "builtin":
+        return ARRAYS.function(name)
+    if where == "places":
+        return PRIMITIVES[name].places
     if where == "support":
         return globals()[name]  # type: ignore[no-any-return]
     return getattr(np, name)  # type: ignore[no-any-return]
+
+
+class Arrays(Domain[Any]):
+    """Values of terms over batches, without errors and tangents."""
+
+    def constant(self, node: Const) -> Any:
+        return node.value
+
+    def rule(self, entry: Primitive) -> Callable[..., Any] | None:
+        return _numeric(entry.name)
+
+    def unknown(self) -> Any:
+        return np.nan
+
+    def other(self, node: Term, known: Mapping[Term, Any]) -> Any:
+        if isinstance(node, Branch):
+            side = known[node.surface]
+            return np.where(side > 0 if node.strict else side >= 0, known[node.then], known[node.orelse])
+        if isinstance(node, If):
+            return np.where(known[node.condition], known[node.then], known[node.orelse])
+        return np.nan
+
+    def function(self, op: str) -> Callable[..., Any]:
+        """The numeric form of a builtin."""
+        return _numeric(op) or (lambda *args: self.apply(op, args))
+
+
+ARRAYS = Arrays()
+
+
+@lru_cache(maxsize=256)
+def _numeric(op: str) -> Callable[..., Any] | None:
+    """What an entry names; nan outside of where the builtin is defined."""
+    entry = PRIMITIVES[op]
+    if not entry.numpy:
+        return None
+    own = function(entry.numpy)
+    if entry.arity is None:
+        return lambda *args: reduce(own, args)
+    if not entry.guarded:
+        return own
+    least, most = entry.within
+    return lambda x: own(select((x >= least) & (x <= most), x, np.nan))
+
+
+class _Ops:
+    """`Elementwise` of arrays."""
+
+    where = staticmethod(np.where)
+    least = staticmethod(np.minimum)
+    most = staticmethod(np.maximum)
+    finite = staticmethod(np.isfinite)
+    of = staticmethod(ARRAYS.function)
+
+
+OPS: Elementwise = _Ops()
 
 
 def select(mask: Mask, a: Number, b: Number) -> Number:

@@ -68,5 +68,3 @@ ROUNDING: dict[str, Callable[..., Any]] = {
     "div": div,
     "pow": power,
 }
-# Their values are those of an argument, perhaps with the other sign.
-SELECTING = frozenset({"neg", "abs", "min", "max", "clamp"})

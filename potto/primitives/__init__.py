@@ -13,6 +13,6 @@ from potto.primitives import (  # noqa: F401  (imported for their entries)
     special,
     trigonometric,
 )
-from potto.primitives.registry import PRIMITIVES, Primitive, register
+from potto.primitives.registry import EXACT, PRIMITIVES, UNDOES, Primitive, register
 
-__all__ = ["PRIMITIVES", "Primitive", "register"]
+__all__ = ["EXACT", "PRIMITIVES", "UNDOES", "Primitive", "register"]

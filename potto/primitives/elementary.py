@@ -3,12 +3,27 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
-from potto.core.terms import ONE, Term, add, branch, const, div, mul, prim
-from potto.primitives.registry import Primitive, Terms, register
+from potto.core.terms import ONE, Term, add, branch, const, div, mul, prim, sub
+from potto.primitives.bounds import exponential, share, slack
+from potto.primitives.registry import Elementwise, Primitive, Terms, register
 
 NAN = const(math.nan)
 HALF = const(0.5)
+
+
+def _root_remainder(ops: Elementwise, m: Any, d: Any) -> Any:
+    q, root = share(ops, m, d), ops.of("sqrt")
+    return root(m) * (1 - 0.5 * q - root(1 - q) + slack(q))
+
+
+def _exp_remainder(ops: Elementwise, m: Any, d: Any) -> Any:
+    return ops.of("exp")(m) * exponential(ops, d)
+
+
+def _log_remainder(ops: Elementwise, q: Any) -> Any:
+    return -ops.of("log1p")(-q) - q + slack(q)
 
 
 def _square_of_root(y: Term) -> Terms:
@@ -21,6 +36,13 @@ sqrt = register(
         arity=1,
         numpy="sqrt",
         mpmath="sqrt",
+        scalar="math.sqrt",
+        decimal="sqrt",
+        topic="Roots, exponentials, logarithms, powers",
+        image=(0.0, math.inf),
+        within=(0.0, math.inf),
+        roots=(0.0,),
+        remainder=_root_remainder,
         doc="The square root, of numbers that are not negative.",
         partials=lambda x: (div(HALF, prim("sqrt", x)),),
         domain=((0.0, 1e12),),
@@ -37,6 +59,13 @@ exp = register(
         arity=1,
         numpy="exp",
         mpmath="exp",
+        scalar="math.exp",
+        decimal="exp",
+        topic="Roots, exponentials, logarithms, powers",
+        image=(0.0, math.inf),
+        roots=(),
+        values=((0.0, 1.0),),
+        remainder=_exp_remainder,
         doc="The exponential function.",
         partials=lambda x: (prim("exp", x),),
         domain=((-700.0, 700.0),),
@@ -52,6 +81,13 @@ log = register(
         arity=1,
         numpy="log",
         mpmath="log",
+        scalar="math.log",
+        decimal="log",
+        topic="Roots, exponentials, logarithms, powers",
+        within=(0.0, math.inf),
+        broken=True,
+        roots=(1.0,),
+        remainder=lambda ops, m, d: _log_remainder(ops, share(ops, m, d)),
         doc="The natural logarithm, of positive numbers.",
         partials=lambda x: (div(ONE, x),),
         domain=((1e-300, 1e300),),
@@ -67,7 +103,14 @@ log1p = register(
         "log1p",
         arity=1,
         numpy="log1p",
-        mpmath="log1p",
+        mpmath="potto.log1p",
+        formula=lambda x: prim("log", add(ONE, x)),
+        scalar="math.log1p",
+        topic="Roots, exponentials, logarithms, powers",
+        within=(-1.0, math.inf),
+        broken=True,
+        roots=(0.0,),
+        remainder=lambda ops, m, d: _log_remainder(ops, share(ops, 1 + m, d)),
         doc="log(1 + x), to full precision also for small x.",
         partials=lambda x: (div(ONE, add(ONE, x)),),
         domain=((-0.999, 1e12),),
@@ -84,6 +127,12 @@ expm1 = register(
         arity=1,
         numpy="expm1",
         mpmath="expm1",
+        formula=lambda x: sub(prim("exp", x), ONE),
+        scalar="math.expm1",
+        topic="Roots, exponentials, logarithms, powers",
+        image=(-1.0, math.inf),
+        roots=(0.0,),
+        remainder=_exp_remainder,
         doc="exp(x) - 1, to full precision also for small x.",
         partials=lambda x: (prim("exp", x),),  # expm1(x) + 1 has no digits left for x far below 0
         domain=((-700.0, 700.0),),

@@ -3,9 +3,23 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from potto.core.terms import ONE, Term, add, branch, const, div, mul, neg, prim, sub
-from potto.primitives.registry import Primitive, Terms, register
+from potto.primitives.bounds import clear, rising, waves
+from potto.primitives.registry import Elementwise, Primitive, Terms, register
+
+HALF = const(0.5)
+
+
+def _asinh_remainder(ops: Elementwise, m: Any, d: Any) -> Any:
+    """By the second derivative -z/(1 + z^2)^1.5, bounded on the disc by its distance from i and -i."""
+    return 0.5 * d * d * (abs(m) + d) / clear(ops, ops.of("hypot")(m, 1.0), d) ** 3
+
+
+def _acosh_remainder(ops: Elementwise, m: Any, d: Any) -> Any:
+    """By the second derivative -z/(z^2 - 1)^1.5."""
+    return 0.5 * d * d * (m + d) / (clear(ops, m - 1, d) * (m + 1 - d)) ** 1.5
 
 
 def _both_signs(root: Term) -> Terms:
@@ -18,6 +32,12 @@ sinh = register(
         arity=1,
         numpy="sinh",
         mpmath="sinh",
+        formula=lambda x: mul(HALF, sub(prim("exp", x), prim("exp", neg(x)))),
+        scalar="math.sinh",
+        topic="Hyperbolic functions",
+        roots=(0.0,),
+        parity=-1,
+        remainder=waves("sinh", "cosh"),
         doc="The hyperbolic sine.",
         partials=lambda x: (prim("cosh", x),),
         domain=((-700.0, 700.0),),
@@ -33,6 +53,15 @@ cosh = register(
         arity=1,
         numpy="cosh",
         mpmath="cosh",
+        formula=lambda x: mul(HALF, add(prim("exp", x), prim("exp", neg(x)))),
+        scalar="math.cosh",
+        topic="Hyperbolic functions",
+        turns=(0.0,),
+        image=(1.0, math.inf),
+        roots=(),
+        parity=1,
+        values=((0.0, 1.0),),
+        remainder=waves("cosh", "sinh"),
         doc="The hyperbolic cosine.",
         partials=lambda x: (prim("sinh", x),),
         domain=((-700.0, 700.0),),
@@ -47,6 +76,13 @@ tanh = register(
         arity=1,
         numpy="tanh",
         mpmath="tanh",
+        formula=lambda x: div(prim("sinh", x), prim("cosh", x)),
+        scalar="math.tanh",
+        topic="Hyperbolic functions",
+        centered=True,
+        image=(-1.0, 1.0),
+        roots=(0.0,),
+        parity=-1,
         doc="The hyperbolic tangent.",
         # Not 1 - tanh^2, which cancels for large x; dividing twice keeps cosh^2 from overflowing.
         partials=lambda x: (div(div(ONE, prim("cosh", x)), prim("cosh", x)),),
@@ -63,6 +99,11 @@ asinh = register(
         arity=1,
         numpy="arcsinh",
         mpmath="asinh",
+        formula=lambda x: prim("log", add(x, prim("hypot", ONE, x))),
+        scalar="math.asinh",
+        roots=(0.0,),
+        parity=-1,
+        remainder=_asinh_remainder,
         surface=False,
         doc="The inverse of sinh.",
         partials=lambda x: (div(ONE, prim("hypot", ONE, x)),),
@@ -79,6 +120,12 @@ acosh = register(
         arity=1,
         numpy="arccosh",
         mpmath="acosh",
+        formula=lambda x: prim("log", add(x, mul(prim("sqrt", sub(x, ONE)), prim("sqrt", add(x, ONE))))),
+        scalar="math.acosh",
+        image=(0.0, math.inf),
+        within=(1.0, math.inf),
+        roots=(1.0,),
+        remainder=_acosh_remainder,
         surface=False,
         doc="The inverse of cosh that is not negative, of numbers from 1.",
         partials=lambda x: (div(ONE, mul(prim("sqrt", sub(x, ONE)), prim("sqrt", add(x, ONE)))),),
@@ -96,6 +143,13 @@ atanh = register(
         arity=1,
         numpy="arctanh",
         mpmath="atanh",
+        formula=lambda x: mul(HALF, sub(prim("log1p", x), prim("log1p", neg(x)))),
+        scalar="math.atanh",
+        within=(-1.0, 1.0),
+        broken=True,
+        roots=(0.0,),
+        parity=-1,
+        remainder=rising("atanh", lambda ops, x: 1 / ((1 - x) * (1 + x))),
         surface=False,
         doc="The inverse of tanh, of numbers between -1 and 1.",
         partials=lambda x: (div(ONE, mul(sub(ONE, x), add(ONE, x))),),

@@ -10,6 +10,7 @@ import math
 from itertools import combinations
 
 from potto.core.terms import ONE, ZERO, Term, branch, const, neg, prim, sub
+from potto.primitives.bounds import ends, extreme
 from potto.primitives.registry import Primitive, Terms, register
 
 
@@ -35,6 +36,25 @@ def _differences(*args: Term) -> Terms:
     return tuple(sub(a, b) for a, b in combinations(args, 2))
 
 
+def _joined(op: str, args: Terms) -> Term:
+    return args[0] if len(args) == 1 else prim(op, *args)
+
+
+def _greatest(*args: Term) -> tuple[Term, Term, Term]:
+    other = _joined("max", args[1:])
+    return sub(args[0], other), args[0], other
+
+
+def _least(*args: Term) -> tuple[Term, Term, Term]:
+    other = _joined("min", args[1:])
+    return sub(other, args[0]), args[0], other
+
+
+def _clamped(x: Term, lo: Term, hi: Term) -> tuple[Term, Term, Term]:
+    inner = prim("max", x, lo)
+    return sub(hi, inner), inner, hi
+
+
 def _clamp_partials(x: Term, lo: Term, hi: Term) -> Terms:
     """clamp is min(max(x, lo), hi), also where lo > hi."""
 
@@ -52,7 +72,16 @@ absolute = register(
         "abs",
         arity=1,
         numpy="abs",
-        mpmath="fabs",
+        mpmath="potto.magnitude",
+        scalar="math.fabs",
+        decimal="magnitude",
+        ulp=0.0,
+        topic="With kinks",
+        cases=lambda x: (x, x, neg(x)),
+        turns=(0.0,),
+        image=(0.0, math.inf),
+        roots=(0.0,),
+        parity=1,
         doc="The absolute value.",
         partials=lambda x: (branch((x,), False, ONE, neg(ONE)),),
         domain=((-1e6, 1e6),),
@@ -67,7 +96,13 @@ minimum = register(
         "min",
         arity=None,
         numpy="minimum",
-        mpmath="minimum",
+        mpmath="potto.minimum",
+        scalar="builtins.min",
+        decimal="least",
+        ulp=0.0,
+        topic="With kinks",
+        cases=_least,
+        interval=extreme(least=True),
         doc="The least of two or more numbers.",
         partials=lambda *args: _choose("min", args),
         domain=((-1e6, 1e6),),
@@ -81,7 +116,13 @@ maximum = register(
         "max",
         arity=None,
         numpy="maximum",
-        mpmath="maximum",
+        mpmath="potto.maximum",
+        scalar="builtins.max",
+        decimal="greatest",
+        ulp=0.0,
+        topic="With kinks",
+        cases=_greatest,
+        interval=extreme(least=False),
         doc="The greatest of two or more numbers.",
         partials=lambda *args: _choose("max", args),
         domain=((-1e6, 1e6),),
@@ -95,7 +136,11 @@ clamp = register(
         "clamp",
         arity=3,
         numpy="potto.clamp",
-        mpmath="clamp",
+        mpmath="potto.clamp",
+        formula=lambda x, lo, hi: prim("min", prim("max", x, lo), hi),
+        ulp=0.0,
+        topic="With kinks",
+        cases=_clamped,
         doc="x, but at least lo and at most hi: clamp(x, lo, hi) is min(max(x, lo), hi).",
         partials=_clamp_partials,
         domain=((-1e3, 1e3), (-1e3, 1e3), (-1e3, 1e3)),
@@ -110,6 +155,13 @@ sign = register(
         arity=1,
         numpy="sign",
         mpmath="sign",
+        scalar="potto.sign",
+        decimal="sign",
+        topic="With jumps",
+        image=(-1.0, 1.0),
+        roots=(0.0,),
+        parity=-1,
+        interval=ends("sign"),
         doc="-1, 0 or 1. It jumps, so it takes plain values only; under an integral use `[x > 0]`.",
         plain=True,
         domain=((-1e6, 1e6),),
@@ -123,6 +175,10 @@ floor = register(
         arity=1,
         numpy="floor",
         mpmath="floor",
+        scalar="math.floor",
+        decimal="floor",
+        topic="With jumps",
+        interval=ends("floor"),
         doc="The greatest whole number that is not above x. It jumps, so it takes plain values only.",
         plain=True,
         domain=((-1e6, 1e6),),
@@ -136,6 +192,10 @@ ceil = register(
         arity=1,
         numpy="ceil",
         mpmath="ceil",
+        scalar="math.ceil",
+        decimal="ceil",
+        topic="With jumps",
+        interval=ends("ceil"),
         doc="The least whole number that is not below x. It jumps, so it takes plain values only.",
         plain=True,
         domain=((-1e6, 1e6),),

@@ -1,17 +1,34 @@
 """The one table of builtins.
 
 Owns `Primitive` and `PRIMITIVES`. An entry says all that there is to say about a builtin; parser, checker, hover,
-completion, derivative, kernels, inversion, docs and tests read it. numpy is named, never imported, on this floor.
+completion, derivative, kernels, inversion, enclosures, docs and tests read it. numpy and mpmath are named, never
+imported, on this floor: a rule gets the arithmetic that it is to work with.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any, Protocol
 
-from potto.core.terms import Term
+from potto.core.terms import Prim, Term, Var, var
 
 Terms = tuple[Term, ...]
+Ends = tuple[Any, Any]  # lower and upper bounds, numbers or arrays
+EPS = 2.0**-52
+
+
+class Elementwise(Protocol):
+    """What a rule may do with numbers beside arithmetic, `abs` and comparisons: the same for floats and for arrays."""
+
+    def of(self, name: str) -> Callable[..., Any]:
+        """The numeric form of a builtin."""
+
+    def where(self, condition: Any, a: Any, b: Any) -> Any: ...
+    def least(self, a: Any, b: Any) -> Any: ...
+    def most(self, a: Any, b: Any) -> Any: ...
+    def finite(self, x: Any) -> Any: ...
 
 
 def _none(*args: Term) -> Terms:
@@ -20,51 +37,131 @@ def _none(*args: Term) -> Terms:
 
 @dataclass(frozen=True)
 class Primitive:
-    """One builtin.
+    """One builtin. What it does in a domain is a rule of its own, or else read off its `formula` (see `walking`).
 
     name: as core terms (and, unless `surface` is False, programs) call it.
     arity: number of arguments; None for any number (add, mul, min, max take two or more).
+    formula: what it is in terms of other builtins; every rule that an entry leaves out is that of the formula. With no
+        numeric form it must be one that keeps its digits in doubles.
+    domain: per argument an interval where it is defined and tests may sample: a promise.
+    doc: one or two sentences for a person. example: an expression of Potto that a doc page shows, with its value.
+    topic: the section of the page of builtins.
+    lacks: the domains that it has no rule for: a bare list of debts, which the tests hold against the rules.
+    plain: takes plain values only (sign, floor, ceil). truth: a truth value.
+
+    Values:
     numpy: the name of a ufunc: "sqrt" is numpy's, "special.erf" is scipy.special's, "potto.xyz" is one of
         potto.kernels.ufuncs (for `clamp` and the like).
-    mpmath: the name of the function in mpmath, or of one in potto.core.reference.
+    mpmath: the name of the function in mpmath; "potto.xyz" is one of potto.core.reference.functions.
+    scalar: its name in the module math, for numbers one by one; where there is none mpmath is asked.
+    decimal: its name in potto.core.decimals, for proofs by digits; without one it is an unknown function there.
+    ulp: what its numeric form may be off, in units of half a last place, as a number or by the arguments; 0 if its
+        values are those of an argument, perhaps with the other sign.
+    off: what it may be off beside that, absolutely: of functions that keep no digits where they cross 0.
+    guarded: whether the numeric form has values also outside of `within`, which are not the builtin's.
+
+    Derivatives:
     partials: the partial derivatives as terms over the arguments; None for a builtin that jumps.
-    plain: takes plain values only (sign, floor, ceil).
-    domain: per argument an interval where it is defined and tests may sample: a promise.
     kinks: terms over the arguments whose zeros are kinks (abs: x; max: a - b).
+    cases: for builtins that choose, a margin, what they are where that is >= 0, and what they are elsewhere.
     edges: terms over the arguments that are 0 at the edge of the domain and where the builtin or its derivative is
         singular (sqrt: x; log: x; asin: 1 - x, 1 + x).
-    inverse: for a builtin of one argument, given y: the solutions x of f(x) = y on the principal branch(es), as terms,
-        nan where there is none (sqrt: y^2 where y >= 0; abs: y and -y; sin: asin y). None if not invertible so.
+    broken: whether it may have a pole, or jump by itself.
+    centered: whether it changes mostly where its argument is near 0.
+
+    Shape, of builtins of one argument:
+    within: the interval on which it is defined. image: an interval that holds its values (of any number of arguments).
+    increasing: +1 strictly increasing on its domain, -1 decreasing, 0 neither.
+    turns: where it turns from rising to falling or back, all of them; None if there are many, or they are not known.
+    roots: where it is 0, all of them (of a period); None if there are many, or they are not known. A builtin of more
+        arguments with the roots (0.0,) is 0 where all of them are.
+    parity: +1 for f(-x) = f(x), -1 for f(-x) = -f(x), 0 for neither.
+    values: arguments and what it is there, exactly (exp: 0 and 1).
+    inverse: given y, the solutions x of f(x) = y on the principal branch(es), as terms, nan where there is none
+        (sqrt: y^2 where y >= 0; abs: y and -y; sin: asin y). None if not invertible so.
     period: for periodic ones, the period of f and further solutions of f(x) = y within one period
         (sin: 2 pi, (pi - asin y,)).
-    increasing: +1 strictly increasing on its domain, -1 decreasing, 0 neither.
-    doc: one or two sentences for a person.
-    example: an expression of Potto that a doc page shows, with its value.
+
+    Enclosures:
+    interval: bounds of its values for arguments within bounds, given the arithmetic and the bounds of each argument;
+        a third item says where there is no value. What has `turns` needs none. Rounding is the walker's business.
+    remainder: given the arithmetic, m and d: what f(z) has at most beyond f(m) + f'(m) (z - m) in the disc |z - m| <= d
+        of the complex plane; nan where it is not analytic there.
     """
 
     name: str
     arity: int | None
-    numpy: str
-    mpmath: str
     doc: str
-    partials: Callable[..., Terms] | None = None
+    domain: tuple[tuple[float, float], ...] = ()
+    formula: Callable[..., Term] | None = None
+    example: str = ""
+    topic: str = ""
+    lacks: frozenset[str] = frozenset()
     plain: bool = False
     surface: bool = True
-    domain: tuple[tuple[float, float], ...] = ()
+    truth: bool = False
+
+    numpy: str = ""
+    mpmath: str = ""
+    scalar: str = ""
+    decimal: str = ""
+    ulp: float | Callable[..., Any] = 1.0
+    off: float = 0.0
+    guarded: bool = False
+
+    partials: Callable[..., Terms] | None = None
     kinks: Callable[..., Terms] = field(default=_none)
+    cases: Callable[..., tuple[Term, Term, Term]] | None = None
     edges: Callable[..., Terms] = field(default=_none)
+    broken: bool = False
+    centered: bool = False
+
+    within: tuple[float, float] = (-math.inf, math.inf)
+    image: tuple[float, float] = (-math.inf, math.inf)
+    increasing: int = 0
+    turns: tuple[float, ...] | None = None
+    roots: tuple[float, ...] | None = None
+    parity: int = 0
+    values: tuple[tuple[float, float], ...] = ()
     inverse: Callable[[Term], Terms] | None = None
     period: Callable[[Term], tuple[Term, Terms]] | None = None
-    increasing: int = 0
-    truth: bool = False
-    example: str = ""
+
+    interval: Callable[..., tuple[Any, ...]] | None = None
+    remainder: Callable[[Elementwise, Any, Any], Any] | None = None
+
+    def places(self, *args: Any) -> Any:
+        """What the numeric form may be off at some arguments, in units of half a last place."""
+        return self.ulp(*args) if callable(self.ulp) else self.ulp
+
+    @property
+    def piecewise_monotone(self) -> bool:
+        """Whether its ends and its turns are its extremes."""
+        return self.arity == 1 and (self.increasing != 0 or self.turns is not None)
+
+    @property
+    def analytic(self) -> bool:
+        """Whether it is one analytic function wherever it is defined, poles and edges aside."""
+        return not (self.truth or self.plain or self.cases is not None)
 
 
 PRIMITIVES: dict[str, Primitive] = {}
+UNDOES: dict[str, str] = {}
+"""f and g with f(g(x)) = x wherever g(x) is defined: read off the inverses."""
+EXACT: dict[tuple[str, float], float] = {}
+"""Values of builtins of one argument that are known exactly."""
 
 
 def register(primitive: Primitive) -> Primitive:
     if primitive.name in PRIMITIVES:
         raise ValueError(f"builtin {primitive.name} is registered twice")
     PRIMITIVES[primitive.name] = primitive
+    if primitive.inverse is not None:
+        match primitive.inverse(var("y")):
+            case (Prim(op=inverse, args=(Var(),)), *_):
+                UNDOES[primitive.name] = inverse
+    if primitive.arity == 1:
+        odd = ((0.0, 0.0),) if primitive.parity < 0 else ()
+        EXACT.update(
+            ((primitive.name, x), y) for x, y in (*odd, *((r, 0.0) for r in primitive.roots or ()), *primitive.values)
+        )
     return primitive

@@ -2,14 +2,33 @@
 
 from __future__ import annotations
 
-from potto.core.terms import PI, Term, const, div, mul, neg, prim
-from potto.primitives.registry import Primitive, register
+import math
+from typing import Any
+
+from potto.core.terms import ONE, PI, Term, const, div, mul, neg, prim, sub
+from potto.primitives.bounds import rising
+from potto.primitives.registry import Elementwise, Primitive, register
 
 SLOPE = div(const(2.0), prim("sqrt", PI))  # of erf at 0
 
 
 def _bell(x: Term) -> Term:
     return mul(SLOPE, prim("exp", neg(mul(x, x))))
+
+
+def _bell_remainder(ops: Elementwise, m: Any, d: Any) -> Any:
+    """By the second derivative -4z/sqrt(pi) exp(-z^2): x^2 - y^2 is least on the rim, at m/2 if that is in the disc."""
+    near = abs(m)
+    least = ops.where(2 * d >= near, 0.5 * near * near - d * d, (near - d) * (near - d))
+    return 2 / math.sqrt(math.pi) * d * d * (near + d) * ops.of("exp")(-least)
+
+
+def _root_slope(ops: Elementwise, y: Any) -> Any:
+    root = ops.of("erfinv")(y)
+    return 0.5 * math.sqrt(math.pi) * ops.of("exp")(root * root)
+
+
+_erfinv_remainder = rising("erfinv", _root_slope)
 
 
 def _inverse_slope(op: str, y: Term) -> Term:
@@ -23,6 +42,15 @@ erf = register(
         arity=1,
         numpy="special.erf",
         mpmath="erf",
+        ulp=3.0,
+        scalar="math.erf",
+        decimal="erf",
+        topic="The error function",
+        centered=True,
+        image=(-1.0, 1.0),
+        roots=(0.0,),
+        parity=-1,
+        remainder=_bell_remainder,
         doc="The error function, 2/sqrt(pi) times the integral of exp(-t^2) from 0 to x.",
         partials=lambda x: (_bell(x),),
         domain=((-20.0, 20.0),),
@@ -38,6 +66,15 @@ erfc = register(
         arity=1,
         numpy="special.erfc",
         mpmath="erfc",
+        ulp=lambda x: 3 + (x > 0) * x * x,  # the square of its argument is rounded
+        formula=lambda x: sub(ONE, prim("erf", x)),
+        scalar="math.erfc",
+        topic="The error function",
+        centered=True,
+        image=(0.0, 2.0),
+        roots=(),
+        values=((0.0, 1.0),),
+        remainder=_bell_remainder,
         doc="1 - erf(x), to full precision also for large x.",
         partials=lambda x: (neg(_bell(x)),),
         domain=((-20.0, 20.0),),
@@ -53,6 +90,13 @@ erfinv = register(
         arity=1,
         numpy="special.erfinv",
         mpmath="erfinv",
+        ulp=3.0,
+        lacks=frozenset({"digits"}),
+        within=(-1.0, 1.0),
+        broken=True,
+        roots=(0.0,),
+        parity=-1,
+        remainder=_erfinv_remainder,
         surface=False,
         doc="The inverse of erf, of numbers between -1 and 1.",
         partials=lambda y: (_inverse_slope("erfinv", y),),
@@ -68,7 +112,13 @@ erfcinv = register(
         "erfcinv",
         arity=1,
         numpy="special.erfcinv",
-        mpmath="erfcinv",
+        mpmath="potto.erfcinv",
+        ulp=7.0,
+        lacks=frozenset({"digits"}),
+        within=(0.0, 2.0),
+        broken=True,
+        roots=(1.0,),
+        remainder=lambda ops, m, d: _erfinv_remainder(ops, 1 - m, d),
         surface=False,
         doc="The inverse of erfc, of numbers between 0 and 2; good for the tail, where erf is 1.",
         partials=lambda y: (neg(_inverse_slope("erfcinv", y)),),

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from potto.core.terms import ONE, PI, Term, add, branch, const, div, mul, neg, prim, sub
-from potto.primitives.registry import Primitive, Terms, register
+from potto.primitives.bounds import angle, clear, length, rising, tangent, wave, waves
+from potto.primitives.registry import Elementwise, Primitive, Terms, register
 
 NAN = const(math.nan)
 HALF_PI = div(PI, const(2.0))
@@ -15,6 +17,15 @@ TWO_PI = mul(const(2.0), PI)
 def _between(y: Term, lo: Term, hi: Term, solution: Term) -> Terms:
     """The solution where y is a value that the function takes, else nan."""
     return (branch((sub(y, lo),), False, branch((sub(hi, y),), False, solution, NAN), NAN),)
+
+
+def _asin_slope(ops: Elementwise, x: Any) -> Any:
+    return 1 / ops.of("sqrt")((1 - x) * (1 + x))
+
+
+def _atan_remainder(ops: Elementwise, m: Any, d: Any) -> Any:
+    """By the second derivative -2z/(1 + z^2)^2, bounded on the disc by its distance from i and -i."""
+    return d * d * (abs(m) + d) / clear(ops, ops.of("hypot")(m, 1.0), d) ** 4
 
 
 def _half_circle(x: Term) -> Term:
@@ -38,6 +49,13 @@ sin = register(
         arity=1,
         numpy="sin",
         mpmath="sin",
+        scalar="math.sin",
+        decimal="sin",
+        topic="Angles",
+        image=(-1.0, 1.0),
+        parity=-1,
+        interval=wave(0.0),
+        remainder=waves("sin", "cos"),
         doc="The sine of an angle in radians.",
         partials=lambda x: (prim("cos", x),),
         domain=((-1e3, 1e3),),
@@ -53,6 +71,14 @@ cos = register(
         arity=1,
         numpy="cos",
         mpmath="cos",
+        formula=lambda x: prim("sin", add(x, HALF_PI)),
+        scalar="math.cos",
+        topic="Angles",
+        image=(-1.0, 1.0),
+        parity=1,
+        values=((0.0, 1.0),),
+        interval=wave(math.pi / 2),
+        remainder=waves("cos", "sin"),
         doc="The cosine of an angle in radians.",
         partials=lambda x: (neg(prim("sin", x)),),
         domain=((-1e3, 1e3),),
@@ -68,6 +94,13 @@ tan = register(
         arity=1,
         numpy="tan",
         mpmath="tan",
+        formula=lambda x: div(prim("sin", x), prim("cos", x)),
+        scalar="math.tan",
+        topic="Angles",
+        broken=True,
+        roots=(0.0,),
+        parity=-1,
+        interval=tangent,
         doc="The tangent of an angle in radians.",
         partials=lambda x: (div(ONE, mul(prim("cos", x), prim("cos", x))),),
         domain=((-1.57, 1.57),),
@@ -84,6 +117,13 @@ asin = register(
         arity=1,
         numpy="arcsin",
         mpmath="asin",
+        scalar="math.asin",
+        decimal="asin",
+        topic="Angles",
+        within=(-1.0, 1.0),
+        roots=(0.0,),
+        parity=-1,
+        remainder=rising("asin", _asin_slope),
         doc="The angle between -pi/2 and pi/2 with a given sine.",
         partials=lambda x: (div(ONE, _half_circle(x)),),
         domain=((-1.0, 1.0),),
@@ -100,6 +140,13 @@ acos = register(
         arity=1,
         numpy="arccos",
         mpmath="acos",
+        formula=lambda x: sub(HALF_PI, prim("asin", x)),
+        scalar="math.acos",
+        topic="Angles",
+        image=(0.0, math.inf),
+        within=(-1.0, 1.0),
+        roots=(1.0,),
+        remainder=rising("asin", _asin_slope),
         doc="The angle between 0 and pi with a given cosine.",
         partials=lambda x: (neg(div(ONE, _half_circle(x))),),
         domain=((-1.0, 1.0),),
@@ -116,6 +163,13 @@ atan = register(
         arity=1,
         numpy="arctan",
         mpmath="atan",
+        scalar="math.atan",
+        decimal="atan",
+        topic="Angles",
+        centered=True,
+        roots=(0.0,),
+        parity=-1,
+        remainder=_atan_remainder,
         doc="The angle between -pi/2 and pi/2 with a given tangent.",
         partials=lambda x: (div(ONE, add(ONE, mul(x, x))),),
         domain=((-1e6, 1e6),),
@@ -131,6 +185,12 @@ atan2 = register(
         arity=2,
         numpy="arctan2",
         mpmath="atan2",
+        lacks=frozenset({"discs"}),
+        scalar="math.atan2",
+        decimal="atan2",
+        topic="Angles",
+        broken=True,
+        interval=angle,
         doc="The angle of the point (x, y), between -pi and pi. Its arguments are y, then x.",
         partials=_angle_partials,
         domain=((-1e3, 1e3), (-1e3, 1e3)),
@@ -145,6 +205,12 @@ hypot = register(
         arity=2,
         numpy="hypot",
         mpmath="hypot",
+        formula=lambda x, y: prim("sqrt", add(mul(x, x), mul(y, y))),
+        scalar="math.hypot",
+        topic="Angles",
+        image=(0.0, math.inf),
+        roots=(0.0,),
+        interval=length,
         doc="The length of (x, y), that is sqrt(x^2 + y^2), without overflow.",
         partials=lambda x, y: (_over_length(x, x, y), _over_length(y, x, y)),
         domain=((-1e150, 1e150), (-1e150, 1e150)),

@@ -34,6 +34,12 @@ def test_the_page_is_what_the_tables_say() -> None:
     assert (DOCS / "builtins.md").read_text(encoding="utf-8") == generator().page()
 
 
+def test_the_grammars_have_the_builtins_of_the_tables() -> None:
+    """If this fails: python docs/write_builtins.py."""
+    for path, text in generator().grammars().items():
+        assert path.read_text(encoding="utf-8") == text
+
+
 def test_the_page_has_every_builtin() -> None:
     page = (DOCS / "builtins.md").read_text(encoding="utf-8")
     for entry in PRIMITIVES.values():

@@ -1,4 +1,4 @@
-"""Double-precision values of terms made of builtins, by the functions that the registry names."""
+"""Double-precision values of terms made of builtins, by their numeric forms."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from potto.core.terms import Branch, Const, If, Term, Var, postorder
-from potto.kernels.support import function
-from potto.primitives import PRIMITIVES
+from potto.kernels.support import ARRAYS
 
 EPS = 2.0**-52
 
@@ -34,13 +33,6 @@ def double(term: Term, env: Mapping[str, float]) -> float:
 
 
 def builtin(op: str, *args: float) -> float:
-    """A builtin by its numpy name; those of any number of arguments folded from the left."""
-    entry = PRIMITIVES[op]
-    f = function(entry.numpy)
+    """The numeric form of a builtin."""
     with np.errstate(all="ignore"):
-        if entry.arity is None:
-            result = args[0]
-            for arg in args[1:]:
-                result = f(result, arg)
-            return float(result)
-        return f(*(np.float64(a) for a in args))
+        return float(ARRAYS.function(op)(*(np.float64(a) for a in args)))

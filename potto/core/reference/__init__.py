@@ -5,16 +5,11 @@ quadrature between the points where the integrand decides differently, derivativ
 tests and checks import it; mpmath is an optional dependency.
 """
 
-from potto.core.reference.functions import FUNCTIONS, clamp, erfcinv, function, maximum, minimum
+from potto.core.reference.functions import function
 from potto.core.reference.walk import NotAccurate, evaluate
 
 __all__ = [
-    "FUNCTIONS",
     "NotAccurate",
-    "clamp",
-    "erfcinv",
     "evaluate",
     "function",
-    "maximum",
-    "minimum",
 ]

@@ -1,18 +1,25 @@
 """The builtins on mpmath numbers.
 
-Owns `FUNCTIONS`: what each builtin gives, real or nan, infinite where IEEE arithmetic is. Written apart from the
-registry, which names numpy's functions, so that a slip in one of them shows.
+Owns `function`, which finds what an entry names: a function of mpmath, or one of those below, which mpmath lacks or
+takes for complex numbers. They share no code with numpy's, so that a slip in one of them shows.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 import mpmath
 from mpmath import mp
 
+from potto.core.terms import Const
+from potto.primitives import PRIMITIVES
+from potto.primitives.registry import Primitive
+from potto.primitives.walking import Domain
+
 Number = Any  # an mpmath number; mpmath has no types
+_TAKES_ANYTHING = frozenset({"add", "mul", "neg", "div", "abs"})  # of nan they make nan by themselves
 
 
 def real(value: Number) -> Number:
@@ -22,9 +29,11 @@ def real(value: Number) -> Number:
     return mp.mpf(value)
 
 
-def _real(f: Callable[..., Number]) -> Callable[..., Number]:
+def _real(f: Callable[..., Number], within: tuple[float, float]) -> Callable[..., Number]:
+    """nan for nan, outside of where a builtin of one argument is defined, and for what is not real."""
+
     def run(*args: Number) -> Number:
-        if any(mp.isnan(a) for a in args):
+        if any(mp.isnan(a) for a in args) or (len(args) == 1 and not within[0] <= args[0] <= within[1]):
             return mp.nan
         try:
             return real(f(*args))
@@ -81,51 +90,70 @@ def product(*args: Number) -> Number:
     return result
 
 
-FUNCTIONS: dict[str, Callable[..., Any]] = {
-    "add": lambda *args: sum(args, mp.mpf(0)),
-    "mul": product,
-    "neg": lambda x: -x,
-    "div": divide,
-    "pow": _real(power),
-    "sqrt": _real(mp.sqrt),
-    "exp": _real(mp.exp),
-    "log": _real(mp.log),
-    "log1p": _real(lambda x: mp.log1p(x) if x > -1 else mp.log(1 + x)),
-    "expm1": _real(mp.expm1),
-    "sin": _real(mp.sin),
-    "cos": _real(mp.cos),
-    "tan": _real(mp.tan),
-    "asin": _real(mp.asin),
-    "acos": _real(mp.acos),
-    "atan": _real(mp.atan),
-    "atan2": _real(mp.atan2),
-    "hypot": _real(mp.hypot),
-    "sinh": _real(mp.sinh),
-    "cosh": _real(mp.cosh),
-    "tanh": _real(mp.tanh),
-    "asinh": _real(mp.asinh),
-    "acosh": _real(mp.acosh),
-    "atanh": _real(mp.atanh),
-    "erf": _real(mp.erf),
-    "erfc": _real(mp.erfc),
-    "erfinv": _real(mp.erfinv),
-    "erfcinv": _real(erfcinv),
-    "abs": abs,
-    "min": minimum,
-    "max": maximum,
-    "clamp": clamp,
-    "sign": _real(mp.sign),
-    "floor": _real(mp.floor),
-    "ceil": _real(mp.ceil),
-    "lt": lambda a, b: bool(a < b),
-    "le": lambda a, b: bool(a <= b),
-    "eq": lambda a, b: bool(a == b),
-    "ne": lambda a, b: bool(a != b),
-    "and": lambda *args: all(args),
-    "or": lambda *args: any(args),
-    "not": lambda a: not a,
-}
+def total(*args: Number) -> Number:
+    return sum(args, mp.mpf(0))
 
 
+def negative(x: Number) -> Number:
+    return -x
+
+
+def magnitude(x: Number) -> Number:
+    return abs(x)
+
+
+def log1p(x: Number) -> Number:
+    return mp.log1p(x) if x > -1 else mp.log(1 + x)
+
+
+def less(a: Number, b: Number) -> bool:
+    return bool(a < b)
+
+
+def less_equal(a: Number, b: Number) -> bool:
+    return bool(a <= b)
+
+
+def equal(a: Number, b: Number) -> bool:
+    return bool(a == b)
+
+
+def not_equal(a: Number, b: Number) -> bool:
+    return bool(a != b)
+
+
+def logical_and(*parts: bool) -> bool:
+    return all(parts)
+
+
+def logical_or(*parts: bool) -> bool:
+    return any(parts)
+
+
+def logical_not(part: bool) -> bool:
+    return not part
+
+
+class _Exact(Domain[Number]):
+    """The functions of mpmath that the entries of builtins name, and what these make of formulas."""
+
+    def constant(self, node: Const) -> Number:
+        return +mp.pi if node.name == "pi" else mp.mpf(node.value)
+
+    def rule(self, entry: Primitive) -> Callable[..., Number] | None:
+        where, _, name = entry.mpmath.rpartition(".")
+        if not name:
+            return None
+        own = globals()[name] if where else getattr(mp, name)
+        return _real(own, entry.within) if not entry.truth and entry.name not in _TAKES_ANYTHING else own
+
+
+_EXACT = _Exact()
+
+
+@lru_cache(maxsize=256)
 def function(op: str) -> Callable[..., Any]:
-    return FUNCTIONS[op]
+    """What a builtin gives: real or nan, infinite where IEEE arithmetic is."""
+    if not _EXACT.knows(op):
+        raise KeyError(f"{op} has no rule for mpmath's numbers")
+    return _EXACT.rule(PRIMITIVES[op]) or (lambda *args: _EXACT.apply(op, args))

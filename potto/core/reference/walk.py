@@ -10,12 +10,13 @@ import contextlib
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 from mpmath import mp
 
 from potto.core.reference import differences, integrals
-from potto.core.reference.functions import FUNCTIONS
+from potto.core.reference.functions import function
 from potto.core.terms import (
     App,
     Branch,
@@ -34,7 +35,9 @@ from potto.core.terms import (
     Term,
     Tuple,
     Var,
+    var,
 )
+from potto.primitives import PRIMITIVES
 
 Value = Any  # an mpmath number, a tuple or list of values, a truth value, or a function of values
 Lookup = Callable[[str, str], Term]
@@ -164,11 +167,13 @@ class Oracle:
             self.trace.values.append(value)
 
     def builtin(self, term: Prim, env: Environment) -> Value:
-        run = self.decide if term.op in _KINKS else self.run
+        kinks = _kinks(term.op, len(term.args))
+        run = self.decide if kinks else self.run
         args = [run(arg, env) for arg in term.args]
-        result = FUNCTIONS[term.op](*args)
-        if self.trace is not None and term.op in _KINKS:
-            for margin in _KINKS[term.op](*args):
+        result = function(term.op)(*args)
+        if self.trace is not None:
+            for kink in kinks:
+                margin = self.decide(kink, dict(zip(_PLACES, args, strict=False)))
                 self.note(term, bool(margin >= 0), margin)
         return result
 
@@ -185,14 +190,13 @@ class Oracle:
         return plus(parts) if parts else mp.mpf(0)
 
 
-_KINKS: dict[str, Callable[..., list[Any]]] = {
-    "abs": lambda x: [x],
-    "min": lambda *args: [a - b for i, a in enumerate(args) for b in args[:i]],
-    "max": lambda *args: [a - b for i, a in enumerate(args) for b in args[:i]],
-    "clamp": lambda x, lo, hi: [x - lo, hi - x],
-    "hypot": lambda x, y: [x, y],
-    "atan2": lambda y, x: [y],
-}
+_PLACES = tuple(f"#{i}" for i in range(1000))
+
+
+@lru_cache(maxsize=256)
+def _kinks(op: str, arity: int) -> tuple[Term, ...]:
+    """The kinks of a builtin over places for its arguments."""
+    return PRIMITIVES[op].kinks(*map(var, _PLACES[:arity]))
 
 
 @dataclass(frozen=True)
