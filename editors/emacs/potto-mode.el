@@ -42,7 +42,7 @@
 
 (defconst potto--builtins
   '("abs" "acos" "asin" "atan" "atan2" "ceil" "clamp" "cos" "cosh" "erf" "erfc" "exp" "expm1" "floor" "hypot" "log"
-    "log1p" "max" "min" "pow" "sign" "sin" "sinh" "sqrt" "tan" "tanh" "fst" "snd" "print" "deriv" "delta"))
+    "log1p" "max" "min" "pow" "sech" "sign" "sin" "sinh" "sqrt" "tan" "tanh" "fst" "snd" "print" "deriv" "delta"))
 
 (defconst potto-font-lock-keywords
   `(("^\\s-*#>" 0 font-lock-doc-face t)

@@ -93,6 +93,28 @@ tanh = register(
     )
 )
 
+sech = register(
+    Primitive(
+        "sech",
+        arity=1,
+        formula=lambda x: div(ONE, prim("cosh", x)),
+        doc="The hyperbolic secant, 1/cosh(x).",
+        partials=lambda x: (neg(mul(prim("sech", x), prim("tanh", x))),),
+        domain=((-700.0, 700.0),),
+        mpmath="sech",
+        topic="Hyperbolic functions",
+        ulp=3.0,
+        centered=True,
+        turns=(0.0,),
+        roots=(),
+        parity=1,
+        values=((0.0, 1.0),),
+        image=(0.0, 1.0),
+        inverse=lambda y: _both_signs(prim("acosh", div(ONE, y))),
+        example="sech(1)",
+    )
+)
+
 asinh = register(
     Primitive(
         "asinh",
