@@ -114,12 +114,12 @@ def _guarded(f: Callable[..., float], entry: Primitive) -> Callable[..., float]:
     """nan for nan and where there is no value; infinite beyond all numbers."""
 
     def run(*args: float) -> float:
-        if any(x != x for x in args) or (len(args) == 1 and not entry.within[0] <= args[0] <= entry.within[1]):
+        if any(x != x for x in args) or not entry.within[0] <= args[-1] <= entry.within[1]:
             return NAN
         try:
             return float(f(*args))
         except OverflowError:
-            return math.copysign(math.inf, args[0]) if entry.parity < 0 else math.inf
+            return math.copysign(math.inf, args[-1]) if entry.parity < 0 else math.inf
         except (ValueError, ZeroDivisionError, ArithmeticError):
             return NAN
 

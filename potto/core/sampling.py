@@ -33,6 +33,11 @@ class _Digits(Domain[Decimal | bool]):
     def rule(self, entry: Primitive) -> Callable[..., Decimal | bool] | None:
         return getattr(decimals, entry.decimal) if entry.decimal else None
 
+    def other(self, node: Term, known: Mapping[Term, Decimal | bool]) -> Decimal | bool:
+        if not isinstance(node, If):
+            return self.unknown()
+        return known[node.then if known[node.condition] is True else node.orelse]
+
     def unknown(self) -> Decimal | bool:
         raise Undefined
 

@@ -162,17 +162,20 @@ DISCS = Discs(np.zeros((1, 1)))
 
 
 @lru_cache(maxsize=256)
-def _series(op: str) -> Callable[[Form], Form] | None:
+def _series(op: str) -> Callable[..., Form] | None:
     """A builtin by its value, its slope and the remainder of its series."""
     entry = PRIMITIVES[op]
     remainder = entry.remainder
     if remainder is None or entry.partials is None:
         return None
-    f, (slope,) = ARRAYS.function(op), entry.partials(var("x"))
+    names = tuple(f"#{i}" for i in range(entry.orders + 1))
+    f, slope = ARRAYS.function(op), entry.partials(*map(var, names))[-1]
 
-    def run(x: Form) -> Form:
-        (steep,) = ARRAYS.walk((slope,), {"x": x.m}, {})
-        return x.through(f(x.m), steep, remainder(OPS, x.m, x.spread))
+    def run(*args: Form) -> Form:
+        *orders, x = args
+        at = [order.m for order in orders]
+        (steep,) = ARRAYS.walk((slope,), dict(zip(names, (*at, x.m), strict=True)), {})
+        return x.through(f(*at, x.m), steep, remainder(OPS, *at, x.m, x.spread))
 
     return run
 

@@ -168,7 +168,7 @@ class Lines:
         if op == "div":
             return self.let(f"{self.ufunc('divide')}({a[0]}, {a[1]})")
         entry = PRIMITIVES[op]
-        if not entry.numpy:
+        if not entry.numpy and not entry.guarded:
             whole, names = formula_of(op, len(a))
             return self.smooth(whole, {n: self.plain(x) for n, x in zip(names, a, strict=True)}, {}).v
         name = "builtin." + op if entry.guarded else entry.numpy

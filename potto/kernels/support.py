@@ -65,7 +65,7 @@ class Arrays(Domain[Any]):
 
     def function(self, op: str) -> Callable[..., Any]:
         """The numeric form of a builtin."""
-        return _numeric(op) or (lambda *args: self.apply(op, args))
+        return _numeric(op) or _guarded(PRIMITIVES[op], lambda *args: self.apply(op, args))
 
 
 ARRAYS = Arrays()
@@ -80,10 +80,14 @@ def _numeric(op: str) -> Callable[..., Any] | None:
     own = function(entry.numpy)
     if entry.arity is None:
         return lambda *args: reduce(own, args)
+    return _guarded(entry, own)
+
+
+def _guarded(entry: Primitive, own: Callable[..., Any]) -> Callable[..., Any]:
     if not entry.guarded:
         return own
     least, most = entry.within
-    return lambda x: own(select((x >= least) & (x <= most), x, np.nan))
+    return lambda *args: own(*args[:-1], select((args[-1] >= least) & (args[-1] <= most), args[-1], np.nan))
 
 
 class _Ops:

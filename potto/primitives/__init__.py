@@ -4,15 +4,13 @@ Owns nothing itself: importing it registers every entry, file by file, in `PRIMI
 entry says.
 """
 
-from potto.primitives import (  # noqa: F401  (imported for their entries)
-    arithmetic,
-    elementary,
-    hyperbolic,
-    logic,
-    piecewise,
-    special,
-    trigonometric,
-)
+from importlib import import_module
+from pathlib import Path
+
 from potto.primitives.registry import EXACT, PRIMITIVES, UNDOES, Primitive, register
+
+for _file in sorted(Path(__file__).parent.glob("*.py")):
+    if _file.stem != "__init__":
+        import_module(f"{__name__}.{_file.stem}")
 
 __all__ = ["EXACT", "PRIMITIVES", "UNDOES", "Primitive", "register"]

@@ -43,6 +43,7 @@ class Primitive:
     arity: number of arguments; None for any number (add, mul, min, max take two or more).
     formula: what it is in terms of other builtins; every rule that an entry leaves out is that of the formula. With no
         numeric form it must be one that keeps its digits in doubles.
+    orders: how many of the first arguments are numbers that are written down: nothing is differentiated by them.
     domain: per argument an interval where it is defined and tests may sample: a promise.
     doc: one or two sentences for a person. example: an expression of Potto that a doc page shows, with its value.
     topic: the section of the page of builtins.
@@ -69,7 +70,7 @@ class Primitive:
     broken: whether it may have a pole, or jump by itself.
     centered: whether it changes mostly where its argument is near 0.
 
-    Shape, of builtins of one argument:
+    Shape, of builtins of one argument beside orders:
     within: the interval on which it is defined. image: an interval that holds its values (of any number of arguments).
     increasing: +1 strictly increasing on its domain, -1 decreasing, 0 neither.
     turns: where it turns from rising to falling or back, all of them; None if there are many, or they are not known.
@@ -85,8 +86,8 @@ class Primitive:
     Enclosures:
     interval: bounds of its values for arguments within bounds, given the arithmetic and the bounds of each argument;
         a third item says where there is no value. What has `turns` needs none. Rounding is the walker's business.
-    remainder: given the arithmetic, m and d: what f(z) has at most beyond f(m) + f'(m) (z - m) in the disc |z - m| <= d
-        of the complex plane; nan where it is not analytic there.
+    remainder: given the arithmetic, the orders, m and d: what f(z) has at most beyond f(m) + f'(m) (z - m) in the disc
+        |z - m| <= d of the complex plane; nan where it is not analytic there.
     """
 
     name: str
@@ -96,6 +97,7 @@ class Primitive:
     formula: Callable[..., Term] | None = None
     example: str = ""
     topic: str = ""
+    orders: int = 0
     lacks: frozenset[str] = frozenset()
     plain: bool = False
     surface: bool = True
@@ -127,7 +129,7 @@ class Primitive:
     period: Callable[[Term], tuple[Term, Terms]] | None = None
 
     interval: Callable[..., tuple[Any, ...]] | None = None
-    remainder: Callable[[Elementwise, Any, Any], Any] | None = None
+    remainder: Callable[..., Any] | None = None
 
     def places(self, *args: Any) -> Any:
         """What the numeric form may be off at some arguments, in units of half a last place."""

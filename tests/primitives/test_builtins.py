@@ -41,7 +41,9 @@ def numbers(lo: float, hi: float) -> st.SearchStrategy[float]:
 
 
 def points(primitive: Primitive) -> st.SearchStrategy[tuple[float, ...]]:
-    return st.tuples(*(numbers(lo, hi) for lo, hi in domains(primitive)))
+    return st.tuples(*(numbers(lo, hi) for lo, hi in domains(primitive))).map(
+        lambda point: (*(round(2 * x) / 2 for x in point[: primitive.orders]), *point[primitive.orders :])
+    )
 
 
 def names(primitive: Primitive) -> list[str]:
@@ -98,7 +100,7 @@ def test_partials_agree_with_mpmath(primitive: Primitive, data: st.DataObject) -
     assume(regular(primitive, point))
     env = dict(zip(names(primitive), point))
     formulas = primitive.partials(*map(var, names(primitive)))  # type: ignore[misc]
-    for i, formula in enumerate(formulas):
+    for i, formula in list(enumerate(formulas))[primitive.orders :]:
         with mp.workdps(110):
             wanted = slope(primitive, point, i)
         found = evaluate(formula, env, digits=40)
@@ -125,9 +127,9 @@ def test_partials_keep_their_digits_in_doubles(primitive: Primitive, data: st.Da
     assume(regular(primitive, point))
     holders = names(primitive)
     env = dict(zip(holders, point))
-    for formula in primitive.partials(*map(var, holders)):  # type: ignore[misc]
+    for formula in primitive.partials(*map(var, holders))[primitive.orders :]:  # type: ignore[misc]
         wanted = evaluate(formula, env, digits=40)
-        changes = (abs(evaluate(partial(formula, n), env, digits=40) * env[n]) for n in holders)
+        changes = (abs(evaluate(partial(formula, n), env, digits=40) * env[n]) for n in holders[primitive.orders :])
         allowed = (400 if primitive.name in ("erfinv", "erfcinv") else 16) * EPS * (
             abs(wanted) + sum(changes, mp.mpf(0))
         ) + mp.mpf("1e-300")

@@ -33,7 +33,7 @@ def _real(f: Callable[..., Number], within: tuple[float, float]) -> Callable[...
     """nan for nan, outside of where a builtin of one argument is defined, and for what is not real."""
 
     def run(*args: Number) -> Number:
-        if any(mp.isnan(a) for a in args) or (len(args) == 1 and not within[0] <= args[0] <= within[1]):
+        if any(mp.isnan(a) for a in args) or not within[0] <= args[-1] <= within[1]:
             return mp.nan
         try:
             return real(f(*args))
