@@ -115,3 +115,30 @@ digamma = register(
         example="digamma(1)",
     )
 )
+
+
+lgamma = register(
+    Primitive(
+        "lgamma",
+        arity=1,
+        numpy="special.gammaln",
+        mpmath="loggamma",
+        scalar="math.lgamma",
+        lacks=frozenset({"digits"}),
+        ulp=8.0,
+        off=4e-16,  # it is 0 at 1 and at 2
+        guarded=True,
+        doc="The logarithm of the gamma function, of positive numbers.",
+        topic=TOPIC,
+        partials=lambda x: (prim("digamma", x),),
+        domain=((1e-300, 1e12),),
+        edges=lambda x: (x,),
+        broken=True,
+        within=POSITIVE,
+        image=(-0.1215, math.inf),
+        turns=(LOWEST,),
+        roots=(1.0, 2.0),
+        remainder=lambda ops, m, d: 0.5 * d * d * ops.of("hurwitz")(2.0, clear(ops, m, d)),
+        example="lgamma(100)",
+    )
+)
