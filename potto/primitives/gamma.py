@@ -142,3 +142,26 @@ lgamma = register(
         example="lgamma(100)",
     )
 )
+
+
+trigamma = register(
+    Primitive(
+        "trigamma",
+        arity=1,
+        formula=lambda x: prim("hurwitz", TWO, x),
+        lacks=frozenset({"digits"}),
+        ulp=8.0,
+        guarded=True,
+        doc="The derivative of digamma, of positive numbers.",
+        topic=TOPIC,
+        partials=lambda x: (mul(neg(TWO), prim("hurwitz", const(3.0), x)),),
+        domain=((1e-100, 1e12),),
+        edges=lambda x: (x,),
+        broken=True,
+        within=POSITIVE,
+        increasing=-1,
+        roots=(),
+        image=POSITIVE,
+        example="trigamma(1)",
+    )
+)
