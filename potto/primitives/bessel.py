@@ -89,6 +89,29 @@ hyp0f1 = register(
     )
 )
 
+besselj0 = register(
+    Primitive(
+        "besselj0",
+        arity=1,
+        formula=lambda x: _series(1.0, x),
+        numpy="special.j0",
+        lacks=frozenset({"digits"}),
+        ulp=4.0,
+        off=4e-16,
+        doc="The Bessel function of the first kind of order 0.",
+        topic=TOPIC,
+        partials=lambda x: (neg(prim("besselj1", x)),),
+        domain=((-200.0, 200.0),),
+        parity=1,
+        values=((0.0, 1.0),),
+        image=(-0.403, 1.0),
+        interval=_tangent_bounds("besselj0", lambda ops, x: ops.of("besselj1")(x), 0.25, _root_fall),
+        remainder=lambda ops, m, d: 0.5 * exponential(ops, d),
+        example="besselj0(1)",
+    )
+)
+
+
 def _sinc_slope(ops: Elementwise, x: Any) -> Any:
     return -x / 3 * ops.of("hyp0f1")(2.5, -0.25 * x * x)
 
