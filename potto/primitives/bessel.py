@@ -135,3 +135,33 @@ sinc = register(
         example="sinc(1)",
     )
 )
+
+
+def _order_two(x: Term) -> Term:
+    return mul(div(mul(x, x), const(8.0)), _series(3.0, x))
+
+
+def _slope_of_one(ops: Elementwise, x: Any) -> Any:
+    return 0.5 * (ops.of("besselj0")(x) - x * x / 8 * ops.of("hyp0f1")(3.0, -0.25 * x * x))
+
+
+besselj1 = register(
+    Primitive(
+        "besselj1",
+        arity=1,
+        formula=lambda x: mul(div(x, TWO), _series(2.0, x)),
+        numpy="special.j1",
+        lacks=frozenset({"digits"}),
+        ulp=4.0,
+        off=4e-16,
+        doc="The Bessel function of the first kind of order 1.",
+        topic=TOPIC,
+        partials=lambda x: (div(sub(prim("besselj0", x), _order_two(x)), TWO),),
+        domain=((-200.0, 200.0),),
+        parity=-1,
+        image=(-0.582, 0.582),
+        interval=_tangent_bounds("besselj1", _slope_of_one, 0.25, _root_fall),
+        remainder=lambda ops, m, d: 0.5 * exponential(ops, d),
+        example="besselj1(1)",
+    )
+)
