@@ -41,9 +41,9 @@
   '("and" "as" "def" "diffeo" "else" "for" "from" "if" "import" "in" "integral" "let" "not" "or" "sum" "then"))
 
 (defconst potto--builtins
-  '("abs" "acos" "asin" "atan" "atan2" "besselj0" "besselj1" "ceil" "clamp" "cos" "cosh" "digamma" "erf" "erfc" "exp"
-    "expm1" "floor" "gamma" "hypot" "lgamma" "log" "log1p" "max" "min" "pow" "sech" "sign" "sin" "sinc" "sinh" "sqrt"
-    "tan" "tanh" "trigamma" "fst" "snd" "print" "deriv" "delta"))
+  '("abs" "acos" "asin" "atan" "atan2" "besselj0" "besselj1" "ceil" "clamp" "cos" "cosh" "digamma" "erf" "erfc"
+    "erfinv" "exp" "expm1" "floor" "gamma" "hypot" "lgamma" "log" "log1p" "max" "min" "pow" "sech" "sign" "sin" "sinc"
+    "sinh" "sqrt" "tan" "tanh" "trigamma" "fst" "snd" "print" "deriv" "delta"))
 
 (defconst potto-font-lock-keywords
   `(("^\\s-*#>" 0 font-lock-doc-face t)

@@ -97,13 +97,13 @@ erfinv = register(
         roots=(0.0,),
         parity=-1,
         remainder=_erfinv_remainder,
-        surface=False,
+        topic="The error function",
         doc="The inverse of erf, of numbers between -1 and 1.",
         partials=lambda y: (_inverse_slope("erfinv", y),),
         domain=((-0.999, 0.999),),
         inverse=lambda x: (prim("erf", x),),
         increasing=1,
-        example="erf(0.5)",
+        example="erfinv(0.5)",
     )
 )
 

@@ -25,8 +25,8 @@ syntax match pottoFunction "\K\k*" contained
 syntax match pottoFunction "^\K\k*\ze\s*=\s*\(\\\|λ\|deriv\>\)"
 syntax keyword pottoConstant pi inf
 syntax keyword pottoCalculus deriv delta
-syntax keyword pottoBuiltin abs acos asin atan atan2 besselj0 besselj1 ceil clamp cos cosh digamma erf erfc exp expm1
-syntax keyword pottoBuiltin floor gamma hypot lgamma log log1p max min pow sech sign sin sinc sinh sqrt tan tanh
+syntax keyword pottoBuiltin abs acos asin atan atan2 besselj0 besselj1 ceil clamp cos cosh digamma erf erfc erfinv exp
+syntax keyword pottoBuiltin expm1 floor gamma hypot lgamma log log1p max min pow sech sign sin sinc sinh sqrt tan tanh
 syntax keyword pottoBuiltin trigamma fst snd print
 syntax match pottoMeasure "\(\~\s*\)\@<=\K\k*"
 syntax keyword pottoType Real Dist Diffeo
