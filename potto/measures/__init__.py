@@ -3,7 +3,7 @@
 Owns nothing itself: importing it registers every entry in `MEASURES`. See `registry` for what an entry says.
 """
 
-from potto.measures import bounded, unbounded  # noqa: F401  (imported for their entries)
+from potto.measures import bounded, shaped, unbounded  # noqa: F401  (imported for their entries)
 from potto.measures.registry import MEASURES, Measure, register
 
 __all__ = ["MEASURES", "Measure", "register"]

@@ -101,6 +101,11 @@ def _log_density(x: Term, m: Term, s: Term) -> Term:
     return div(bell, mul(x, s, prim("sqrt", mul(TWO, PI))))
 
 
+def _log_cdf(x: Term, m: Term, s: Term) -> Term:
+    assert normal.cdf is not None
+    return normal.cdf(prim("log", x), m, s)
+
+
 def _log_quantile(u: Term, m: Term, s: Term) -> Term:
     assert normal.quantile is not None
     return prim("exp", normal.quantile(u, m, s))
@@ -112,7 +117,7 @@ lognormal = register(
         parameters=("m", "s"),
         support=lambda m, s: (ZERO, INF),
         density=_log_density,
-        cdf=lambda x, m, s: normal.cdf(prim("log", x), m, s),
+        cdf=_log_cdf,
         quantile=_log_quantile,
         mean=lambda m, s: prim("exp", add(m, div(mul(s, s), TWO))),
         variance=lambda m, s: mul(prim("expm1", mul(s, s)), prim("exp", add(mul(TWO, m), mul(s, s)))),

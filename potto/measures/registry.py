@@ -30,8 +30,8 @@ class Measure:
     density: over the variable and the parameters, inside of the support; it integrates to 1.
     hints: points between which the density is smooth and not too steep; the integrator cuts there, nothing else
         depends on them. In ascending order.
-    cdf: the integral of the density up to x.
-    quantile: the inverse of the cdf, for sampling.
+    cdf: the integral of the density up to x; None if it is no formula of builtins.
+    quantile: the inverse of the cdf; None if it is no formula of builtins.
     mean, variance: None where they do not exist.
     valid: conditions that the parameters must meet.
     domain: per parameter an interval in which tests may sample it; they discard what is not valid.
@@ -41,8 +41,6 @@ class Measure:
     parameters: tuple[str, ...]
     support: Callable[..., tuple[Term, Term]]
     density: Callable[..., Term]
-    cdf: Callable[..., Term]
-    quantile: Callable[..., Term] | None
     mean: Callable[..., Term] | None
     variance: Callable[..., Term] | None
     valid: Callable[..., tuple[Condition, ...]]
@@ -50,6 +48,8 @@ class Measure:
     doc: str
     example: str
     hints: Callable[..., Terms] = field(default=_none)
+    cdf: Callable[..., Term] | None = None
+    quantile: Callable[..., Term] | None = None
 
 
 MEASURES: dict[str, Measure] = {}

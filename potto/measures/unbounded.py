@@ -53,8 +53,8 @@ normal = register(
 
 
 def _logistic_density(x: Term, m: Term, s: Term) -> Term:
-    half = prim("cosh", div(_standard(x, m, s), TWO))
-    return div(div(div(HALF, half), half), mul(TWO, s))
+    half = prim("sech", div(_standard(x, m, s), TWO))  # whose derivative is a number also far away
+    return div(mul(half, half), mul(const(4.0), s))
 
 
 logistic = register(

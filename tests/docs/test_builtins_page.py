@@ -43,7 +43,7 @@ def test_the_grammars_have_the_builtins_of_the_tables() -> None:
 def test_the_page_has_every_builtin() -> None:
     page = (DOCS / "builtins.md").read_text(encoding="utf-8")
     for entry in PRIMITIVES.values():
-        assert (f"| `{entry.name}(" in page) == entry.surface
+        assert (f"\n| `{entry.name}(" in page) == entry.surface
 
 
 @pytest.mark.parametrize("entry", ENTRIES, ids=lambda e: e.name)

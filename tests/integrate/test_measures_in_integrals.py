@@ -1,0 +1,98 @@
+"""Expectations of measures whose shape is a parameter, with jumps in what is expected: against mpmath's distributions.
+
+Derivatives by every parameter and by the place of the jump, by differences of the closed forms at 40 digits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from mpmath import mp
+
+import potto
+
+Cdf = Callable[..., mp.mpf]
+
+
+def beta(t: mp.mpf, a: mp.mpf, b: mp.mpf) -> mp.mpf:
+    return mp.betainc(a, b, 0, t, regularized=True)
+
+
+def gamma(t: mp.mpf, a: mp.mpf, r: mp.mpf) -> mp.mpf:
+    return mp.gammainc(a, 0, r * t, regularized=True)
+
+
+def student(t: mp.mpf, n: mp.mpf, m: mp.mpf, s: mp.mpf) -> mp.mpf:
+    z = (t - m) / s
+    tail = mp.betainc(n / 2, mp.mpf(1) / 2, 0, n / (n + z * z), regularized=True) / 2
+    return tail if z < 0 else 1 - tail
+
+
+def cauchy(t: mp.mpf, m: mp.mpf, s: mp.mpf) -> mp.mpf:
+    return mp.atan((t - m) / s) / mp.pi + mp.mpf(1) / 2
+
+
+def logistic(t: mp.mpf, m: mp.mpf, s: mp.mpf) -> mp.mpf:
+    return 1 / (1 + mp.exp((m - t) / s))
+
+
+def lognormal(t: mp.mpf, m: mp.mpf, s: mp.mpf) -> mp.mpf:
+    return mp.ncdf((mp.log(t) - m) / s)
+
+
+CASES: list[tuple[str, tuple[str, ...], Cdf, tuple[float, ...]]] = [
+    ("beta(a, b)", ("a", "b"), beta, (0.4, 2.5, 3.0)),
+    ("beta(a, b)", ("a", "b"), beta, (0.85, 6.0, 1.5)),
+    ("beta(a, b)", ("a", "b"), beta, (0.1, 1.0, 1.0)),
+    ("beta(a, b)", ("a", "b"), beta, (0.3, 0.6, 0.7)),
+    ("gamma(a, r)", ("a", "r"), gamma, (1.7, 2.5, 1.5)),
+    ("gamma(a, r)", ("a", "r"), gamma, (95.0, 200.0, 2.0)),
+    ("gamma(a, r)", ("a", "r"), gamma, (0.2, 0.7, 0.5)),
+    ("student_t(n, m, s)", ("n", "m", "s"), student, (0.7, 3.0, 0.2, 1.5)),
+    ("student_t(n, m, s)", ("n", "m", "s"), student, (-2.5, 1.5, 0.0, 0.7)),
+    ("cauchy(m, s)", ("m", "s"), cauchy, (0.7, 0.2, 1.5)),
+    ("logistic(m, s)", ("m", "s"), logistic, (0.7, 0.2, 1.5)),
+    ("lognormal(m, s)", ("m", "s"), lognormal, (1.7, 0.2, 0.6)),
+]
+
+
+def program(measure: str, names: tuple[str, ...]) -> potto.Module:
+    """The chance of what is below t, and its derivative by each parameter."""
+    every = ("t", *names)
+    lines = [f"def f({', '.join(every)}) integral (x ~ {measure}) [x < t] d(x)"]
+    for name in every:
+        moved = ", ".join(f"({n}, {int(n == name)})" for n in every)
+        lines.append(f"def d_{name}({', '.join(every)}) snd(deriv(f)({moved}))")
+    return potto.compile("\n".join(lines) + "\n")
+
+
+@pytest.mark.parametrize(("measure", "names", "cdf", "values"), CASES)
+def test_by_quadrature(measure: str, names: tuple[str, ...], cdf: Cdf, values: tuple[float, ...]) -> None:
+    module = program(measure, names)
+    with mp.workdps(40):
+        exact = [mp.mpf(v) for v in values]
+        check(module.f(*values), cdf(*exact))
+        for place, name in enumerate(("t", *names)):
+            order = tuple(int(i == place) for i in range(len(values)))
+            check(getattr(module, f"d_{name}")(*values), mp.diff(cdf, tuple(exact), order), 1e-8)
+
+
+def check(found: potto.Estimate, wanted: mp.mpf, rel: float = 1e-9) -> None:
+    off = abs(mp.mpf(float(found)) - wanted)
+    assert off <= found.error + 1e-14 * max(1, abs(wanted)), (found, wanted)
+    assert off <= rel * max(1, abs(wanted)), (found, wanted)
+
+
+@pytest.mark.parametrize("method", ["mc", "qmc"])
+@pytest.mark.parametrize(("measure", "names", "cdf", "values"), [c for c in CASES if c[3][1] != 200.0])
+def test_by_samples(measure: str, names: tuple[str, ...], cdf: Cdf, values: tuple[float, ...], method: str) -> None:
+    module = program(measure, names)
+    with mp.workdps(40), potto.settings(method=method, samples=20_000, seed=11):
+        exact = [mp.mpf(v) for v in values]
+        found = module.f(*values)
+        assert abs(mp.mpf(float(found)) - cdf(*exact)) <= 5 * found.error + 1e-9
+        for place, name in enumerate(("t", *names)):
+            order = tuple(int(i == place) for i in range(len(values)))
+            moved = getattr(module, f"d_{name}")(*values)
+            assert abs(mp.mpf(float(moved)) - mp.diff(cdf, tuple(exact), order)) <= 5 * moved.error + 1e-9
