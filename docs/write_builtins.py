@@ -15,7 +15,7 @@ from potto.core.reference import evaluate
 from potto.core.simplify import simplify
 from potto.core.terms import Term, var
 from potto.elaborate import elaborate_expression
-from potto.measures import MEASURES, Measure
+from potto.measures import COMPOSITIONS, MEASURES, Measure
 from potto.primitives import PRIMITIVES, Primitive
 from potto.query import Database
 from potto.syntax import parse_expression
@@ -47,6 +47,7 @@ def page() -> str:
     for title, names in sections().items():
         parts.append(f"## {title}\n\n" + (f"{NOTES[title]}\n\n" if title in NOTES else "") + builtin_table(names))
     parts.append(MEASURE_INTRODUCTION + measure_table())
+    parts.append(COMPOSITION_INTRODUCTION + composition_table())
     return "\n".join(parts)
 
 
@@ -126,6 +127,23 @@ MEASURE_INTRODUCTION = """## Measures
 `integral (x ~ normal(m, s)) body d(x)` is the expectation of the body where x has that distribution.
 
 """
+
+
+COMPOSITION_INTRODUCTION = """## Measures made of measures
+
+They take measures where these say so, and numbers elsewhere. Truncating divides by the integral of the density between
+the bounds, which keeps its digits also far out; a mixture is worked out as the sum of its components, so that each
+keeps its own support.
+
+"""
+
+
+def composition_table() -> str:
+    rows = ["| measure | what | example | value |", "|---|---|---|---|"]
+    for entry in COMPOSITIONS.values():
+        call = code(f"{entry.name}({', '.join(entry.parameters)})")
+        rows.append(f"| {' | '.join((call, entry.doc, *shown(entry.example)))} |")
+    return "\n".join(rows) + "\n"
 
 
 def measure_table() -> str:

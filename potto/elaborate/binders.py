@@ -1,12 +1,16 @@
 """Binders of numbers: integrals, expectations and sums.
 
 The first variable of an integral is the outermost, and a bound sees the variables before its own. A measure gives the
-bounds of its variable, its density as a factor, and hints where that is concentrated.
+bounds of its variable, its density as a factor, and hints where that is concentrated; where it is a sum of parts, so is
+the integral.
 """
 
 from __future__ import annotations
 
+from itertools import product
+
 from potto.core.terms import (
+    ONE,
     App,
     Branch,
     Const,
@@ -16,6 +20,7 @@ from potto.core.terms import (
     Sum,
     Term,
     Tuple,
+    add,
     branch,
     hole,
     if_,
@@ -29,7 +34,7 @@ from potto.core.terms import integral as integral_term
 from potto.elaborate.context import Elaboration, rule
 from potto.elaborate.signatures import dims_of_term
 from potto.elaborate.values import Scope, Value
-from potto.measures import MEASURES
+from potto.measures.composed import Part, parts_of, problem
 from potto.syntax import nodes
 
 
@@ -38,33 +43,52 @@ def _integral(elaboration: Elaboration, node: nodes.Integral, scope: Scope) -> V
     if len(node.bounds) != len(node.variables) or not node.variables:
         return hole("this integral has not as many bounds as variables of integration")
     names: list[str] = []
-    bounds: list[tuple[Term, Term]] = []
-    hints: list[tuple[Term, ...]] = []
-    densities: list[Term] = []
-    guards: list[tuple[Term, str]] = []
+    choices: list[tuple[Part, ...]] = []  # of each variable, what its measure is the sum of
     for bound, variable in zip(node.bounds, node.variables):
         before = scope
         name, scope = elaboration.bind_number(variable.name, scope)
         if isinstance(bound, nodes.Interval):
-            bounds.append((elaboration.term(bound.lo, before), elaboration.term(bound.hi, before)))
-            hints.append(())
+            ends = elaboration.term(bound.lo, before), elaboration.term(bound.hi, before)
+            choices.append((Part(ONE, ends, (), lambda _: ONE, ()),))
         else:
-            measure, parameters = MEASURES.get(bound.measure), elaboration.terms(bound.arguments, before)
-            if measure is None or len(parameters) != len(measure.parameters):
-                return hole(f"`{bound.measure}` is not a measure of {len(parameters)} parameters")
-            bounds.append(measure.support(*parameters))
-            hints.append(measure.hints(*parameters))
-            densities.append(measure.density(var(name), *parameters))
-            guards += [(valid, f"{bound.measure}: {why}") for valid, why in measure.valid(*parameters)]
+            if problem(bound.shape) is not None:
+                return hole(f"`{bound.measure}` is not a measure of {len(bound.arguments)} parameters")
+            choices.append(parts_of(bound.shape, elaboration.terms(bound.arguments, before)))
         names.append(name)
     body = elaboration.term(node.body, scope)
-    if densities:
-        body = scaled(elaboration, mul(*densities), body)
-    made = elaboration.note(integral_term(tuple(names), tuple(bounds), body, tuple(hints)), node.span)
-    for valid, why in reversed(guards):
+    made = [_integral_over(elaboration, node, tuple(names), parts, body) for parts in product(*choices)]
+    whole = _summed(elaboration, made)
+    every = [guard for parts in choices for part in parts for guard in part.valid]
+    guards = dict.fromkeys(reversed(every))
+    for valid, why in guards:
         if not valid.free & set(names) and not _holds(valid):  # a plain condition cannot vary inside the integral
-            made = if_(valid, made, hole(why, measure=True))
-    return made
+            whole = if_(valid, whole, hole(why, measure=True))
+    return whole
+
+
+def _integral_over(
+    elaboration: Elaboration, node: nodes.Integral, names: tuple[str, ...], parts: tuple[Part, ...], body: Term
+) -> Term:
+    """The body over one part of the measure of each variable; weights that vary with none of these stay outside."""
+    bounds, hints = tuple(part.support for part in parts), tuple(part.hints for part in parts)
+    inside = [part.density(var(name)) for name, part in zip(names, parts, strict=True)]
+    inside += [part.weight for part in parts if part.weight.free & set(names)]
+    outside = mul(*(part.weight for part in parts if not part.weight.free & set(names)))
+    density = mul(*inside)
+    if density is not ONE:
+        body = scaled(elaboration, density, body)
+    made = elaboration.note(integral_term(names, bounds, body, hints), node.span)
+    return made if outside is ONE else elaboration.note(scaled(elaboration, outside, made), node.span)
+
+
+def _summed(elaboration: Elaboration, terms: list[Term]) -> Term:
+    """The sum, component by component where the terms are tuples."""
+    if len(terms) == 1:
+        return terms[0]
+    dims = dims_of(elaboration, terms[0])
+    if dims is None:
+        return add(*terms)
+    return tuple_(add(*(proj(term, place) for term in terms)) for place in range(dims))
 
 
 def _holds(condition: Term) -> bool:

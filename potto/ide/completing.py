@@ -23,7 +23,8 @@ from potto.ide.places import Site, chunk_at, site_after, site_at
 from potto.ide.signatures import called_in
 from potto.ide.symbols import LocalSymbol, owner
 from potto.ide.words import KEYWORDS, LETTERS, SPECIALS, TYPES, Keyword
-from potto.measures import MEASURES
+from potto.measures import COMPOSITIONS, MEASURES, Measure
+from potto.measures.composed import Composition
 from potto.modules import DefinitionTarget, ModuleTarget, resolve
 from potto.modules.lookup import bindings, preludes
 from potto.modules.texts import imports
@@ -98,8 +99,10 @@ def _letters(place: Place) -> Iterator[Completion]:
 
 
 def _measures(place: Place) -> Iterator[Completion]:
-    for name, measure in MEASURES.items():
-        holes = ", ".join(f"${{{number}:{p}}}" for number, p in enumerate(measure.parameters, 1))
+    every: tuple[Measure | Composition, ...] = (*MEASURES.values(), *COMPOSITIONS.values())
+    for measure in every:
+        name = measure.name
+        holes = ", ".join(f"${{{number}:{p}}}" for number, p in enumerate(measure.parameters, 1) if p != "...")
         yield Completion(
             name, "measure", place.span, f"{name}({holes})", name, snippet=True,
             detail=measure_signature(measure), data=("measure", name),

@@ -182,8 +182,7 @@ def written(text: str, expr: nodes.Expr) -> str:
 def _domain(text: str, bounds: nodes.Interval | nodes.MeasureBound, variable: str) -> str:
     if isinstance(bounds, nodes.Interval):
         return f"from {code(written(text, bounds.lo))} to {code(written(text, bounds.hi))}"
-    arguments = ", ".join(written(text, a) for a in bounds.arguments)
-    return f"distributed as {code(f'{variable} ~ {bounds.measure}({arguments})')}"
+    return f"distributed as {code(f'{variable} ~ {text[bounds.measure_span.start : bounds.span.end]}')}"
 
 
 def _parameter(db: Database, chunk: ChunkAt, name: str, parameter: str) -> list[str]:

@@ -38,7 +38,8 @@ from potto.ide.symbols import (
     symbol_at,
 )
 from potto.ide.words import KEYWORDS, SPECIALS, TYPES
-from potto.measures import MEASURES, Measure
+from potto.measures import COMPOSITIONS, MEASURES, Measure
+from potto.measures.composed import Composition
 from potto.modules import definition, names
 from potto.primitives import PRIMITIVES, Primitive
 from potto.query import Database, query
@@ -194,7 +195,10 @@ def _equation(kink: Term) -> str:
 
 
 def measure_markdown(name: str) -> str:
-    """A measure: its parameters, density and moments."""
+    """A measure: its parameters, density and moments; of one that is made of measures, how."""
+    if name in COMPOSITIONS:
+        made = COMPOSITIONS[name]
+        return "\n\n".join([fence(f"x ~ {measure_signature(made)}"), made.doc, f"example: {code(made.example)}"])
     measure = MEASURES[name]
     parameters = tuple(var(p) for p in measure.parameters)
     lo, hi = measure.support(*parameters)
@@ -208,7 +212,7 @@ def measure_markdown(name: str) -> str:
     return "\n\n".join([head, measure.doc, "\n".join(facts), f"example: {code(measure.example)}"])
 
 
-def measure_signature(measure: Measure) -> str:
+def measure_signature(measure: Measure | Composition) -> str:
     """`normal(m, s)`"""
     return f"{measure.name}({', '.join(measure.parameters)})"
 

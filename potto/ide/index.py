@@ -245,7 +245,8 @@ class _Walk:
                     number = self.binder(bounds.variable, bounds.variable_span, "variable", Span(start, node.span.end))
                 else:
                     self.add(bounds.variable_span, bounds.variable, "bind", number if same else -1)
-                self.add(bounds.measure_span, bounds.measure, "measure")
+                for name, span in ((bounds.measure, bounds.measure_span), *bounds.inner):
+                    self.add(span, name, "measure")
                 steps.extend(bounds.arguments)
             elif bounds is not None:
                 steps += [bounds.lo, bounds.hi]

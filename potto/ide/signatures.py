@@ -17,7 +17,7 @@ from potto.ide.pending import PendingCall, call_at, juxtaposed_at
 from potto.ide.places import ChunkAt, chunk_at
 from potto.ide.symbols import LocalSymbol, callee
 from potto.ide.words import SPECIALS
-from potto.measures import MEASURES
+from potto.measures import COMPOSITIONS, MEASURES
 from potto.modules import resolve
 from potto.primitives import PRIMITIVES
 from potto.query import Database
@@ -138,7 +138,9 @@ def active_parameter(group: tuple[Parameter, ...], call: PendingCall) -> int | N
 
 
 def _measure(head: nodes.Expr, call: PendingCall) -> SignatureHelp | None:
-    measure = MEASURES.get(head.id) if isinstance(head, nodes.Name) else None
+    if not isinstance(head, nodes.Name):
+        return None
+    measure = MEASURES.get(head.id) or COMPOSITIONS.get(head.id)
     return None if measure is None else _simple(measure.name, measure.parameters, "", measure.doc, call.positional)
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from potto.ide.index import Binder, Occurrence, call_head
 from potto.ide.places import ChunkAt, chunk_at
-from potto.measures import MEASURES
+from potto.measures import COMPOSITIONS, MEASURES
 from potto.modules import (
     DefinitionTarget,
     ModuleTarget,
@@ -119,7 +119,7 @@ def meaning_of(db: Database, chunk: ChunkAt, occurrence: Occurrence) -> Symbol |
         case "keyword":
             return None if occurrence.callee is None else keyword_symbol(db, chunk, occurrence.callee, name)
         case "measure":
-            return MeasureSymbol(name) if name in MEASURES else None
+            return MeasureSymbol(name) if name in MEASURES or name in COMPOSITIONS else None
         case "import":
             return imported(db, file, occurrence.path, name)
         case _:

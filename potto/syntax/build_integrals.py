@@ -6,7 +6,7 @@ from potto.diagnostics import Related
 from potto.source import Span
 from potto.syntax import kinds
 from potto.syntax.groups import Context, Group, Values, as_binders, plain
-from potto.syntax.nodes import Binder, Integral, Interval, MeasureBound
+from potto.syntax.nodes import Apply, Binder, Expr, Integral, Interval, MeasureBound, Name
 
 
 def interval(_: Context, v: Values) -> Interval:
@@ -17,7 +17,26 @@ def measure(context: Context, v: Values) -> MeasureBound:
     group: Group = v[3]
     values = tuple(plain(context, written) for written in group.written)
     span = Span(v[0].start, group.span.end)
-    return MeasureBound(span, v[0].text, v[0].span, v[2].text, v[2].span, values)
+    shape, arguments, inner = _opened(v[2].text, values)
+    return MeasureBound(span, v[0].text, v[0].span, v[2].text, v[2].span, arguments, shape, inner)
+
+
+def _opened(name: str, values: tuple[Expr, ...]) -> tuple[str, tuple[Expr, ...], tuple[tuple[str, Span], ...]]:
+    """The shape of a measure, its arguments and those of the measures inside, and their names."""
+    shapes: list[str] = []
+    arguments: list[Expr] = []
+    inner: list[tuple[str, Span]] = []
+    for place, value in enumerate(values):
+        within = (name == "truncated" and place == 0) or (name == "mixture" and place % 2 == 1)
+        if within and isinstance(value, Apply) and isinstance(value.function, Name):
+            inner.append((value.function.id, value.function.span))
+            shape, more, deeper = _opened(value.function.id, tuple(a.value for a in value.arguments))
+            inner.extend(deeper)
+        else:
+            shape, more = "_", (value,)
+        shapes.append(shape)
+        arguments.extend(more)
+    return f"{name}({', '.join(shapes)})", tuple(arguments), tuple(inner)
 
 
 def integral(context: Context, v: Values) -> Integral:

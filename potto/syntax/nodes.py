@@ -173,7 +173,11 @@ class Interval:
 
 @dataclass(frozen=True, slots=True)
 class MeasureBound:
-    """`x ~ normal(m, s)` among the bounds of an integral."""
+    """`x ~ normal(m, s)` among the bounds of an integral.
+
+    arguments: those of measures that a measure is made of among them, in the order of the text; `shape` says where they
+    stand, as `truncated(normal(_, _), _, _)`, and `inner` which measures there are inside.
+    """
 
     span: Span
     variable: str
@@ -181,6 +185,8 @@ class MeasureBound:
     measure: str
     measure_span: Span
     arguments: tuple[Expr, ...]
+    shape: str
+    inner: tuple[tuple[str, Span], ...]
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ gives the tree again. What the author wrote is laid out by `formatter` instead.
 
 from __future__ import annotations
 
+import re
 from typing import assert_never
 
 from potto.syntax.nodes import (
@@ -279,10 +280,19 @@ def _bounds(bounds: tuple[Interval | MeasureBound, ...]) -> str:
         if isinstance(bound, Interval):
             listed.append(f"[{print_expression(bound.lo)}, {print_expression(bound.hi)}]")
         else:
-            listed.append(f"{bound.variable} ~ {bound.measure}({_list(bound.arguments)})")
+            listed.append(f"{bound.variable} ~ {_measure(bound)}")
     if len(bounds) == 1 and isinstance(bounds[0], Interval):
         return listed[0]
     return f"({', '.join(listed)})"
+
+
+_PLACE = re.compile(r"(?<!\w)_(?!\w)")
+
+
+def _measure(bound: MeasureBound) -> str:
+    """The shape with the arguments in their places."""
+    first, *rest = _PLACE.split(bound.shape)
+    return first + "".join(print_expression(a) + after for a, after in zip(bound.arguments, rest, strict=True))
 
 
 def _bound(expr: Expr) -> str:

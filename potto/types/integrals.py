@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from potto.diagnostics import Diagnostic
-from potto.measures import MEASURES
+from potto.measures import COMPOSITIONS, MEASURES
+from potto.measures.composed import problem
 from potto.modules.free import free_references
 from potto.modules.hints import did_you_mean, near_names
 from potto.syntax import nodes
@@ -78,20 +79,26 @@ def _inner_bound(name: nodes.Name, node: nodes.Integral) -> Diagnostic:
 
 def _measure(inference: Inference, bounds: nodes.MeasureBound) -> None:
     """Check that a measure exists and has all its parameters."""
-    measure = MEASURES.get(bounds.measure)
-    if measure is None:
-        help = did_you_mean(near_names(bounds.measure, MEASURES))
-        message = f"there is no measure `{bounds.measure}`"
-        known = f"the measures are {', '.join(f'`{name}`' for name in MEASURES)}"
-        inference.report(kinds.MEASURE(bounds.measure_span, message, label="not a measure", help=help or known))
+    found = problem(bounds.shape)
+    if found is None:
         return
-    wanted, given = len(measure.parameters), len(bounds.arguments)
-    if wanted != given:
-        names = ", ".join(measure.parameters)
+    span = (bounds.measure_span, *(span for _, span in bounds.inner))[found.place]
+    every = (*MEASURES, *COMPOSITIONS)
+    if found.wanted is None:
+        help = did_you_mean(near_names(found.name, every))
+        message = f"there is no measure `{found.name}`"
+        known = f"the measures are {', '.join(f'`{name}`' for name in every)}"
+        inference.report(kinds.MEASURE(span, message, label="not a measure", help=help or known))
+        return
+    call = f"{found.name}({', '.join(found.wanted)})"
+    if found.name in COMPOSITIONS:
+        message, label = f"`{found.name}` is not given the measures that it is made of", "made of measures"
+    else:
+        wanted = len(found.wanted)
         plural = "s" if wanted != 1 else ""
-        message = f"`{bounds.measure}` takes {wanted} parameter{plural}, but is given {given}"
-        help = f"write `{bounds.variable} ~ {bounds.measure}({names})`"
-        inference.report(kinds.MEASURE(bounds.measure_span, message, label=f"{given} given", help=help))
+        message = f"`{found.name}` takes {wanted} parameter{plural}, but is given {found.given}"
+        label = f"{found.given} given"
+    inference.report(kinds.MEASURE(span, message, label=label, help=f"write `{bounds.variable} ~ {call}`"))
 
 
 @rule(nodes.Sum)

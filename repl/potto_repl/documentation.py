@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 
-from potto.measures import MEASURES
+from potto.measures import COMPOSITIONS, MEASURES
 from potto.modules import DefinitionTarget
 from potto.primitives import PRIMITIVES
 from potto.query import Database
@@ -22,10 +22,13 @@ def documentation(db: Database, name: str, target: DefinitionTarget | None) -> s
 
     if target is not None:
         return _of_definition(db, name, target)
+    known = []
     if name in SPECIALS or (name in PRIMITIVES and PRIMITIVES[name].surface):
-        return plain(builtin_markdown(name))
-    if name in MEASURES:
-        return plain(measure_markdown(name))
+        known.append(plain(builtin_markdown(name)))
+    if name in MEASURES or name in COMPOSITIONS:
+        known.append(plain(measure_markdown(name)))
+    if known:
+        return "\n\n".join(known)
     if name in KEYWORDS:
         return f"{KEYWORDS[name].form}\n\n{KEYWORDS[name].doc}"
     return None
@@ -35,7 +38,7 @@ def documented() -> list[str]:
     """The names that are explained without being defined."""
     from potto.ide.words import KEYWORDS, SPECIALS
 
-    return [*PRIMITIVES, *MEASURES, *KEYWORDS, *SPECIALS]
+    return [*PRIMITIVES, *MEASURES, *COMPOSITIONS, *KEYWORDS, *SPECIALS]
 
 
 def plain(markdown: str) -> str:

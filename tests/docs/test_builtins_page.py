@@ -12,13 +12,13 @@ from mpmath import mp
 import potto
 from potto.core.reference import evaluate
 from potto.elaborate import elaborate_expression
-from potto.measures import MEASURES
+from potto.measures import COMPOSITIONS, MEASURES
 from potto.primitives import PRIMITIVES
 from potto.query import Database
 from potto.syntax import parse_expression
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
-ENTRIES = [*PRIMITIVES.values(), *MEASURES.values()]
+ENTRIES = [*PRIMITIVES.values(), *MEASURES.values(), *COMPOSITIONS.values()]
 
 
 def generator() -> ModuleType:

@@ -121,7 +121,10 @@ def _integral(parts: st.SearchStrategy[Expr]) -> st.SearchStrategy[Expr]:
     def bound(name: str) -> st.SearchStrategy[Interval | MeasureBound]:
         interval = st.tuples(parts, parts).map(lambda p: Interval(O, *p))
         values = st.lists(parts, max_size=2).map(tuple)
-        return interval | values.map(lambda v: MeasureBound(O, name, O, "normal", O, v))
+        shaped = values.map(
+            lambda v: MeasureBound(O, name, O, "normal", O, v, f"normal({', '.join('_' * len(v))})", ())
+        )
+        return interval | shaped
 
     def whole(found: list[str]) -> st.SearchStrategy[Expr]:
         binders = tuple(Binder(O, n) for n in found)

@@ -1,0 +1,196 @@
+"""Measures made of measures: `truncated(normal(m, s), lo, hi)`, `mixture(1, normal(0, 1), 2, uniform(0, 3))`.
+
+Owns `parts_of`. A measure is a sum of parts, each with a weight, a support and a density: a mixture has one for each of
+its components, so that each keeps its own support and its own hints; truncating cuts their supports and divides by what
+is left. What a tree of measures looks like is its shape, a text with `_` for every argument:
+"truncated(normal(_, _), _, _)".
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+from potto.core.terms import ONE, ZERO, Const, Term, add, div, fresh, integral, mul, prim, var
+from potto.measures.registry import MEASURES, Condition, Terms
+
+Tree = tuple[str, tuple["Tree | None", ...]]  # a measure and what it is given: None for a number, else a measure
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A part of a measure over one variable: its weight, and as in `Measure` support, hints and density."""
+
+    weight: Term
+    support: tuple[Term, Term]
+    hints: Terms
+    density: Callable[[Term], Term]
+    valid: tuple[Condition, ...]
+
+
+@dataclass(frozen=True)
+class Composition:
+    """A way to make measures of measures.
+
+    parameters: as a person writes them. takes: whether it may be given numbers and measures like these. parts: its
+    parts, from numbers and the parts of measures.
+    """
+
+    name: str
+    parameters: tuple[str, ...]
+    takes: Callable[[tuple[Tree | None, ...]], bool]
+    parts: Callable[[Sequence[Term | tuple[Part, ...]]], tuple[Part, ...]]
+    doc: str
+    example: str
+
+
+COMPOSITIONS: dict[str, Composition] = {}
+
+
+def parts_of(shape: str, arguments: Sequence[Term]) -> tuple[Part, ...]:
+    """The parts of a measure whose shape has no `problem`."""
+    return _parts(tree_of(shape), iter(arguments))
+
+
+def _parts(tree: Tree, arguments: Iterator[Term]) -> tuple[Part, ...]:
+    name, inside = tree
+    given = [next(arguments) if inner is None else _parts(inner, arguments) for inner in inside]
+    if name in COMPOSITIONS:
+        return COMPOSITIONS[name].parts(given)
+    measure, terms = MEASURES[name], [term for term in given if isinstance(term, Term)]
+    valid = tuple((condition, f"{name}: {why}") for condition, why in measure.valid(*terms))
+    support, hints = measure.support(*terms), measure.hints(*terms)
+    return (Part(ONE, support, hints, lambda x: measure.density(x, *terms), valid),)
+
+
+@lru_cache(maxsize=1024)
+def tree_of(shape: str) -> Tree:
+    """A shape as a tree."""
+    name, _, rest = shape.partition("(")
+    found: list[Tree | None] = []
+    depth = start = 0
+    for place, char in enumerate(rest):
+        if (char == "," and depth == 0) or (char == ")" and depth == 0):
+            word = rest[start:place].strip()
+            if word:
+                found.append(None if word == "_" else tree_of(word))
+            start = place + 1
+        depth += (char == "(") - (char == ")")
+    return name, tuple(found)
+
+
+@dataclass(frozen=True, slots=True)
+class Misuse:
+    """What is wrong with a shape: of which measure in it (counted in the order of the text), and what it takes."""
+
+    place: int
+    name: str
+    given: int
+    wanted: tuple[str, ...] | None  # None if there is no such measure
+
+
+def problem(shape: str) -> Misuse | None:
+    """What is wrong with a shape, if anything is."""
+    return next((found for place, tree in enumerate(_trees(tree_of(shape))) if (found := _misuse(place, tree))), None)
+
+
+def _trees(tree: Tree) -> Iterator[Tree]:
+    yield tree
+    for inner in tree[1]:
+        if inner is not None:
+            yield from _trees(inner)
+
+
+def _misuse(place: int, tree: Tree) -> Misuse | None:
+    name, inside = tree
+    if name in COMPOSITIONS:
+        composition = COMPOSITIONS[name]
+        return None if composition.takes(inside) else Misuse(place, name, len(inside), composition.parameters)
+    if name not in MEASURES:
+        return Misuse(place, name, len(inside), None)
+    wanted = MEASURES[name].parameters
+    return None if len(wanted) == len(inside) and not any(inside) else Misuse(place, name, len(inside), wanted)
+
+
+def compose(composition: Composition) -> Composition:
+    COMPOSITIONS[composition.name] = composition
+    return composition
+
+
+# Truncated
+
+
+def _cut(part: Part, lo: Term, hi: Term) -> Part:
+    low, high = part.support
+    inside = _end("max", low, lo, -math.inf), _end("min", high, hi, math.inf)
+    return replace(part, support=inside, valid=(*part.valid, (prim("lt", *inside), "truncated: nothing is left")))
+
+
+def _end(op: str, own: Term, other: Term, nowhere: float) -> Term:
+    """The inner one of two ends; an infinite one says nothing."""
+    if isinstance(own, Const) and own.value == nowhere:
+        return other
+    if isinstance(other, Const) and other.value == nowhere:
+        return own
+    if isinstance(own, Const) and isinstance(other, Const):
+        return (max if op == "max" else min)(own, other, key=lambda end: end.value)
+    return prim(op, own, other)
+
+
+def _mass(part: Part) -> Term:
+    """By the integral, not as a difference of the cdf, which has no digits in the upper tail."""
+    lo, hi = part.support
+    name = fresh("inside", lo.free | hi.free | part.density(ZERO).free)
+    return integral((name,), (part.support,), part.density(var(name)), (part.hints,))
+
+
+def _truncated(given: Sequence[Term | tuple[Part, ...]]) -> tuple[Part, ...]:
+    inner, lo, hi = given
+    assert isinstance(inner, tuple) and isinstance(lo, Term) and isinstance(hi, Term)
+    parts = [_cut(part, lo, hi) for part in inner]
+    left = add(*(mul(part.weight, _mass(part)) for part in parts))
+    return tuple(replace(part, weight=div(part.weight, left)) for part in parts)
+
+
+truncated = compose(
+    Composition(
+        "truncated",
+        parameters=("measure", "lo", "hi"),
+        takes=lambda inside: len(inside) == 3 and inside[0] is not None and inside[1:] == (None, None),
+        parts=_truncated,
+        doc="A measure between lo and hi only, which may be infinite: divided by what is left of it there.",
+        example="integral (x ~ truncated(normal(0, 1), 0, 2)) x d(x)",
+    )
+)
+
+
+# Mixtures
+
+
+def _mixture(given: Sequence[Term | tuple[Part, ...]]) -> tuple[Part, ...]:
+    weights = [term for term in given if isinstance(term, Term)]
+    whole = add(*weights)
+    valid = tuple((prim("le", ZERO, weight), "mixture: a weight must not be negative") for weight in weights)
+    valid = (*valid, (prim("lt", ZERO, whole), "mixture: the weights must not all be 0"))
+    return tuple(
+        replace(part, weight=mul(div(weight, whole), part.weight), valid=(*valid, *part.valid))
+        for weight, inner in zip(weights, given[1::2], strict=True)
+        if isinstance(inner, tuple)
+        for part in inner
+    )
+
+
+mixture = compose(
+    Composition(
+        "mixture",
+        parameters=("w1", "measure1", "w2", "measure2", "..."),
+        takes=lambda inside: len(inside) >= 2
+        and len(inside) % 2 == 0
+        and all((inner is None) == (place % 2 == 0) for place, inner in enumerate(inside)),
+        parts=_mixture,
+        doc="One of several measures, each as often as the weight before it says; the weights need not add up to 1.",
+        example="integral (x ~ mixture(1, normal(0, 1), 2, normal(3, 0.5))) x d(x)",
+    )
+)
