@@ -124,7 +124,11 @@ def derivatives(entry: Primitive, arguments: tuple[str, ...]) -> str:
 
 MEASURE_INTRODUCTION = """## Measures
 
-`integral (x ~ normal(m, s)) body d(x)` is the expectation of the body where x has that distribution.
+`integral (x ~ normal(m, s)) body d(x)` is the expectation of the body where x has that distribution. Of a measure of
+whole numbers (bernoulli, binomial, poisson, categorical) it is a sum: the chance of each number times the body there.
+A jump in such a variable moves nothing, `[k < t]` is a step in t. Of a Poisson variable the numbers that have a chance
+below 1e-20 together are left out; its rate and the number of trials of a binomial one must not vary with another
+variable of integration, since they say how far the sum goes.
 
 """
 

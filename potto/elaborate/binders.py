@@ -7,7 +7,7 @@ the integral.
 
 from __future__ import annotations
 
-from itertools import product
+from itertools import groupby, product
 
 from potto.core.terms import (
     ONE,
@@ -69,16 +69,31 @@ def _integral(elaboration: Elaboration, node: nodes.Integral, scope: Scope) -> V
 def _integral_over(
     elaboration: Elaboration, node: nodes.Integral, names: tuple[str, ...], parts: tuple[Part, ...], body: Term
 ) -> Term:
-    """The body over one part of the measure of each variable; weights that vary with none of these stay outside."""
-    bounds, hints = tuple(part.support for part in parts), tuple(part.hints for part in parts)
-    inside = [part.density(var(name)) for name, part in zip(names, parts, strict=True)]
-    inside += [part.weight for part in parts if part.weight.free & set(names)]
-    outside = mul(*(part.weight for part in parts if not part.weight.free & set(names)))
-    density = mul(*inside)
-    if density is not ONE:
-        body = scaled(elaboration, density, body)
-    made = elaboration.note(integral_term(names, bounds, body, hints), node.span)
-    return made if outside is ONE else elaboration.note(scaled(elaboration, outside, made), node.span)
+    """The body over one part of the measure of each variable: neighbours that are not whole numbers in one integral.
+
+    Weights that vary with none of the variables of an integral stay outside of it.
+    """
+    for run in reversed([list(found) for _, found in groupby(zip(names, parts, strict=True), _together)]):
+        own = {name for name, _ in run}
+        inside = [part.density(var(name)) for name, part in run]
+        inside += [part.weight for _, part in run if part.weight.free & own]
+        outside = mul(*(part.weight for _, part in run if not part.weight.free & own))
+        density = mul(*inside)
+        body = body if density is ONE else scaled(elaboration, density, body)
+        if run[0][1].discrete:
+            ((name, part),) = run
+            body = sum_(name, *part.support, body)
+        else:
+            bounds, hints = tuple(part.support for _, part in run), tuple(part.hints for _, part in run)
+            body = elaboration.note(integral_term(tuple(name for name, _ in run), bounds, body, hints), node.span)
+        if outside is not ONE:
+            body = elaboration.note(scaled(elaboration, outside, body), node.span)
+    return body
+
+
+def _together(variable: tuple[str, Part]) -> str:
+    """What neighbours in one integral have in common; each whole number has a sum of its own."""
+    return variable[0] if variable[1].discrete else ""
 
 
 def _summed(elaboration: Elaboration, terms: list[Term]) -> Term:

@@ -13,7 +13,23 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
-from potto.core.terms import ONE, ZERO, Const, Term, add, div, fresh, integral, mul, prim, var
+from potto.core.terms import (
+    ONE,
+    ZERO,
+    Const,
+    Term,
+    add,
+    branch,
+    const,
+    div,
+    fresh,
+    integral,
+    mul,
+    prim,
+    sub,
+    sum_,
+    var,
+)
 from potto.measures.registry import MEASURES, Condition, Terms
 
 Tree = tuple[str, tuple["Tree | None", ...]]  # a measure and what it is given: None for a number, else a measure
@@ -28,6 +44,7 @@ class Part:
     hints: Terms
     density: Callable[[Term], Term]
     valid: tuple[Condition, ...]
+    discrete: bool = False
 
 
 @dataclass(frozen=True)
@@ -62,7 +79,13 @@ def _parts(tree: Tree, arguments: Iterator[Term]) -> tuple[Part, ...]:
     measure, terms = MEASURES[name], [term for term in given if isinstance(term, Term)]
     valid = tuple((condition, f"{name}: {why}") for condition, why in measure.valid(*terms))
     support, hints = measure.support(*terms), measure.hints(*terms)
-    return (Part(ONE, support, hints, lambda x: measure.density(x, *terms), valid),)
+    return (Part(ONE, support, hints, lambda x: measure.density(x, *terms), valid, measure.discrete),)
+
+
+def discrete(shape: str) -> bool:
+    """Whether a measure is one of whole numbers only."""
+    names = [name for name, inside in _trees(tree_of(shape)) if not any(inside)]
+    return all(name == "categorical" or (name in MEASURES and MEASURES[name].discrete) for name in names)
 
 
 @lru_cache(maxsize=1024)
@@ -119,13 +142,40 @@ def compose(composition: Composition) -> Composition:
     return composition
 
 
+def bounding(shape: str) -> tuple[bool, ...]:
+    """Of every argument, whether it decides where the support of a measure ends."""
+    return tuple(_bounding(tree_of(shape)))
+
+
+def _bounding(tree: Tree) -> Iterator[bool]:
+    name, inside = tree
+    ends: frozenset[str] = frozenset()
+    if name in MEASURES:
+        names = MEASURES[name].parameters
+        lo, hi = MEASURES[name].support(*map(var, names))
+        ends = lo.free | hi.free
+    for place, inner in enumerate(inside):
+        if inner is not None:
+            yield from _bounding(inner)
+        else:
+            yield MEASURES[name].parameters[place] in ends if name in MEASURES else name == "truncated"
+
+
 # Truncated
 
 
 def _cut(part: Part, lo: Term, hi: Term) -> Part:
     low, high = part.support
+    if part.discrete:
+        lo, hi = _whole("ceil", lo), _whole("floor", hi)
     inside = _end("max", low, lo, -math.inf), _end("min", high, hi, math.inf)
-    return replace(part, support=inside, valid=(*part.valid, (prim("lt", *inside), "truncated: nothing is left")))
+    holds = "le" if part.discrete else "lt"
+    return replace(part, support=inside, valid=(*part.valid, (prim(holds, *inside), "truncated: nothing is left")))
+
+
+def _whole(op: str, end: Term) -> Term:
+    """A bound as a whole number."""
+    return end if isinstance(end, Const) and (math.isinf(end.value) or end.value.is_integer()) else prim(op, end)
 
 
 def _end(op: str, own: Term, other: Term, nowhere: float) -> Term:
@@ -140,9 +190,11 @@ def _end(op: str, own: Term, other: Term, nowhere: float) -> Term:
 
 
 def _mass(part: Part) -> Term:
-    """By the integral, not as a difference of the cdf, which has no digits in the upper tail."""
+    """By the integral or the sum, not as a difference of the cdf, which has no digits in the upper tail."""
     lo, hi = part.support
     name = fresh("inside", lo.free | hi.free | part.density(ZERO).free)
+    if part.discrete:
+        return sum_(name, lo, hi, part.density(var(name)))
     return integral((name,), (part.support,), part.density(var(name)), (part.hints,))
 
 
@@ -192,5 +244,35 @@ mixture = compose(
         parts=_mixture,
         doc="One of several measures, each as often as the weight before it says; the weights need not add up to 1.",
         example="integral (x ~ mixture(1, normal(0, 1), 2, normal(3, 0.5))) x d(x)",
+    )
+)
+
+
+# Of numbers one by one
+
+
+def _categorical(given: Sequence[Term | tuple[Part, ...]]) -> tuple[Part, ...]:
+    weights = [term for term in given if isinstance(term, Term)]
+    whole = add(*weights)
+    valid = tuple((prim("le", ZERO, weight), "categorical: a weight must not be negative") for weight in weights)
+    valid = (*valid, (prim("lt", ZERO, whole), "categorical: the weights must not all be 0"))
+
+    def chance(k: Term) -> Term:
+        found = weights[-1]
+        for number, weight in reversed(list(enumerate(weights[:-1]))):
+            found = branch((sub(k, const(number + 0.5)),), False, found, weight)
+        return div(found, whole)
+
+    return (Part(ONE, (ZERO, const(len(weights) - 1.0)), (), chance, valid, True),)
+
+
+categorical = compose(
+    Composition(
+        "categorical",
+        parameters=("w0", "w1", "..."),
+        takes=lambda inside: len(inside) >= 1 and not any(inside),
+        parts=_categorical,
+        doc="0, 1, 2, ..., each as often as its weight says; the weights need not add up to 1.",
+        example="integral (k ~ categorical(1, 2, 3)) k^2 d(k)",
     )
 )

@@ -30,6 +30,8 @@ class Measure:
     density: over the variable and the parameters, inside of the support; it integrates to 1.
     hints: points between which the density is smooth and not too steep; the integrator cuts there, nothing else
         depends on them. In ascending order.
+    discrete: whether it is one of whole numbers: the support is the first and the last of them, the density the chance
+        of each, and an expectation a sum.
     cdf: the integral of the density up to x; None if it is no formula of builtins.
     quantile: the inverse of the cdf; None if it is no formula of builtins.
     mean, variance: None where they do not exist.
@@ -48,6 +50,7 @@ class Measure:
     doc: str
     example: str
     hints: Callable[..., Terms] = field(default=_none)
+    discrete: bool = False
     cdf: Callable[..., Term] | None = None
     quantile: Callable[..., Term] | None = None
 

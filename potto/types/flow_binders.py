@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
+from potto.measures.composed import bounding, discrete, problem
 from potto.syntax import nodes
 from potto.types.algebra import flat, merge, taint, without
 from potto.types.flow import Walk, walks
@@ -15,10 +18,15 @@ def _integral(walk: Walk, node: nodes.Integral) -> Value:
     bounds: Sources = NONE
     for place, bound in enumerate(node.bounds):
         parts = (bound.lo, bound.hi) if isinstance(bound, nodes.Interval) else bound.arguments
-        for part in parts:
-            bounds = merge(bounds, flat(walk.value(part)))
+        whole = isinstance(bound, nodes.MeasureBound) and problem(bound.shape) is None and discrete(bound.shape)
+        ends = bounding(bound.shape) if whole and isinstance(bound, nodes.MeasureBound) else (False,) * len(parts)
+        for part, decides in zip(parts, ends, strict=True):
+            value = walk.value(part)
+            bounds = merge(bounds, flat(value))
+            if decides:
+                walk.sink("sum", part.span, value)
         if place < len(node.variables):
-            variables.append(_variable(walk, node.variables[place]))
+            variables.append(_variable(walk, node.variables[place], "other" if whole else "variable"))
     for binder in node.variables[len(node.bounds) :]:
         variables.append(_variable(walk, binder))
     body = walk.value(node.body)
@@ -28,9 +36,10 @@ def _integral(walk: Walk, node: nodes.Integral) -> Value:
     return result
 
 
-def _variable(walk: Walk, binder: nodes.Binder) -> Source:
+def _variable(walk: Walk, binder: nodes.Binder, kind: Literal["variable", "other"] = "variable") -> Source:
+    """What is integrated over; a measure of whole numbers is summed up, and moves nothing."""
     local = walk.inference.binders[id(binder)]
-    source = Source("variable", binder.name, binder.span)
+    source = Source(kind, binder.name, binder.span)
     value = Scalar({source: None})
     walk.locals[local] = value
     walk.places[id(binder)] = value

@@ -11,7 +11,7 @@ from mpmath import mp
 from potto.calculus.derivative import partial
 from potto.core.lint import lint
 from potto.core.reference import evaluate
-from potto.core.terms import Term, const, integral, mul, prim, sub, var
+from potto.core.terms import Term, const, integral, mul, prim, sub, sum_, var
 from potto.measures import MEASURES, Measure
 
 X = var("x")
@@ -26,7 +26,9 @@ def samples(measure: Measure, count: int = 3) -> tuple[tuple[float, ...], ...]:
     generator = random.Random(measure.name)
     found: list[tuple[float, ...]] = []
     while len(found) < count:
-        values = tuple(round(generator.uniform(lo, hi), 3) for lo, hi in measure.domain)
+        draws = [generator.uniform(lo, hi) for lo, hi in measure.domain]
+        whole = measure.name == "binomial"  # n is
+        values = tuple(round(x, 0 if whole and place == 0 else 3) for place, x in enumerate(draws))
         if valid(measure, values):
             found.append(values)
     return tuple(found)
@@ -40,6 +42,8 @@ def expectation(measure: Measure, values: tuple[float, ...], body: Term) -> mp.m
     """To 20 digits, along the entry's own support and hints."""
     parameters = tuple(map(const, values))
     density = measure.density(X, *parameters)
+    if measure.discrete:
+        return evaluate(sum_("x", *measure.support(*parameters), mul(density, body)), {}, digits=20)
     term = integral(("x",), (measure.support(*parameters),), mul(density, body), (measure.hints(*parameters),))
     return evaluate(term, {}, digits=15)
 
@@ -59,6 +63,7 @@ def test_entries_are_complete(measure: Measure) -> None:
     terms += [] if measure.cdf is None else [measure.cdf(X, *names)]
     for term in terms:
         assert not lint(term) and term.free <= {"x", *measure.parameters}
+    assert not measure.discrete or not measure.hints(*names)
     assert measure.density(X, *names).free == {"x", *measure.parameters} or measure.name == "uniform"
 
 
@@ -128,6 +133,13 @@ def test_hints_ascend_inside_of_the_support(measure: Measure) -> None:
         ("exponential", (0.0,)),
         ("exponential", (float("nan"),)),
         ("lognormal", (0.0, -1.0)),
+        ("beta", (0.0, 1.0)),
+        ("gamma", (1.0, 0.0)),
+        ("student_t", (0.0, 0.0, 1.0)),
+        ("bernoulli", (1.5,)),
+        ("binomial", (2.5, 0.5)),
+        ("binomial", (3.0, 1.0)),
+        ("poisson", (0.0,)),
     ],
 )
 def test_what_is_not_valid(name: str, values: tuple[float, ...]) -> None:

@@ -1,0 +1,107 @@
+"""Expectations over whole numbers: sums with the masses of mpmath's functions; derivatives by every parameter."""
+
+from __future__ import annotations
+
+import pytest
+from mpmath import mp
+
+import potto
+
+
+def poisson(k: int, r: mp.mpf) -> mp.mpf:
+    return mp.exp(-r) * r**k / mp.factorial(k)
+
+
+def binomial(k: int, n: int, p: mp.mpf) -> mp.mpf:
+    return mp.binomial(n, k) * p**k * (1 - p) ** (n - k)
+
+
+def close(found: potto.Estimate, wanted: mp.mpf) -> None:
+    off = abs(mp.mpf(float(found)) - wanted)
+    assert off <= found.error + 1e-13 * max(1, abs(wanted)), (found, wanted)
+    assert off <= 1e-9 * max(1, abs(wanted)), (found, wanted)
+
+
+PROGRAM = potto.compile("""
+def square(r) integral (k ~ poisson(r)) k^2 d(k)
+def d_square(r) snd(deriv(square)((r, 1)))
+def few(n, p) integral (k ~ binomial(n, p)) [k < 3] d(k)
+def d_few(n, p) snd(deriv(few)((n, 0), (p, 1)))
+def shots(r, t) integral (k ~ poisson(r), x ~ normal(k, 0.5)) [x < t] d(k, x)
+def d_shots(r, t) snd(deriv(shots)((r, 1), (t, 0)))
+def t_shots(r, t) snd(deriv(shots)((r, 0), (t, 1)))
+def coin(p, t) integral (x ~ exponential(1), k ~ bernoulli(p)) [x*(k + 1) < t] d(x, k)
+def d_coin(p, t) snd(deriv(coin)((p, 0), (t, 1)))
+def die(w, t) integral (k ~ categorical(1, w, 3), x ~ uniform(0, 1)) [x*k < t] d(k, x)
+def d_die(w, t) snd(deriv(die)((w, 1), (t, 0)))
+def some(r) integral (k ~ truncated(poisson(r), 1, inf)) k d(k)
+def d_some(r) snd(deriv(some)((r, 1)))
+def both(w) integral (x ~ mixture(w, poisson(2), 1, normal(0, 1))) x^2 d(x)
+""")
+
+
+@pytest.mark.parametrize("r", [0.3, 3.0, 400.0])
+def test_poisson(r: float) -> None:
+    with mp.workdps(40):
+        close(PROGRAM.square(r), mp.mpf(r) ** 2 + r)
+        close(PROGRAM.d_square(r), 2 * mp.mpf(r) + 1)
+
+
+def test_binomial() -> None:
+    with mp.workdps(40):
+        def wanted(p: mp.mpf) -> mp.mpf:
+            return mp.fsum(binomial(k, 10, p) for k in range(3))
+
+        close(PROGRAM.few(10.0, 0.3), wanted(mp.mpf(0.3)))
+        close(PROGRAM.d_few(10.0, 0.3), mp.diff(wanted, mp.mpf(0.3)))
+
+
+@pytest.mark.parametrize("method", ["quadrature", "mc", "qmc"])
+def test_whole_numbers_and_others(method: str) -> None:
+    """A sum around an integral with a jump that moves."""
+    with mp.workdps(40):
+        def wanted(r: mp.mpf, t: mp.mpf) -> mp.mpf:
+            return mp.fsum(poisson(k, r) * mp.ncdf(2 * (t - k)) for k in range(60))
+
+        r, t = mp.mpf(2), mp.mpf("1.75")
+        exact = wanted(r, t), mp.diff(wanted, (r, t), (1, 0)), mp.diff(wanted, (r, t), (0, 1))
+    with potto.settings(method=method, samples=4_000, seed=2):
+        found = PROGRAM.shots(2.0, 1.75), PROGRAM.d_shots(2.0, 1.75), PROGRAM.t_shots(2.0, 1.75)
+    for one, value in zip(found, exact, strict=True):
+        if method == "quadrature":
+            close(one, value)
+        else:
+            assert abs(float(one) - value) <= 5 * one.error + 1e-9
+
+
+def test_inside_of_an_integral() -> None:
+    with mp.workdps(40):
+        p, t = mp.mpf(0.3), mp.mpf(1.3)
+        close(PROGRAM.coin(0.3, 1.3), (1 - p) * (1 - mp.exp(-t)) + p * (1 - mp.exp(-t / 2)))
+        close(PROGRAM.d_coin(0.3, 1.3), (1 - p) * mp.exp(-t) + p / 2 * mp.exp(-t / 2))
+
+
+def test_categorical_and_truncated_and_mixed() -> None:
+    with mp.workdps(40):
+        w, t, r = mp.mpf(2), mp.mpf(0.7), mp.mpf(0.5)
+
+        def die(w: mp.mpf) -> mp.mpf:
+            return (1 + w * t + 3 * t / 2) / (4 + w)
+
+        close(PROGRAM.die(2.0, 0.7), die(w))
+        close(PROGRAM.d_die(2.0, 0.7), mp.diff(die, w))
+        close(PROGRAM.some(0.5), r / -mp.expm1(-r))
+        close(PROGRAM.d_some(0.5), mp.diff(lambda r: r / -mp.expm1(-r), r))
+        close(PROGRAM.both(2.0), mp.mpf(2 * 6 + 1) / 3)
+
+
+def test_a_rate_that_varies_inside() -> None:
+    """How far the sum goes has to be known outside."""
+    with pytest.raises(potto.PottoError, match="P0303"):
+        potto.compile("def h(t) integral (x ~ uniform(1, 2), k ~ poisson(x)) [x < t] d(x, k)\n").h(1.0)
+
+
+@pytest.mark.parametrize(("name", "values"), [("few", (2.5, 0.5)), ("square", (-1.0,)), ("coin", (1.5, 1.0))])
+def test_what_is_not_valid(name: str, values: tuple[float, ...]) -> None:
+    with pytest.raises(potto.PottoError, match=r"trials must be whole|rate must be positive|between 0 and 1"):
+        getattr(PROGRAM, name)(*values)
