@@ -120,6 +120,12 @@ def test_keyword_arguments_of_functions_and_derivatives():
     assert "c=" not in fixture(files + "print(render(c=$0))\n").labels()
 
 
+def test_measures_made_of_measures_after_a_tilde():
+    f = fixture("y = integral (x ~ trunc$0")
+    _, text = f.complete("truncated")
+    assert "x ~ truncated(${1:measure}, ${2:lo}, ${3:hi})" in text
+
+
 def test_measures_after_a_tilde():
     f = fixture("def f(m)\n    integral (x ~ nor$0) x d(x)\n")
     item, text = f.complete("normal")

@@ -94,6 +94,14 @@ def test_variable_of_integration_shows_its_domain_and_what_varies_with_it():
     assert "moved by `a`, `t`" in text
 
 
+def test_measures_made_of_measures_and_those_inside():
+    f = fixture("def f(m)\n    integral (x ~ truncated(gamma(m, 2), 0, 3)) gamma(x)*x d(x)\n")
+    assert "`x ~ truncated(gamma(m, 2), 0, 3)`" in f.hover("x d(x)")
+    assert "x ~ truncated(measure, lo, hi)" in f.hover("truncated")
+    assert "- mean: `a/r`" in f.hover("gamma(m")
+    assert "gamma : (x: Real*) -> Real" in f.hover("gamma(x)") and "digamma(x)" in f.hover("gamma(x)")
+
+
 def test_variable_of_a_measure_shows_the_measure():
     f = fixture("def f(m)\n    integral (x ~ normal(m, 2)) x^2 d(x)\n")
     assert "`x ~ normal(m, 2)`" in f.hover("x^2")
