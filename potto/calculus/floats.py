@@ -1,6 +1,6 @@
 """Builtins of plain Python numbers, without numpy: for questions about terms, not for results.
 
-Owns `number_form` (a builtin of numbers one by one, nan where it has no value) and `OPS`, the arithmetic that the rules
+Owns `FLOATS` (terms at a point, nan where they have no value) and `OPS`, the arithmetic that the rules
 of enclosure get where they are asked about single intervals.
 """
 
