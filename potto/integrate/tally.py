@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from potto.integrate.work import Work
 
 
+LEAST = 1e-6  # the relative accuracy that is asked of every node
 MOST_SLACK = 1e6  # how many times the error of a node may be larger that hardly counts
 
 
@@ -66,15 +67,31 @@ class Tally:
                 scale = np.stack([work.parent.siblings(row, work.root) for row in scale])
             self.scale = np.maximum(work.machine.atol, work.machine.rtol * scale)
         shares: Array = self.scale[:, owner] / (2 * self.count[owner])
-        if work.slack is not None:
-            shares = shares * work.slack[owner]
+        if work.slack is not None:  # what is not resolved at all says nothing of its error
+            most = np.maximum(1.0, LEAST / work.machine.rtol)
+            shares = shares * np.minimum(work.slack[owner], most)
         return shares
+
+
+def filled(work: Work, p: Pieces) -> Array:
+    """Which part of its range each integrand of a batch takes up, at the least: its mean over its largest, (B,)."""
+    owner, length = work.seg.owner[p.segment], (work.seg.b - work.seg.a)[p.segment] * (p.u1 - p.u0)
+    reach = np.bincount(owner, length, minlength=work.batch)
+    share = np.ones(work.batch)
+    for row in p.size.reshape(work.width, -1, owner.size)[:, : 1 + work.k].reshape(-1, owner.size):
+        most = np.zeros(work.batch)
+        np.maximum.at(most, owner, row / length)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            part = np.bincount(owner, row, minlength=work.batch) / (most * reach)
+        share = np.where(most > 0, np.fmin(share, np.nan_to_num(part)), share)
+    return share
 
 
 def slack(work: Work, owner: Ints, weight: Array) -> Array:
     """How many times the error of integrals further in may be larger at nodes that count less than the mean."""
+    assert work.filled is not None
     seg, nodes = work.seg, np.bincount(owner, minlength=work.batch) * weight.shape[1]
-    reach = np.bincount(seg.owner, seg.b - seg.a, minlength=work.batch)
+    reach = work.filled * np.bincount(seg.owner, seg.b - seg.a, minlength=work.batch)
     mean = (np.where(np.isfinite(reach), reach, 0.0) / np.maximum(nodes, 1))[owner]  # far out what counts is small
     with np.errstate(divide="ignore", invalid="ignore"):
         times: Array = np.fmax(1.0, np.fmin(mean[:, None] / weight, MOST_SLACK)).ravel()

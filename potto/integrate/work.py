@@ -28,7 +28,7 @@ from potto.integrate.plan import LevelPlan
 from potto.integrate.roundoff import few_doubles, misplaced, noise, shake, together
 from potto.integrate.rules import EPS, Rule, gauss, truncation
 from potto.integrate.steps import look_for_steps
-from potto.integrate.tally import Tally, slack
+from potto.integrate.tally import Tally, filled, slack
 from potto.integrate.undefined import mend
 from potto.kernels.cells import Array, Cell, Ints, Mask, Number, Value, pad
 
@@ -69,6 +69,7 @@ class Work:
     cancels: Array = field(init=False)
     hidden: Array = field(init=False)  # what is added up further in, on the average, where it comes to nothing
     endless: Array | None = None  # (k, B) the tangents that are infinite, with their signs; 0 for others
+    filled: Array | None = None  # (B,) which part of the range integrands take up, where that is known
     misplaced: Array | None = None  # (m, k, S) what the rounding of the ends of segments means for the fixed form
 
     def __post_init__(self) -> None:
@@ -100,6 +101,7 @@ class Work:
             return sums(self, found, ends)
         self.endless = endless(self, found)
         tally = Tally(self, fresh)
+        self.filled = filled(self, fresh)
         done = self.refine(fresh, ends, tally)
         for _ in range(DOUBTFUL_ROUNDS):
             found = totals(self, done, ends)
@@ -327,7 +329,8 @@ class Work:
         env[name] = Cell(x.reshape(-1), None, tangent)
         masks = {g: m[index[flat]] if isinstance(m, np.ndarray) else m for g, m in self.sides.items()}
         root = self.below(owner[flat])
-        less = None if weight is None else slack(self, owner, np.broadcast_to(np.abs(weight), x.shape))
+        known = weight is not None and self.filled is not None
+        less = slack(self, owner, np.broadcast_to(np.abs(weight), x.shape)) if known else self.inherited(owner, n)
         sums = self.parent.run(self.number + 1, env, x.size, masks, self.inner, root, less)
         if sums.gross is not None:
             note_cancelling(self, sums, sums.gross, owner[flat])
@@ -336,6 +339,10 @@ class Work:
         et = sums.et.reshape(t.shape)
         common = sums.common if sums.common is None else sums.common.reshape(t.shape)
         return sums.v.reshape(shape), t[:, k] if self.moving else None, t[:, :k], sums.e.reshape(shape), et, common
+
+    def inherited(self, owner: Ints, n: int) -> Array | None:
+        """How many times the error may be larger of the nodes of members that have less weight than others."""
+        return None if self.slack is None else np.repeat(self.slack[owner], n)
 
     def below(self, owner: Ints) -> Ints | None:
         """For members of the next batch, the members of the outermost one."""

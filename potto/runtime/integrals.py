@@ -24,6 +24,7 @@ from potto.integrate.straight import certain
 from potto.kernels import errors
 from potto.kernels.cells import Array, Cell, Ints, Number, Value, all_arrays, map_arrays
 from potto.runtime.choices import many, orders, preferred, too_many, trials
+from potto.runtime.coarser import by_less
 from potto.runtime.convergence import allowance, missing, widest
 from potto.runtime.differences import by_differences
 from potto.runtime.elimination import ACCURATE, WORTH, step_by_step
@@ -230,7 +231,9 @@ def _looked_into(
 ) -> Sums:  # fmt: skip
     """The sums of an iterated quadrature, with what was met on the way looked into, and another side where it helps."""
     met, env = machine.books.met, linked.env
-    if plan.folds or machine.books.met.incomplete:
+    if outermost:
+        sums = by_less(machine, plan, plan.environment(env, env), batch, sums)
+    if plan.folds or met.incomplete:
         beside_another(machine, order, linked, env, batch, sums)
     if outermost and met.sided and not machine.side:
         from_both_sides(machine, plan, plan.environment(env, env), batch, sums, iterated)
