@@ -11,16 +11,19 @@ from functools import lru_cache
 from potto.calculus.derivative import NotSmooth, partial
 from potto.calculus.ranges import ARITHMETIC, RANGES
 from potto.core.simplify import simplify
-from potto.core.terms import Branch, Const, If, Prim, Proj, Term, Var, children, postorder_by
+from potto.core.terms import Branch, Const, If, Prim, Proj, Sum, Term, Var, children, postorder_by
 
 
 def enclosable(term: Term, jumps: bool = False) -> bool:
-    """Whether a term can be enclosed: arithmetic and builtins, and conditionals if it may jump."""
+    """Whether a term can be enclosed: arithmetic and builtins, sums of such, and brackets if it may jump.
+
+    Sums are written out before any number is asked for (`unrolled`), and what plain conditionals decide is decided.
+    """
     return all(
-        isinstance(node, Const | Var)
+        isinstance(node, Const | Var | Sum | If)
         or (isinstance(node, Proj) and isinstance(node.term, Proj | Var))
         or (isinstance(node, Prim) and (node.op in ARITHMETIC or RANGES.knows(node.op)))
-        or (jumps and isinstance(node, Branch | If))
+        or (jumps and isinstance(node, Branch))
         for node in postorder_by(term, _values)
     )
 

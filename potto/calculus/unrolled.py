@@ -62,6 +62,13 @@ class _Unrolling:
     def run(self, term: Term, depth: int) -> Term:
         taken: dict[Term, Term] = {}  # plain conditionals, and the sides that they take
         memo: dict[Term, Term] = {}
+        deciding = {
+            part
+            for node in postorder(term)
+            if isinstance(node, Branch)
+            for part in postorder(node.surface)
+            if isinstance(part, Sum)
+        }
         for node in postorder_by(term, lambda node: self.below(node, taken)):
             if node in taken:
                 memo[node] = memo[taken[node]]
@@ -71,7 +78,7 @@ class _Unrolling:
                 memo[node] = proj(memo[node.term], node.index)
             else:
                 new = rebuild(node, tuple(memo[c] for c in children(node)))
-                memo[node] = self.carried_out(new, depth)
+                memo[node] = self.carried_out(new, depth, node in deciding)
         return memo[term]
 
     def below(self, node: Term, taken: dict[Term, Term]) -> Sequence[Term]:
@@ -85,10 +92,13 @@ class _Unrolling:
                 return (taken[node],)
         return children(node)
 
-    def carried_out(self, node: Term, depth: int) -> Term:
+    def carried_out(self, node: Term, depth: int, decides: bool) -> Term:
+        """A call as what it does, a sum as its summands where they jump, or decide where something else does."""
         if isinstance(node, App):
             return self.applied(node, depth)
-        if isinstance(node, Sum) and any(isinstance(part, App | Branch) for part in postorder(node.body)):
+        if isinstance(node, Sum) and (
+            decides or any(isinstance(part, App | Branch) for part in postorder(node.body))
+        ):
             return self.summed(node, depth)
         return node
 

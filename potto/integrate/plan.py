@@ -33,6 +33,7 @@ from potto.core.terms import (
     Branch,
     Const,
     Deriv,
+    If,
     Integral,
     Lam,
     Sum,
@@ -252,9 +253,9 @@ def _may_fold(term: Integral, levels: Sequence[LevelPlan]) -> bool:
 
 
 def _may_be_mixed(found: Finding) -> bool:
-    """Whether a surface may be several, as conditions inside of it fall."""
+    """Whether a surface may be several, as conditions inside of it fall, or has a sum that is to be written out."""
     parts = outside(found.surface, (Integral, Sum, Lam)) if found.kind == "jump" else ()
-    return any(isinstance(part, Branch | App) for part in parts)
+    return any(isinstance(part, Branch | App | Sum | If) for part in parts)
 
 
 def _apart(term: Integral, inline: Resolve, decide: Decide, number: Number) -> Lifted | None:

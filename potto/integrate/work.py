@@ -329,8 +329,10 @@ class Work:
         env[name] = Cell(x.reshape(-1), None, tangent)
         masks = {g: m[index[flat]] if isinstance(m, np.ndarray) else m for g, m in self.sides.items()}
         root = self.below(owner[flat])
-        known = weight is not None and self.filled is not None
-        less = slack(self, owner, np.broadcast_to(np.abs(weight), x.shape)) if known else self.inherited(owner, n)
+        if weight is None or self.filled is None:
+            less = self.inherited(owner, n)
+        else:
+            less = slack(self, owner, np.broadcast_to(np.abs(weight), x.shape))
         sums = self.parent.run(self.number + 1, env, x.size, masks, self.inner, root, less)
         if sums.gross is not None:
             note_cancelling(self, sums, sums.gross, owner[flat])
