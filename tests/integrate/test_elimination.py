@@ -116,3 +116,28 @@ def test_what_cannot_be_passed_on_by_one_number_is_integrated_as_ever(body: str,
         again = f((at, 1.0))
     assert abs(found.value - again.value) <= found.error + again.error
     assert abs(found.tangent - again.tangent) <= found.tangent_error + again.tangent_error
+
+
+SIX = [f"x{i}" for i in range(6)]
+
+
+@pytest.mark.parametrize(
+    "condition",
+    [
+        "[" + " and ".join(f"{x} < t" for x in SIX) + "]",
+        "[max(" + ", ".join(SIX) + ") < t]",
+        "[not (" + " or ".join(f"{x} >= t" for x in SIX) + ")]",
+        "[min(" + ", ".join(f"t - {x}" for x in SIX) + ") > 0]",
+        "*".join(f"[{x} < t]" for x in SIX),
+    ],
+    ids=["and", "max", "not or", "min", "product"],
+)
+def test_all_of_several_conditions_are_their_product(condition: str) -> None:
+    """Each of six numbers below t: (1 - exp(-t))^6, at the cost of the product."""
+    text = f"{condition}*exp({' '.join(f'- {x}' for x in SIX)})"
+    f = potto.compile(f"def f(t) integral ({', '.join(['[0, 1]'] * 6)}) {text} d({', '.join(SIX)})").f
+    answer = potto.grad(f, "t")(0.7)
+    below = 1 - mp.exp(-mp.mpf(0.7))
+    assert abs(answer.value - below**6) <= answer.error + 1e-17 and answer.error <= 1e-13
+    assert abs(answer.tangent - 6 * below**5 * (1 - below)) <= answer.tangent_error + 1e-17
+    assert answer.tangent_error <= 1e-13 and answer.evals <= 200

@@ -171,3 +171,18 @@ def test_however_it_is_written(program: str) -> None:
         rate = a / abs(3 * a * a - 1) + b / abs(3 * b * b - 1)
         assert abs(answer.tangent - rate) <= answer.tangent_error + 64 * EPS
     assert abs(answer.value - exact) <= answer.error + 16 * EPS and answer.converged
+
+
+@pytest.mark.parametrize("n", [1, 2, 4, 9])
+@pytest.mark.parametrize("given", ["1..{n}", "1..n"])
+def test_a_sum_in_a_condition_is_the_sum_written_out(n: int, given: str) -> None:
+    """Partial sums of a sawtooth, with as many roots as they have turns."""
+    written = " + ".join(f"sin({k}*x)/{k}" for k in range(1, n + 1))
+    summed = f"sum k in {given.format(n=n)} (sin(k*x)/k)"
+    for condition in (f"{summed} < t", f"t > {summed} + (if n > 3 then 0 else 0*x)"):
+        f = potto.compile(f"def f(t, n) integral [0, 6] [{condition}]*exp(-x/3) d(x)").f
+        g = potto.compile(f"def f(t) integral [0, 6] [{written} < t]*exp(-x/3) d(x)").f
+        one, other = potto.grad(f, "t")(0.3, n), potto.grad(g, "t")(0.3)
+        assert abs(one.value - other.value) <= one.error + other.error
+        assert abs(one.tangent - other.tangent) <= one.tangent_error + other.tangent_error
+        assert one.converged and one.evals <= 2 * other.evals
