@@ -61,6 +61,8 @@ def _places(system: Critical, variable: str, env: dict[str, Value], low: Array, 
     names = (variable, *(w.variable for w in system.within))
     terms, env = flat((*system.equations, *slopes, *ends), env)
     n = len(names)
+    if not all(equation.free.intersection(names) for equation in terms[:n]):
+        return []  # what the parameters alone decide is 0 everywhere, or nowhere
     fixed: dict[str, Array] = {}
     for name in frozenset().union(*(t.free for t in terms)).difference(names):
         value = env[name]
