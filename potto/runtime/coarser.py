@@ -26,8 +26,11 @@ EXTRA = 0.125  # the part of the budget that each may take beyond it
 
 
 def by_less(machine: Machine, plan: Plan, env: dict[str, Value], batch: int, sums: Sums) -> Sums:
-    """The sums, or better ones that were found by asking for less, where the budget ran out with few digits."""
-    if not machine.exhausted() or (sums.e <= ENOUGH * np.abs(sums.v)).all():
+    """The sums, or better ones that were found by asking for less, where the budget ran out with few digits.
+
+    Not where the integrand calls for integrals, which would go far beyond any budget once more.
+    """
+    if not machine.exhausted() or (sums.e <= ENOUGH * np.abs(sums.v)).all() or machine.inexact(plan.term.body):
         return sums
     for rtol in TOLERANCES:
         most = math.ceil(machine.books.spent + EXTRA * machine.settings.max_evals)
