@@ -171,8 +171,7 @@ def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, d
     x = np.empty((count + 2, batch))
     t = np.zeros((2 * directions, count + 2, batch))  # speeds, then their errors
     e = np.empty((count + 2, batch))
-    x[0], x[-1] = low, high
-    e[0], e[-1] = el, eh
+    x[0], x[-1], e[0], e[-1] = low, high, el, eh
     t[:directions, 0], t[:directions, -1] = tl, th
     inside = np.zeros((count + 2, batch), dtype=bool)
     edges: list[Edge] = []

@@ -29,7 +29,7 @@ def test_the_radius_of_a_disc(far: float) -> None:
     f = potto.compile(f"def f(t)\n    integral ({box}, {box}) [(x - {o})^2 + (y - {o})^2 < t^2] d(x, y)").f
     answer = potto.deriv(f)((0.3, 1.0))
     covered(answer, mp.pi * mp.mpf(0.3) ** 2, 2 * mp.pi * mp.mpf(0.3))
-    assert answer.error <= 3e-14 * abs(far) and answer.tangent_error <= 1.5e-13 * abs(far)
+    assert answer.error <= 3e-14 * abs(far) and answer.tangent_error <= 1e-13 * abs(far)
 
 
 @pytest.mark.parametrize("far", FAR)
@@ -43,6 +43,7 @@ def test_a_disc_that_moves(far: float) -> None:
     with mp.workdps(50):
         d = mp.mpf(far + 0.3) - mp.mpf(far)
         covered(answer, mp.pi / 4 * (d**2 + mp.mpf(1) / 16), mp.pi / 2 * d)
+    # Next to where the disc begins its sections move fast, and their speeds are rounded, which counts as well.
     assert answer.error <= 1e-14 * abs(far) and answer.tangent_error <= 1.5e-14 * abs(far)
 
 
