@@ -29,8 +29,8 @@ RUNS = 7
 LINES = 2000
 TARGETS = {"version": 60.0, "prompt": 250.0, "first expression": 300.0, "echo p99": 10.0, "highlighting p99": 10.0,
            "enter p99": 10.0}  # fmt: skip
-HEAVY = ("numpy", "scipy", "mpmath", "lark", "prompt_toolkit", "pygls", "asyncio", "potto.syntax", "potto.check",
-         "potto.kernels", "potto.integrate", "potto.ide", "potto_repl")  # fmt: skip
+HEAVY = ("numpy", "scipy", "mpmath", "lark", "prompt_toolkit", "pygls", "asyncio", "potto.syntax",
+         "potto.checking.check", "potto.kernels", "potto.integrate", "potto.ide", "potto_repl")  # fmt: skip
 TEXT = """def renderer(c, shader)
     area = integral ([0, 1], [0, 1])
         (shader(x, y) * [x + y + c >= 0]) d(x, y)
@@ -174,7 +174,7 @@ def keystrokes() -> dict[str, Figure]:
     from potto_repl.start import Loader
     from prompt_toolkit.document import Document
 
-    from potto.settings import DEFAULTS
+    from potto.projects.settings import DEFAULTS
 
     loader = Loader(DEFAULTS)
     session = loader.session

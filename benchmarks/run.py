@@ -223,7 +223,7 @@ def conditions() -> None:
 
 
 def hard_dimensions() -> None:
-    from potto.runtime.printing import with_error
+    from potto.runtime.answers.printing import with_error
 
     title("More dimensions")
     m = potto.compile("""

@@ -7,16 +7,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-# At once, because `potto.settings` is a module as well: this binding comes after, and stays.
 from potto.diagnostics import PottoError
-from potto.settings import settings
+from potto.projects.settings import settings
 
 if TYPE_CHECKING:
-    from potto.api import Function, Module, ProgramWarning, Workspace, compile, deriv, grad, load
-    from potto.fitting import fit
-    from potto.hessian import hvp
+    from potto.applications.fitting import fit
+    from potto.applications.hessian import hvp
     from potto.integrate.costs import counting
-    from potto.runtime.estimate import Estimate
+    from potto.python.api import Function, Module, ProgramWarning, Workspace, compile, deriv, grad, load
+    from potto.runtime.answers.estimate import Estimate
 
 __version__ = "0.1.0"
 __all__ = [
@@ -38,10 +37,10 @@ __all__ = [
 ]
 
 _HOMES = {
-    "Estimate": "potto.runtime.estimate",
+    "Estimate": "potto.runtime.answers.estimate",
     "counting": "potto.integrate.costs",
-    "fit": "potto.fitting",
-    "hvp": "potto.hessian",
+    "fit": "potto.applications.fitting",
+    "hvp": "potto.applications.hessian",
 }
 
 
@@ -50,7 +49,7 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'potto' has no attribute {name!r}")
     from importlib import import_module
 
-    value = getattr(import_module(_HOMES.get(name, "potto.api")), name)
+    value = getattr(import_module(_HOMES.get(name, "potto.python.api")), name)
     globals()[name] = value
     return value
 

@@ -13,19 +13,16 @@ ROOT = Path(__file__).resolve().parent.parent
 # From the top floor down. Packages on one floor may import each other unless they are listed as strangers.
 FLOORS: tuple[tuple[str, ...], ...] = (
     ("potto_lsp", "potto_repl", "potto.__main__", "potto.cli"),
-    (
-        "potto.ide", "potto.session", "potto.api", "potto.calls", "potto.arguments", "potto.live", "potto.world",
-        "potto.fitting", "potto.hessian", "potto.images", "potto.bench",
-    ),
+    ("potto.ide", "potto.evaluating", "potto.python", "potto.applications", "potto.bench"),
     ("potto.runtime",),
     ("potto.kernels", "potto.integrate"),
-    ("potto.library", "potto.facts", "potto.check", "potto.spoiled", "potto.crew"),
+    ("potto.checking", "potto.crew"),
     ("potto.calculus",),
     ("potto.elaborate",),
     ("potto.types",),
     ("potto.modules", "potto.diffeos", "potto.measures"),
     ("potto.syntax", "potto.core", "potto.primitives"),
-    ("potto.png", "potto.render", "potto.excerpt", "potto.settings", "potto.project", "potto.pages"),
+    ("potto.reports", "potto.projects"),
     ("potto.source", "potto.quick", "potto.diagnostics", "potto.query"),
 )
 # What a package must not import although its floor would let it.
@@ -33,14 +30,14 @@ FORBIDDEN: dict[str, tuple[str, ...]] = {
     "potto.syntax": ("potto.core",),
     "potto.core": ("potto.syntax",),
     "potto.primitives": ("potto.syntax",),
-    "potto.ide": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.api", "potto.world", "potto.live"),
+    "potto.ide": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.python", "potto.evaluating"),
 }
 # Who may import a package that is not ours; nobody else may, at the top of a module or inside of a function.
 OUTSIDERS: dict[str, tuple[str, ...]] = {
     "lark": ("potto.syntax",),
-    "numpy": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.arguments", "potto.fitting",
-              "potto.images", "potto.bench", "potto_lsp.preview", "potto_lsp.sampling"),
-    "scipy": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.fitting", "potto.bench"),
+    "numpy": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.python.arguments", "potto.applications",
+              "potto.bench", "potto_lsp.preview", "potto_lsp.sampling"),
+    "scipy": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.applications.fitting", "potto.bench"),
     "jax": ("potto.bench.peers",),
     "vegas": ("potto.bench.peers",),
     "matplotlib": ("potto.bench.plotting",),
@@ -137,7 +134,7 @@ def test_the_front_end_starts_without_numpy() -> None:
     import subprocess
     import sys
 
-    code = "import sys, potto.check, potto.render; sys.exit('numpy' in sys.modules)"
+    code = "import sys, potto.checking.check, potto.reports.render; sys.exit('numpy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False).returncode == 0
 
 

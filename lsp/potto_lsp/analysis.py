@@ -14,9 +14,9 @@ from potto.modules import chunk_start, module_diagnostics, names, open_files, so
 from potto.modules.graph import dependencies, imported_files
 from potto.modules.lookup import bindings
 from potto.modules.texts import chunk_text, chunks, imports, is_diffeo, parsed, syntax_diagnostics
-from potto.project import Project, Projects, read_project
+from potto.projects.project import Project, Projects, read_project
 from potto.query import Database
-from potto.render import Located
+from potto.reports.render import Located
 from potto_lsp.documents import Document
 from potto_lsp.text import Encoding, Text
 from potto_lsp.uris import to_key, to_uri
@@ -194,7 +194,7 @@ class Analysis:
             known = self._verdicts.of(key)
             if known is not None:
                 return known
-        from potto import check  # slow to import, and what is known from earlier is told without it
+        from potto.checking import check  # slow to import, and what is known from earlier is told without it
 
         if key not in self.taken:
             self._ripe.add(key)
@@ -203,7 +203,7 @@ class Analysis:
         try:
             return check.diagnostics(self.db, key)
         except Exception:
-            from potto.check import arranged
+            from potto.checking.check import arranged
 
             return tuple(Located(key, said) for said in arranged(self._guarded(key)))
 
@@ -250,7 +250,7 @@ class Analysis:
 
     def keep(self, key: str) -> None:
         """Keep for later sessions what was found out about a file."""
-        from potto.check import diagnostics
+        from potto.checking.check import diagnostics
 
         try:
             self._verdicts.keep(key, diagnostics(self.db, key), diagnostics.__name__)
@@ -259,7 +259,7 @@ class Analysis:
 
     def _guarded(self, key: str) -> list[Diagnostic]:
         """The diagnostics of a file part by part; a part that fails is logged once for each of its texts."""
-        from potto.check import absolute, definition_diagnostics
+        from potto.checking.check import absolute, definition_diagnostics
         from potto.types import check_statement
 
         db, found = self.db, list[Diagnostic]()

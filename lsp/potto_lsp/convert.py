@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from potto.diagnostics import Diagnostic, Related
     from potto.ide import Change, Edit, FileEdits, FileRename
     from potto.ide import Location as Place
-    from potto.render import Located
+    from potto.reports.render import Located
     from potto.source import Span
     from potto_lsp.analysis import Analysis
     from potto_lsp.client import Client
@@ -145,7 +145,7 @@ _pages: dict[str, str | None] = {}
 def page_uri(code: str) -> str | None:
     """Where the page of a diagnostic is."""
     if code not in _pages:
-        from potto.pages import folder
+        from potto.reports.pages import folder
 
         home = folder()
         path = None if home is None else home / f"{code}.md"

@@ -17,12 +17,12 @@ from dataclasses import replace
 from threading import Thread
 from typing import TYPE_CHECKING, Any, TextIO
 
-from potto.render import Located, ProgramError, render
+from potto.reports.render import Located, ProgramError, render
 from potto.source import Span
 
 if TYPE_CHECKING:
-    from potto.runtime.estimate import Estimate
-    from potto.world import World
+    from potto.evaluating.world import World
+    from potto.runtime.answers.estimate import Estimate
 
 MOST_LINES = 1000  # of what a script shows
 
@@ -74,7 +74,7 @@ def main() -> int:
 
 
 def _loaded() -> World:
-    from potto.world import World
+    from potto.evaluating.world import World
 
     return World()
 
@@ -119,7 +119,7 @@ def _answer(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
 
 def _evaluate(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
     """The value of an expression."""
-    from potto.runtime.shown import estimate_json, format_answer
+    from potto.runtime.answers.shown import estimate_json, format_answer
 
     answer = world.evaluate(task["file"], task["text"])
     remarks = [located.diagnostic.message for located in answer.remarks]
@@ -129,9 +129,9 @@ def _evaluate(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
 
 def _live(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
     """The value of a live expression, whether it is the expected one, and what there is to say about it."""
-    from potto.live import DOES_NOT_HOLD, agrees
-    from potto.runtime.printing import largest
-    from potto.runtime.shown import bounds, format_estimate, interval, pair
+    from potto.evaluating.live import DOES_NOT_HOLD, agrees
+    from potto.runtime.answers.printing import largest
+    from potto.runtime.answers.shown import bounds, format_estimate, interval, pair
 
     file, expected = task["file"], task["expected"]
     try:
@@ -186,7 +186,7 @@ def _rendered(error: ProgramError) -> str:
 
 def _point(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
     """A value, and the slopes by each parameter where they are numbers; all with error bars."""
-    from potto.runtime.shown import bounds, format_estimate, interval, tangent_of
+    from potto.runtime.answers.shown import bounds, format_estimate, interval, tangent_of
 
     estimate = world.evaluate(task["file"], task["text"]).estimate
     found: dict[str, Any] = {"text": format_estimate(estimate), "shown": interval(estimate), "slopes": []}

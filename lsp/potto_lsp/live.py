@@ -19,7 +19,7 @@ from potto.diagnostics import Diagnostic
 from potto.elaborate import core, elaborate_expression
 from potto.modules import names
 from potto.query import Database, query
-from potto.render import Located
+from potto.reports.render import Located
 from potto.source import Span
 from potto.syntax import parse_expression
 from potto_lsp.evaluation import LIVE, POINTS, Task

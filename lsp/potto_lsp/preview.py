@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from potto.api import Function, Module
 from potto.diagnostics import PottoError
-from potto.runtime.printing import format_digits, format_range
+from potto.python.api import Function, Module
+from potto.runtime.answers.printing import format_digits, format_range
 from potto_lsp.sampling import NoSamples, argument
 
 if TYPE_CHECKING:
-    from potto.world import World
+    from potto.evaluating.world import World
 
 SIZE, CURVE = 128, 256  # pixels along a side of an image, and along a curve
 Array = np.ndarray[Any, np.dtype[Any]]

@@ -17,8 +17,8 @@ from potto_lsp.text import Text
 from potto_lsp.uris import to_uri
 
 if TYPE_CHECKING:
-    from potto.project import Project
-    from potto.render import Located
+    from potto.projects.project import Project
+    from potto.reports.render import Located
     from potto_lsp.analysis import Analysis
     from potto_lsp.client import Client
     from potto_lsp.documents import Document
@@ -56,7 +56,7 @@ class Publisher:
 
     def report(self, key: str) -> Report:
         """What there is to say about a file now."""
-        from potto.project import levelled
+        from potto.projects.project import levelled
 
         analysis = self._analysis
         found = checked, further = analysis.diagnostics(key), self.further(key)

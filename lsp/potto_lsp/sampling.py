@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from potto.api import Function, Module, expression, grad
 from potto.diagnostics import PottoError
 from potto.modules import find_module, resolve_module
-from potto.runtime.estimate import Estimate
-from potto.settings import settings
+from potto.projects.settings import settings
+from potto.python.api import Function, Module, expression, grad
+from potto.runtime.answers.estimate import Estimate
 from potto.syntax import nodes
 
 if TYPE_CHECKING:
-    from potto.world import World
+    from potto.evaluating.world import World
 
 RTOL = 1e-6
 Array = np.ndarray[Any, np.dtype[Any]]

@@ -18,7 +18,7 @@ from potto_lsp.progress import Progress
 
 if TYPE_CHECKING:
     from potto.query import Database
-    from potto.render import Located
+    from potto.reports.render import Located
     from potto_lsp.analysis import Analysis
     from potto_lsp.evaluation import Evaluator
     from potto_lsp.live import LiveValues

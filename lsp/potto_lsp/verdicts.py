@@ -24,7 +24,7 @@ from typing import Any
 from potto.diagnostics import Diagnostic, Related
 from potto.modules.texts import content
 from potto.query import Database
-from potto.render import Located
+from potto.reports.render import Located
 from potto.source import Span
 from potto.syntax.tables import cache_folder
 

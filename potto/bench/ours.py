@@ -9,11 +9,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from potto.api import Workspace, deriv
 from potto.bench.adapter import Answer, Solve
 from potto.bench.problems import Problem, Quantity
-from potto.runtime.estimate import Estimate
-from potto.settings import settings
+from potto.projects.settings import settings
+from potto.python.api import Workspace, deriv
+from potto.runtime.answers.estimate import Estimate
 
 TOLERANCES = (1e-1, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 POINTS = tuple(2.0**k for k in range(7, 21))

@@ -17,7 +17,7 @@ from typing import Any, Literal, TextIO
 from potto.bench.adapter import Adapter, installed
 from potto.bench.measure import Run, slope
 from potto.bench.problems import QUANTITIES, Problem, Quantity, catalogue
-from potto.runtime.printing import format_error
+from potto.runtime.answers.printing import format_error
 
 Measure = Literal["time", "evaluations"]
 TARGETS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-12)

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from potto.api import Function
-    from potto.world import World
+    from potto.evaluating.world import World
+    from potto.python.api import Function
 
 
 def assignment(text: str) -> tuple[str, str]:
@@ -21,8 +21,8 @@ def assignment(text: str) -> tuple[str, str]:
 
 def function_in(world: World, file: str, text: str) -> Function:
     """The function that an expression stands for. Raises ProgramError, PottoError."""
-    from potto.api import Function
     from potto.kernels.errors import wrong_call
+    from potto.python.api import Function
     from potto.types.types import Diffeo
     from potto.types.types import Function as FunctionType
 
@@ -34,7 +34,7 @@ def function_in(world: World, file: str, text: str) -> Function:
 
 def argument_in(world: World, file: str, text: str) -> Any:
     """What a parameter is given: a function, or numbers. Raises ProgramError."""
-    from potto.api import Function
+    from potto.python.api import Function
     from potto.types.types import Diffeo
     from potto.types.types import Function as FunctionType
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from potto.cli.console import Console
 
 if TYPE_CHECKING:
-    from potto.library import Library
-    from potto.render import Located
+    from potto.checking.library import Library
+    from potto.reports.render import Located
 
 SUMMARY = "say what is wrong with programs, where, and what to do"
 EXAMPLE = "  potto check examples/ --watch"
@@ -24,7 +24,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    from potto.library import Library
+    from potto.checking.library import Library
 
     gc.disable()  # nearly all that a check makes stays, and collections would be a fifth of its time and more
     try:
@@ -43,7 +43,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 def _look(world: Library, options: argparse.Namespace, console: Console) -> int:
     """Check all files once and say what was found."""
-    from potto.render import all_to_json, summary
+    from potto.reports.render import all_to_json, summary
 
     found, files = gather(world, options.paths)
     if options.json:
@@ -59,7 +59,7 @@ def gather(world: Library, paths: list[str]) -> tuple[list[Located], int]:
     """The diagnostics of all files that the paths name, and how many files there are."""
     from potto.cli.files import expand
     from potto.cli.opening import opened
-    from potto.render import ProgramError
+    from potto.reports.render import ProgramError
 
     files, found = expand(paths)
     parts: dict[str, list[Located]] = {}

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, TextIO
 
 if TYPE_CHECKING:
-    from potto.render import Located, Palette, Sources
+    from potto.reports.render import Located, Palette, Sources
 
 Color = Literal["auto", "always", "never"]
 MOST_SHOWN = 50  # diagnostics of one command shown to a person
@@ -52,7 +52,7 @@ class Console:
             self.err.flush()
 
     def palette(self, stream: TextIO) -> Palette:
-        from potto.render import COLORS, PLAIN
+        from potto.reports.render import COLORS, PLAIN
 
         return COLORS if wants_color(self.color, stream) else PLAIN
 
@@ -65,7 +65,7 @@ class Console:
         inline_header: bool = False,
     ) -> None:
         """Show diagnostics to a person: as the answer (of `check`), else as complaints."""
-        from potto.render import render
+        from potto.reports.render import render
 
         stream = self.out if to_answer else self.err
         palette = self.palette(stream)

@@ -12,8 +12,8 @@ from potto.cli.console import Console
 from potto.cli.numbers import accounts, add_options, settings_of, show_stats
 
 if TYPE_CHECKING:
-    from potto.calls import Gradient
-    from potto.world import World
+    from potto.evaluating.world import World
+    from potto.python.calls import Gradient
 
 SUMMARY = "show the derivative of a definition in symbols, or its gradient in numbers"
 EXAMPLE = """  potto deriv examples/paper/renderer.po renderer
@@ -36,11 +36,11 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 
 def _symbols(options: argparse.Namespace, console: Console) -> int:
+    from potto.checking.facts import derivative_facts
+    from potto.checking.library import NO_SUCH_DEFINITION, NOWHERE, Library
     from potto.cli.opening import fail, opened, others_json, report_others
-    from potto.facts import derivative_facts
-    from potto.library import NO_SUCH_DEFINITION, NOWHERE, Library
     from potto.modules import DefinitionTarget, names, resolve
-    from potto.render import Located, ProgramError
+    from potto.reports.render import Located, ProgramError
     from potto.syntax import nodes
 
     world = Library(["."])
@@ -76,8 +76,8 @@ def _numbers(options: argparse.Namespace, console: Console) -> int:
     if chosen is None:
         return 2
     from potto.diagnostics import PottoError
-    from potto.settings import settings
-    from potto.world import World
+    from potto.evaluating.world import World
+    from potto.projects.settings import settings
 
     world = World(["."])
     try:
@@ -94,8 +94,8 @@ def _numbers(options: argparse.Namespace, console: Console) -> int:
 
 def _taken(world: World, file: str, options: argparse.Namespace) -> tuple[Gradient, Gradient | None]:
     """The gradient, and the Hessian's product with the vector if one is given. Raises PottoError."""
-    from potto.api import Function, grad
-    from potto.hessian import hvp
+    from potto.applications.hessian import hvp
+    from potto.python.api import Function, grad
 
     function = function_in(world, file, options.name)
     given = arguments_in(world, file, options.given)
@@ -111,7 +111,7 @@ def _tell(
     once: Gradient, twice: Gradient | None, options: argparse.Namespace, console: Console,
     others: dict[str, Any],
 ) -> None:  # fmt: skip
-    from potto.runtime.shown import answer_text, json_number
+    from potto.runtime.answers.shown import answer_text, json_number
 
     def sides(found: Gradient) -> list[tuple[str, Any, Any]]:
         errors = found.tangent_error if len(found.wrt) > 1 else (found.tangent_error,)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from potto.cli.console import Console
 
 if TYPE_CHECKING:
-    from potto.live import Outcome
+    from potto.evaluating.live import Outcome
 
 SUMMARY = "run the live expressions of programs (`#> e`, `#= v`) as tests"
 EXAMPLE = "  potto test examples/"
@@ -23,9 +23,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     from potto.cli.files import expand
     from potto.cli.opening import opened
-    from potto.live import outcomes_of
-    from potto.render import ProgramError, all_to_json
-    from potto.world import World
+    from potto.evaluating.live import outcomes_of
+    from potto.evaluating.world import World
+    from potto.reports.render import ProgramError, all_to_json
 
     world = World(["."])
     files, problems = expand(options.paths)
@@ -46,7 +46,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 
 def _show(outcomes: list[Outcome], files: int, broken: bool, verbose: bool, console: Console) -> None:
-    from potto.render import display_name
+    from potto.reports.render import display_name
 
     for outcome in outcomes:
         head = f"{display_name(outcome.file)}:{outcome.line}: {outcome.expression}"

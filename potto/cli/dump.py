@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from potto.cli.console import Console
 
 if TYPE_CHECKING:
-    from potto.world import World
+    from potto.evaluating.world import World
 
 SUMMARY = "show what a program becomes: tokens, tree, types, core, deriv or kernel"
 EXAMPLE = "  potto dump core examples/paper/renderer.po"
@@ -25,8 +25,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, console: Console) -> int:
     from potto.cli.opening import fail, opened, others_json, report_others
-    from potto.render import ProgramError
-    from potto.world import World
+    from potto.evaluating.world import World
+    from potto.reports.render import ProgramError
 
     world = World(["."])
     makers: dict[str, Callable[[World, str], Iterator[Section]]] = {
@@ -92,7 +92,7 @@ def _core(world: World, file: str) -> Iterator[Section]:
 
 
 def _deriv(world: World, file: str) -> Iterator[Section]:
-    from potto.facts import derivative_facts
+    from potto.checking.facts import derivative_facts
     from potto.modules import names
 
     for name in filter(lambda name: world.is_sound(file, name), names(world.db, file)):

@@ -29,9 +29,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
     settings = settings_of(options, console)
     if settings is None:
         return 2
-    from potto.render import ProgramError, to_json
-    from potto.runtime.shown import estimate_json, format_answer, interval
-    from potto.world import World
+    from potto.evaluating.world import World
+    from potto.reports.render import ProgramError, to_json
+    from potto.runtime.answers.shown import estimate_json, format_answer, interval
 
     world = World(["."])
     try:

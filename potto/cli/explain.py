@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from potto.cli.console import Console, wants_color
 
 if TYPE_CHECKING:
-    from potto.pages import Page
+    from potto.reports.pages import Page
 
 SUMMARY = "what a diagnostic means, with a wrong and a right program"
 EXAMPLE = "  potto explain P0301"
@@ -20,7 +20,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    from potto import pages
+    from potto.reports import pages
 
     wanted = [code.upper() for code in options.codes]
     if not wanted:
@@ -40,7 +40,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 
 def _list(options: argparse.Namespace, console: Console) -> int:
-    from potto import pages
+    from potto.reports import pages
 
     found = [page for page in map(pages.page, pages.codes()) if page is not None]
     if options.json:

@@ -6,11 +6,11 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 
-from potto.library import NO_PROGRAMS
+from potto.checking.library import NO_PROGRAMS
 from potto.modules.folders import HEAVY, is_translation
 from potto.modules.kinds import UNREADABLE
 from potto.modules.lookup import SUFFIXES
-from potto.render import Located, ProgramError
+from potto.reports.render import Located, ProgramError
 from potto.source import Span
 
 STDIN = "<stdin>"

@@ -14,9 +14,9 @@ from potto.cli.console import Console
 from potto.cli.numbers import accounts, add_options, settings_of, show_stats
 
 if TYPE_CHECKING:
-    from potto.fitting import Fit, Step
-    from potto.runtime.estimate import Estimate
-    from potto.world import World
+    from potto.applications.fitting import Fit, Step
+    from potto.evaluating.world import World
+    from potto.runtime.answers.estimate import Estimate
 
 SUMMARY = "find the parameters that make a function least, along its derivatives"
 EXAMPLE = """  potto fit lamp.po loss angle=0.2 height=1 --with shader=lin --bound angle=0:1.5
@@ -73,8 +73,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
         console.complain("potto fit: --steps must be at least 1")
         return 2
     from potto.diagnostics import PottoError
-    from potto.settings import settings
-    from potto.world import World
+    from potto.evaluating.world import World
+    from potto.projects.settings import settings
 
     world = World(["."])
     answers: list[Estimate] = []
@@ -107,7 +107,7 @@ def _fitted(
 
     Raises PottoError; OSError and ValueError for the table.
     """
-    from potto.fitting import fit
+    from potto.applications.fitting import fit
     from potto.kernels.errors import wrong_call
 
     function = function_in(world, file, options.name)
@@ -139,7 +139,7 @@ class _Progress:
         self.names, self.console, self.last = names, console, time.perf_counter()
 
     def __call__(self, step: Step) -> None:
-        from potto.runtime.printing import format_digits, format_error
+        from potto.runtime.answers.printing import format_digits, format_error
 
         at = ", ".join(f"{n} = {format_digits(v)}" for n, v in zip(self.names, step.parameters, strict=True))
         line = f"step {step.number}: {format_digits(step.value)} at {at}, slope {format_error(step.slope)}"
@@ -151,7 +151,7 @@ class _Progress:
 
 def read_table(path: str) -> dict[str, Any]:
     """The columns of a CSV file with a line of names, as arrays. Raises OSError, ValueError."""
-    from potto.fitting import column
+    from potto.applications.fitting import column
 
     with open(path, encoding="utf-8-sig", newline="") as stream:
         rows = [row for row in csv.reader(stream) if any(cell.strip() for cell in row)]
@@ -184,8 +184,8 @@ def _write_trace(found: Fit, path: str) -> None:
 
 
 def _tell(found: Fit, options: argparse.Namespace, console: Console) -> None:
-    from potto.runtime.printing import format_error, format_number, with_error
-    from potto.runtime.shown import json_number
+    from potto.runtime.answers.printing import format_error, format_number, with_error
+    from potto.runtime.answers.shown import json_number
 
     console.progress("")
     count = len(found.steps) - 1

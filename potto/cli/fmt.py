@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 from potto.cli.console import Console
 
 if TYPE_CHECKING:
-    from potto.library import Library
-    from potto.render import Located
+    from potto.checking.library import Library
+    from potto.reports.render import Located
 
 SUMMARY = "format programs"
 EXAMPLE = "  potto fmt --diff examples/"
@@ -25,10 +25,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
+    from potto.checking.library import Library
     from potto.cli.files import expand
     from potto.cli.opening import opened
-    from potto.library import Library
-    from potto.render import ProgramError, all_to_json
+    from potto.reports.render import ProgramError, all_to_json
 
     world = Library()
     files, problems = expand(options.paths)
@@ -55,9 +55,9 @@ def _format(
     world: Library, path: str, key: str, options: argparse.Namespace, console: Console
 ) -> tuple[list[Located], bool]:
     """Format one file as the options say; what is wrong with it, and whether it was (or would be) changed."""
-    from potto.check import errors_of
+    from potto.checking.check import errors_of
     from potto.modules.texts import is_diffeo, syntax_diagnostics
-    from potto.render import Located, display_name
+    from potto.reports.render import Located, display_name
     from potto.syntax import format_source
 
     source = world.source(key)

@@ -10,11 +10,11 @@ from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any
 
 from potto.cli.console import Console
-from potto.project import Projects
-from potto.settings import DEFAULTS, METHODS, Settings, problem
+from potto.projects.project import Projects
+from potto.projects.settings import DEFAULTS, METHODS, Settings, problem
 
 if TYPE_CHECKING:
-    from potto.runtime.estimate import Estimate
+    from potto.runtime.answers.estimate import Estimate
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

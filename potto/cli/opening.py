@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 from potto.cli.console import Console
 from potto.cli.files import STDIN, main_of, missing, read_stdin
 from potto.diagnostics import PottoError
-from potto.render import Located, ProgramError, all_to_json
+from potto.reports.render import Located, ProgramError, all_to_json
 from potto.source import SourceText
 
 if TYPE_CHECKING:
-    from potto.library import Library
+    from potto.checking.library import Library
 
 
 def opened(world: Library, path: str) -> str:

@@ -14,11 +14,11 @@ from potto.cli.console import Console
 from potto.cli.numbers import accounts, add_options, settings_of, show_stats
 
 if TYPE_CHECKING:
-    from potto.api import Function
-    from potto.images import Grid, Sampled
-    from potto.runtime.estimate import Estimate
-    from potto.settings import Settings
-    from potto.world import World
+    from potto.applications.images import Grid, Sampled
+    from potto.evaluating.world import World
+    from potto.projects.settings import Settings
+    from potto.python.api import Function
+    from potto.runtime.answers.estimate import Estimate
 
 SUMMARY = "draw a function of two numbers as an image, and its derivatives"
 EXAMPLE = "  potto render examples/worked/picture.po pixel r=0.7 --wrt r --size 512x512 -o disc.png"
@@ -92,8 +92,8 @@ class Picture:
 
     def call(self, *places: Any) -> tuple[Sequence[Any], Estimate]:
         """The value, the derivatives and the errors at places, as parts one after the other."""
-        from potto.api import grad
-        from potto.images import flat
+        from potto.applications.images import flat
+        from potto.python.api import grad
 
         here = {**self.given, **dict(zip(self.axes, places, strict=True))}
         answer = (grad(self.function, self.wrt) if self.wrt else self.function)(**here)
@@ -109,9 +109,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
     settings = settings_of(options, console)
     if settings is None:
         return 2
+    from potto.applications.images import Grid
     from potto.diagnostics import PottoError
-    from potto.images import Grid
-    from potto.world import World
+    from potto.evaluating.world import World
 
     world = World(["."])
     grid = Grid(options.size[0], options.size[1], options.box)
@@ -157,8 +157,8 @@ def _sampled(picture: Picture, grid: Grid, chosen: Settings, console: Console) -
     """All pixels, with progress for a person who waits."""
     from dataclasses import asdict
 
-    from potto.images import sampled
-    from potto.settings import settings
+    from potto.applications.images import sampled
+    from potto.projects.settings import settings
 
     total = grid.width * grid.height
 
@@ -173,7 +173,7 @@ def _sampled(picture: Picture, grid: Grid, chosen: Settings, console: Console) -
 
 def _write(picture: Picture, found: Sampled, grid: Grid, options: argparse.Namespace) -> None:
     """The files: value, derivatives, errors. Raises OSError."""
-    from potto.images import decades, limits, shades, signed
+    from potto.applications.images import decades, limits, shades, signed
 
     target = options.output or f"{options.name if options.name.isidentifier() else 'image'}.png"
     stem, ending = os.path.splitext(target)
@@ -192,7 +192,7 @@ def _write(picture: Picture, found: Sampled, grid: Grid, options: argparse.Names
 
 def _color_limits(parts: Any) -> tuple[float, float]:
     """Colours between 0 and 1 are meant as they are."""
-    from potto.images import limits
+    from potto.applications.images import limits
 
     low, high = limits(parts)
     return (0.0, 1.0) if low >= 0 and high <= 1 else (low, high)
@@ -202,7 +202,7 @@ def _save(
     picture: Picture, path: str, what: str, parts: Any, grid: Grid, low: float, high: float,
     paint: Callable[[Any, float, float], Any],
 ) -> None:  # fmt: skip
-    from potto.images import png, save_array
+    from potto.applications.images import png, save_array
 
     if path.endswith(".npy"):
         save_array(path, parts, grid)
@@ -215,12 +215,12 @@ def _save(
 def _tell(
     picture: Picture, found: Sampled, grid: Grid, seconds: float, options: argparse.Namespace, console: Console
 ) -> None:  # fmt: skip
-    from potto.images import largest
+    from potto.applications.images import largest
 
     pixels = grid.width * grid.height
     most = largest(found.numbers[len(found.numbers) // 2 :])  # errors come after as many values and derivatives
     if options.json:
-        from potto.runtime.shown import json_number
+        from potto.runtime.answers.shown import json_number
 
         console.answer_json({
             "files": picture.files, "width": grid.width, "height": grid.height, "evals": found.evaluations,
@@ -228,7 +228,7 @@ def _tell(
             "converged": not found.reasons and not found.holes,
         })  # fmt: skip
     else:
-        from potto.runtime.printing import format_error, format_range
+        from potto.runtime.answers.printing import format_error, format_range
 
         for entry in picture.files:
             console.answer(f"{entry['file']}: {entry['shows']}, {format_range(entry['low'], entry['high'])}")

@@ -23,10 +23,10 @@ def run(options: argparse.Namespace, console: Console) -> int:
     settings = settings_of(options, console)
     if settings is None:
         return 2
-    from potto.render import Located, ProgramError, to_json
-    from potto.runtime.estimate import Estimate
-    from potto.runtime.shown import estimate_json
-    from potto.world import World
+    from potto.evaluating.world import World
+    from potto.reports.render import Located, ProgramError, to_json
+    from potto.runtime.answers.estimate import Estimate
+    from potto.runtime.answers.shown import estimate_json
 
     world = World(["."])
     status = 0

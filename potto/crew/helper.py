@@ -9,7 +9,7 @@ from queue import SimpleQueue
 from threading import Thread
 from typing import BinaryIO
 
-from potto.check import diagnostics
+from potto.checking.check import diagnostics
 from potto.crew.pipes import Found, Task, packed, unpacked
 from potto.modules import open_files
 from potto.query import Database

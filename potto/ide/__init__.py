@@ -4,21 +4,19 @@ Owns what an editor may ask; one module a feature. Knows neither a protocol nor 
 question takes the database first and answers also on broken text.
 """
 
-from potto.ide.acting import code_actions, resolve_code_action
-from potto.ide.calling import incoming_calls, outgoing_calls, prepare_call_hierarchy
-from potto.ide.colours import semantic_tokens
-from potto.ide.completing import completions, completions_after, resolve_completion
-from potto.ide.documents import kind_of
-from potto.ide.explaining import derivative_markdown, diffeo_markdown
-from potto.ide.explaining import sound as is_sound
-from potto.ide.finding import highlights, references
-from potto.ide.folds import folding_ranges
-from potto.ide.formatting import format_document, format_on_type, format_range
-from potto.ide.hints import inlay_hints, resolve_inlay_hint
-from potto.ide.hovers import hover
-from potto.ide.lenses import code_lenses, resolve_code_lens
-from potto.ide.linking import document_links, linked_editing
-from potto.ide.living import live_diagnostics, live_in
+from potto.ide.actions.code_actions import code_actions, resolve_code_action
+from potto.ide.completion.completing import completions, completions_after, resolve_completion
+from potto.ide.completion.signature_help import signature_help
+from potto.ide.display.code_lenses import code_lenses, resolve_code_lens
+from potto.ide.display.folding_ranges import folding_ranges
+from potto.ide.display.formatting import format_document, format_on_type, format_range
+from potto.ide.display.inlay_hints import inlay_hints, resolve_inlay_hint
+from potto.ide.display.inline_values import inline_values
+from potto.ide.display.scenes import Scene, SceneParameter, scene, scenes
+from potto.ide.display.semantic_tokens import semantic_tokens
+from potto.ide.hover.derivatives import derivative_markdown, diffeo_markdown
+from potto.ide.hover.derivatives import sound as is_sound
+from potto.ide.hover.hovers import hover
 from potto.ide.model import (
     TOKEN_MODIFIERS,
     TOKEN_TYPES,
@@ -49,16 +47,18 @@ from potto.ide.model import (
     SignatureHelp,
     WorkspaceSymbol,
 )
-from potto.ide.moving import rename_files
-from potto.ide.outlines import document_symbols, workspace_symbols
-from potto.ide.points import Point, point_of, points
-from potto.ide.renaming import prepare_rename, rename
-from potto.ide.scenes import Scene, SceneParameter, scene, scenes
-from potto.ide.selecting import selection_ranges
-from potto.ide.signatures import signature_help
-from potto.ide.symbols import definition_at
-from potto.ide.targets import declaration, definition, implementation, type_definition
-from potto.ide.values import inline_values
+from potto.ide.names.documents import kind_of
+from potto.ide.names.live_expressions import live_diagnostics, live_in
+from potto.ide.names.points import Point, point_of, points
+from potto.ide.names.symbols import definition_at
+from potto.ide.navigation.call_hierarchy import incoming_calls, outgoing_calls, prepare_call_hierarchy
+from potto.ide.navigation.links import document_links, linked_editing
+from potto.ide.navigation.moved_files import rename_files
+from potto.ide.navigation.outlines import document_symbols, workspace_symbols
+from potto.ide.navigation.references import highlights, references
+from potto.ide.navigation.renaming import prepare_rename, rename
+from potto.ide.navigation.selection_ranges import selection_ranges
+from potto.ide.navigation.targets import declaration, definition, implementation, type_definition
 
 __all__ = [
     "TOKEN_MODIFIERS",

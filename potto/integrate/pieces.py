@@ -11,9 +11,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from potto.core.terms import Lam, Term
-from potto.integrate import maps
 from potto.integrate.costs import Costs
-from potto.integrate.rules import gauss, leaning
+from potto.integrate.rules import substitution
+from potto.integrate.rules.gauss import gauss, leaning
 from potto.kernels.cells import Array, Cell, Ints, Mask, Trace, Value, map_arrays
 from potto.kernels.errors import not_a_number
 
@@ -174,8 +174,9 @@ def _power(heights: Array, lean: Ints, end: Ints) -> Ints:
     near = np.where(lean[:, None] > 0, heights[:, :-3:-1], heights[:, :2])
     with np.errstate(all="ignore"):
         exponent = np.log(near[:, 0] / near[:, 1]) / np.log(t[0] / t[1])
-        wanted = maps.GRADE * np.maximum(np.abs(end), 1) / (exponent + 1)
-    return np.where((wanted > maps.GRADE) & (wanted <= maps.STEEPEST), np.rint(wanted), maps.GRADE).astype(np.int64)
+        wanted = substitution.GRADE * np.maximum(np.abs(end), 1) / (exponent + 1)
+    steep = (wanted > substitution.GRADE) & (wanted <= substitution.STEEPEST)
+    return np.where(steep, np.rint(wanted), substitution.GRADE).astype(np.int64)
 
 
 def joined(parts: list[Pieces]) -> Pieces:

@@ -14,20 +14,20 @@ from typing import Any
 
 import numpy as np
 
-from potto.calculus.cases import cased
-from potto.calculus.critical import MOST_EQUATIONS, slopes_of
-from potto.calculus.degree import degree
-from potto.calculus.enclosable import slope_of
-from potto.calculus.expand import expanded
-from potto.calculus.hoist import hidden, hoisted
-from potto.calculus.lifted import Lifted, lifted
-from potto.calculus.nested import nested
-from potto.calculus.regions import Number
-from potto.calculus.sides import box_of as extents
-from potto.calculus.surfaces import Decide, Finding, Resolve, findings
-from potto.calculus.sweep import Cut, Level, along, sweep
-from potto.calculus.unrolled import unrolled
-from potto.calculus.verdict import monotone
+from potto.calculus.algebra.degree import degree
+from potto.calculus.algebra.polytopes import Number
+from potto.calculus.checking.solvability import monotone
+from potto.calculus.decomposition.critical import MOST_EQUATIONS, slopes_of
+from potto.calculus.decomposition.sweep import Cut, Level, along, sweep
+from potto.calculus.inlining.expand import expanded
+from potto.calculus.inlining.unrolled import unrolled
+from potto.calculus.solving.enclosable import slope_of
+from potto.calculus.surfaces.branch_assignment import box_of as extents
+from potto.calculus.surfaces.case_split import cased
+from potto.calculus.surfaces.discontinuities import Decide, Finding, Resolve, findings
+from potto.calculus.surfaces.hoist import hidden, hoisted
+from potto.calculus.surfaces.lifted import Lifted, lifted
+from potto.calculus.surfaces.nested_brackets import nested
 from potto.core.terms import (
     App,
     Branch,
@@ -48,9 +48,9 @@ from potto.core.terms import (
     substitute,
     tuple_,
 )  # fmt: skip
-from potto.integrate.boxes import Box, box_of
-from potto.integrate.straight import Straight, straight
-from potto.integrate.vanishing import vanishing_of
+from potto.integrate.decomposition.vanishing import vanishing_of
+from potto.integrate.fixed.a_priori import Straight, straight
+from potto.integrate.fixed.tensor_product import Box, box_of
 from potto.kernels.cells import Mask, Trace, Value
 
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Protocol
 
-from potto.calculus.trace import CallSite, Layout, is_lazy, layout
+from potto.calculus.surfaces.trace import CallSite, Layout, is_lazy, layout
 from potto.core.terms import (
     App,
     Branch,

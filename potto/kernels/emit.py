@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
-from potto.calculus.derivative import partial
+from potto.calculus.differentiation.derivative import partial
 from potto.core.terms import Branch, Const, If, Prim, Term, Var, postorder, var
 from potto.kernels.whole import ROUNDING, UNIT_ROUNDOFF
 from potto.primitives import PRIMITIVES

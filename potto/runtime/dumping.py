@@ -5,8 +5,8 @@ from __future__ import annotations
 from potto.core.terms import Lam, Term, lam, postorder
 from potto.kernels.cells import Pattern
 from potto.kernels.compile import kernel
+from potto.projects.settings import DEFAULTS
 from potto.runtime.evaluate import Program
-from potto.settings import DEFAULTS
 
 
 def kernel_text(program: Program, file: str, name: str) -> str | None:

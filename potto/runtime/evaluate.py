@@ -12,21 +12,21 @@ from typing import Any
 
 import numpy as np
 
-from potto.calculus.branch_cuts import opened
-from potto.calculus.surfaces import TooDeep
+from potto.calculus.surfaces.branch_cuts import opened
+from potto.calculus.surfaces.discontinuities import TooDeep
 from potto.core.printer import format_term
 from potto.core.terms import Term
 from potto.diagnostics import PottoError
 from potto.kernels import compile as compiling
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Value
-from potto.runtime.advice import INFINITE, ROUGH
-from potto.runtime.convergence import CANCELS, Reasons, converged_members, members_of, merged, missed
-from potto.runtime.estimate import Estimate, OneSided
-from potto.runtime.functions import Closure, Derivative
-from potto.runtime.inherited import rough, widened
-from potto.runtime.machine import Books, Linker, Machine
-from potto.settings import DEFAULTS, Settings
+from potto.projects.settings import DEFAULTS, Settings
+from potto.runtime.answers.advice import INFINITE, ROUGH
+from potto.runtime.answers.convergence import CANCELS, Reasons, converged_members, members_of, merged, missed
+from potto.runtime.answers.estimate import Estimate, OneSided
+from potto.runtime.answers.inherited_errors import rough, widened
+from potto.runtime.evaluation.functions import Closure, Derivative
+from potto.runtime.evaluation.machine import Books, Linker, Machine
 
 Lookup = Callable[[str, str], Term]
 

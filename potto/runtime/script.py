@@ -11,23 +11,23 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
+from potto.checking.spoiled import statement_errors
 from potto.diagnostics import Diagnostic, PottoError, declare
 from potto.elaborate import elaborate_expression
-from potto.integrate.undefined import UNDEFINED
+from potto.integrate.adaptive.undefined import UNDEFINED
 from potto.kernels.cells import Value
 from potto.kernels.errors import wrong_call
 from potto.modules import statements
+from potto.projects.settings import Settings
 from potto.query import Database
-from potto.render import Located, ProgramError
-from potto.runtime.advice import DIVERGENT, ROUGH, advice
-from potto.runtime.estimate import Estimate
+from potto.reports.render import Located, ProgramError
+from potto.runtime.answers.advice import DIVERGENT, ROUGH, advice
+from potto.runtime.answers.estimate import Estimate
+from potto.runtime.answers.shown import as_dual, format_answer, format_value, gives_dual
 from potto.runtime.evaluate import Clock, Program, report
-from potto.runtime.functions import Closure
-from potto.runtime.machine import Machine
-from potto.runtime.shown import as_dual, format_answer, format_value, gives_dual
-from potto.settings import Settings
+from potto.runtime.evaluation.functions import Closure
+from potto.runtime.evaluation.machine import Machine
 from potto.source import Span
-from potto.spoiled import statement_errors
 from potto.syntax import nodes
 
 NOT_CONVERGED = declare("P0501", "an estimate that is not as accurate as was asked", "warning")

@@ -10,15 +10,15 @@ import re
 from collections.abc import Iterator
 from dataclasses import replace
 
-from potto.calculus.again import NoText, first_derivative
-from potto.calculus.explain import describe
+from potto.calculus.differentiation.higher_order import NoText, first_derivative
+from potto.calculus.explanation.explain import describe
 from potto.core.printer import format_term
 from potto.core.terms import App, Deriv, Global, Lam, Term
 from potto.elaborate import elaborate_expression
+from potto.evaluating.session import Defined, Imported, Outcome, Said, Valued
 from potto.modules import statements
-from potto.render import Located
-from potto.runtime.estimate import Estimate
-from potto.session import Defined, Imported, Outcome, Said, Valued
+from potto.reports.render import Located
+from potto.runtime.answers.estimate import Estimate
 from potto.source import Span
 from potto.syntax import nodes
 from potto_repl.reply import Part, answer, diagnostic, note

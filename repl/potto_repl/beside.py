@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, TextIO
 from potto_repl.start import Loader
 
 if TYPE_CHECKING:
-    from potto.runtime.books import Gauge
+    from potto.runtime.evaluation.record import Gauge
 
 PAUSE = 0.2  # seconds without a key before a text is checked
 PATIENCE = 0.5  # seconds before progress is shown

@@ -11,9 +11,9 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from potto import pages
 from potto.ide import completions, resolve_completion
-from potto.settings import METHODS
+from potto.projects.settings import METHODS
+from potto.reports import pages
 from potto_repl import options
 from potto_repl.commands.settings import NUMBERS
 from potto_repl.documentation import plain

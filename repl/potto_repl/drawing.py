@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Literal
 
-from potto.runtime.printing import format_digits
+from potto.runtime.answers.printing import format_digits
 from potto_repl.pictures import Color, Curve, Image, Plot, line
 
 Protocol = Literal["kitty", "iterm", "sixel", "blocks"]

@@ -9,12 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import cast
 
-from potto.check import absolute
-from potto.render import Located, ProgramError
+from potto.checking.check import absolute
+from potto.evaluating.world import EXPRESSION
+from potto.reports.render import Located, ProgramError
 from potto.syntax import nodes, print_expression
 from potto.types import Type, infer_expression
 from potto.types.types import Function, Parameter, groups_of
-from potto.world import EXPRESSION
 from potto_repl.reply import Refusal
 from potto_repl.session import Conversation, plain_names
 

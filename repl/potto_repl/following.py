@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 from potto.core.terms import Global, postorder
 from potto.elaborate import core, core_term
+from potto.evaluating.session import Imported, Said
 from potto.modules import imported_files, names
 from potto.modules.texts import chunk_text
-from potto.render import Located, ProgramError, display_name
-from potto.session import Imported, Said
+from potto.reports.render import Located, ProgramError, display_name
 from potto_repl.reply import Part, Refusal, diagnostic, note
 from potto_repl.session import Conversation
 

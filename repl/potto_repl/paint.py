@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from potto.render import COLORS, PLAIN, Palette
+from potto.reports.render import COLORS, PLAIN, Palette
 from potto_repl.drawing import Protocol, braille, half_blocks, inline, room_for_curves, shrunk
 from potto_repl.pictures import Image, Plot
 from potto_repl.reply import Part

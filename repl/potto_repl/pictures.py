@@ -11,8 +11,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from potto.png import encode
-from potto.runtime.printing import format_digits
+from potto.applications.png import encode
+from potto.runtime.answers.printing import format_digits
 
 Color = tuple[int, int, int]
 COLORS: tuple[Color, ...] = ((31, 119, 180), (214, 39, 40), (44, 160, 44), (148, 103, 189), (255, 127, 14))
@@ -201,7 +201,7 @@ def image_of(components: Sequence[Sequence[float]], columns: int, *, signed: boo
 
     signed: of a derivative; zero is white, what is above it red, what is below it blue.
     """
-    from potto.images import coloured
+    from potto.applications.images import coloured
 
     colours, low, high = coloured(components, signed)
     rows = (colours[i : i + columns] for i in range(0, len(colours), columns))

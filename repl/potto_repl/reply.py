@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
-from potto.render import Located, Palette, Sources, broken, render, to_json
+from potto.reports.render import Located, Palette, Sources, broken, render, to_json
 from potto.source import SourceText
 
 Kind = Literal["answer", "output", "note", "tail", "error", "help", "diagnostic", "picture"]

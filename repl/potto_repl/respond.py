@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator
 
 from potto.diagnostics import PottoError
-from potto.render import Located, ProgramError
+from potto.reports.render import Located, ProgramError
 from potto_repl import commands as _commands  # noqa: F401  (fills the table)
 from potto_repl.editing import flush_left
 from potto_repl.registry import Result, find

@@ -12,13 +12,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from potto.api import Function
-from potto.arguments import evenly
-from potto.images import flat, sampled
+from potto.applications.images import flat, sampled
 from potto.modules.builtins import is_builtin
 from potto.modules.free import free_references
-from potto.runtime.estimate import Estimate
-from potto.settings import Settings, settings
+from potto.projects.settings import Settings, settings
+from potto.python.api import Function
+from potto.python.arguments import evenly
+from potto.runtime.answers.estimate import Estimate
 from potto.syntax import nodes, parse_expression
 from potto.types.types import Diffeo, Real, TupleOf, resolve
 from potto.types.types import Function as FunctionType

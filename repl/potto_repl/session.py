@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from potto.diagnostics import Diagnostic
-from potto.session import Defined, Imported, Outcome, Session
-from potto.settings import DEFAULTS, Settings
+from potto.evaluating.session import Defined, Imported, Outcome, Session
+from potto.projects.settings import DEFAULTS, Settings
 from potto.source import SourceText
 from potto_repl.options import Options
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from potto.runtime.estimate import Estimate
-from potto.runtime.shown import as_dual
+from potto.runtime.answers.estimate import Estimate
+from potto.runtime.answers.shown import as_dual
 from potto.syntax import nodes, print_expression
 from potto.types.types import Diffeo, Function, ListOf, Parameter, TupleOf, resolve
 from potto_repl.expressions import Called, checked

@@ -12,7 +12,7 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from potto.settings import Settings
+from potto.projects.settings import Settings
 
 if TYPE_CHECKING:
     from potto_repl.session import Conversation

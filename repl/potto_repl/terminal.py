@@ -158,7 +158,7 @@ class Terminal:
                     self.progress.note("starting")
                 self._attach()
                 self.progress.note(PLAIN)
-                from potto.runtime.books import Gauge, watching
+                from potto.runtime.evaluation.record import Gauge, watching
                 from potto_repl.respond import stream
                 from potto_repl.symbols import readable
 

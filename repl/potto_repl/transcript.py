@@ -10,10 +10,10 @@ import os
 import re
 from collections.abc import Iterator
 
+from potto.evaluating.session import Defined, Imported, Valued
 from potto.modules import statements
 from potto.modules.texts import chunks
-from potto.runtime.advice import ROUGH
-from potto.session import Defined, Imported, Valued
+from potto.runtime.answers.advice import ROUGH
 from potto.syntax import nodes, tokenize
 from potto_repl.session import Conversation, Entry, plain_names
 
@@ -132,7 +132,7 @@ class _Writer:
 
     def _renamed(self, text: str, scope: dict[str, str]) -> str:
         """The text with the names of the session as they are called in the file; names that it binds itself stay."""
-        from potto.ide.index import index
+        from potto.ide.names.index import index
 
         pieces, at = [], 0
         for found in index(self.session.db, text, False).occurrences:

@@ -14,13 +14,13 @@ from typing import Any
 from potto.core.terms import App, Delta, Global, Integral, Term, postorder
 from potto.diagnostics import PottoError
 from potto.elaborate import elaborate_expression
-from potto.runtime.estimate import Estimate
+from potto.evaluating.world import World
+from potto.projects.settings import Settings
+from potto.runtime.answers.estimate import Estimate
+from potto.runtime.answers.printing import format_seconds, with_error
+from potto.runtime.answers.shown import MISSED, as_dual, estimate_json, format_estimate, gives_dual, interval
 from potto.runtime.evaluate import Clock, report
-from potto.runtime.printing import format_seconds, with_error
-from potto.runtime.shown import MISSED, as_dual, estimate_json, format_estimate, gives_dual, interval
-from potto.settings import Settings
 from potto.syntax import nodes
-from potto.world import World
 from potto_repl.reply import Part
 
 SLOW = 5.0  # seconds; of a derivative that took longer the parts are not looked for, which would take as long again

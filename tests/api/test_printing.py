@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import potto
-from potto.runtime.printing import (
+from potto.runtime.answers.printing import (
     concisely,
     format_bounds,
     format_digits,
@@ -24,7 +24,7 @@ from potto.runtime.printing import (
     with_error,
     written_tolerance,
 )
-from potto.runtime.shown import MISSED, format_answer, interval
+from potto.runtime.answers.shown import MISSED, format_answer, interval
 
 
 @pytest.mark.parametrize(

@@ -6,10 +6,10 @@ import textwrap
 
 import pytest
 
-from potto.calculus import conditions
-from potto.calculus.conditions import has_conditions
-from potto.calculus.diffeo import DiffeoInfo, check_conditions, diffeo_info, exported
-from potto.calculus.expand import expanded
+from potto.calculus.checking import conditions
+from potto.calculus.checking.conditions import has_conditions
+from potto.calculus.checking.diffeo import DiffeoInfo, check_conditions, diffeo_info, exported
+from potto.calculus.inlining.expand import expanded
 from potto.core.printer import format_term
 from potto.core.terms import Branch, global_, lam, postorder, var
 from potto.diagnostics import Diagnostic

@@ -10,8 +10,8 @@ import mpmath
 import pytest
 from calculus_terms import term, value
 
-from potto.calculus.boundary import NoClosedForm
-from potto.calculus.dual import dual, dual_function
+from potto.calculus.differentiation.boundary_terms import NoClosedForm
+from potto.calculus.differentiation.dual import dual, dual_function
 from potto.core import terms as t
 from potto.core.terms import ONE, Term
 from potto.diagnostics import PottoError

@@ -12,8 +12,8 @@ import random
 import pytest
 from calculus_terms import value
 
-from potto.calculus.boundary import NoClosedForm
-from potto.calculus.dual import dual
+from potto.calculus.differentiation.boundary_terms import NoClosedForm
+from potto.calculus.differentiation.dual import dual
 from potto.core import terms as t
 from potto.core.printer import format_term
 from potto.core.terms import ONE, ZERO, Term

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 
-from potto.calculus.explain import DerivativeText, explain_derivative
+from potto.calculus.explanation.explain import DerivativeText, explain_derivative
 from potto.query import Database
 
 FILE = "<text>"

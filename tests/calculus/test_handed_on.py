@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from calculus_terms import term
 
-from potto.calculus.elimination import eliminate
+from potto.calculus.decomposition.elimination import eliminate
 from potto.core.printer import format_term
 from potto.core.terms import ONE, ZERO, integral
 

@@ -9,8 +9,8 @@ import mpmath
 import pytest
 from calculus_terms import term, value
 
-from potto.calculus.invert import Failure, Inverse, invert, jacobian
-from potto.calculus.linear import affine, determinant, solve_affine
+from potto.calculus.algebra.affine import affine, determinant, solve_affine
+from potto.calculus.solving.inverse_map import Failure, Inverse, invert, jacobian
 from potto.core.terms import Term, substitute, var
 from potto.diffeos import FAMILIES, DiffeoFamily
 
@@ -166,7 +166,7 @@ def test_affine_systems_are_solved_exactly(size: int) -> None:
 
 def test_a_determinant_that_vanishes_identically_is_zero() -> None:
     rows = jacobian((term("x*cos(a) + y*sin(a)"), term("x*cos(a)^3 + y*sin(a)*cos(a)^2 + 0*x")), ("x", "y"))
-    from potto.calculus.normal import is_zero
+    from potto.calculus.algebra.rational_form import is_zero
 
     assert is_zero(determinant(rows))
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from potto.calculus.explain import explain_derivative
-from potto.facts import derivative_facts
-from potto.library import Library
+from potto.calculus.explanation.explain import explain_derivative
+from potto.checking.facts import derivative_facts
+from potto.checking.library import Library
 from potto.syntax import parse_expression
 
 PROGRAMS = [

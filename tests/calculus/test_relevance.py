@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from potto.calculus.conditions import conditions_of
-from potto.calculus.diffeo import exported
-from potto.calculus.relevance import may_integrate
+from potto.calculus.checking.conditions import conditions_of
+from potto.calculus.checking.diffeo import exported
+from potto.calculus.inlining.relevance import may_integrate
+from potto.checking.library import Library
 from potto.elaborate import core_term
-from potto.library import Library
 from potto.modules import names
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

@@ -13,7 +13,7 @@ import mpmath
 import pytest
 from calculus_terms import term, value
 
-from potto.calculus.solve import Sections, Unsolvable, sections
+from potto.calculus.solving.solve import Sections, Unsolvable, sections
 from potto.core.terms import Term, const, postorder, substitute
 
 # A surface in x, and what its parameters range over (the default is [-2, 2]).

@@ -355,7 +355,7 @@ def test_a_bug_of_ours_is_a_short_report(potto: Potto, monkeypatch: pytest.Monke
     def broken(*arguments: object) -> None:
         raise AssertionError("impossible")
 
-    monkeypatch.setattr("potto.check.syntax_diagnostics", broken)
+    monkeypatch.setattr("potto.checking.check.syntax_diagnostics", broken)
     ran = potto("check", "main.po", main=HALF)
     assert ran.status == 70 and "internal error (AssertionError)" in ran.err and "potto check main.po" in ran.err
     report = Path(ran.err.split("report:")[1].strip())
@@ -367,7 +367,7 @@ def test_an_interrupt_ends_with_130(potto: Potto, monkeypatch: pytest.MonkeyPatc
     def interrupted(*arguments: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("potto.check.syntax_diagnostics", interrupted)
+    monkeypatch.setattr("potto.checking.check.syntax_diagnostics", interrupted)
     assert potto("check", "main.po", main=HALF).status == 130
 
 

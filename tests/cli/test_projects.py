@@ -9,9 +9,9 @@ import pytest
 from command_runs import Potto
 
 import potto as api
-from potto.project import Projects, read_project
-from potto.session import Said, Session, Valued
-from potto.settings import DEFAULTS, current
+from potto.evaluating.session import Said, Session, Valued
+from potto.projects.project import Projects, read_project
+from potto.projects.settings import DEFAULTS, current
 
 USES_SRC = "from shapes import f\ndef g(t) f(t)\n"
 UNUSED = "from shapes import f\ndef g(t) t\n"

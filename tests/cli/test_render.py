@@ -5,8 +5,8 @@ from __future__ import annotations
 from textwrap import dedent
 
 from potto.diagnostics import Diagnostic, Related
-from potto.excerpt import printable, width
-from potto.render import COLORS, Located, render, summary, to_json
+from potto.reports.excerpt import printable, width
+from potto.reports.render import COLORS, Located, render, summary, to_json
 from potto.source import SourceText, Span
 
 PROGRAM = "def f(t)\n    integral [0, 1] (if x < t then 1 else 0) d(x)\n"

@@ -7,7 +7,7 @@ from core_terms import HALF, THREE, TWO, area, bracket, c, n, s, t, terms, x, y
 from hypothesis import given, settings
 from mpmath import mp
 
-from potto.calculus.derivative import NotSmooth, partial
+from potto.calculus.differentiation.derivative import NotSmooth, partial
 from potto.core.lint import lint
 from potto.core.printer import format_term
 from potto.core.reference import evaluate

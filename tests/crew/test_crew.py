@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from potto.checking.library import Library
 from potto.crew import Crew, helpers_for
 from potto.crew.crew import ENOUGH
-from potto.library import Library
 from potto.modules import names
 from potto.types import interface
 

@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 import potto
-from potto import pages
 from potto.__main__ import main
 from potto.diagnostics import KINDS, Diagnostic
-from potto.pages import Example, Page
-from potto.render import Located
-from potto.world import World
+from potto.evaluating.world import World
+from potto.reports import pages
+from potto.reports.pages import Example, Page
+from potto.reports.render import Located
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -9,7 +9,7 @@ import pytest
 from potto_lsp.features import COMMANDS, capabilities
 
 import potto.ide as ide
-from potto.library import Library
+from potto.checking.library import Library
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "lsp.md").read_text(encoding="utf-8")

@@ -11,8 +11,8 @@ import pytest
 from potto.__main__ import main
 from potto.cli import COMMANDS
 from potto.cli.command_line import dispatch
+from potto.evaluating.world import World
 from potto.types import format_type, interface
-from potto.world import World
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]

@@ -9,7 +9,7 @@ import pytest
 from potto_lsp.features import FEATURES
 
 from potto.__main__ import main
-from potto.world import World
+from potto.evaluating.world import World
 
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

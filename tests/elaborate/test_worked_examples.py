@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from potto.live import outcomes_of
+from potto.evaluating.live import outcomes_of
+from potto.evaluating.world import World
 from potto.runtime.script import Shown
-from potto.world import World
 
 ROOT = Path(__file__).resolve().parents[2] / "examples"
 WORKED = sorted((ROOT / "worked").rglob("*.po"))

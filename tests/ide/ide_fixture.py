@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import potto.ide as ide
-from potto.check import diagnostics
-from potto.library import Library
+from potto.checking.check import diagnostics
+from potto.checking.library import Library
 from potto.source import Span
 
 FOLDER = "/nowhere/workspace"

@@ -6,7 +6,7 @@ import pytest
 from ide_fixture import fixture
 
 import potto.ide as ide
-from potto.check import diagnostics
+from potto.checking.check import diagnostics
 
 
 def fixed(text: str, title: str, left: tuple[str, ...] = ()) -> str:

@@ -9,7 +9,7 @@ import pytest
 from ide_fixture import Fixture, edited, fixture
 
 import potto.ide as ide
-from potto.ide.edits import applied, minimal
+from potto.ide.actions.edits import applied, minimal
 from potto.source import Span
 from potto.syntax import format_source
 

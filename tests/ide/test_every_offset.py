@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import potto.ide as ide
-from potto.library import Library
+from potto.checking.library import Library
 from potto.source import Span
 from potto.syntax import live_expressions
 

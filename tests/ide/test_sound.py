@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from ide_fixture import fixture
 
-from potto.ide.explaining import sound
+from potto.ide.hover.derivatives import sound
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import potto
-from potto.runtime import quadrature
+from potto.runtime.integration import quadrature
 
 PROGRAM = """
 def line(a, b, t) integral ([a, a + 1/16], [b, b + 1/16]) exp(x*y)*[x + 2*y >= t] d(x, y)

@@ -13,9 +13,9 @@ from hard import CASES, derivative_term, problem, value_term
 
 from potto.core import terms as core
 from potto.diagnostics import PottoError
-from potto.runtime.estimate import Estimate
+from potto.projects.settings import Settings
+from potto.runtime.answers.estimate import Estimate
 from potto.runtime.evaluate import evaluate
-from potto.settings import Settings
 
 
 def nothing(module: str, name: str) -> core.Term:

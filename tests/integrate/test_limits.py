@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import potto
-from potto.runtime.advice import advice
+from potto.runtime.answers.advice import advice
 
 WAVES = "integral [0, 1] sin(1e4*t*x) d(x)"
 SURFACE = "integral ([0, 1], [0, 1]) [x*y < t]*exp(x + y) d(x, y)"

@@ -17,10 +17,10 @@ import pytest
 from scipy import special
 
 import potto
-from potto.calculus.enclosable import slope_of
+from potto.calculus.solving.enclosable import slope_of
 from potto.core.terms import add, const, mul, prim, sub, var
-from potto.integrate.brackets import isolated
-from potto.integrate.intervals import enclosure
+from potto.integrate.decomposition.root_isolation import isolated
+from potto.integrate.rules.intervals import enclosure
 from potto.kernels.cells import Cell
 
 # a, w, p, b, t

@@ -292,7 +292,8 @@ def test_the_server_loads_no_numbers() -> None:
 
 
 def test_the_greeting_waits_for_no_analysis() -> None:
-    code = "import sys, potto_lsp.main; print([m for m in ('potto.check', 'lark', 'asyncio') if m in sys.modules])"
+    late = ("potto.checking.check", "lark", "asyncio")
+    code = f"import sys, potto_lsp.main; print([m for m in {late} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
 

@@ -16,7 +16,7 @@ import pytest
 from potto_lsp import server
 from potto_lsp.features import Feature
 
-from potto import check
+from potto.checking import check
 
 HOVER = "textDocument/hover"
 
@@ -128,7 +128,7 @@ def test_a_check_that_fails_costs_one_definition(
             raise ZeroDivisionError("a bug")
         return original(db, file, name)
 
-    monkeypatch.setattr("potto.check.definition_diagnostics", broken)
+    monkeypatch.setattr("potto.checking.check.definition_diagnostics", broken)
     text = "def f(t) one\ndef g(t) two\ndef h(t) three\n"
     with caplog.at_level(logging.ERROR):
         pipe.send(method="textDocument/didOpen", params=document(1, text))

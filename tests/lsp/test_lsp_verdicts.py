@@ -16,7 +16,7 @@ from potto_lsp.text import Text
 from potto_lsp.uris import to_uri
 from potto_lsp.verdicts import FOLDER, Verdicts, program_digest
 
-from potto.render import Located
+from potto.reports.render import Located
 from potto.syntax.tables import tables
 
 PUSHED = "textDocument/publishDiagnostics"

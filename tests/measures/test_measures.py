@@ -8,7 +8,7 @@ from functools import cache
 import pytest
 from mpmath import mp
 
-from potto.calculus.derivative import partial
+from potto.calculus.differentiation.derivative import partial
 from potto.core.lint import lint
 from potto.core.reference import evaluate
 from potto.core.terms import Term, const, integral, mul, prim, sub, sum_, var

@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from mpmath import mp
 
-from potto.calculus.derivative import partial
+from potto.calculus.differentiation.derivative import partial
 from potto.core.lint import lint
 from potto.core.reference import evaluate, function
 from potto.core.terms import Const, Prim, const, postorder, prim, sub, var

@@ -13,14 +13,14 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from mpmath import mp
 
-from potto.calculus.floats import FLOATS
-from potto.calculus.ranges import ARITHMETIC, RANGES, ranges
+from potto.calculus.algebra.floats import FLOATS
+from potto.calculus.algebra.ranges import ARITHMETIC, RANGES, ranges
 from potto.core.decimals import Undefined
 from potto.core.reference import function
 from potto.core.sampling import DIGITS
 from potto.core.terms import Const, const, postorder, prim, var
-from potto.integrate.discs import DISCS, Form, enclosed
-from potto.integrate.intervals import INTERVALS, enclosure
+from potto.integrate.rules.complex_enclosures import DISCS, Form, enclosed
+from potto.integrate.rules.intervals import INTERVALS, enclosure
 from potto.kernels.support import ARRAYS
 from potto.primitives import EXACT, PRIMITIVES, Primitive
 from potto.primitives.walking import Domain

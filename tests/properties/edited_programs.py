@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 
-from potto.library import Library
+from potto.checking.library import Library
 from potto.syntax import split
 
 WORKSPACE = {

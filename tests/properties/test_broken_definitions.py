@@ -12,8 +12,8 @@ import time
 import pytest
 from edited_programs import WORKSPACE, broken, library
 
-from potto.check import definition_diagnostics, has_errors
-from potto.library import Library
+from potto.checking.check import definition_diagnostics, has_errors
+from potto.checking.library import Library
 from potto.modules import chunk_text, names
 from potto.modules.texts import chunks, head, is_diffeo, parsed
 from potto.syntax import parse_chunk

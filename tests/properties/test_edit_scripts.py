@@ -15,7 +15,7 @@ import pytest
 from edited_programs import WORKSPACE, edited, library
 
 import potto.ide as ide
-from potto.library import Library
+from potto.checking.library import Library
 from potto.modules import definition, names, statements
 from potto.modules.texts import content
 from potto.types import interface

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from potto.checking.library import Library
 from potto.elaborate import core
-from potto.library import Library
 from potto.modules import names
 from potto.types import interface
 

@@ -15,13 +15,13 @@ import numpy as np
 import pytest
 from mpmath import mp
 
-from potto.calculus.trace import Side, layout
+from potto.calculus.surfaces.trace import Side, layout
 from potto.core import terms as core
 from potto.core.reference import evaluate
 from potto.core.terms import Branch, Prim, Term
 from potto.kernels.cells import Cell, Trace
+from potto.projects.settings import DEFAULTS
 from potto.runtime.evaluate import Program
-from potto.settings import DEFAULTS
 
 NAMES = ("x", "y", "t")
 POINTS = 7

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import potto
-from potto.integrate.sampling import SIGMAS
+from potto.integrate.montecarlo.sampling import SIGMAS
 
 SAMPLES = 2_000
 SEEDS = 60

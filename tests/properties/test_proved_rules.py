@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from potto.core.terms import Const, Prim, Term, Var, add, const, div, mul, neg, pow_, prim, sub, var
-from potto.integrate.discs import Form, enclosed
-from potto.integrate.proofs import Cell, Region, proved
+from potto.integrate.rules.complex_enclosures import Form, enclosed
+from potto.integrate.rules.proved_orders import Cell, Region, proved
 
 OPS: dict[str, Callable[..., Any]] = {
     "add": lambda *a: sum(a[1:], a[0]),

@@ -12,7 +12,7 @@ from potto_repl.beside import Progress
 from potto_repl.respond import respond
 from screens import Screen
 
-from potto.runtime.books import Gauge
+from potto.runtime.evaluation.record import Gauge
 
 AT_ONCE = 0.2  # seconds; what an interrupt may take
 TRIES = 4  # on a machine that is busy with something else as well
@@ -182,7 +182,7 @@ def test_a_second_integral_that_is_sampled_says_no_time():
 
 
 def test_evaluations_say_how_far_they_are(talk):
-    from potto.runtime.books import watching
+    from potto.runtime.evaluation.record import watching
 
     def told(text):
         seen = Gauge()

@@ -14,7 +14,7 @@ from prompt_toolkit.history import InMemoryHistory
 from prompt_toolkit.input import create_pipe_input
 from prompt_toolkit.output import DummyOutput
 
-from potto.settings import DEFAULTS
+from potto.projects.settings import DEFAULTS
 
 UP, RIGHT, LEFT, CTRL_C, CTRL_D, CTRL_E, TAB = "\x1b[A", "\x1b[C", "\x1b[D", "\x03", "\x04", "\x05", "\t"
 

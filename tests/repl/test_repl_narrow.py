@@ -6,8 +6,8 @@ import pytest
 from potto_repl.paint import Look, painted
 from potto_repl.registry import COMMANDS
 
-from potto.excerpt import width
-from potto.render import broken
+from potto.reports.excerpt import width
+from potto.reports.render import broken
 
 RULE = "def g(t) integral [0, 1] (if x < t then 1 else 0) d(x)"
 

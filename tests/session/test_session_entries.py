@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from potto.render import ProgramError, render
-from potto.session import Defined, Imported, Said, Session, Valued
+from potto.evaluating.session import Defined, Imported, Said, Session, Valued
+from potto.reports.render import ProgramError, render
 
 JUMP = "def f(t) integral [0, 1] [x < t] d(x)"
 

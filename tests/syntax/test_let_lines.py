@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 import potto
+from potto.evaluating.world import World
 from potto.syntax import completeness, format_source, parse_chunk
 from potto.syntax.chunks import split
-from potto.world import World
 
 # Each gives 8 for `f(3)`
 PROGRAMS = [

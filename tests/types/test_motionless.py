@@ -12,7 +12,7 @@ import pytest
 
 import potto
 from potto.__main__ import main
-from potto.world import World
+from potto.evaluating.world import World
 
 PROGRAM = r"""
 def f(t) integral [0, 1] [x < t]*x d(x)

@@ -53,7 +53,7 @@ def _point_of_name(ask: Ask, file: str, text: str) -> ide.Point | None:
 
 def _differentiate(ask: Ask, file: str, arguments: list[Any]) -> Any:
     """Of a name the derivative in symbols, which needs no numbers and no other process; of a call the slopes there."""
-    from potto.facts import derivative_facts
+    from potto.checking.facts import derivative_facts
 
     text = _text(arguments)
     if text not in names(ask.db, file):

@@ -6,7 +6,7 @@ import os.path
 from collections.abc import Mapping
 from typing import Any
 
-from potto.project import NAME as PROJECT
+from potto.projects.project import NAME as PROJECT
 from potto_lsp.asking import Ask
 from potto_lsp.session import TREES
 from potto_lsp.uris import to_key

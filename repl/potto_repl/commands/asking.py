@@ -5,17 +5,17 @@ from __future__ import annotations
 import difflib
 import os
 
-from potto import pages
-from potto.calculus.again import NoText, first_derivative
-from potto.calculus.explain import describe, explain_derivative
-from potto.calculus.explained import DerivativeText
+from potto.calculus.differentiation.higher_order import NoText, first_derivative
+from potto.calculus.explanation.explain import describe, explain_derivative
+from potto.calculus.explanation.layout import DerivativeText
+from potto.checking.facts import surfaces
 from potto.core.terms import Deriv, Global, Term
 from potto.elaborate import core_term, elaborate_expression
-from potto.facts import surfaces
 from potto.modules import DefinitionTarget, ModuleTarget, chunk_start, names, resolve
 from potto.modules.lookup import find_module, resolve_module, scope
 from potto.modules.texts import chunk_text
-from potto.render import display_name
+from potto.reports import pages
+from potto.reports.render import display_name
 from potto.syntax import nodes, print_expression
 from potto.types import derivative_type, format_type, interface
 from potto.types.types import Diffeo, Function

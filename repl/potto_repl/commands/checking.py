@@ -15,10 +15,10 @@ from typing import Any
 from potto.core.terms import Delta, Global, Term, postorder
 from potto.diagnostics import PottoError
 from potto.elaborate import elaborate_expression
+from potto.projects.settings import Settings
+from potto.runtime.answers.printing import format_error, format_number, with_error
+from potto.runtime.answers.shown import as_dual
 from potto.runtime.evaluate import Program
-from potto.runtime.printing import format_error, format_number, with_error
-from potto.runtime.shown import as_dual
-from potto.settings import Settings
 from potto.syntax import nodes, print_expression
 from potto_repl.discretized import dimensions, discretized, points_of
 from potto_repl.expressions import Called, call_of

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 
-from potto.runtime.printing import format_digits, format_error, format_range
+from potto.runtime.answers.printing import format_digits, format_error, format_range
 from potto_repl.drawing import braille, half_blocks, room_for_curves
 from potto_repl.expressions import split_items
 from potto_repl.pictures import Curve, Plot, image_of

@@ -7,17 +7,24 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
-from potto.check import absolute
+from potto.checking.check import absolute
 from potto.elaborate import elaborate_expression
+from potto.evaluating.world import EXPRESSION
 from potto.kernels import compile as compiling
-from potto.render import Located, ProgramError
-from potto.runtime.estimate import Estimate
-from potto.runtime.printing import format_bars, format_error, format_numbers, format_seconds, largest, with_error
-from potto.runtime.shown import MISSED, as_dual
-from potto.settings import Settings
+from potto.projects.settings import Settings
+from potto.reports.render import Located, ProgramError
+from potto.runtime.answers.estimate import Estimate
+from potto.runtime.answers.printing import (
+    format_bars,
+    format_error,
+    format_numbers,
+    format_seconds,
+    largest,
+    with_error,
+)
+from potto.runtime.answers.shown import MISSED, as_dual
 from potto.syntax import parse_expression
 from potto.types import infer_expression
-from potto.world import EXPRESSION
 from potto_repl.expressions import call_of, checked
 from potto_repl.registry import command
 from potto_repl.reply import Part, Refusal, diagnostic

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 
 from potto.modules.texts import chunk_text
-from potto.render import display_name
+from potto.reports.render import display_name
 from potto_repl.following import bring, refreshed
 from potto_repl.registry import command
 from potto_repl.replay import prompted

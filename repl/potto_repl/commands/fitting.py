@@ -1,6 +1,6 @@
 """`:fit`: the parameters that make a value least, found along its derivatives.
 
-Owns how a fit is asked for and told at the prompt; the fitting itself is `potto.fitting`.
+Owns how a fit is asked for and told at the prompt; the fitting itself is `potto.applications.fitting`.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 
-from potto.api import Function
-from potto.fitting import Step
-from potto.fitting import fit as fitted
-from potto.runtime.printing import format_digits, format_error, format_number, format_seconds, with_error
-from potto.settings import settings
+from potto.applications.fitting import Step
+from potto.applications.fitting import fit as fitted
+from potto.projects.settings import settings
+from potto.python.api import Function
+from potto.runtime.answers.printing import format_digits, format_error, format_number, format_seconds, with_error
 from potto_repl.drawing import braille, room_for_curves
 from potto_repl.expressions import checked, split_items
 from potto_repl.pictures import Curve, Plot

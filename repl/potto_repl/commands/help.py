@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from potto.render import broken
+from potto.reports.render import broken
 from potto_repl.registry import COMMANDS, Command, command, find
 from potto_repl.reply import Part
 from potto_repl.session import Conversation

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from dataclasses import fields, replace
 
-from potto.settings import METHODS, Settings, problem
+from potto.projects.settings import METHODS, Settings, problem
 from potto_repl import options
 from potto_repl.registry import command
 from potto_repl.reply import Part, Refusal, answer

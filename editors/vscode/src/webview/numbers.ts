@@ -62,7 +62,7 @@ export function short(number: number, digits = 6): string {
 }
 
 /**
- * A value to the second digit of its error, and the error: as `potto/runtime/printing.py` writes them. The error is
+ * A value to the second digit of its error, and the error: as `potto/runtime/answers/printing.py` writes them. The error is
  * rounded up by what the value loses, so that the interval that one reads contains the one that was computed.
  */
 export function estimated(value: number | undefined, error: number | undefined): string {

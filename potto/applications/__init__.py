@@ -1,0 +1,1 @@
+"""What is done with functions of a program: fits, second derivatives, pictures."""

@@ -1,0 +1,1 @@
+"""Terms as algebra: normal forms, polynomials, affine maps, the values that terms can take."""

@@ -1,0 +1,1 @@
+"""Diffeomorphisms and conditions, checked."""

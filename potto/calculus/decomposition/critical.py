@@ -1,0 +1,158 @@
+"""Critical places: where what is left of integrals further in is not smooth, as the solution of a system of equations.
+
+Owns `Critical`, and what one leaves in the variables further out. Two surfaces meet where both are 0; the sections of
+one surface appear or merge where it and its slope are 0. Neither needs closed-form roots: numbers find the places
+(`integrate/decomposition/critical_places`). Projecting such systems one variable further out, until none is left, is
+the projection of a cylindrical decomposition (Collins 1975), done by numbers rather than by resultants.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+from potto.calculus.algebra.affine import determinant
+from potto.calculus.algebra.ranges import positive
+from potto.calculus.differentiation.derivative import NotSmooth, partial
+from potto.calculus.solving.enclosable import enclosable, slope_of
+from potto.core.simplify import simplify
+from potto.core.terms import Const, Prim, Term, substitute
+
+MOST_EQUATIONS = 3  # a search takes about 2^n times as long for n of them
+
+
+@dataclass(frozen=True, slots=True)
+class Within:
+    """A variable further in, and its bounds, which may depend on those between."""
+
+    variable: str
+    lo: Term
+    hi: Term
+
+
+@dataclass(frozen=True, slots=True)
+class Critical:
+    """Where all equations are 0 for some values of the variables of `within`, innermost first: one fewer than those.
+
+    turning: what is integrated further in changes there like a square root, or worse.
+    """
+
+    equations: tuple[Term, ...]
+    within: tuple[Within, ...]
+    turning: bool = False
+
+    @property
+    def free(self) -> frozenset[str]:
+        """What the place depends on."""
+        names = frozenset().union(*(e.free for e in self.equations), *(w.lo.free | w.hi.free for w in self.within))
+        return names - {w.variable for w in self.within}
+
+    def mapped(self, change: Callable[[Term], Term]) -> Critical:
+        """The system with its equations changed."""
+        return Critical(tuple(map(change, self.equations)), self.within, self.turning)
+
+    def at(self, variable: str, value: Term) -> Critical:
+        """The system with a variable further out replaced."""
+        put = {variable: value}
+        within = tuple(Within(w.variable, substitute(w.lo, put), substitute(w.hi, put)) for w in self.within)
+        return Critical(tuple(simplify(substitute(e, put)) for e in self.equations), within, self.turning)
+
+
+@lru_cache(maxsize=1024)
+def slopes_of(system: Critical, variable: str) -> tuple[Term, ...] | None:
+    """The derivatives of the equations, row by row, by the variable further out, then by those of `within`; None if the
+    solutions can't be searched for."""
+    ends = (end for w in system.within for end in (w.lo, w.hi))
+    if not all(enclosable(t, jumps=True) for t in (*system.equations, *ends)):
+        return None
+    names = (variable, *(w.variable for w in system.within))
+    try:
+        slopes = tuple(simplify(partial(e, name)) for e in system.equations for name in names)
+    except NotSmooth:
+        return None
+    return slopes if all(enclosable(t, jumps=True) for t in slopes) else None
+
+
+def folds(surface: Term, variable: str, lo: Term, hi: Term) -> Iterator[Critical]:
+    """Where sections of a surface along a variable appear or merge; nothing where that can't be searched for."""
+    slope = slope_of(surface, variable)
+    if slope is None:
+        return
+    for factor in _factors(slope):
+        yield Critical((surface, factor), (Within(variable, lo, hi),), True)
+
+
+def shadows(
+    found: Sequence[Critical], variable: str, lo: Term, hi: Term, roots: Sequence[Term], searched: Sequence[Term]
+) -> Iterator[Critical]:
+    """What the critical places along one variable leave in those further out: where they meet its bounds, turn, or meet
+    a third surface at one place further in. What meets them elsewhere further in adds up with them, smoothly.
+
+    roots, searched: places and surfaces that cut the variable as bounds do.
+    """
+    here = Within(variable, lo, hi)
+    known = dict.fromkeys(found)
+    for system in found:
+        for place in (*(bound for bound in (lo, hi) if not _infinite(bound)), *roots):
+            at = system.at(variable, place)
+            if all(e.free for e in at.equations):
+                yield at
+        del known[system]
+        if len(system.equations) >= MOST_EQUATIONS:
+            continue
+        within = (*system.within, here)
+        for turn in _turns(system, variable):
+            yield Critical((*system.equations, turn), within, True)
+        for slope in _slopes(system):
+            yield Critical((*system.equations, slope), within)
+        for surface in searched:
+            if surface not in system.equations:
+                yield Critical((*system.equations, surface), within, system.turning)
+        for other in known:
+            union = tuple(dict.fromkeys((*system.equations, *other.equations)))
+            if other.within == system.within and len(union) == len(system.equations) + 1:
+                yield Critical(union, within)
+
+
+def _slopes(system: Critical) -> Iterator[Term]:
+    """Where one of the surfaces of a system folds."""
+    for surface in system.equations if not system.turning else ():
+        slope = slope_of(surface, system.within[0].variable)
+        if slope is not None:
+            yield from _factors(slope)
+
+
+def _infinite(bound: Term) -> bool:
+    return isinstance(bound, Const) and bound.value in (float("inf"), float("-inf"))
+
+
+def _turns(system: Critical, variable: str) -> Iterator[Term]:
+    """Where the place of a system turns back along a variable: factors of the determinant by this and those within."""
+    names = (*(w.variable for w in system.within), variable)
+    surface, slope = system.equations[0], system.equations[-1]
+    try:
+        if len(system.equations) == 2 and slope == slope_of(surface, names[0]):
+            whole = [partial(surface, variable), partial(slope, names[0])]  # on it the slope is 0
+        else:
+            whole = [determinant(tuple(tuple(partial(e, name) for name in names) for e in system.equations))]
+    except NotSmooth:
+        return
+    for turn in whole:
+        for factor in _factors(simplify(turn)):
+            if enclosable(factor, jumps=True):
+                yield factor
+
+
+def _factors(term: Term) -> Iterator[Term]:
+    """What a product is 0 with: its factors, but for those that show by their form that they never are."""
+    match term:
+        case Prim(op="mul", args=args):
+            for arg in dict.fromkeys(args):
+                yield from _factors(arg)
+        case Prim(op="neg", args=(inner,)) | Prim(op="div", args=(inner, _)):
+            yield from _factors(inner)
+        case Prim(op="pow", args=(inner, Const(value=exponent))) if exponent > 0:
+            yield from _factors(inner)
+        case _ if term.free and not positive(term):
+            yield term

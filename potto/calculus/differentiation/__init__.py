@@ -1,0 +1,1 @@
+"""Derivatives of terms: duals, boundary terms, deltas, higher orders."""

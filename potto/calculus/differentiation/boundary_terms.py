@@ -1,0 +1,307 @@
+"""What an integral gains as its surfaces and bounds move, in closed form.
+
+Owns `at_surfaces`, `at_bounds` and `jumps`. At a root r of a surface in one variable of integration the integral
+gains (F left of r - F right of r) dr: the whole integrand, with every branch that flips at r forced to its side and
+every other one as it falls there; no product rule, no value of a bracket on its own edge. A bound gains the integrand
+just inside it. The terms are integrals over the variables that remain, with the bounds of the eliminated one as
+brackets, so that they can be differentiated again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from potto.calculus.algebra.radicals import NAN
+from potto.calculus.algebra.ranges import range_of
+from potto.calculus.differentiation.derivative import zero_like
+from potto.calculus.solving.pivots import NoClosedForm as NoClosedForm
+from potto.calculus.solving.pivots import Root, chosen, conjunction, pivots
+from potto.calculus.solving.solve import factors
+from potto.calculus.surfaces.branch_assignment import (
+    NOWHERE,
+    Box,
+    Flip,
+    Flips,
+    box_of,
+    branches_of,
+    flipping,
+    forced,
+    side_of,
+    summed_over,
+    unguarded,
+)
+from potto.core.simplify import is_zero, normalized_surface
+from potto.core.terms import (
+    ONE,
+    ZERO,
+    Branch,
+    Const,
+    If,
+    Integral,
+    Sum,
+    Term,
+    Tuple,
+    add,
+    branch,
+    children,
+    const,
+    delta,
+    fresh,
+    if_,
+    integral,
+    mul,
+    neg,
+    postorder,
+    prim,
+    proj,
+    rebuild,
+    sub,
+    substitute,
+    sum_,
+    tuple_,
+    var,
+)
+
+Rate = Callable[[Term], Term]
+
+
+def at_surfaces(node: Integral, moving: frozenset[str], rate: Rate) -> list[Term]:
+    """The boundary terms of an integral, one for each root of each surface that moves."""
+    branches = branches_of(node.body, node.variables)
+    surfaces: dict[Term, list[Branch]] = {}
+    for item in branches:
+        for factor in factors(item.surface):
+            if factor.free & frozenset(node.variables) and factor.free & moving:
+                surfaces.setdefault(normalized_surface(factor)[0], []).append(item)
+    terms: list[Term] = []
+    met: list[Root] = []
+    zero = zero_like(node.body)
+    for surface, members in surfaces.items():
+        sums = summed_over(node.body, members[0])
+        alternatives: list[tuple[Term | None, Term]] = []
+        for pivot in pivots(node, surface):
+            new = [r for r in pivot.roots if not any(_same(r, other) for other in met)]
+            met += new
+            gains: list[Term] = []
+            for root in new:
+                gains += _at_root(node, flipping(branches, root.variable, root.at, members), root, rate, sums)
+            alternatives.append((pivot.condition, total(gains, zero)))
+        terms.append(chosen(alternatives))
+    return [term for term in terms if not vanishes(term)]
+
+
+def _same(root: Root, other: Root) -> bool:
+    if root.variable != other.variable or (root.index is None) != (other.index is None):
+        return False
+    return is_zero(sub(unguarded(root.at), unguarded(other.at)))
+
+
+def _at_root(node: Integral, flips: Flips, root: Root, rate: Rate, sums: list[Sum]) -> Iterator[Term]:
+    speed = rate(root.at)
+    if speed is ZERO:
+        return
+    body, instances = _instances(node.body, flips, sums, box_of(node))
+    left, right = (substitute(f, {root.variable: root.at}) for f in (body(False), body(True)))
+    if left is right:
+        return
+    gain = scaled(difference(left, right), speed)
+    lo, hi = node.bounds[node.variables.index(root.variable)]
+    gain = substitute(between(root.at, lo, hi, gain), instances)
+    for old in sums:
+        new = instances[old.variable]
+        gain = sum_(_name(new), old.lo, old.hi, gain)
+    if root.index is not None and root.counts is not None:
+        lowest, highest = root.counts
+        gain = sum_(root.index, lowest, highest, gain)
+    yield remaining(node, root.variable, root.at, gain)
+
+
+def _name(term: Term) -> str:
+    (name,) = term.free
+    return name
+
+
+def _instances(body: Term, flips: Flips, sums: list[Sum], box: Box) -> tuple[Callable[[bool], Term], dict[str, Term]]:
+    """The forced integrand; under sums only the instance of a branch that flips is forced, the others fall."""
+    if not sums:
+        return (lambda right: forced(body, flips, right, box)), {}
+    taken = {n for t in postorder(body) for n in t.free} | {s.variable for s in sums}
+    names: dict[str, Term] = {}
+    for item in sums:
+        name = fresh(item.variable, taken)
+        taken.add(name)
+        names[item.variable] = var(name)
+    here = conjunction(prim("eq", var(s.variable), names[s.variable]) for s in sums)
+
+    def run(right: bool) -> Term:
+        memo: dict[Term, Term] = {}
+        signs = {f.branch: f.right if right else f.left for f in flips}
+        for node in postorder(body):
+            new = rebuild(node, tuple(memo[c] for c in children(node)))
+            if isinstance(node, Branch) and node in signs and isinstance(new, Branch):
+                new = if_(here, side_of(substitute(signs[node], names), new.then, new.orelse, box), new)
+            memo[node] = new
+        return memo[body]
+
+    return run, names
+
+
+def at_bounds(node: Integral, rate: Rate) -> list[Term]:
+    """Leibniz's rule: what enters or leaves at bounds that move, taken just inside them."""
+    terms: list[Term] = []
+    branches = branches_of(node.body, node.variables)
+    for name, (lo, hi) in zip(node.variables, node.bounds, strict=True):
+        for bound, other, upper in ((hi, lo, True), (lo, hi, False)):
+            speed = rate(bound)
+            if speed is ZERO:
+                continue
+            # Inside is left of an upper bound that is above the lower one, and of a lower bound that is above.
+            flips = flipping(branches, name, bound)
+            left, right = (forced(node.body, flips, side) for side in (False, True))
+            inside = left if left is right else side_of(sub(bound, other), left, right)
+            gain = scaled(substitute(inside, {name: bound}), speed if upper else neg(speed))
+            terms.append(remaining(node, name, bound, gain))
+    return terms
+
+
+# Building
+
+
+def between(at: Term, lo: Term, hi: Term, value: Term) -> Term:
+    """`value` where lo < at < hi, minus it where hi < at < lo, 0 elsewhere and where `at` is not a number."""
+    upward = value
+    if finite(hi):
+        upward = above(sub(hi, at), upward)
+    if finite(lo):
+        upward = above(sub(at, lo), upward)
+    if not (finite(lo) and finite(hi)) or range_of(sub(hi, lo)).lo >= 0:
+        return exists(at, upward)
+    downward = above(sub(lo, at), above(sub(at, hi), scaled(value, neg(ONE))))
+    return exists(at, branch((sub(hi, lo),), False, upward, downward))
+
+
+def exists(at: Term, value: Term) -> Term:
+    """`value` where `at` is a number, else 0: these conditions come first, since a comparison with nan is nan."""
+    guards = [n.surface for n in postorder(at) if isinstance(n, Branch) and n.orelse is NAN]
+    for surface in guards:
+        value = branch((surface,), False, value, zero_like(value))
+    radicands = [n.args[0] for n in postorder(at) if getattr(n, "op", "") in ("sqrt", "log")]  # type: ignore[union-attr]
+    for radicand in radicands:
+        if not range_of(radicand).positive:
+            value = branch((radicand,), False, value, zero_like(value))
+    return value
+
+
+def above(surface: Term, value: Term) -> Term:
+    """`value` where the surface is positive, else 0."""
+    bounds = range_of(surface)
+    if bounds.positive:
+        return value
+    if bounds.hi <= 0:
+        return zero_like(value)
+    return branch((surface,), True, value, zero_like(value))
+
+
+def finite(bound: Term) -> bool:
+    """Whether a bound is not known to be infinite."""
+    bounds = range_of(bound)
+    return not (bounds.lo == bounds.hi and abs(bounds.lo) == float("inf"))
+
+
+def remaining(node: Integral, name: str, at: Term, body: Term) -> Term:
+    """The integral over the other variables, with this one put at a place."""
+    position = node.variables.index(name)
+    later = frozenset(node.variables[position + 1 :])
+    names, bounds, hints = [], [], []
+    for k, (v, (lo, hi), points) in enumerate(zip(node.variables, node.bounds, node.hints, strict=True)):
+        if k == position:
+            continue
+        if k > position and any(name in t.free for t in (lo, hi)) and at.free & later:
+            raise NoClosedForm(f"the bounds of `{v}` depend on `{name}`, and where it is depends on `{v}`")
+        place = {name: at} if k > position else {}
+        names.append(v)
+        bounds.append((substitute(lo, place), substitute(hi, place)))
+        hints.append(tuple(substitute(p, place) for p in points))
+    if isinstance(body, Const) and body.value == 0:
+        return ZERO
+    return integral(tuple(names), tuple(bounds), body, tuple(hints)) if names else body
+
+
+def vanishes(term: Term) -> bool:
+    return all(map(vanishes, term.items)) if isinstance(term, Tuple) else term is ZERO
+
+
+def total(parts: Sequence[Term], zero: Term) -> Term:
+    """The sum of numbers, or of tuples shaped like `zero`."""
+    if len(parts) <= 1:
+        return parts[0] if parts else zero
+    if isinstance(zero, Tuple):
+        return tuple_(total([proj(p, i) for p in parts], item) for i, item in enumerate(zero.items))
+    return add(*parts)
+
+
+def difference(a: Term, b: Term) -> Term:
+    """a - b, for numbers and for tuples."""
+    zero = zero_like(a)
+    if isinstance(zero, Tuple):
+        return tuple_(difference(proj(a, i), proj(b, i)) for i in range(len(zero.items)))
+    return sub(a, b)
+
+
+def scaled(value: Term, factor: Term) -> Term:
+    """A number or a tuple of numbers times a factor; a side that is 0 stays 0 where the factor is not a number."""
+    match value:
+        case Tuple(items=items):
+            return tuple_(scaled(item, factor) for item in items)
+        case Branch():
+            return branch(value.coordinates, value.strict, scaled(value.then, factor), scaled(value.orelse, factor))
+        case If():
+            return if_(value.condition, scaled(value.then, factor), scaled(value.orelse, factor))
+        case _:
+            return mul(value, factor)
+
+
+# Without an integral
+
+
+@dataclass(frozen=True, slots=True)
+class JumpTerm:
+    """What a surface contributes to the derivative of an integrand: jump * rate * delta(surface), for each value of the
+    indices of `sums`."""
+
+    surface: Term
+    jump: Term
+    rate: Term
+    sums: tuple[tuple[str, Term, Term], ...] = ()
+
+    @property
+    def contribution(self) -> Term:
+        """All of it."""
+        found = scaled(self.jump, mul(delta((self.surface,)), self.rate))
+        for name, lo, hi in self.sums:
+            found = sum_(name, lo, hi, found)
+        return found
+
+
+def jumps(body: Term, variables: Iterable[str], rate: Rate) -> list[JumpTerm]:
+    """The distribution part of the derivative of an integrand, surface by surface; coincident ones as one."""
+    groups: dict[Term, list[tuple[Branch, int]]] = {}
+    for item in branches_of(body, variables):
+        canonical, orientation = normalized_surface(item.surface)
+        groups.setdefault(canonical, []).append((item, orientation))
+    found: list[JumpTerm] = []
+    for members in groups.values():
+        first, side = members[0]
+        speed = rate(first.surface)
+        if speed is ZERO:
+            continue
+        flips = [Flip(b, const(-o * side), const(o * side)) for b, o in members]
+        sums = summed_over(body, first)
+        sided, instances = _instances(body, flips, sums, NOWHERE)
+        positive, negative = sided(True), sided(False)
+        if positive is not negative:
+            surface, speed = substitute(first.surface, instances), substitute(speed, instances)
+            over = tuple((_name(instances[s.variable]), s.lo, s.hi) for s in sums)
+            found.append(JumpTerm(surface, difference(positive, negative), speed, over))
+    return found

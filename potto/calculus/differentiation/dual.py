@@ -1,0 +1,395 @@
+"""The symbolic dual: a term's value and tangent as core terms.
+
+Owns `dual`. Builtins come from the registry's partials; conditionals go side by side, because a condition that varies
+with no variable of integration only chooses; an integral adds what its moving surfaces and bounds sweep (`boundary`).
+Functions become functions over pairs `(value, tangent)`. The result holds no `Deriv` of a known function, so it can be
+evaluated and differentiated again: an independent check of the numeric derivative, and the text of `potto deriv`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from potto.calculus.differentiation.boundary_terms import at_bounds, at_surfaces, jumps, scaled, total, vanishes
+from potto.calculus.differentiation.deltas import without_deltas
+from potto.calculus.differentiation.derivative import NotSmooth, partial, zero_like
+from potto.calculus.inlining.expand import Resolve, expanded, known_function
+from potto.calculus.surfaces.case_split import resolved
+from potto.calculus.surfaces.trace import spine
+from potto.core.terms import (
+    ZERO,
+    App,
+    Branch,
+    Const,
+    Delta,
+    Deriv,
+    Global,
+    Hole,
+    If,
+    Integral,
+    Lam,
+    ListOf,
+    Prim,
+    Proj,
+    Sum,
+    Term,
+    Tuple,
+    Var,
+    add,
+    app,
+    branch,
+    children,
+    deriv,
+    fresh,
+    if_,
+    integral,
+    lam,
+    list_of,
+    postorder,
+    postorder_by,
+    proj,
+    rebuild,
+    substitute,
+    sum_,
+    tuple_,
+    var,
+)
+from potto.primitives import PRIMITIVES
+
+Dual = tuple[Term, Term]
+
+
+def nothing_known(name: Global) -> Term | None:
+    """Resolves no definition."""
+    return None
+
+
+def dual(term: Term, tangents: Mapping[str, Term], resolve: Resolve = nothing_known) -> Dual:
+    """Value and tangent of a term.
+
+    tangents: for each perturbed variable its tangent; for a variable that is a function, its dual function. What is
+        not mentioned stands still.
+    resolve: the terms of other definitions; those that are not known stay calls of `Deriv(definition)`.
+    Raises PottoError (P0502, P0505) where the derivative has no meaning or no closed form.
+    """
+    return Differentiator(resolve).dual(term, tangents)
+
+
+def dual_function(function: Lam, resolve: Resolve = nothing_known, frozen: bool = False) -> Lam:
+    """The function over duals: each parameter becomes a pair, or a dual function where it is applied; so the result.
+
+    frozen: surfaces and bounds stand still, so that the tangent is the interior alone.
+    """
+    return Differentiator(resolve, frozen=frozen).function(function)
+
+
+def split_pairs(value: Term, tangent: Term) -> Term:
+    return tuple_((value, tangent))
+
+
+class Differentiator:
+    """One derivation. singular: a jump becomes a delta, for an integral is around it; frozen: it stands still."""
+
+    def __init__(
+        self, resolve: Resolve, singular: bool = False, pairs: Callable[[Term, Term], Term] | None = None,
+        frozen: bool = False,
+    ) -> None:  # fmt: skip
+        self.resolve = resolve
+        self.singular = singular
+        self.frozen = frozen
+        self.pair = pairs or split_pairs
+
+    def dual(self, term: Term, tangents: Mapping[str, Term]) -> Dual:
+        functions = {n: t for n, t in tangents.items() if n in heads_of(term)}
+        value, tangent = _Pass(self, tangents).run(term)
+        return self.as_values(value, functions), self.as_values(tangent, functions)
+
+    def function(self, function: Lam) -> Lam:
+        """Over duals, group by group."""
+        return _Pass(self, {}).closed(function)
+
+    def as_values(self, term: Term, functions: Mapping[str, Term]) -> Term:
+        """Calls of functions of which only the dual is at hand, as the value of the dual's answer."""
+        if not functions or not term.free & functions.keys():
+            return term
+        inner = {n.function for n in postorder(term) if isinstance(n, App)}
+        memo: dict[Term, Term] = {}
+        for node in postorder(term):
+            if isinstance(node, App) and node not in inner:
+                head, groups = spine(node)
+                used = [a for group in groups for a in group if isinstance(a, Var) and a.name in functions]
+                if used or (isinstance(head, Var) and head.name in functions):
+                    memo[node] = self.answer(head, groups, functions, memo)
+                    continue
+            memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
+        return memo[term]
+
+    def answer(
+        self, head: Term, groups: tuple[tuple[Term, ...], ...], functions: Mapping[str, Term], memo: Mapping[Term, Term]
+    ) -> Term:
+        def over(term: Term) -> Term:
+            if isinstance(term, Var) and term.name in functions:
+                return functions[term.name]
+            return deriv(term) if isinstance(term, Global | Deriv | Lam) else self.pair(memo[term], ZERO)
+
+        result = over(head)
+        for group in groups:
+            result = app(result, tuple(over(a) for a in group))
+        return proj(result, 0)
+
+    def with_deltas(self, body: Term, tangent: Term, tangents: Mapping[str, Term]) -> Term:
+        """The tangent of an integrand: where a surface moves, its jump as a delta."""
+        names = {n for t in postorder(body) for n in t.free}
+        parts = [tangent]
+        for item in jumps(body, names, lambda t: self.dual(t, tangents)[1]):
+            parts.append(item.contribution)
+        return total([p for p in parts if p is not ZERO], zero_like(body))
+
+    def carried_out(self, term: Term) -> Term:
+        """Calls of known functions carried out, derivatives of known functions too, with deltas for jumps."""
+        inside = Differentiator(self.resolve, not self.frozen, frozen=self.frozen)
+        return expanded(term, self.resolve, inside.function)
+
+
+def heads_of(term: Term) -> frozenset[str]:
+    """The variables that are functions: those that are applied."""
+    found: set[str] = set()
+    for node in postorder(term):
+        if isinstance(node, App):
+            head = node.function
+            while isinstance(head, Deriv):
+                head = head.function
+            if isinstance(head, Var):
+                found.add(head.name)
+    return frozenset(found)
+
+
+def _outside(root: Term) -> list[Term]:
+    """Every subterm under no binder, children first; of a sum the limits."""
+    return postorder_by(root, _unbound)
+
+
+def _unbound(node: Term) -> tuple[Term, ...]:
+    if isinstance(node, Sum):
+        return node.lo, node.hi
+    return () if isinstance(node, Integral | Lam) else children(node)
+
+
+class _Pass:
+    """The duals of all subterms under one set of tangents."""
+
+    def __init__(self, owner: Differentiator, tangents: Mapping[str, Term]) -> None:
+        self.owner = owner
+        self.tangents = tangents
+        self.found: dict[Term, Dual] = {}
+        self.heads: frozenset[str] = frozenset()
+
+    def run(self, term: Term) -> Dual:
+        self.heads = heads_of(term) | {n for n, t in self.tangents.items() if isinstance(t, Lam | Global | Deriv)}
+        for node in _outside(term):
+            if node not in self.found:
+                self.found[node] = self.node(node)
+        return self.found[term]
+
+    def node(self, node: Term) -> Dual:
+        parts = children(node)
+        still = not any(n in self.tangents for n in node.free) and not isinstance(node, App | Integral | Proj)
+        if still and all(self.found[p][0] is p and self.found[p][1] is ZERO for p in parts if p in self.found):
+            return node, zero_like(node)
+        match node:
+            case Var(name=name):
+                return node, self.tangents.get(name, ZERO)
+            case Prim():
+                return self.builtin(node)
+            case If():
+                (c, _), (a, da), (b, db) = (self.found[p] for p in parts)
+                return if_(c, a, b), if_(c, da, db)
+            case Branch():
+                return self.branch(node)
+            case Tuple() | ListOf():
+                duals = [self.found[p] for p in parts]
+                make = tuple_ if isinstance(node, Tuple) else list_of
+                return make(d[0] for d in duals), make(d[1] for d in duals)
+            case Proj():
+                value, tangent = self.found[node.term]
+                return proj(value, node.index), ZERO if tangent is ZERO else proj(tangent, node.index)
+            case App():
+                return self.call(node)
+            case Sum():
+                return self.sum(node)
+            case Integral():
+                return self.integral(node)
+            case Delta() if self.owner.singular and any(self.found[p][1] is not ZERO for p in parts):
+                raise NotSmooth("a delta moves")
+            case Const() | Global() | Lam() | Deriv() | Hole():
+                return node, ZERO
+            case _:
+                return rebuild(node, tuple(self.found[p][0] for p in parts)), ZERO
+
+    def builtin(self, node: Prim) -> Dual:
+        duals = [self.found[a] for a in node.args]
+        values, slopes = tuple(d[0] for d in duals), [d[1] for d in duals]
+        value = rebuild(node, values)
+        entry = PRIMITIVES[node.op]
+        if entry.truth or entry.partials is None or all(s is ZERO for s in slopes):
+            return value, ZERO
+        if node.op in ("add", "neg"):
+            return value, rebuild(node, tuple(slopes))
+        moving = [i for i, s in enumerate(slopes) if s is not ZERO]
+        names = {i: fresh(f"z{i}", value.free) for i in moving}
+        opened = rebuild(node, tuple(var(names[i]) if i in names else v for i, v in enumerate(values)))
+        back = {names[i]: values[i] for i in moving}
+        return value, add(*(scaled(substitute(partial(opened, names[i]), back), slopes[i]) for i in moving))
+
+    def branch(self, node: Branch) -> Dual:
+        duals = [self.found[p] for p in children(node)]
+        coordinates = tuple(d[0] for d in duals[:-2])
+        (a, da), (b, db) = duals[-2:]
+        value = branch(coordinates, node.strict, a, b)
+        return value, da if da is db else branch(coordinates, node.strict, da, db)
+
+    # Functions
+
+    def call(self, node: App) -> Dual:
+        head, groups = spine(node)
+        if isinstance(head, Lam):
+            whole = expanded(node, nothing_known)
+            if whole is not node:
+                return _Pass(self.owner, self.tangents).run(whole)
+        function = self.function(head)
+        result: Term = function
+        for group in groups:
+            result = app(result, tuple(self.argument(a) for a in group))
+        result = expanded(result, nothing_known)
+        return proj(result, 0), proj(result, 1)
+
+    def argument(self, arg: Term) -> Term:
+        """An argument as its dual function takes it."""
+        if self.is_function(arg):
+            return self.function(arg)
+        value, tangent = self.found[arg]
+        return self.owner.pair(value, tangent)
+
+    def is_function(self, term: Term) -> bool:
+        match term:
+            case Lam() | Deriv():
+                return True
+            case Var(name=name):
+                return name in self.heads
+            case Global():
+                found = self.owner.resolve(term)
+                return found is None or isinstance(found, Lam)
+            case _:
+                return False
+
+    def function(self, term: Term) -> Term:
+        """The dual of a function."""
+        match term:
+            case Lam():
+                return self.closed(term)
+            case Var(name=name) if name in self.tangents:
+                return self.tangents[name]
+            case Deriv(function=inner):
+                known = known_function(inner, self.owner.resolve, self.owner.function)
+                return deriv(term) if known is None else self.closed(self.owner.function(known))
+            case App():
+                head, groups = spine(term)
+                result = self.function(head)
+                for group in groups:
+                    result = app(result, tuple(self.argument(a) for a in group))
+                return result
+            case _:
+                return deriv(term)
+
+    def closed(self, function: Lam) -> Lam:
+        """The dual of a function, which may use variables from around it."""
+        outside = {n: t for n, t in self.tangents.items() if n in function.free}
+        taken = {n for t in postorder(function) for n in t.free} | {n for t in outside.values() for n in t.free}
+        taken |= set(function.params)
+        heads = heads_of(function)
+        tangents: dict[str, Term] = {}
+        for name in outside:
+            tangents[name] = var(fresh(f"{name}'tangent", taken))
+            taken |= tangents[name].free
+        values: dict[str, Term] = {}
+        functions: dict[str, Term] = {}
+        params = tuple(self.parameter(p, p in heads, taken, values, tangents, functions) for p in function.params)
+        result = self.owner.as_values(_Pass(self.owner, tangents).body_of(function), functions)
+        opened = substitute(result, values)
+        stand_ins = {next(iter(t.free)): outside[n] for n, t in tangents.items() if n in outside}
+        made = lam(params, substitute(opened, stand_ins))
+        assert isinstance(made, Lam)
+        return made
+
+    def parameter(
+        self,
+        param: str,
+        is_function: bool,
+        taken: set[str],
+        values: dict[str, Term],
+        tangents: dict[str, Term],
+        functions: dict[str, Term],
+    ) -> str:
+        """The name of a parameter's dual; what the parameter and its tangent are in terms of it."""
+        name = fresh(f"d{param}", taken)
+        taken.add(name)
+        if is_function:
+            tangents[param] = functions[param] = var(name)
+        else:
+            values[param], tangents[param] = proj(var(name), 0), proj(var(name), 1)
+        return name
+
+    def body_of(self, function: Lam) -> Term:
+        body = function.body
+        if isinstance(body, Lam):
+            return self.closed(body)
+        if self.owner.singular:
+            body = resolved(body)
+        value, tangent = self.run(body)
+        if self.owner.singular:
+            tangent = self.owner.with_deltas(body, tangent, self.tangents)
+        return self.owner.pair(value, tangent)
+
+    # Binders
+
+    def sum(self, node: Sum) -> Dual:
+        body, tangent = self.under(node.body, (node.variable,))
+        lo, hi = self.found[node.lo][0], self.found[node.hi][0]
+        return sum_(node.variable, lo, hi, body), ZERO if tangent is ZERO else sum_(node.variable, lo, hi, tangent)
+
+    def under(self, body: Term, bound: tuple[str, ...]) -> Dual:
+        return _Pass(self.owner, {n: t for n, t in self.tangents.items() if n not in bound}).run(body)
+
+    def integral(self, node: Integral) -> Dual:
+        whole = resolved(self.owner.carried_out(node))
+        if not isinstance(whole, Integral):
+            return _Pass(self.owner, self.tangents).run(whole)
+        plain = _without(without_deltas(whole), Delta)
+        if not isinstance(plain, Integral):
+            return _Pass(self.owner, self.tangents).run(plain)
+        moving = {n: t for n, t in self.tangents.items() if n not in plain.variables}
+        if not any(n in plain.free for n in moving):
+            return plain, zero_like(plain.body)
+
+        def rate(term: Term) -> Term:
+            """The tangent of a term as the parameters move; the variables of integration stand still."""
+            return _Pass(self.owner, moving).run(term)[1]
+
+        parts = [_over(plain, rate(plain.body))]
+        if not self.owner.frozen:
+            parts += [*at_bounds(plain, rate), *at_surfaces(plain, frozenset(moving), rate)]
+        return plain, total([p for p in parts if p is not ZERO], zero_like(plain.body))
+
+
+def _without(term: Term, kind: type[Delta]) -> Term:
+    """Deltas that are left vary with no variable of integration: they stand for a jump that nothing sweeps."""
+    memo: dict[Term, Term] = {}
+    for node in postorder(term):
+        memo[node] = ZERO if isinstance(node, kind) else rebuild(node, tuple(memo[c] for c in children(node)))
+    return memo[term]
+
+
+def _over(node: Integral, body: Term) -> Term:
+    if vanishes(body):
+        return ZERO
+    return integral(node.variables, node.bounds, body, node.hints)

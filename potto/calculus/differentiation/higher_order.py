@@ -1,0 +1,75 @@
+"""Derivatives of derivatives, and of deltas, as terms for people to read.
+
+Owns `first_derivative`, which makes a derivative a function that can be differentiated once more, and `moving_deltas`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from potto.calculus.differentiation.derivative import NotSmooth, partial
+from potto.calculus.differentiation.dual import Differentiator, heads_of
+from potto.calculus.inlining.expand import Resolve, named
+from potto.calculus.solving.pivots import NoClosedForm
+from potto.core.terms import (
+    ZERO,
+    Delta,
+    Deriv,
+    Global,
+    Integral,
+    Lam,
+    Term,
+    app,
+    children,
+    fresh,
+    lam,
+    mul,
+    postorder,
+    rebuild,
+    var,
+)
+from potto.diagnostics import PottoError
+
+
+class NoText(Exception):
+    """A derivative that is not written down: says why."""
+
+
+def first_derivative(term: Term, resolve: Resolve) -> Term:
+    """A function as it is; of a derivative, the tangent as a function of the parameters and their tangents.
+
+    Differentiated, that is the second derivative along a curve: `dt` is the tangent of t, `ddt` that of dt.
+    Raises NoText.
+    """
+    at = named(term, resolve) if isinstance(term, Global) else term
+    if not isinstance(at, Deriv):
+        return at if isinstance(at, Lam) else term
+    body, params = first_derivative(at.function, resolve), list[str]()
+    while isinstance(body, Lam):
+        params.extend(body.params)
+        body = body.body
+    if heads_of(body) & set(params):
+        raise NoText("a second derivative is written down only where no parameter is a function")
+    tangents = {p: var(f"d{p}") for p in params}
+    names = tuple(dict.fromkeys((*params, *(f"d{p}" for p in params))))
+    try:
+        return lam(names, Differentiator(resolve).dual(body, tangents)[1])
+    except (NoClosedForm, NotSmooth) as problem:
+        raise NoText(f"the first derivative has no closed form: {problem}") from None
+    except PottoError as problem:
+        raise NoText(problem.diagnostics[0].message) from None
+
+
+def moving_deltas(node: Integral, rate: Callable[[Term], Term]) -> list[Term]:
+    """What deltas in an integrand give when they move: their factor, their speed and the derivative of delta."""
+    found: list[Term] = []
+    hidden = fresh("spike", {name for inner in postorder(node.body) for name in inner.free})
+    for spike in [inner for inner in postorder(node.body) if isinstance(inner, Delta)]:
+        memo: dict[Term, Term] = {}
+        for inner in postorder(node.body):
+            memo[inner] = var(hidden) if inner is spike else rebuild(inner, tuple(memo[c] for c in children(inner)))
+        speed = rate(spike.coordinates[0])
+        if speed is not ZERO:
+            steep = app(var("delta'"), (spike.coordinates[0],))
+            found.append(mul(partial(memo[node.body], hidden), speed, steep))
+    return found

@@ -1,0 +1,1 @@
+"""Derivatives for a person to read."""

@@ -1,0 +1,1 @@
+"""Calls carried out, and what can be told about them without doing so."""

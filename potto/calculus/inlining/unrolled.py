@@ -1,0 +1,123 @@
+"""Terms with everything carried out that plain values decide: calls, the sides of plain conditionals, sums.
+
+Owns `unrolled`. `expand` leaves a recursion as a call, since how deep it goes is a matter of values; here the values
+are known, so that a simulation of n steps becomes one term, in which a state that is met again is one object.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from potto.calculus.inlining.expand import Calls
+from potto.calculus.surfaces.discontinuities import Decide, Resolve
+from potto.calculus.surfaces.trace import spine
+from potto.core.binders import apart
+from potto.core.terms import (
+    App,
+    Branch,
+    Deriv,
+    If,
+    Lam,
+    Proj,
+    Sum,
+    Term,
+    add,
+    children,
+    const,
+    postorder,
+    postorder_by,
+    proj,
+    rebuild,
+    substitute,
+)
+
+DEEPEST = 150  # calls inside calls: Python's own stack holds four frames for each
+MOST_CALLS = 5000
+MOST_SUMMANDS = 256
+
+
+class _TooMuch(Exception):
+    """More calls than a term is worth."""
+
+
+def unrolled(term: Term, resolve: Resolve, decide: Decide) -> Term | None:
+    """An equal term for the plain values at hand; None if it would take too many calls.
+
+    `resolve` gives the functions that a call may be replaced by; others stay calls.
+    """
+    try:
+        return apart(_Unrolling(resolve, decide).run(term, 0))
+    except _TooMuch:
+        return None
+
+
+class _Unrolling:
+    """One unrolling."""
+
+    def __init__(self, resolve: Resolve, decide: Decide) -> None:
+        self.resolve = resolve
+        self.decide = decide
+        self.calls = Calls()
+
+    def run(self, term: Term, depth: int) -> Term:
+        taken: dict[Term, Term] = {}  # plain conditionals, and the sides that they take
+        memo: dict[Term, Term] = {}
+        deciding = {
+            part
+            for node in postorder(term)
+            if isinstance(node, Branch)
+            for part in postorder(node.surface)
+            if isinstance(part, Sum)
+        }
+        for node in postorder_by(term, lambda node: self.below(node, taken)):
+            if node in taken:
+                memo[node] = memo[taken[node]]
+            elif isinstance(node, Deriv):
+                memo[node] = node
+            elif isinstance(node, Proj):
+                memo[node] = proj(memo[node.term], node.index)
+            else:
+                new = rebuild(node, tuple(memo[c] for c in children(node)))
+                memo[node] = self.carried_out(new, depth, node in deciding)
+        return memo[term]
+
+    def below(self, node: Term, taken: dict[Term, Term]) -> Sequence[Term]:
+        """What has to be there before a node: of a conditional that is decided, the side that it takes."""
+        if isinstance(node, Deriv):
+            return ()
+        if isinstance(node, If):
+            outcome = self.decide(node.condition)
+            if outcome is not None and outcome == outcome:
+                taken[node] = node.then if outcome else node.orelse
+                return (taken[node],)
+        return children(node)
+
+    def carried_out(self, node: Term, depth: int, decides: bool) -> Term:
+        """A call as what it does, a sum as its summands where they jump, or decide where something else does."""
+        if isinstance(node, App):
+            return self.applied(node, depth)
+        if isinstance(node, Sum) and (
+            decides or any(isinstance(part, App | Branch) for part in postorder(node.body))
+        ):
+            return self.summed(node, depth)
+        return node
+
+    def applied(self, call: App, depth: int) -> Term:
+        head, groups = spine(call)
+        function = head if isinstance(head, Lam) else self.resolve(head)
+        if not isinstance(function, Lam):
+            return call
+
+        def run(body: Term) -> Term:
+            if depth > DEEPEST or len(self.calls.known) > MOST_CALLS:
+                raise _TooMuch
+            return self.run(body, depth + 1)
+
+        return self.calls.carried_out(call, function, groups, run)
+
+    def summed(self, node: Sum, depth: int) -> Term:
+        lo, hi = self.decide(node.lo), self.decide(node.hi)
+        if lo is None or hi is None or not hi - lo < MOST_SUMMANDS:
+            return node
+        numbers = range(int(lo), int(hi) + 1)
+        return add(*(self.run(substitute(node.body, {node.variable: const(k)}), depth + 1) for k in numbers))

@@ -1,0 +1,51 @@
+"""Which terms interval arithmetic can evaluate: their zeros can be searched for with certainty.
+
+Owns `enclosable` and `searchable`. The rules are those of the entries, which `integrate/rules/intervals`
+does to batches.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+from potto.calculus.algebra.ranges import ARITHMETIC, RANGES
+from potto.calculus.differentiation.derivative import NotSmooth, partial
+from potto.core.simplify import simplify
+from potto.core.terms import Branch, Const, If, Prim, Proj, Sum, Term, Var, children, postorder_by
+
+
+def enclosable(term: Term, jumps: bool = False) -> bool:
+    """Whether a term can be enclosed: arithmetic and builtins, sums of such, and brackets if it may jump.
+
+    Sums are written out before any number is asked for (`unrolled`), and what plain conditionals decide is decided.
+    """
+    return all(
+        isinstance(node, Const | Var | Sum | If)
+        or (isinstance(node, Proj) and isinstance(node.term, Proj | Var))
+        or (isinstance(node, Prim) and (node.op in ARITHMETIC or RANGES.knows(node.op)))
+        or (jumps and isinstance(node, Branch))
+        for node in postorder_by(term, _values)
+    )
+
+
+def _values(node: Term) -> Sequence[Term]:
+    """What a term's value is made of: of a conditional both sides, whatever decides."""
+    return (node.then, node.orelse) if isinstance(node, Branch | If) else children(node)
+
+
+@lru_cache(maxsize=4096)
+def slope_of(surface: Term, variable: str) -> Term | None:
+    """The surface's derivative along the variable if both can be enclosed."""
+    if not enclosable(surface, jumps=True):
+        return None
+    try:
+        slope = simplify(partial(surface, variable))
+    except NotSmooth:
+        return None
+    return slope if enclosable(slope, jumps=True) else None
+
+
+def searchable(surface: Term, variable: str) -> bool:
+    """Whether the zeros of a surface along a variable can be searched for so that none is missed."""
+    return enclosable(surface) and slope_of(surface, variable) is not None

@@ -1,0 +1,271 @@
+"""One step of undoing a builtin: from f(..., u, ...) = y to equations for u.
+
+Owns the inverses that need more than the registry knows: operators, powers, `abs`, `hypot`, `min`, `max`, `clamp`,
+`atan2`. Everything else comes from `Primitive.inverse` and `Primitive.period`. A step keeps the structure of what it
+moves to the other side, so that (x - 0.5)^2 = t gives 0.5 ± sqrt(t) and no digits are lost by expanding.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from potto.calculus.algebra.radicals import TWO, even_root, guarded, minus, odd_root, quotient
+from potto.calculus.algebra.ranges import range_of
+from potto.core.terms import (
+    ONE,
+    PI,
+    ZERO,
+    Branch,
+    Const,
+    Prim,
+    Term,
+    add,
+    const,
+    div,
+    mul,
+    neg,
+    pow_,
+    prim,
+    sub,
+)
+from potto.primitives import PRIMITIVES
+
+
+@dataclass(frozen=True, slots=True)
+class Guard:
+    """A root counts only where `surface` >= 0 (> 0 when strict). The surface may contain the variable solved for."""
+
+    surface: Term
+    strict: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One equation `inner = value` that the step leads to. With `period` set, also value + k period for integers k."""
+
+    inner: Term
+    value: Term
+    guards: tuple[Guard, ...] = ()
+    period: Term | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Stuck:
+    """Why a step is not possible, in the user's words."""
+
+    reason: str
+
+
+Steps = tuple[Step, ...] | Stuck
+
+
+def step(term: Prim, index: int, value: Term) -> Steps:
+    """The equations for argument `index` of a builtin, the only argument that contains the variable."""
+    special = _SPECIAL.get(term.op)
+    if special is not None:
+        return special(term.args, index, value)
+    return _registered(term.op, term.args, value)
+
+
+# Operators
+
+
+def _add(args: tuple[Term, ...], index: int, value: Term) -> Steps:
+    return (Step(args[index], add(value, *(minus(a) for i, a in enumerate(args) if i != index))),)
+
+
+def _neg(args: tuple[Term, ...], index: int, value: Term) -> Steps:
+    return (Step(args[0], minus(value)),)
+
+
+def _mul(args: tuple[Term, ...], index: int, value: Term) -> Steps:
+    if value is ZERO:
+        return (Step(args[index], ZERO),)
+    return (Step(args[index], quotient(value, mul(*(a for i, a in enumerate(args) if i != index)))),)
+
+
+def _div(args: tuple[Term, ...], index: int, value: Term) -> Steps:
+    top, bottom = args
+    if index == 0:
+        return (Step(top, mul(value, bottom)),)
+    return () if value is ZERO else (Step(bottom, quotient(top, value)),)
+
+
+def _pow(args: tuple[Term, ...], index: int, value: Term) -> Steps:
+    base, exponent = args
+    if index == 1:
+        if value is ZERO:
+            return ()
+        return (Step(exponent, div(prim("log", value), prim("log", base))),)
+    if isinstance(exponent, Const):
+        return _constant_power(base, exponent.value, value)
+    return _symbolic_power(base, exponent, value)
+
+
+def _constant_power(base: Term, power: float, value: Term) -> Steps:
+    if power == 0 or not math.isfinite(power):
+        return Stuck(f"a power of {power:g} does not determine its base")
+    if power < 0:
+        return () if value is ZERO else _constant_power(base, -power, div(ONE, value))
+    if not power.is_integer():
+        if value is ZERO:
+            return (Step(base, ZERO),)
+        back = 1 / power
+        exponent = const(back) if back.is_integer() else div(ONE, const(power))
+        return (Step(base, pow_(guarded(value, value), exponent)),)
+    if int(power) % 2:
+        return (Step(base, odd_root(value, int(power))),)
+    if value is ZERO:
+        return (Step(base, ZERO),)
+    root = even_root(value, int(power))
+    return (Step(base, neg(root)), Step(base, root))
+
+
+def _symbolic_power(base: Term, exponent: Term, value: Term) -> Steps:
+    """u^p = y for a p known at run time only: the positive root, and negative ones where p is an integer."""
+    if value is ZERO:
+        return (Step(base, guarded(exponent, ZERO, strict=True)),)
+    inverse = div(ONE, exponent)
+    up = prim("pow", value, inverse)
+    down, odd = neg(up), neg(prim("pow", neg(value), inverse))
+    # (-u)^p is nan unless p is an integer, and has the sign of y for an even p only (for an odd p when y < 0).
+    return (
+        Step(base, guarded(value, up)),
+        Step(base, guarded(mul(prim("pow", down, exponent), value), down, strict=True)),
+        Step(base, guarded(mul(prim("pow", odd, exponent), value), odd, strict=True)),
+    )
+
+
+# Builtins that need more than one inverse
+
+
+def _abs(args: tuple[Term, ...], index: int, value: Term) -> Steps:
+    if value is ZERO:
+        return (Step(args[0], ZERO),)
+    root = guarded(value, value)
+    return (Step(args[0], neg(root)), Step(args[0], root))
+
+
+def _sqrt(args: tuple[Term, ...], index: int, value: Term) -> Steps:
+    if value is ZERO:
+        return (Step(args[0], ZERO),)
+    if isinstance(value, Prim) and value.op == "sqrt":
+        return (Step(args[0], value.args[0], (Guard(value.args[0]),)),)
+    return (Step(args[0], guarded(value, pow_(value, TWO))),)
+
+
+def _exp(args: tuple[Term, ...], index: int, value: Term) -> Steps:
+    if value is ZERO or range_of(value).hi <= 0:
+        return ()
+    if isinstance(value, Prim) and value.op == "exp":
+        return (Step(args[0], value.args[0]),)
+    return (Step(args[0], ZERO if value is ONE else prim("log", value)),)
+
+
+def _log(args: tuple[Term, ...], index: int, value: Term) -> Steps:
+    if isinstance(value, Prim) and value.op == "log":
+        return (Step(args[0], value.args[0], (Guard(value.args[0], strict=True),)),)
+    return (Step(args[0], ONE if value is ZERO else prim("exp", value)),)
+
+
+def _hypot(args: tuple[Term, ...], index: int, value: Term) -> Steps:
+    other = args[1 - index]
+    root = guarded(value, prim("sqrt", mul(sub(value, other), add(value, other))))
+    return (Step(args[index], neg(root)), Step(args[index], root))
+
+
+def _extreme(sign: Callable[[Term], Term]) -> Callable[[tuple[Term, ...], int, Term], Steps]:
+    def run(args: tuple[Term, ...], index: int, value: Term) -> Steps:
+        guards = tuple(Guard(sign(sub(value, a))) for i, a in enumerate(args) if i != index)
+        return (Step(args[index], value, guards),)
+
+    return run
+
+
+def _clamp(args: tuple[Term, ...], index: int, value: Term) -> Steps:
+    x, lo, hi = args
+    if index == 0:
+        return (Step(x, value, (Guard(sub(value, lo), True), Guard(sub(hi, value), True))),)
+    if index == 1:
+        return (Step(lo, value, (Guard(sub(value, x)), Guard(sub(hi, value), True))),)
+    return (Step(hi, value, (Guard(sub(x, value)), Guard(sub(value, lo), True))),)
+
+
+def _atan2(args: tuple[Term, ...], index: int, value: Term) -> Steps:
+    y, x = args
+    within = (Guard(sub(PI, value)), Guard(add(PI, value)))
+    if index == 0:
+        if value is ZERO:
+            return (Step(y, ZERO, (Guard(x, True),)),)
+        return (Step(y, mul(x, prim("tan", value)), (*within, Guard(mul(x, prim("cos", value)), True))),)
+    if value is ZERO:
+        return ()
+    return (Step(x, div(y, prim("tan", value)), (*within, Guard(mul(y, prim("sin", value)), True))),)
+
+
+def _registered(op: str, args: tuple[Term, ...], value: Term) -> Steps:
+    """Through the registry: a builtin of one argument that has an inverse."""
+    entry = PRIMITIVES.get(op)
+    if entry is None or len(args) != 1:
+        return Stuck(f"`{op}` has no inverse")
+    (inner,) = args
+    if value is ZERO and entry.roots == ():
+        return ()
+    one_to_one = entry.increasing != 0
+    if one_to_one and isinstance(value, Prim) and value.op == op and not entry.edges(inner):
+        return (Step(inner, value.args[0]),)
+    if value is ZERO and entry.roots == (0.0,):
+        return (Step(inner, ZERO, (), entry.period(value)[0] if entry.period else None),)
+    if entry.inverse is None:
+        return Stuck(f"`{op}` has no inverse in closed form")
+    solutions = tuple(_folded(s) for s in entry.inverse(value))
+    if entry.period is None:
+        return tuple(Step(inner, s) for s in solutions)
+    period, further = entry.period(value)
+    return tuple(Step(inner, s, (), period) for s in (*solutions, *further))
+
+
+def _folded(term: Term) -> Term:
+    """A solution with the guards that the form of the value decides taken off."""
+    while isinstance(term, Branch):
+        bounds = range_of(term.surface)
+        if bounds.positive or (bounds.lo >= 0 and not term.strict):
+            term = term.then
+        elif bounds.negative or (bounds.hi <= 0 and term.strict):
+            term = term.orelse
+        else:
+            break
+    return term
+
+
+def _turn(start: Term) -> Callable[[tuple[Term, ...], int, Term], Steps]:
+    """sin u = 0 and cos u = 0 have one root in half a period, which is better than two in a whole one."""
+
+    def run(args: tuple[Term, ...], index: int, value: Term) -> Steps:
+        if value is ZERO:
+            return (Step(args[0], start, (), PI),)
+        return _registered("sin" if start is ZERO else "cos", args, value)
+
+    return run
+
+
+_SPECIAL: dict[str, Callable[[tuple[Term, ...], int, Term], Steps]] = {
+    "add": _add,
+    "neg": _neg,
+    "mul": _mul,
+    "div": _div,
+    "pow": _pow,
+    "abs": _abs,
+    "sqrt": _sqrt,
+    "exp": _exp,
+    "sin": _turn(ZERO),
+    "cos": _turn(div(PI, TWO)),
+    "log": _log,
+    "hypot": _hypot,
+    "max": _extreme(lambda gap: gap),
+    "min": _extreme(neg),
+    "clamp": _clamp,
+    "atan2": _atan2,
+}

@@ -1,0 +1,147 @@
+"""An author's inverse, verified.
+
+Owns `verify`: by symbols where they decide (inverse after map is the identity), else at sample points, and then it says
+so. Doubles sort out at many points what is plainly wrong, or not defined; at a few of them numbers of fifty digits find
+what is wrong by less. Those are loaded only for an inverse that symbols do not decide.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from potto.calculus.algebra.point_values import points, sample_value
+from potto.calculus.algebra.rational_form import equal
+from potto.calculus.solving.isolate import Guard
+from potto.core.terms import Const, Term, children, const, postorder, prim, rebuild, substitute, var
+
+_POINTS = 4000
+_ENOUGH = 200
+_TOLERANCE = 1e-7  # of doubles, through functions of any slope
+_DIGITS = 50
+_EXACT_POINTS = 12
+_EXACT = 1e-20
+# A number in the text with this many digits or more stands for one that it is not, such as sqrt(2).
+_ROUNDED_DIGITS = 13
+_ROUNDED = 1e-12
+
+Box = Mapping[str, tuple[float, float]]
+
+
+@dataclass(frozen=True, slots=True)
+class Verified:
+    """The inverse holds: `proven` by symbols, else at `tested` points."""
+
+    proven: bool
+    tested: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Refuted:
+    """A point that does not come back: variables and parameters there, what comes back, and by how much it is off."""
+
+    point: Mapping[str, float]
+    back: Mapping[str, float]
+    off: float = math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Untested:
+    """No point was found at which map and inverse are both defined."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Passed:
+    """Points at which doubles found nothing wrong."""
+
+    points: tuple[Mapping[str, float], ...]
+
+
+Outcome = Verified | Refuted | Untested
+
+
+def verify(
+    coordinates: Sequence[Term],
+    variables: Sequence[str],
+    values: Sequence[str],
+    inverse: Sequence[Term],
+    where: Sequence[Guard] = (),
+    box: Box | None = None,
+) -> Outcome:
+    """Whether `inverse`, over `values`, gives back the variables; only where `where` holds."""
+    forth = dict(zip(values, coordinates, strict=True))
+    round_trip = [substitute(i, forth) for i in inverse]
+    refuted = _sampled(coordinates, round_trip, variables, where, box or {})
+    if isinstance(refuted, Refuted):
+        return refuted
+    if all(equal(r, var(v)) for r, v in zip(round_trip, variables, strict=True)):
+        return Verified(True)
+    return _closely(round_trip, variables, refuted)
+
+
+def _sampled(
+    coordinates: Sequence[Term], round_trip: Sequence[Term], variables: Sequence[str], where: Sequence[Guard], box: Box
+) -> _Passed | Refuted | Untested:
+    names = sorted({n for t in round_trip for n in t.free} | {n for g in where for n in g.surface.free} | {*variables})
+    tested: list[Mapping[str, float]] = []
+    for point in points(names, box, _POINTS):
+        if not all(_holds(guard, point) for guard in where):
+            continue
+        back = [sample_value(t, point) for t in round_trip]
+        if any(not math.isfinite(b) for b in back):
+            if all(math.isfinite(sample_value(c, point)) for c in coordinates):
+                return Refuted(point, dict(zip(variables, back, strict=True)))  # the map reaches what has no inverse
+            continue
+        tested.append(point)
+        far = [abs(b - point[v]) > _TOLERANCE * (1 + abs(point[v])) for b, v in zip(back, variables, strict=True)]
+        if any(far):
+            return Refuted(point, dict(zip(variables, back, strict=True)))
+        if len(tested) >= _ENOUGH:
+            break
+    return _Passed(tuple(tested)) if tested else Untested()
+
+
+def _closely(round_trip: Sequence[Term], variables: Sequence[str], passed: _Passed | Untested) -> Outcome:
+    """At some of the points again, in fifty digits."""
+    if isinstance(passed, Untested):
+        return passed
+    from potto.core.reference import NotAccurate, evaluate
+
+    exact = [_as_written(term) for term in round_trip]
+    tolerance = _ROUNDED if any(_is_rounded(term) for term in round_trip) else _EXACT
+    for point in passed.points[:_EXACT_POINTS]:
+        for term, name in zip(exact, variables, strict=True):
+            try:
+                back = evaluate(term, point, digits=_DIGITS)
+                off = float(abs(back - point[name]))
+            except (ArithmeticError, ValueError, TypeError, NotAccurate):
+                continue
+            if off > tolerance * (1 + abs(point[name])):
+                values = [sample_value(t, point) for t in round_trip]
+                return Refuted(point, dict(zip(variables, values, strict=True)), off)
+    return Verified(False, len(passed.points))
+
+
+def _as_written(term: Term) -> Term:
+    """The term with the decimals of its text as what they say: 0.1 is a tenth, and not the double beside it."""
+    memo: dict[Term, Term] = {}
+    for node in postorder(term):
+        new = rebuild(node, tuple(memo[c] for c in children(node)))
+        if isinstance(node, Const) and node.name is None and math.isfinite(node.value) and not node.value.is_integer():
+            tenth = Fraction(repr(node.value))
+            if max(abs(tenth.numerator), tenth.denominator) < 2**53:  # both are doubles
+                new = prim("div", const(float(tenth.numerator)), const(float(tenth.denominator)))
+        memo[node] = new
+    return memo[term]
+
+
+def _is_rounded(term: Term) -> bool:
+    numbers = (node.value for node in postorder(term) if isinstance(node, Const) and node.name is None)
+    return any(len(repr(abs(n)).partition("e")[0].replace(".", "").strip("0")) >= _ROUNDED_DIGITS for n in numbers)
+
+
+def _holds(guard: Guard, point: Mapping[str, float]) -> bool:
+    value = sample_value(guard.surface, point)
+    return value > 0 if guard.strict else value >= 0

@@ -1,0 +1,162 @@
+"""Branches and the sides of them that an integrand takes.
+
+Owns `branches_of`, `flipping` and `forced`: which branches of an integrand flip at a root, and what the integrand is
+just left and just right of it, every other branch as it falls.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from potto.calculus.algebra.radicals import NAN
+from potto.calculus.algebra.ranges import range_of
+from potto.calculus.algebra.rational_form import as_term, normal
+from potto.calculus.differentiation.derivative import partial
+from potto.core.simplify import is_zero
+from potto.core.terms import (
+    ONE,
+    Branch,
+    Integral,
+    Lam,
+    Sum,
+    Term,
+    branch,
+    children,
+    mul,
+    neg,
+    postorder,
+    rebuild,
+    substitute,
+)
+
+Box = Mapping[str, tuple[float, float]]
+NOWHERE: Box = {}
+
+
+def branches_of(body: Term, variables: Iterable[str]) -> list[Branch]:
+    """The branches of an integrand that vary with the variables and with nothing bound further in."""
+    names = frozenset(variables)
+    inside: set[str] = set()
+    for node in postorder(body):
+        if isinstance(node, Integral):
+            inside.update(node.variables)
+        elif isinstance(node, Lam):
+            inside.update(node.params)
+    return [
+        node
+        for node in postorder(body)
+        if isinstance(node, Branch) and node.surface.free & names and not node.surface.free & inside
+    ]
+
+
+def summed_over(body: Term, branch_: Branch) -> list[Sum]:
+    """The sums whose index a branch's surface uses: it is one surface for each value."""
+    return [node for node in postorder(body) if isinstance(node, Sum) and node.variable in branch_.surface.free]
+
+
+@dataclass(frozen=True, slots=True)
+class Flip:
+    """A branch whose surface is 0 at a root, and terms with the signs of that surface just left and right of it."""
+
+    branch: Branch
+    left: Term
+    right: Term
+
+
+Flips = Sequence[Flip]
+
+
+def forced(body: Term, flips: Flips, right: bool, box: Box = NOWHERE) -> Term:
+    """The integrand just right (or left) of where the branches flip."""
+    if not flips:
+        return body
+    signs = {f.branch: f.right if right else f.left for f in flips}
+    memo: dict[Term, Term] = {}
+    for node in postorder(body):
+        new = rebuild(node, tuple(memo[c] for c in children(node)))
+        if isinstance(node, Branch) and node in signs and isinstance(new, Branch):
+            new = side_of(signs[node], new.then, new.orelse, box)
+        memo[node] = new
+    return memo[body]
+
+
+def side_of(slope: Term, then: Term, orelse: Term, box: Box = NOWHERE) -> Term:
+    """`then` where the slope is positive. One that is 0 only here and there may count as either."""
+    bounds = range_of(slope, box)
+    if then is orelse or bounds.hi <= 0:
+        return orelse
+    return then if bounds.lo >= 0 else branch((slope,), True, then, orelse)
+
+
+def box_of(node: Integral) -> dict[str, tuple[float, float]]:
+    """The bounds of the variables of integration, as far as the form of the bounds shows them."""
+    box: dict[str, tuple[float, float]] = {}
+    for name, (lo, hi) in zip(node.variables, node.bounds, strict=True):
+        a, b = range_of(lo, box), range_of(hi, box)
+        box[name] = min(a.lo, b.lo), max(a.hi, b.hi)
+    return box
+
+
+def flipping(
+    branches: Iterable[Branch], variable: str, at: Term, known: Sequence[Branch] = (), bends: int = 3
+) -> list[Flip]:
+    """The branches whose surface is 0 where `variable = at` (`known` ones surely are), with their sides there.
+
+    `bends`: how many kinks inside kinks are looked into.
+    """
+    found: list[Flip] = []
+    for item in branches:
+        if variable in item.surface.free:
+            surface = without_poles(item.surface)
+            if item in known or is_zero(substitute(surface, {variable: unguarded(at)})):
+                signs = _signs(surface, variable, at, bends)
+                if signs is not None:
+                    found.append(Flip(item, *signs))
+    return found
+
+
+_HIGHEST = 4  # derivatives that are asked for a sign
+
+
+def _signs(surface: Term, variable: str, at: Term, bends: int) -> tuple[Term, Term] | None:
+    """Terms with the sign of a surface just left and right of its root; None if it is 0 around it."""
+    bounds = range_of(surface)
+    if bounds.lo >= 0 or bounds.hi <= 0:
+        side = ONE if bounds.lo >= 0 else neg(ONE)
+        return None if is_zero(surface) else (side, side)
+    slope, parity = surface, 1
+    for _ in range(_HIGHEST):
+        slope, parity = partial(slope, variable), -parity
+        left, right = _both(slope, variable, at, bends)
+        if not (is_zero(unguarded(left)) and is_zero(unguarded(right))):
+            return (neg(left) if parity < 0 else left), right
+    return None
+
+
+def _both(slope: Term, variable: str, at: Term, bends: int) -> tuple[Term, Term]:
+    """A slope just left and right of a root, where the surface may have a kink."""
+    inner = [n for n in postorder(slope) if isinstance(n, Branch) and variable in n.surface.free]
+    flips = flipping(inner, variable, at, (), bends - 1) if inner and bends else []
+    place = {variable: at}
+    return substitute(forced(slope, flips, False), place), substitute(forced(slope, flips, True), place)
+
+
+def unguarded(root: Term) -> Term:
+    """A root as it is where it exists."""
+    memo: dict[Term, Term] = {}
+    for node in postorder(root):
+        new = rebuild(node, tuple(memo[c] for c in children(node)))
+        memo[node] = new.then if isinstance(new, Branch) and new.orelse is NAN else new
+    return memo[root]
+
+
+def without_poles(surface: Term) -> Term:
+    """A surface with the same sign and no divisors: a/b as a*b."""
+    if not any(getattr(n, "op", "") == "div" and n.free for n in postorder(surface)):
+        return surface
+    found = normal(surface)
+    if found is None or found.whole:
+        return surface
+    top, below = as_term(found.top), as_term(found.below)
+    return surface if top is None or below is None else mul(top, below)

@@ -1,0 +1,326 @@
+"""The surfaces of a term: where it jumps, where it has a kink, where it stops being smooth, through its calls.
+
+Owns `findings`. A function compiled alone exports its conditions as terms over its parameters; here a caller's
+arguments are put in for them. Each jump comes with the trace that forces it: the path of sites from the term to the
+branch. Plain conditions and sums that decide what there is are asked of `decide`, so that a recursion is followed
+only as deep as its values go.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Literal
+
+from potto.calculus.algebra.ranges import nonnegative
+from potto.calculus.decomposition.critical import Critical
+from potto.calculus.inlining.currying import arguments_of, groups_of, sizes_of, uncurry
+from potto.calculus.surfaces.nested_brackets import BINDERS, pieces
+from potto.calculus.surfaces.trace import CallSite, Part, Side, layout, spine
+from potto.core.terms import (
+    App,
+    Const,
+    Delta,
+    Deriv,
+    If,
+    Integral,
+    Lam,
+    Prim,
+    Proj,
+    Sum,
+    Term,
+    Tuple,
+    children,
+    const,
+    outside,
+    postorder,
+    proj,
+    rebuild,
+    substitute,
+)  # fmt: skip
+from potto.primitives import PRIMITIVES
+
+DEEPEST = 2000
+_DEEPEST_SURFACE = 12
+
+Kind = Literal["jump", "kink", "edge", "center", "critical"]
+# Where a part of the program gets its functions from: a Lam for the head of a call, or None if it is not known here.
+Resolve = Callable[[Term], "Lam | Deriv | None"]
+# The value of a plain term (a condition: 1 or 0), or None where it is not decided.
+Decide = Callable[[Term], "float | None"]
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One surface `surface = 0`, over the variables of the term that was searched.
+
+    kind: a jump (a branch), a kink (abs, max), an edge, where the term stops being smooth or defined (sqrt at 0), or a
+        center, around which a smooth term may be concentrated (x - m in exp(-(x - m)^2), u in 1/(1 + exp(u))), or a
+        critical place of an integral: of `surface` and others, somewhere inside.
+    path: for a jump, the sites of the trace that lead to the branch.
+    calls: the calls on that path, for messages.
+    """
+
+    kind: Kind
+    surface: Term
+    path: tuple[int, ...] = ()
+    strict: bool = False
+    coordinates: tuple[Term, ...] = ()
+    calls: tuple[App, ...] = ()
+    critical: Critical | None = None
+
+
+class TooDeep(Exception):
+    """A recursion was followed past `DEEPEST` calls."""
+
+
+def undecided(term: Term) -> float | None:
+    return term.value if isinstance(term, Const) else None
+
+
+def underlying(head: Term, resolve: Resolve) -> tuple[Lam | None, int]:
+    """The function that is called, or whose derivative is called; and how many derivatives of it are taken."""
+    order = 0
+    function: Term | None = head
+    while function is not None and not isinstance(function, Lam):
+        if isinstance(function, Deriv):
+            function, order = function.function, order + 1
+        else:
+            function = resolve(function)
+    return function, order
+
+
+def findings(term: Term, resolve: Resolve, decide: Decide = undecided) -> tuple[Finding, ...]:
+    """All surfaces of a term, jumps with the trace that forces them. Raises TooDeep."""
+    searched = _Search(resolve, decide).term(term, {}, (), (), 0)
+    found = tuple(_carried_out(f, resolve) for f in searched)
+    ends = {end: None for f in found if f.kind == "jump" for end in _ends_of_domain(f.surface)}
+    return (*found, *(Finding("kink", end) for end in ends))
+
+
+def _ends_of_domain(surface: Term) -> Iterator[Term]:
+    """Where a condition stops being defined, if it does: on what lies beyond it has no side.
+
+    An edge that is a period's is a pole, on both sides of which there is a value.
+    """
+    for node in outside(surface, BINDERS):
+        if isinstance(node, Prim) and node.free and node.op != "div":
+            entry = PRIMITIVES[node.op]
+            for end in () if entry.period else entry.edges(*node.args):
+                if not nonnegative(end):
+                    yield from (piece for piece in pieces(end) if piece.free)
+
+
+def _carried_out(f: Finding, resolve: Resolve) -> Finding:
+    critical = f.critical
+    if critical is not None:
+        critical = critical.mapped(lambda equation: carried_out(equation, resolve))
+    return replace(f, surface=carried_out(f.surface, resolve), critical=critical)
+
+
+def carried_out(surface: Term, resolve: Resolve, depth: int = 0) -> Term:
+    """A surface with the calls in it replaced by what they give, as far as `resolve` knows: then it can be solved.
+
+    A recursion stays a call after a few rounds.
+    """
+    order = postorder(surface)
+    if depth > _DEEPEST_SURFACE or not any(isinstance(node, App) for node in order):
+        return surface
+    memo: dict[Term, Term] = {}
+    for node in order:
+        made = rebuild(node, tuple(memo[c] for c in children(node)))
+        memo[node] = _result(made, resolve, depth) if isinstance(made, App) else made
+    return memo[surface]
+
+
+def _result(call: App, resolve: Resolve, depth: int) -> Term:
+    head, groups = spine(call)
+    function = head if isinstance(head, Lam) else None if isinstance(head, Deriv) else resolve(head)
+    if not isinstance(function, Lam):
+        return call
+    params, body = uncurry(function, sizes_of(groups))
+    args = arguments_of(function, groups)
+    if len(args) != len(params):
+        return call
+    return carried_out(substitute(body, dict(zip(params, args, strict=True))), resolve, depth + 1)
+
+
+@dataclass(frozen=True, slots=True)
+class _Search:
+    resolve: Resolve
+    decide: Decide
+
+    def term(
+        self, term: Term, mapping: dict[str, Term], path: tuple[int, ...], calls: tuple[App, ...], depth: int
+    ) -> Iterator[Finding]:
+        if depth > DEEPEST:
+            raise TooDeep
+        shape = layout(term)
+        for node in shape.order:
+            if isinstance(node, Prim):
+                yield from self.builtin(node, mapping)
+            elif isinstance(node, Integral):
+                yield from self.nested(node, mapping)
+        for number, site in enumerate(shape.sites):
+            here = (*path, number)
+            match site:
+                case Side(branch=branch):
+                    coordinates = tuple(substitute(c, mapping) for c in branch.coordinates)
+                    yield Finding("jump", coordinates[0], here, branch.strict, coordinates, calls)
+                case Part():
+                    yield from self.part(site, mapping, here, calls, depth)
+                case CallSite():
+                    yield from self.call(site, mapping, here, calls, depth)
+
+    def builtin(self, node: Prim, mapping: dict[str, Term]) -> Iterator[Finding]:
+        entry = PRIMITIVES[node.op]
+        if not node.free:
+            return
+        for kink in entry.kinks(*node.args):
+            for piece in self.pieces(kink, mapping):
+                yield Finding("kink", piece)
+        for center in centers(node):
+            yield Finding("center", substitute(center, mapping))
+        if node.op != "div":  # a pole is no edge to cut at: the integral diverges there or the pole is outside
+            for edge in entry.edges(*node.args):
+                for piece in self.pieces(edge, mapping):
+                    yield Finding("edge", piece)
+
+    def pieces(self, surface: Term, mapping: dict[str, Term]) -> Iterator[Term]:
+        """What a surface is on either side of the conditions inside of it, also of those that calls lead to."""
+        surface = substitute(surface, mapping)
+        if any(isinstance(part, App) for part in postorder(surface)):
+            from potto.calculus.inlining.expand import expanded
+
+            surface = expanded(surface, self.resolve)
+        return (piece for piece in pieces(surface) if piece.free)
+
+    def nested(self, node: Integral, mapping: dict[str, Term]) -> Iterator[Finding]:
+        from potto.calculus.decomposition.sweep import outer_findings
+
+        inner = substitute(node, mapping)
+        assert isinstance(inner, Integral)
+        yield from outer_findings(inner, self.resolve, self.decide)
+
+    def part(
+        self, site: Part, mapping: dict[str, Term], path: tuple[int, ...], calls: tuple[App, ...], depth: int
+    ) -> Iterator[Finding]:
+        owner = site.owner
+        if isinstance(owner, If):
+            outcome = self.decide(substitute(owner.condition, mapping))
+            if outcome is not None and bool(outcome) != (site.index == 0):
+                return
+        if isinstance(owner, Sum):
+            lo, hi = (self.decide(substitute(b, mapping)) for b in (owner.lo, owner.hi))
+            if lo is None or hi is None:
+                return
+            for number in range(int(lo), int(hi) + 1):
+                inner = {**mapping, owner.variable: const(number)}
+                yield from self.term(owner.body, inner, (*path, number - int(lo)), calls, depth + 1)
+            return
+        yield from self.term(site.body.body, mapping, path, calls, depth + 1)
+
+    def call(
+        self, site: CallSite, mapping: dict[str, Term], path: tuple[int, ...], calls: tuple[App, ...], depth: int
+    ) -> Iterator[Finding]:
+        found = self.called(substitute(site.head, mapping))
+        if found is None:
+            return
+        function, before, order = found
+        groups = (*before, *(tuple(substitute(a, mapping) for a in group) for group in site.groups))
+        params, body = uncurry(function, sizes_of(groups))
+        args = arguments_of(function, groups)
+        if len(args) != len(params):
+            return
+        for _ in range(order):
+            args = tuple(map(_primal, args))
+        yield from self.term(body, dict(zip(params, args, strict=True)), path, (*calls, site.call), depth + 1)
+
+    def called(self, head: Term) -> tuple[Lam, tuple[tuple[Term, ...], ...], int] | None:
+        """What stands at the head of a call: the function, what it was given before, how many derivatives are taken.
+
+        A function that earlier calls gave in full is what these gave, as it is when the program runs.
+        """
+        head, before = _spine(head)
+        function, order = underlying(head, self.resolve)
+        while function is not None and groups_of(function) < len(before):
+            own = groups_of(function)
+            params, body = uncurry(function, sizes_of(before[:own]))
+            args = arguments_of(function, before[:own])
+            if len(args) != len(params):
+                return None
+            for _ in range(order):
+                args = tuple(map(_primal, args))
+            head, first = _spine(substitute(body, dict(zip(params, args, strict=True))))
+            before = (*first, *before[own:])
+            function, more = underlying(head, self.resolve)
+            order += more
+        return None if function is None else (function, before, order)
+
+
+@lru_cache(maxsize=4096)
+def centers(node: Prim) -> tuple[Term, ...]:
+    """Terms around whose zeros a builtin may be concentrated, if a part of its argument is steep."""
+    centered = PRIMITIVES[node.op].centered
+    if not centered and node.op not in ("exp", "div"):
+        return ()
+    where = node.args[1] if node.op == "div" else node.args[0]
+    if not where.free:
+        return ()
+    if centered:
+        return (where,)
+    if node.op == "div" and isinstance(where, Prim) and where.op in ("pow", "mul"):
+        return ()  # a pole there, not a center
+    found: dict[Term, None] = {}
+    for part in outside(where, BINDERS):
+        if not isinstance(part, Prim) or not part.free:
+            continue
+        if part.op == "pow" and isinstance(part.args[1], Const) and part.args[1].value % 2 == 0:
+            found[part.args[0]] = None
+        elif part.op == "mul" and len(set(part.args)) < len(part.args):
+            found.update((a, None) for a in part.args if part.args.count(a) > 1 and a.free)
+        elif node.op == "div" and part.op in ("exp", "cosh"):
+            found[part.args[0]] = None
+    return tuple(found)
+
+
+def _spine(head: Term) -> tuple[Term, tuple[tuple[Term, ...], ...]]:
+    """What is called, and the groups of arguments that it was given before."""
+    return spine(head) if isinstance(head, App) else (head, ())
+
+
+def _primal(arg: Term) -> Term:
+    """The value of a dual given to a derivative; functions are given as derivatives of functions."""
+    if isinstance(arg, Deriv):
+        return arg.function
+    if isinstance(arg, Tuple) and len(arg.items) == 2:
+        return arg.items[0]
+    if isinstance(arg, (Lam, Const)):
+        return arg
+    return proj(arg, 0) if isinstance(arg, (Proj, App)) else arg
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """A branch or a delta under an integral: the integral, the coordinates as its variables see them, the calls."""
+
+    integral: Integral
+    coordinates: tuple[Term, ...]
+    strict: bool
+    calls: tuple[App, ...]
+
+
+def conditions(term: Term, resolve: Resolve) -> tuple[Condition, ...]:
+    """The diffeomorphisms under each integral of a term (deltas too), through the calls that `resolve` knows."""
+    out: list[Condition] = []
+    for node in postorder(term):
+        if not isinstance(node, Integral):
+            continue
+        for found in findings(node.body, resolve):
+            if found.kind == "jump" and found.surface.free & set(node.variables):
+                out.append(Condition(node, found.coordinates, found.strict, found.calls))
+        for inner in postorder(node.body):
+            if isinstance(inner, Delta) and inner.free & set(node.variables):
+                out.append(Condition(node, inner.coordinates, False, ()))
+    return tuple(out)

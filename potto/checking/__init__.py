@@ -1,0 +1,1 @@
+"""Programs from files, checked as a whole."""

@@ -1,0 +1,152 @@
+"""What is known of a function by symbols alone: its surfaces, and its derivative as interior and boundary.
+
+Owns `surfaces` and `derivative_facts`, the answers of `potto deriv` and of `Function.surfaces`. The derivative is that
+of `calculus.explain`, of a definition with its calls carried out, each part written as a formula of its own; the
+editor and the prompt lay the same out in a definition's own words. No numbers are computed.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from potto.calculus.checking.conditions import conditions_of
+from potto.calculus.checking.diffeo import exported
+from potto.calculus.checking.guards import unguarded
+from potto.calculus.explanation.explain import describe
+from potto.calculus.explanation.layout import DerivativeText, IntegralText
+from potto.calculus.inlining.expand import expanded
+from potto.calculus.surfaces.branch_cuts import opened
+from potto.core.printer import format_term
+from potto.core.simplify import simplify
+from potto.core.terms import App, Branch, Delta, Deriv, Global, Lam, Term, postorder
+from potto.elaborate import core, elaborate_expression
+from potto.modules import is_recursive
+from potto.query import Database
+from potto.syntax import nodes
+from potto.types import derivative_type, format_type, interface
+
+_COPY = re.compile(r"'\d+")  # the mark of a copy of a bound variable: `x'1` is another x
+
+
+@dataclass(frozen=True, slots=True)
+class PartFacts:
+    """One integral of a definition, or its body around them, and the parts of its derivative; as Potto writes it.
+
+    interior: the integral of the integrand's derivative. boundary: per surface its jump times its speed, at the
+    surface. bounds: what bounds that move bring in. reason: why a part has no symbolic form (which is
+    empty then), or nothing.
+    """
+
+    value: str
+    interior: str
+    boundary: tuple[str, ...]
+    bounds: tuple[str, ...]
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class DerivativeFacts:
+    """What `potto deriv` says of a definition."""
+
+    name: str
+    type: str
+    derivative_type: str
+    surfaces: tuple[str, ...]
+    integrals: tuple[PartFacts, ...]
+    body: PartFacts | None
+    derivative: str = ""  # the whole of it, deltas integrated out
+    where: tuple[str, ...] = ()  # what the parameters of measures must be
+
+    @property
+    def text(self) -> str:
+        lines = [f"{self.name} : {self.type}", f"deriv({self.name}) : {self.derivative_type}"]
+        for number, item in enumerate(self.integrals):
+            lines += ["", f"integral {number + 1} of {len(self.integrals)}" if len(self.integrals) > 1 else "integral"]
+            lines += _lines(item)
+        if self.body is not None:
+            lines += ["", "body" if self.integrals else "function", *_lines(self.body)]
+        said = [part.interior for part in (*self.integrals, self.body) if part is not None and not part.boundary]
+        if self.derivative and said != [self.derivative]:
+            lines += ["", *_part("whole", (self.derivative,))]
+        lines += ["", *_part("surfaces", self.surfaces or ("none",)), *_part("where", self.where)]
+        return "\n".join(lines)
+
+
+def _lines(item: PartFacts) -> list[str]:
+    note = (item.reason,) if item.reason else ()
+    boundary = item.boundary or (() if item.reason else ("0",))
+    return [
+        *_part("value", (item.value,)),
+        *_part("interior", (item.interior,) if item.interior else ()),
+        *_part("boundary", boundary if item.interior or item.boundary else ()),
+        *_part("bounds", item.bounds),
+        *_part("note", note),
+    ]
+
+
+def _part(word: str, texts: tuple[str, ...]) -> list[str]:
+    return [f"  {word if not number else '':<9} {text}" for number, text in enumerate(texts)]
+
+
+def surfaces(db: Database, file: str, expr: nodes.Expr) -> tuple[str, ...]:
+    """Where the value or the integrand of an expression jumps: `x + y + c = 0`, each once."""
+    return tuple(_surfaces(db, elaborate_expression(db, file, expr).term))
+
+
+def _surfaces(db: Database, term: Term) -> dict[str, None]:
+    while isinstance(term, Deriv | Global):  # another name for it, or its derivative, has the same ones
+        term = term.function if isinstance(term, Deriv) else core(db, term.module, term.name).term
+    found = conditions_of(term, lambda g: exported(db, g.module, g.name), lambda g: core(db, g.module, g.name).term)
+    own = [node.surface if isinstance(node, Branch) else node.coordinates[0]
+           for node in postorder(opened(term)) if isinstance(node, Branch | Delta)]  # fmt: skip
+    known = [condition.surface for condition in found]
+    readable = [surface for surface in own if not any(isinstance(node, App) for node in postorder(surface))]
+    texts = (format_term(simplify(surface)) for surface in (*known, *readable))
+    return dict.fromkeys(f"{_COPY.sub('', text)} = 0" for text in texts)
+
+
+def derivative_facts(db: Database, file: str, name: str) -> DerivativeFacts | None:
+    """The derivative of a definition in symbols; None for one that is no function."""
+    whole = core(db, file, name).term
+    term = whole
+    while isinstance(term, Deriv | Global):
+        term = term.function if isinstance(term, Deriv) else core(db, term.module, term.name).term
+    if not isinstance(term, Lam):
+        return None
+    if not is_recursive(db, file, name):
+        term = expanded(term, lambda g: _unless_recursive(db, g))
+    type = interface(db, file, name).type
+    derived = format_type(derivative_type(type))
+    found = describe(term, name, derived, lambda g: core(db, g.module, g.name).term)
+    return DerivativeFacts(
+        name,
+        format_type(type),
+        derived,
+        tuple(_surfaces(db, whole)),
+        tuple(map(_integral_facts, found.integrals)),
+        None if found.alone else _body_facts(term, found),
+        found.tangent,
+        found.conditions,
+    )
+
+
+def _unless_recursive(db: Database, target: Global) -> Term | None:
+    return None if is_recursive(db, target.module, target.name) else core(db, target.module, target.name).term
+
+
+def _integral_facts(found: IntegralText) -> PartFacts:
+    def over(body: str) -> str:
+        return f"{found.head} {body} d({found.variables})"
+
+    interior = over(found.interior) if found.interior not in ("", "0") else found.interior
+    reason = f"the boundary is found by numbers: {found.reason}" if found.reason else ""
+    return PartFacts(over(found.integrand), interior, tuple(map(over, found.deltas)), found.bounds, reason)
+
+
+def _body_facts(term: Term, found: DerivativeText) -> PartFacts:
+    """A body that is no integral by itself; what it is around its integrals is seen in the whole derivative."""
+    while isinstance(term, Lam):
+        term = term.body
+    interior = "" if found.integrals else found.smooth
+    return PartFacts(format_term(unguarded(term)[0]), interior, found.deltas, (), "; ".join(found.problems))

@@ -1,0 +1,1 @@
+"""Programs that are evaluated while they are written: worlds, live expressions, the prompt's session."""

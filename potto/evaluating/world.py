@@ -1,0 +1,178 @@
+"""A world of programs: one database, the files that it reads, and what evaluates them.
+
+Owns `World`, which the command line and the Python interface share. Everything may be called from several threads: the
+database lets one thread in at a time, and each thread evaluates with a `Program` of its own.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import weakref
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
+
+from potto.checking.check import absolute, definition_diagnostics, has_errors
+from potto.checking.library import Library
+from potto.core.terms import Term
+from potto.diagnostics import Diagnostic, PottoError
+from potto.elaborate import core, elaborate_expression
+from potto.kernels.cells import Value
+from potto.modules import chunk_start
+from potto.projects.settings import Settings, current
+from potto.reports.render import Located, ProgramError
+from potto.runtime.answers.estimate import Estimate
+from potto.runtime.answers.shown import as_dual, gives_dual
+from potto.runtime.evaluate import Program
+from potto.runtime.script import Script, Shown, placed, remarks
+from potto.source import SourceText, Span
+from potto.syntax import parse_expression
+from potto.syntax.nodes import Expr
+from potto.types import format_type, infer_expression
+from potto.types.kinds import NO_TANGENT
+from potto.types.types import Type
+
+EXPRESSION = "<expression>"
+T = TypeVar("T")
+# Texts that were never on disk are found by functions of other worlds as well, under keys that are given once.
+_owners: weakref.WeakValueDictionary[str, World] = weakref.WeakValueDictionary()
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What an expression evaluates to, its type, and what a reader should know about the number."""
+
+    estimate: Estimate
+    type: str
+    remarks: tuple[Located, ...] = ()
+
+
+class World(Library):
+    """Programs from disk and from memory, checked and evaluated."""
+
+    def __init__(self, roots: Sequence[str | os.PathLike[str]] = ()) -> None:
+        super().__init__(roots)
+        self._local = threading.local()
+        self._held: dict[tuple[str, str], Value] = {}
+
+    # Evaluating
+
+    @property
+    def program(self) -> Program:
+        """What evaluates in this thread, for the present texts of all files."""
+        self._forget_old()
+        program: Program = self._local.program
+        return program
+
+    def remember(self, key: Hashable, make: Callable[[], T]) -> T:
+        """What `make` gives, once in each thread for the present texts of all files."""
+        self._forget_old()
+        memory: dict[Hashable, Any] = self._local.memory
+        if key not in memory:
+            memory[key] = make()
+        found: T = memory[key]
+        return found
+
+    def _forget_old(self) -> None:
+        revision = self.db.revision
+        if getattr(self._local, "revision", None) != revision:
+            self._local.revision = revision
+            self._local.memory = {}
+            self._local.program = Program(self.lookup, self._held)
+
+    def hold(self, file: str, name: str, value: Value) -> None:
+        """Let a definition have this value, with its error, from now on: its term is not evaluated again."""
+        self._held[file, name] = value
+
+    def own(self, key: str, text: str) -> str:
+        """Give a pseudo file its text, for this world and for those that its functions are given to."""
+        _owners[key] = self
+        return self.put(key, text)
+
+    def lookup(self, file: str, name: str) -> Term:
+        """The term of a definition. Raises ProgramError if it has errors."""
+        owner = _owners.get(file, self)
+        if owner is not self:
+            return owner.lookup(file, name)
+        with self.db.evaluating():
+            found = definition_diagnostics(self.db, file, name)
+            if has_errors(found):
+                start = chunk_start(self.db, file, name)
+                wrong = [Located(file, absolute(self.db, file, d, start)) for d in found if d.severity == "error"]
+                raise ProgramError(wrong, self.source)
+            return core(self.db, file, name).term
+
+    def run(self, file: str, settings: Settings | None = None) -> Iterator[Shown | Located]:
+        """Run those statements of a script that no error spoils. The errors come out in their places, those that no
+        statement met in the end; one of evaluation ends the run. What is said of derivatives that move nothing comes in
+        the end as well: their zeros look like answers."""
+        said: set[tuple[str | None, Diagnostic]] = set()
+        for event in Script(self.db, file, self.program, settings or current(self.settings(file))).run():
+            if isinstance(event, Located):
+                said.add(_identity(event))
+            yield event
+        yield from (located for located in self.errors(file) if _identity(located) not in said)
+        yield from (located for located in self.diagnostics(file) if located.diagnostic.code == NO_TANGENT.code)
+
+    def evaluate(self, file: str, text: str, settings: Settings | None = None) -> Answer:
+        """The value of an expression with a file's names in scope. Raises ProgramError, also for an error in a
+        definition that the expression leads to; others of the file are nothing to it."""
+        sources = self.sources(text)
+        parsed = parse_expression(text)
+        self._stop(parsed.diagnostics, sources)
+        self.need(file, parsed.expr)
+        inferred = infer_expression(self.db, file, parsed.expr)
+        self._stop(inferred.diagnostics, sources)
+        elaborated = elaborate_expression(self.db, file, parsed.expr)
+        chosen = settings or current(self.settings(file))
+        try:
+            estimate = self.program.evaluate(elaborated.term, chosen)
+            if gives_dual(elaborated.term, self.program.linker):
+                estimate = as_dual(estimate)
+        except ProgramError:
+            raise
+        except PottoError as error:
+            whole = Span(0, len(text))
+            raise ProgramError([Located(EXPRESSION, placed(d, whole, 0)) for d in error.diagnostics], sources) from None
+        warned = [absolute(self.db, EXPRESSION, d, 0) for d in inferred.diagnostics if d.code == NO_TANGENT.code]
+        found = [*warned, *remarks(estimate, Span(0, len(text)), chosen)]
+        said = tuple(Located(EXPRESSION, d) for d in found)
+        return Answer(estimate, format_type(inferred.type), said)
+
+    def typed(self, file: str, text: str) -> tuple[Expr, Type]:
+        """The tree of an expression with a file's names in scope, and its type. Raises ProgramError."""
+        tree = self.parse(text)
+        self.need(file, tree)
+        inferred = infer_expression(self.db, file, tree)
+        self._stop(inferred.diagnostics, self.sources(text))
+        return tree, inferred.type
+
+    def parse(self, text: str) -> Expr:
+        """The tree of an expression. Raises ProgramError."""
+        parsed = parse_expression(text)
+        self._stop(parsed.diagnostics, self.sources(text))
+        return parsed.expr
+
+    def sources(self, expression: str) -> _Sources:
+        """The texts of files, and an expression as a file of its own."""
+        return _Sources(self, SourceText(EXPRESSION, expression))
+
+    def _stop(self, found: Iterable[Diagnostic], sources: _Sources) -> None:
+        wrong = [Located(EXPRESSION, absolute(self.db, EXPRESSION, d, 0)) for d in found if d.severity == "error"]
+        if wrong:
+            raise ProgramError(wrong, sources)
+
+
+def _identity(located: Located) -> tuple[str | None, Diagnostic]:
+    """An error without the note on how one came to it."""
+    return located.file, replace(located.diagnostic, notes=())
+
+
+@dataclass(frozen=True)
+class _Sources:
+    world: World
+    expression: SourceText
+
+    def __call__(self, file: str) -> SourceText | None:
+        return self.expression if file == EXPRESSION else self.world.source(file)

@@ -1,0 +1,131 @@
+"""Formatting as small edits, so that cursors, folds and breakpoints stay where they are.
+
+Owns `format_document`, `format_range` and `format_on_type`. The layout is that of `potto.syntax.format_source`.
+"""
+
+from __future__ import annotations
+
+from potto.ide.actions.edits import minimal
+from potto.ide.model import Edit
+from potto.ide.names.places import ChunkAt, all_chunks, chunk_at, line_end, line_start, text_of
+from potto.modules import is_diffeo
+from potto.query import Database, query
+from potto.source import Span
+from potto.syntax import format_source, nodes
+
+_INDENT = "    "
+_MOST_BLANK_LINES = 2
+
+
+def format_document(db: Database, file: str) -> tuple[Edit, ...]:
+    """The edits that lay out a file."""
+    text = text_of(db, file)
+    chunks = all_chunks(db, file)
+    if "\r" in text or text.startswith("\ufeff") or not chunks:  # rare, and then all places move
+        mark = len(text) - len(text.removeprefix("\ufeff"))
+        return minimal(text[mark:], format_source(text, is_diffeo(file)), mark)
+    edits, end = list(_gap(text, 0, chunks[0].start, "")), 0
+    for number, chunk in enumerate(chunks):
+        if number:
+            blank_lines = text.count("\n", end, chunk.start) - 1
+            edits += _gap(text, end, chunk.start, "\n" * (1 + min(max(blank_lines, 0), _MOST_BLANK_LINES)))
+        edits += _chunk(db, chunk)
+        end = chunk.start + len(chunk.text)
+    return (*edits, *_gap(text, end, len(text), "\n"))
+
+
+def _gap(text: str, start: int, end: int, wanted: str) -> tuple[Edit, ...]:
+    """What stands between two chunks, as it should be."""
+    return () if text[start:end] == wanted else (Edit(Span(start, end), wanted),)
+
+
+@query(keep=4096)
+def laid_out(db: Database, text: str, diffeo: bool) -> str:
+    """A chunk's text laid out. Kept, so that to format a file again costs what was changed in it."""
+    return format_source(text, diffeo).rstrip("\r\n")
+
+
+def format_range(db: Database, file: str, span: Span) -> tuple[Edit, ...]:
+    """The edits that lay out the definitions that a span touches."""
+    edits: list[Edit] = []
+    for chunk in all_chunks(db, file, span):
+        if chunk.start <= span.end and span.start <= chunk.start + len(chunk.text):
+            edits += _chunk(db, chunk)
+    return tuple(edits)
+
+
+def _chunk(db: Database, chunk: ChunkAt) -> tuple[Edit, ...]:
+    return minimal(chunk.text, laid_out(db, chunk.text, chunk.diffeo), chunk.start)
+
+
+def format_on_type(db: Database, file: str, offset: int, typed: str) -> tuple[Edit, ...]:
+    """What to change when a line's end or a closing bracket has just been typed in front of `offset`.
+
+    A new line gets the indentation of a block where a head or an open bracket asks for one; the line above it is laid
+    out where its definition can be read. A closing bracket goes where the line that opened it begins.
+    """
+    text = text_of(db, file)
+    offset = min(offset, len(text))
+    if typed == "\n":
+        return _new_line(db, file, text, offset)
+    if typed in (")", "]"):
+        return _closer(text, offset, typed)
+    return ()
+
+
+def _new_line(db: Database, file: str, text: str, offset: int) -> tuple[Edit, ...]:
+    start = line_start(text, offset)
+    blanks = text[start : line_end(text, start)]
+    if blanks.strip() or start == 0:
+        return ()
+    chunk = chunk_at(db, file, start - 1)
+    if chunk is None:
+        return ()
+    above = Span(line_start(text, start - 1), start)
+    before = text[above.start : above.end].rstrip("\r\n")
+    edits = [e for e in _chunk(db, chunk) if above.start <= e.span.start and e.span.end < above.end]
+    wanted = _indent_after(db, chunk, before, start)
+    if wanted is not None and wanted != blanks:
+        edits.append(Edit(Span(start, start + len(blanks)), wanted))
+    return tuple(edits)
+
+
+def _indent_after(db: Database, chunk: ChunkAt, line: str, start: int) -> str | None:
+    """The indentation of the line after `line`; None to leave it as the editor has it."""
+    code = line.partition("#")[0].rstrip()
+    if not code.strip():
+        return None
+    own = code[: len(code) - len(code.lstrip())]
+    item = chunk.parsed(db).item
+    opened = code.count("(") + code.count("[") - code.count(")") - code.count("]")
+    if opened > 0:
+        return own + _INDENT
+    headed = isinstance(item, nodes.Definition) and item.keyword and len(own) == 0 and code.startswith("def")
+    body_on_line = isinstance(item, nodes.Definition) and item.body.span.start < start - chunk.start - 1
+    body_on_line = body_on_line and isinstance(item, nodes.Definition) and len(item.body.span) > 0
+    if (headed and not body_on_line) or (code.lstrip().startswith("for ") and code.endswith(":")):
+        return own + _INDENT
+    return None
+
+
+def _closer(text: str, offset: int, typed: str) -> tuple[Edit, ...]:
+    """A closing bracket alone on its line goes under the line that opened it."""
+    start = line_start(text, offset)
+    if text[start : offset - 1].strip() or text[offset - 1 : offset] != typed:
+        return ()
+    depth = 0
+    for position in range(offset - 2, -1, -1):
+        char = text[position]
+        if char in ")]":
+            depth += 1
+        elif char in "([":
+            if depth == 0:
+                line = text[line_start(text, position) : position]
+                wanted = line[: len(line) - len(line.lstrip())]
+                blanks = text[start : offset - 1]
+                return () if wanted == blanks or not wanted else (Edit(Span(start, offset - 1), wanted),)
+            depth -= 1
+    return ()
+
+
+__all__ = ["format_document", "format_on_type", "format_range"]

@@ -1,0 +1,275 @@
+"""A definition's derivative and its conditions, memoized and laid out for reading.
+
+Owns the markdown of what the calculus knows: interior and boundary terms, surfaces and what moves each, the completed
+coordinates of conditions with inverse and determinant. What is true is said by `potto.calculus`; here it is set.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from potto.calculus.checking.conditions import conditions_of
+from potto.calculus.checking.diffeo import DiffeoInfo, diffeo_info, exported
+from potto.calculus.checking.solvability import Problem, Verdict, judge
+from potto.calculus.explanation.explain import equation, explain_derivative
+from potto.calculus.explanation.layout import DerivativeText, IntegralText
+from potto.calculus.solving.inverse_map import Inverse, invert
+from potto.checking.check import has_errors
+from potto.core.printer import format_term
+from potto.core.simplify import simplify
+from potto.core.terms import Hole, Lam, Term, postorder
+from potto.elaborate import core, core_term
+from potto.modules import definition, dependencies, is_recursive, references
+from potto.modules.graph import strongly_connected
+from potto.query import Database, query
+from potto.source import Span
+from potto.syntax import nodes
+from potto.types import check_definition, interface
+
+LONG = 400  # characters of a formula beyond which a hover leaves it out
+
+
+@query
+def sound(db: Database, file: str, name: str) -> bool:
+    """Whether the types of a definition and of all that it needs are right: else its terms mean nothing. Of what it
+    needs the answer is asked, so that a chain of calls is not followed to its end from each of its links."""
+    group = strongly_connected(db, file, name)
+    for target in group:
+        if interface(db, target.file, target.name).broken or has_errors(check_definition(db, target.file, target.name)):
+            return False
+        if (None, "deriv") in references(db, target.file, target.name) and is_recursive(db, target.file, target.name):
+            return False  # it needs the derivative of itself: symbols for that have no end
+    needed = {needed: None for target in group for needed in dependencies(db, target.file, target.name)}
+    return all(sound(db, target.file, target.name) for target in needed if target not in group)
+
+
+@query
+def derivative_text(db: Database, file: str, name: str) -> DerivativeText | None:
+    """The derivative of a definition in symbols; None for one with errors."""
+    return explain_derivative(db, file, name) if sound(db, file, name) else None
+
+
+@dataclass(frozen=True, slots=True)
+class ConditionInfo:
+    """What is known of a condition over variables of integration. `span` is relative to the definition's chunk.
+
+    `problem` says why it can't be integrated over; then the rest is empty. `missing` are the coordinates that were left
+    out. `equation` says where it changes; if it is `searched` for, there is no diffeomorphism.
+    """
+
+    span: Span
+    variables: tuple[str, ...]
+    coordinates: tuple[str, ...]
+    equation: str
+    missing: tuple[str, ...] = ()
+    pivot: str = ""
+    roots: tuple[str, ...] = ()
+    inverse: tuple[tuple[str, ...], ...] = ()
+    values: tuple[str, ...] = ()
+    determinant: str = ""
+    problem: str = ""
+    notes: tuple[str, ...] = ()
+    moved_by: tuple[str, ...] = ()
+    calls: tuple[str, ...] = ()
+    searched: bool = False
+
+
+@query
+def condition_infos(db: Database, file: str, name: str) -> tuple[ConditionInfo, ...]:
+    """The conditions of a definition, in the order of the text; also those that calls lead to."""
+    if not sound(db, file, name):
+        return ()
+    elaborated = core(db, file, name)
+    spans = dict(elaborated.origins)
+    found = conditions_of(
+        elaborated.term, lambda g: exported(db, g.module, g.name), lambda g: core_term(db, g.module, g.name)
+    )
+    parameters = _parameters(elaborated.term)
+    out: dict[ConditionInfo, None] = {}
+    for condition in found:
+        span = spans.get(condition.anchor)
+        if span is None or any(isinstance(n, Hole) for c in condition.coordinates for n in postorder(c)):
+            continue
+        moved = tuple(p for p in parameters if p in condition.surface.free)
+        verdict = judge(
+            condition.coordinates, condition.variables, condition.box, role="delta" if condition.delta else "bracket"
+        )
+        out[_info(span, condition.coordinates, condition.variables, verdict, moved, condition.calls)] = None
+    return tuple(sorted(out, key=lambda info: info.span))
+
+
+def _parameters(term: Term) -> list[str]:
+    names: list[str] = []
+    while isinstance(term, Lam):
+        names += term.params
+        term = term.body
+    return names
+
+
+def _info(
+    span: Span,
+    coordinates: tuple[Term, ...],
+    variables: tuple[str, ...],
+    verdict: Verdict | Problem,
+    moved: tuple[str, ...],
+    calls: tuple[str, ...],
+) -> ConditionInfo:
+    shown, where = _terms(coordinates), _plain(equation(simplify(coordinates[0])))
+    if isinstance(verdict, Problem):
+        said = (*verdict.notes, *([verdict.help] if verdict.help else []))
+        return ConditionInfo(
+            span, variables, shown, where, problem=verdict.message, notes=said, moved_by=moved, calls=calls
+        )
+    completed = (*coordinates, *verdict.completion)
+    inverse = verdict.inverse
+    if inverse is None and len(completed) == len(variables):
+        found = invert(completed, variables)
+        inverse = found if isinstance(found, Inverse) else None
+    roots = () if verdict.roots is None else _terms(verdict.roots.roots)
+    return ConditionInfo(
+        span,
+        variables,
+        shown,
+        where,
+        _terms(verdict.completion),
+        verdict.pivot,
+        roots,
+        () if inverse is None else tuple(_terms(branch) for branch in inverse.branches),
+        () if inverse is None else inverse.values,
+        "" if verdict.determinant is None else _term(verdict.determinant),
+        moved_by=moved,
+        calls=calls,
+        searched=bool(verdict.searched),
+    )
+
+
+def _term(term: Term) -> str:
+    text = format_term(simplify(term))
+    return _plain(text)
+
+
+def _terms(terms: Iterable[Term]) -> tuple[str, ...]:
+    return tuple(_term(term) for term in terms)
+
+
+def _plain(text: str) -> str:
+    """Copies of bound variables (`x'1`) by the names that were written."""
+    parts = text.split("'")
+    return parts[0] + "".join(part.lstrip("0123456789") for part in parts[1:])
+
+
+# Markdown
+
+
+def fence(text: str) -> str:
+    """A block of Potto."""
+    return f"```potto\n{text}\n```"
+
+
+def code(text: str) -> str:
+    """A piece of Potto in a line of text; what is too long is left out."""
+    text = text if len(text) <= LONG else "…"
+    return f"`` {text} ``" if "`" in text else f"`{text}`"
+
+
+def derivative_markdown(db: Database, file: str, name: str) -> str | None:
+    """All there is to say about a definition's derivative, as markdown."""
+    found = derivative_text(db, file, name)
+    return None if found is None else fence(found.text)
+
+
+def derivative_parts(found: DerivativeText, conditions: Iterable[ConditionInfo] = ()) -> list[str]:
+    """The interior and boundary terms, and the surfaces with what moves each: those of its own integrals, or of
+    `conditions`, which it leaves to others."""
+    lines = [f"the derivative of {code(found.name)}"] if found.by else []
+    for number, item in enumerate(found.integrals, 1):
+        title = f"of integral {number}" if len(found.integrals) > 1 else ""
+        lines.append(_integral(item, title))
+    if not found.integrals and found.tangent:
+        lines.append(f"**derivative** {code(f'd{found.name} = {found.tangent}')}")
+        moved = {surface.equation: surface.moved_by for surface in found.surfaces}
+        moved.update({info.equation: info.moved_by for info in conditions if not info.problem})
+        if moved:
+            listed = [f"- {code(where)} {_moved(by)}" for where, by in moved.items()]
+            lines.append("\n".join(["**surfaces**", "", *listed]))
+    told = [item.reason for item in found.integrals if item.reason]
+    lines += [f"*{note}*" for note in found.notes if not any(reason in note for reason in told)]
+    return lines
+
+
+def _moved(by: tuple[str, ...]) -> str:
+    return f"moved by {', '.join(map(code, by))}" if by else "moved by no parameter"
+
+
+def _integral(item: IntegralText, title: str) -> str:
+    head = f"**derivative** {title}".rstrip()
+    lines = [f"{head}", "", f"- interior: {code(item.interior)}"]
+    boundary = list(item.deltas) or ["0"]
+    lines += [f"- boundary: {code(text)}" for text in boundary]
+    lines += [f"- moving bound: {code(text)}" for text in item.bounds]
+    if item.reason:
+        lines.append(f"- the boundary is found by numbers, because {item.reason}")
+    lines += [f"- integrated: {code(text)}" for text in item.boundary if len(text) <= LONG]
+    if item.surfaces:
+        lines += ["", "**surfaces**", ""]
+    for surface in item.surfaces:
+        where = "; at " + ", ".join(code(root) for root in surface.roots) if surface.roots else ""
+        lines.append(f"- {code(surface.equation)} {_moved(surface.moved_by)}{where}")
+    return "\n".join(lines)
+
+
+def condition_markdown(info: ConditionInfo) -> str:
+    """A condition: its diffeomorphism, inverse and determinant, or why there is none."""
+    over = ", ".join(info.variables)
+    if info.problem:
+        first = f"**no diffeomorphism** over {code(over)}: {info.problem}"
+        return "\n".join([first, *(f"\n{note}" for note in info.notes)])
+    if info.searched:
+        first = f"**no diffeomorphism** over {code(over)}: where {code(info.equation)} has no closed form"
+        return "\n".join([first, "", *_facts(info)])
+    all_of_it = ", ".join((*info.coordinates, *info.missing))
+    lines = [fence(f"diffeo({all_of_it})"), f"a diffeomorphism of {code(over)}"]
+    if info.missing:
+        lines[-1] += f", completed by {code(', '.join(info.missing))}"
+    return "\n".join([*lines, "", *_facts(info)])
+
+
+def _facts(info: ConditionInfo) -> list[str]:
+    facts = [f"- {_moved(info.moved_by)}" + ("" if info.moved_by else ": it adds nothing to a derivative")]
+    for root in info.roots:
+        facts.append(f"- surface: {code(f'{info.pivot} = {root}')}")
+    for branch in info.inverse:
+        facts.append(f"- inverse: {code(inverse_text(info.values, branch))}")
+    if not info.inverse:
+        facts.append("- inverse: none in closed form" + ("" if info.roots else "; the surface is found by numbers"))
+    if info.determinant:
+        facts.append(f"- determinant: {code(info.determinant)}")
+    if info.calls:
+        facts.append(f"- inside {', called by '.join(code(c) for c in reversed(info.calls))}")
+    return facts
+
+
+def inverse_text(values: Iterable[str], branch: Iterable[str]) -> str:
+    """An inverse as a program writes it, without the word."""
+    return f"({', '.join(values)}) . ({', '.join(branch)})"
+
+
+def diffeo_markdown(db: Database, file: str, name: str) -> str | None:
+    """A diffeomorphism: its inverse and determinant; None where there is none, the diagnostics say why."""
+    info = diffeo_of(db, file, name)
+    if info is None:
+        return None
+    lines = [f"- inverse: {code(inverse_text(info.values, map(format_term, branch)))}" for branch in info.branches]
+    if info.determinant is not None:
+        lines.append(f"- determinant: {code(format_term(info.determinant))}")
+    lines.append(f"- found: {info.method}" if info.method != "given" else "- the inverse was given by the author")
+    lines += [f"- {note}" for note in info.notes]
+    return "\n".join(lines)
+
+
+def diffeo_of(db: Database, file: str, name: str) -> DiffeoInfo | None:
+    """What is known of a diffeomorphism; None for other definitions."""
+    if not isinstance(definition(db, file, name), nodes.DiffeoDefinition) or not sound(db, file, name):
+        return None
+    return diffeo_info(db, file, name)

@@ -1,0 +1,167 @@
+"""Where an offset of a file is: its chunk, its node, its word.
+
+Owns the way from absolute offsets to what is memoized relative to chunks, and back.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass
+from typing import Literal
+
+from potto.ide.names.index import Index, index
+from potto.modules import ChunkRef, chunks, is_diffeo, parsed, source
+from potto.query import Database, query
+from potto.source import Span
+from potto.syntax import ParsedChunk, nodes
+
+NOWHERE = Span(0, 0)
+
+
+@dataclass(frozen=True, slots=True)
+class Sketch:
+    """What a chunk is, the name that it defines, and where the name and all of it are, relative to the chunk."""
+
+    kind: Literal["definition", "import", "statement", "other"]
+    span: Span = NOWHERE
+    name: str | None = None
+    name_span: Span = NOWHERE
+
+
+@query(keep=16384)
+def sketch(db: Database, text: str, diffeo: bool) -> Sketch:
+    """A chunk in outline. Questions about whole files ask this of every chunk: trees are large, and soon forgotten."""
+    match parsed(db, text, diffeo).item:
+        case (nodes.Definition() | nodes.DiffeoDefinition()) as item:
+            return Sketch("definition", item.span, item.name, item.name_span)
+        case (nodes.Import() | nodes.FromImport()) as item:
+            return Sketch("import", item.span)
+        case (nodes.Print() | nodes.For() | nodes.ExpressionStatement()) as item:
+            return Sketch("statement", item.span)
+        case _:
+            return Sketch("other")
+
+
+@dataclass(frozen=True, slots=True)
+class ChunkAt:
+    """A chunk of a file with what is known about it; `start` is its place in the file."""
+
+    file: str
+    start: int
+    text: str
+    diffeo: bool
+
+    def parsed(self, db: Database) -> ParsedChunk:
+        """Its tree."""
+        return parsed(db, self.text, self.diffeo)
+
+    def sketch(self, db: Database) -> Sketch:
+        """What it is, without its tree."""
+        return sketch(db, self.text, self.diffeo)
+
+    def index(self, db: Database) -> Index:
+        """Its names."""
+        return index(db, self.text, self.diffeo)
+
+    def absolute(self, span: Span) -> Span:
+        """A place in it as a place in the file."""
+        return span.shift(self.start)
+
+
+def text_of(db: Database, file: str) -> str:
+    """The text of a file; of one that cannot be read, nothing."""
+    found = source(db, file)
+    return "" if found is None else found.text
+
+
+@query
+def chunk_starts(db: Database, file: str) -> tuple[int, ...]:
+    """Where the chunks of a file start."""
+    return tuple(chunk.start for chunk in chunks(db, file))
+
+
+def chunk_at(db: Database, file: str, offset: int) -> ChunkAt | None:
+    """The chunk that an offset is in, or that ends before it; None in front of the first one."""
+    place = bisect_right(chunk_starts(db, file), offset) - 1
+    return None if place < 0 else chunk_of(file, chunks(db, file)[place])
+
+
+def writing_at(db: Database, file: str, offset: int) -> tuple[ChunkAt, int] | None:
+    """The chunk that goes on if something is typed at an offset, and the place in it (its end, for blanks after it).
+
+    None at the beginning of a line behind a chunk: something new starts there.
+    """
+    chunk = chunk_at(db, file, offset)
+    if chunk is None:
+        return None
+    end = chunk.start + len(chunk.text)
+    if offset <= end:
+        return chunk, offset - chunk.start
+    text = text_of(db, file)
+    new_line = line_start(text, offset) > end
+    if new_line and (line_start(text, offset) == offset or chunk.parsed(db).item is None):
+        return None
+    return chunk, len(chunk.text)
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """Where something is being typed: `offset` in `text`, seen from the names of `file`.
+
+    `chunk` is what the offset is in or follows; `writing` what goes on if something is typed here, and the place in it.
+    """
+
+    file: str
+    text: str
+    offset: int
+    chunk: ChunkAt | None
+    writing: tuple[ChunkAt, int] | None
+
+
+def site_at(db: Database, file: str, offset: int) -> Site:
+    """A place in a file."""
+    text = text_of(db, file)
+    offset = min(max(offset, 0), len(text))
+    return Site(file, text, offset, chunk_at(db, file, offset), writing_at(db, file, offset))
+
+
+def site_after(file: str, before: str) -> Site:
+    """The end of a text that belongs to no file, as at a prompt."""
+    chunk = ChunkAt(file, 0, before, False)
+    return Site(file, before, len(before), chunk, (chunk, len(before)))
+
+
+def chunk_of(file: str, chunk: ChunkRef) -> ChunkAt:
+    """A chunk with its file."""
+    return ChunkAt(file, chunk.start, chunk.text, is_diffeo(file))
+
+
+def all_chunks(db: Database, file: str, span: Span | None = None) -> tuple[ChunkAt, ...]:
+    """The chunks of a file, or those that touch a span."""
+    found = chunks(db, file)
+    if span is not None:
+        starts = chunk_starts(db, file)
+        first = max(bisect_right(starts, span.start) - 1, 0)
+        found = found[first : bisect_right(starts, span.end)]
+    return tuple(chunk_of(file, chunk) for chunk in found)
+
+
+def word_at(text: str, offset: int) -> Span:
+    """The word that an offset touches; empty if there is none."""
+    start = end = offset
+    while start > 0 and (text[start - 1].isalnum() or text[start - 1] == "_"):
+        start -= 1
+    while end < len(text) and (text[end].isalnum() or text[end] == "_"):
+        end += 1
+    return Span(start, end)
+
+
+def line_start(text: str, offset: int) -> int:
+    """Where the line of an offset begins."""
+    return max(text.rfind("\n", 0, offset), text.rfind("\r", 0, offset)) + 1
+
+
+def line_end(text: str, offset: int) -> int:
+    """Where the line of an offset ends."""
+    ends = [at for at in (text.find("\n", offset), text.find("\r", offset)) if at >= 0]
+    return min(ends, default=len(text))

@@ -1,0 +1,240 @@
+"""What a name in the text means: a local name, a definition of some file, a module, a builtin.
+
+Owns `symbol_at` and `meaning_of`. Names that a chunk binds itself come from `index`, all others from `potto.modules`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from potto.ide.names.index import Binder, Occurrence, call_head
+from potto.ide.names.places import ChunkAt, chunk_at
+from potto.measures import COMPOSITIONS, MEASURES
+from potto.modules import (
+    DefinitionTarget,
+    ModuleTarget,
+    chunk_start,
+    chunk_text,
+    definition,
+    find_module,
+    is_diffeo,
+    resolve,
+    resolve_member,
+    resolve_module,
+)
+from potto.modules.builtins import is_builtin
+from potto.query import Database
+from potto.source import Span
+from potto.syntax import nodes
+
+MOST_ALIASES = 20
+
+
+@dataclass(frozen=True, slots=True)
+class LocalSymbol:
+    """A name that the chunk at `start` of a file binds; `number` counts its binders, `prefix` are the `d`s in front of
+    the name where a call of a derivative names a parameter."""
+
+    chunk: ChunkAt
+    number: int
+    binder: Binder
+    prefix: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class DefinitionSymbol:
+    """A definition. `known`: there is one."""
+
+    file: str
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class ModuleSymbol:
+    """A module."""
+
+    file: str
+    dotted: str
+
+
+@dataclass(frozen=True, slots=True)
+class BuiltinSymbol:
+    """A builtin, a constant or a special form."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class MeasureSymbol:
+    """A measure."""
+
+    name: str
+
+
+Symbol = LocalSymbol | DefinitionSymbol | ModuleSymbol | BuiltinSymbol | MeasureSymbol
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A name at a place (absolute), and what it means; None if nothing."""
+
+    span: Span
+    occurrence: Occurrence
+    chunk: ChunkAt
+    symbol: Symbol | None
+
+
+def symbol_at(db: Database, file: str, offset: int) -> Found | None:
+    """The name that an offset touches and its meaning."""
+    chunk = chunk_at(db, file, offset)
+    if chunk is None:
+        return None
+    occurrence = chunk.index(db).at(offset - chunk.start)
+    if occurrence is None:
+        return None
+    return Found(chunk.absolute(occurrence.span), occurrence, chunk, meaning_of(db, chunk, occurrence))
+
+
+def definition_at(db: Database, file: str, offset: int) -> tuple[str, str] | None:
+    """The definition that is named at an offset: its file and its name."""
+    found = symbol_at(db, file, offset)
+    symbol = None if found is None else found.symbol
+    return (symbol.file, symbol.name) if isinstance(symbol, DefinitionSymbol) else None
+
+
+def meaning_of(db: Database, chunk: ChunkAt, occurrence: Occurrence) -> Symbol | None:
+    """What an occurrence means."""
+    file, name = chunk.file, occurrence.name
+    if occurrence.binder >= 0:
+        return LocalSymbol(chunk, occurrence.binder, chunk.index(db).binders[occurrence.binder])
+    match occurrence.role:
+        case "define":
+            return DefinitionSymbol(file, name)
+        case "module" | "path":
+            found = find_module(db, file, name) if occurrence.role == "module" else resolve_module(db, file, name)
+            return None if found is None else ModuleSymbol(found, name)
+        case "member":
+            target = resolve_member(db, file, occurrence.path, name)
+            return None if target is None else DefinitionSymbol(target.file, target.name)
+        case "keyword":
+            return None if occurrence.callee is None else keyword_symbol(db, chunk, occurrence.callee, name)
+        case "measure":
+            return MeasureSymbol(name) if name in MEASURES or name in COMPOSITIONS else None
+        case "import":
+            return imported(db, file, occurrence.path, name)
+        case _:
+            return outer(db, file, name)
+
+
+def outer(db: Database, file: str, name: str) -> Symbol | None:
+    """What a name means at the top of a file."""
+    target = resolve(db, file, name)
+    if isinstance(target, DefinitionTarget):
+        return DefinitionSymbol(target.file, target.name)
+    if isinstance(target, ModuleTarget):
+        return ModuleSymbol(target.file, target.dotted)
+    return BuiltinSymbol(name) if is_builtin(name) else None
+
+
+def imported(db: Database, file: str, module: str, name: str) -> Symbol | None:
+    """What `from module import name` brings."""
+    where = find_module(db, file, module)
+    target = None if where is None else resolve(db, where, name)
+    if isinstance(target, DefinitionTarget):
+        return DefinitionSymbol(target.file, target.name)
+    inner = find_module(db, file, f"{module}.{name}")
+    return None if inner is None else ModuleSymbol(inner, f"{module}.{name}")
+
+
+# Calls
+
+
+@dataclass(frozen=True, slots=True)
+class Callee:
+    """The definition that a call is of: how many groups were given before, and how often it was derived."""
+
+    file: str
+    name: str
+    given: int
+    derived: int
+
+
+def callee(db: Database, file: str, expr: nodes.Expr) -> Callee | None:
+    """The definition that an expression calls, through partial calls, `deriv` and other names for it. The expression's
+    names are those at the top of the file: the caller sees to local ones."""
+    given = derived = 0
+    for _ in range(MOST_ALIASES):
+        function, groups, times = call_head(expr)
+        given, derived = given + groups, derived + times
+        target: object = None
+        if isinstance(function, nodes.Name):
+            target = resolve(db, file, function.id)
+        elif isinstance(function, nodes.Member):
+            target = resolve_member(db, file, function.path, function.name)
+        if not isinstance(target, DefinitionTarget):
+            return None
+        item = definition(db, target.file, target.name)
+        if (
+            not isinstance(item, nodes.Definition)
+            or item.groups
+            or item.bindings
+            or isinstance(item.body, nodes.Lambda)
+        ):
+            return Callee(target.file, target.name, given, derived)
+        expr, file = item.body, target.file
+    return None
+
+
+def parameters(db: Database, file: str, name: str) -> tuple[tuple[nodes.Parameter, ...], ...]:
+    """The groups of parameters that a definition writes, also those of a lambda that it is."""
+    item = definition(db, file, name)
+    if isinstance(item, nodes.DiffeoDefinition):
+        return (item.variables, *item.groups)
+    if item is None:
+        return ()
+    groups, body = list(item.groups), item.body
+    while isinstance(body, nodes.Lambda):
+        groups += body.groups
+        body = body.body
+    return tuple(groups)
+
+
+def keyword_symbol(db: Database, chunk: ChunkAt, function: nodes.Expr, name: str) -> LocalSymbol | None:
+    """The parameter that a keyword argument fills."""
+    called = callee(db, chunk.file, function)
+    if called is None:
+        return None
+    prefix = "d" * called.derived
+    if not name.startswith(prefix):
+        return None
+    return parameter_symbol(db, called.file, called.name, name[len(prefix) :], prefix)
+
+
+def parameter_symbol(db: Database, file: str, name: str, parameter: str, prefix: str = "") -> LocalSymbol | None:
+    """A parameter of a definition as a local name of it."""
+    written = next((p for group in parameters(db, file, name) for p in group if p.name == parameter), None)
+    target = home(db, file, name)
+    if written is None or target is None:
+        return None
+    for number, binder in enumerate(target.index(db).binders):
+        if binder.kind == "parameter" and binder.span.start == written.span.start:
+            return LocalSymbol(target, number, binder, prefix)
+    return None
+
+
+def home(db: Database, file: str, name: str) -> ChunkAt | None:
+    """The chunk of a definition."""
+    text = chunk_text(db, file, name)
+    return None if text is None else ChunkAt(file, chunk_start(db, file, name), text, is_diffeo(file))
+
+
+def placeless(db: Database, file: str, name: str) -> ChunkAt | None:
+    """The chunk of a definition as if it stood at the head of its file: for queries, which must not read places."""
+    text = chunk_text(db, file, name)
+    return None if text is None else ChunkAt(file, 0, text, is_diffeo(file))
+
+
+def owner(db: Database, chunk: ChunkAt) -> str | None:
+    """The name that a chunk defines, if it is the definition that counts."""
+    name = chunk.sketch(db).name
+    return name if name is not None and chunk_start(db, chunk.file, name) == chunk.start else None

@@ -1,0 +1,1 @@
+"""Going to places: definitions, references, outlines, links; renaming, which is finding all of them."""

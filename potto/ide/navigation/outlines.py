@@ -1,0 +1,122 @@
+"""Outlines: the definitions of a file with what they bind, and those of the workspace by name.
+
+Owns `document_symbols` and `workspace_symbols`.
+"""
+
+from __future__ import annotations
+
+import os.path
+
+from potto.ide.actions.imports import exports
+from potto.ide.model import DocumentSymbol, Location, SymbolKind, WorkspaceSymbol
+from potto.ide.names.documents import item_span, name_span, type_text, written_kind
+from potto.ide.names.index import Binder
+from potto.ide.names.places import ChunkAt, all_chunks
+from potto.ide.names.symbols import owner, placeless
+from potto.query import Database, query
+from potto.source import Span
+from potto.syntax import nodes
+
+MOST_FOUND = 500
+LONG_LABEL = 60
+
+
+def document_symbols(db: Database, file: str) -> tuple[DocumentSymbol, ...]:
+    """The definitions of a file in order, each with its parameters and local names; statements of scripts as well."""
+    found: list[DocumentSymbol] = []
+    for chunk in all_chunks(db, file):
+        name = owner(db, chunk)
+        symbol = _symbol(db, chunk, None) if name is None else definition_symbol(db, file, name)
+        if symbol is not None:
+            found.append(symbol if name is None else _shifted(symbol, chunk.start))
+    return tuple(found)
+
+
+@query
+def definition_symbol(db: Database, file: str, name: str) -> DocumentSymbol | None:
+    """A definition for an outline, its places relative to its chunk."""
+    chunk = placeless(db, file, name)
+    return None if chunk is None else _symbol(db, chunk, name)
+
+
+def _shifted(symbol: DocumentSymbol, by: int) -> DocumentSymbol:
+    span, selection = symbol.span.shift(by), symbol.selection.shift(by)
+    children = tuple([_shifted(child, by) for child in symbol.children])
+    return DocumentSymbol(symbol.name, symbol.detail, symbol.kind, span, selection, children)
+
+
+def _symbol(db: Database, chunk: ChunkAt, name: str | None) -> DocumentSymbol | None:
+    item = chunk.parsed(db).item
+    match item:
+        case nodes.Definition() | nodes.DiffeoDefinition():
+            kind = _kind(db, chunk.file, name, item)
+            detail = type_text(db, chunk.file, name) if name is not None else "defined again below"
+            selection, full = chunk.absolute(item.name_span), chunk.absolute(item.span)
+            return DocumentSymbol(item.name, detail, kind, full.cover(selection), selection, _children(db, chunk))
+        case nodes.BrokenItem(span=span, name=str() as guessed):
+            return DocumentSymbol(guessed, "cannot be read", "constant", chunk.absolute(span), chunk.absolute(span))
+        case nodes.Print(span=span) | nodes.For(span=span) | nodes.ExpressionStatement(span=span):
+            line = chunk.text[span.start : span.end].splitlines()[0] if len(span) else ""
+            label = line if len(line) <= LONG_LABEL else line[: LONG_LABEL - 1] + "…"
+            whole = chunk.absolute(span)
+            return DocumentSymbol(label, "", "statement", whole, whole, _children(db, chunk)) if label else None
+        case _:
+            return None
+
+
+def _kind(db: Database, file: str, name: str | None, item: nodes.Definition | nodes.DiffeoDefinition) -> SymbolKind:
+    if isinstance(item, nodes.DiffeoDefinition):
+        return "diffeo"
+    return "function" if item.groups or name is None else written_kind(db, file, name)
+
+
+def _children(db: Database, chunk: ChunkAt) -> tuple[DocumentSymbol, ...]:
+    """What a chunk binds, without what live expressions bind in its comments."""
+    item = chunk.parsed(db).item
+    inside = Span(0, 0) if item is None else item.span
+    return tuple(
+        DocumentSymbol(b.name, b.kind, _child_kind(b), chunk.absolute(b.span), chunk.absolute(b.span))
+        for b in chunk.index(db).binders
+        if inside.start <= b.span.start and b.span.end <= inside.end
+    )
+
+
+def _child_kind(binder: Binder) -> SymbolKind:
+    match binder.kind:
+        case "parameter":
+            return "parameter"
+        case "variable" | "index":
+            return "variable"
+        case _:
+            return "local"
+
+
+def workspace_symbols(db: Database, text: str) -> tuple[WorkspaceSymbol, ...]:
+    """The definitions of the workspace whose names hold the letters of `text` in their order, the likeliest first."""
+    wanted = text.casefold()
+    scored: list[tuple[int, str, str]] = []
+    for folded, name, file in exports(db):
+        score = _score(wanted, folded)
+        if score is not None:
+            scored.append((score, name, file))
+    scored.sort()
+    return tuple(_found(db, name, file) for _, name, file in scored[:MOST_FOUND])
+
+
+def _score(wanted: str, name: str) -> int | None:
+    if name.startswith(wanted):
+        return 0 if name == wanted else 1
+    if wanted in name:
+        return 2
+    at = -1
+    for letter in wanted:
+        at = name.find(letter, at + 1)
+        if at < 0:
+            return None
+    return 3
+
+
+def _found(db: Database, name: str, file: str) -> WorkspaceSymbol:
+    container = os.path.splitext(os.path.basename(file))[0]
+    place = Location(file, name_span(db, file, name), item_span(db, file, name))
+    return WorkspaceSymbol(name, written_kind(db, file, name), container, place)

@@ -1,0 +1,1 @@
+"""Panels under refinement: iterated integration, estimates, budgets, and what has no value."""

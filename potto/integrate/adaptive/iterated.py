@@ -1,0 +1,260 @@
+"""Iterated integration over segments between cuts, for a whole batch at once.
+
+Owns `Iteration`: at each variable it cuts the bounds, settles on which side of every surface each segment lies,
+leaves out the segments on which the integrand vanishes, and hands the rest to `work`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from potto.core.terms import Term
+from potto.integrate.adaptive.magnitude import Extent
+from potto.integrate.adaptive.panel_batch import Work
+from potto.integrate.adaptive.undefined import lost_members, sides_at
+from potto.integrate.decomposition.coincidences import Scene, count_places, count_slivers, note_folds
+from potto.integrate.decomposition.critical_places import critical_rows
+from potto.integrate.decomposition.cuts import Cuts, Row, at_rest, frame_rows, segments, standing
+from potto.integrate.decomposition.degeneracies import brush
+from potto.integrate.decomposition.effective_range import concentrated
+from potto.integrate.decomposition.empty_ranges import Collapsed, collapsed_ranges, count_collapsed
+from potto.integrate.decomposition.narrow_panels import count_narrow
+from potto.integrate.decomposition.sections import searched_rows
+from potto.integrate.decomposition.vanishing import vanishes
+from potto.integrate.pieces import Evaluator, Sums, components, take
+from potto.integrate.plan import LevelPlan, Plan
+from potto.integrate.rules.substitution import Segments
+from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value
+
+NARROW = 1e-4  # the part of the range of a variable up to which a stretch may lie on either side of a surface
+
+
+@dataclass(frozen=True)
+class Settled:
+    """The sides of surfaces, per segment, and by group the segments on which a surface is not defined, so that it has
+    none. unsure: the members, if any, of which that is rounding for a stretch that matters. doubtful: by group, the
+    narrow stretches of which it is."""
+
+    sides: dict[int, Mask]
+    undefined: dict[int, Bools] = field(default_factory=dict)
+    unsure: Ints | None = None
+    doubtful: dict[int, Bools] = field(default_factory=dict)
+
+
+@dataclass
+class Iteration:
+    """One plan being evaluated by one machine. `order` is the number of nodes per piece to start with.
+
+    still: surfaces that don't move here, since someone else counts what their motion does. tracked: whether the
+    integrand brings its rounding along at every node.
+    """
+
+    plan: Plan
+    machine: Evaluator
+    order: int
+    still: frozenset[Term] = frozenset()
+    tracked: bool = False
+    extent: Extent | None = None
+
+    def whole(self, env: dict[str, Value], batch: int) -> Sums:
+        """The integrals of a batch over all variables, with what they could come to at most counted as added up."""
+        self.extent = Extent(len(self.plan.levels), batch)
+        sums = self.run(0, env, batch, {}, self.machine)
+        self.extent.count(sums)
+        return sums
+
+    def run(
+        self, number: int, env: dict[str, Value], batch: int, sides: dict[int, Mask], machine: Evaluator,
+        root: Ints | None = None, slack: Array | None = None,
+    ) -> Sums:  # fmt: skip
+        """Integrate over variable `number` and those further in, for a batch of environments.
+
+        `root` says, of a batch of nodes, which member of the outermost batch each belongs to; None if there is one.
+        `slack` says how many times the error may be larger of nodes that have less weight than others.
+        """
+        level = self.plan.levels[number]
+        cuts, collapsed = self.cut(level, env, batch, machine)
+        seg = cuts.segments
+        if self.extent is not None:
+            self.extent.saw_range(number, seg, batch, root)
+        scene = Scene(self, number, level, env, sides, machine, batch, root)
+        settled = self.sides_of(scene, seg)
+        keep, lost = self.kept(scene, seg, settled)
+        if machine.costs is not None and number + 1 == len(self.plan.levels):
+            machine.costs.stretches(seg.a.size, seg.a.size if keep is None else keep.size)
+        here, sides = seg, settled.sides
+        if keep is not None:
+            here, sides = seg.pick(keep), {g: take(m, keep) for g, m in sides.items()}
+        moving = cuts.moving and machine.directions > 0
+        work = Work(self, number, level, env, here, sides, machine, moving, batch, root, slack, cuts.conflict)
+        sums = work.integrate()
+        if collapsed:
+            sums = count_collapsed(scene, collapsed, sums)
+        self.count_events(scene, cuts, sums)
+        if settled.doubtful and not self.plan.hides:
+            count_narrow(scene, seg, settled.sides, settled.doubtful, sums)
+        if settled.unsure is not None and not number:  # single nodes of variables further out may lie on a surface
+            reason = f"rounding hides on which side of a surface stretches of `{level.variable}` lie"
+            machine.note_unfinished(reason, work.below(settled.unsure))
+            sums.e[:, settled.unsure] = sums.et[:, :, settled.unsure] = np.inf
+        if cuts.lost is not None:
+            sums.e += cuts.lost
+            sums.et += cuts.lost
+        sums.v *= cuts.sign
+        sums.t *= cuts.sign
+        for gone in (cuts.bound_nan, lost):
+            if gone is not None:
+                sums.v[:, gone] = sums.t[:, :, gone] = np.nan
+                sums.e[:, gone] = sums.et[:, :, gone] = np.inf
+        return sums
+
+    def count_events(self, scene: Scene, cuts: Cuts, sums: Sums) -> None:
+        """Add, or say, what cuts matter that lie on a bound or on one another, and surfaces that fold here."""
+        machine = scene.machine
+        if machine.directions and (cuts.meetings or cuts.edges):
+            if self.plan.hides:
+                places = [*(place.owner for place in cuts.meetings), *(place.owner for place in cuts.edges)]
+                met = np.unique(np.concatenate(places))
+                machine.note_unfinished(
+                    "surfaces meet, or lie on a bound, that an inner integral jumps at", scene.below(met)
+                )
+                sums.et[:, :, met] = np.inf
+            else:
+                count_places(scene, cuts, sums)
+        if machine.directions and cuts.brushes and scene.number + 1 < len(self.plan.levels):
+            brush(scene, cuts)
+        if cuts.slivers and not machine.frozen and not self.plan.hides:
+            count_slivers(scene, cuts, sums)
+        if machine.directions and cuts.folds:
+            note_folds(scene, cuts)
+
+    def kept(self, scene: Scene, seg: Segments, settled: Settled) -> tuple[Ints | None, Ints | None]:
+        """The segments to integrate over, None for all; and the members that have no value."""
+        keep = self.alive(settled.sides, seg, settled.undefined)
+        if not settled.undefined:
+            return keep, None
+        lost = lost_members(scene, seg, settled.undefined, keep)
+        rest = np.nonzero(~np.isin(seg.owner, lost))[0]
+        return (rest if keep is None else np.intersect1d(keep, rest)), lost
+
+    @staticmethod
+    def siblings(scale: Array, root: Ints | None) -> Array:
+        """The largest magnitude among the members that are added up further out: what their accuracy is measured by."""
+        if root is None:
+            return np.full(scale.shape, scale.max()) if scale.size else scale
+        most = np.zeros(int(root.max()) + 1 if root.size else 0)
+        np.maximum.at(most, root, scale)
+        return most[root]
+
+    def cut(
+        self, level: LevelPlan, env: dict[str, Value], batch: int, machine: Evaluator
+    ) -> tuple[Cuts, list[Collapsed]]:
+        """Where the members are cut, and which of them have a range of length zero."""
+        values = machine.tracking().evaluate(level.frame, env, None)
+        assert isinstance(values, tuple)
+        lo, hi, rows = frame_rows(level, values)
+        found, lost = self.searched(level, env, lo, hi, batch, machine)
+        rows += found
+        if machine.costs is not None:
+            asked = self.machine.directions > 0 and not machine.frozen  # others are by variables further out
+            for number, cut in enumerate(level.level.cuts):
+                if cut.jumps:
+                    roots = [(row.x, row.t[: self.machine.directions]) for row in rows if row.cut == number]
+                    machine.costs.saw(cut.surface, roots, lo.v, hi.v, asked)
+        for row in rows if self.still else ():
+            if row.cut >= 0 and level.level.cuts[row.cut].surface in self.still:
+                row.t = ()
+        cuts = segments(level, lo, hi, rows, batch, machine.directions, level is not self.plan.levels[0])
+        if self.resting(level, lo, hi):
+            cuts = at_rest(cuts)
+        cuts.lost = lost
+        collapsed = collapsed_ranges(level, lo, hi, rows, batch, machine.directions)
+        if machine.frozen:
+            return standing(cuts), [ranges.at_rest() for ranges in collapsed]
+        return cuts, collapsed
+
+    def resting(self, level: LevelPlan, lo: Cell, hi: Cell) -> bool:
+        """Whether nothing needs to move with the cuts of a variable: what is integrated is continuous there.
+
+        Then the derivative along it, which nodes that move would need, is best left alone: near critical places it is
+        the hardest of all. Where there is but one variable further in it costs little, and serves as a check.
+        """
+        levels = self.plan.levels
+        if len(levels) < 3 or any(own is level for own in levels[-2:]) or any(c.decides for c in level.level.cuts):
+            return False
+        return not any(np.any(t) for bound in (lo, hi) for t in bound.t if t is not None)
+
+    def searched(
+        self, level: LevelPlan, env: dict[str, Value], lo: Cell, hi: Cell, batch: int, machine: Evaluator
+    ) -> tuple[list[Row], Array | None]:
+        """The cuts that numbers find, and the most that those may matter which lie where a density leaves nothing."""
+        critical = level.level.critical
+        if not (level.families or level.searched or critical):
+            return [], None
+        number = next((n for n, own in enumerate(self.plan.levels) if own is level), None)
+        near = None if number is None else concentrated(self.plan, number, env, lo, hi, batch)
+        lo, hi, lost = near or (lo, hi, None)
+        rows = searched_rows(level, env, lo, hi, batch, machine)
+        return (rows + critical_rows(level, env, lo, hi, batch, machine) if critical else rows), lost
+
+    def sides_of(self, scene: Scene, seg: Segments) -> Settled:
+        """The sides of all surfaces decided so far: those of this variable from the segments' middles."""
+        level = scene.level
+        sides = {g: take(mask, seg.owner) for g, mask in scene.sides.items()}
+        if not level.decided:
+            return Settled(sides)
+        unsure: dict[int, Bools] = {}
+        undefined: dict[int, Bools] = {}
+        values = sides_at(level, scene.env, seg, scene.machine)
+        for group, (at_middle, off), turned in zip(level.decided, values, level.turned, strict=True):
+            if any(outer not in sides for outer in turned):
+                continue  # one that is not defined
+            side = at_middle >= 0 if self.plan.groups[group].up_at_zero else at_middle > 0
+            for outer in turned:
+                side = side ^ np.logical_not(sides[outer])
+            sides[group] = side
+            if np.isnan(at_middle).any():
+                undefined[group] = np.isnan(at_middle)
+            if (hidden := np.abs(at_middle) < off).any():
+                unsure[group] = hidden
+        if not unsure:
+            return Settled(sides, undefined)
+        wide = seg.b - seg.a > NARROW * np.bincount(seg.owner, seg.b - seg.a)[seg.owner]
+        members = np.unique(seg.owner[wide & np.any(list(unsure.values()), axis=0)])
+        doubtful = {group: hidden & ~wide for group, hidden in unsure.items() if (hidden & ~wide).any()}
+        return Settled(sides, undefined, members if members.size else None, doubtful)
+
+    def alive(self, sides: dict[int, Mask], seg: Segments, undefined: dict[int, Bools]) -> Ints | None:
+        """The segments on which the integrand is not known to vanish; None for all of them."""
+        zero = vanishes(self.plan.vanishing, sides)
+        if zero is False:
+            return None
+        mask = np.broadcast_to(np.asarray(zero), seg.a.shape)
+        if undefined:  # there it vanishes only if it does on both sides
+            either = vanishes(self.plan.vanishing, {g: m for g, m in sides.items() if g not in undefined})
+            mask = np.where(np.any(list(undefined.values()), axis=0), either, mask)
+        return np.nonzero(~mask)[0] if mask.any() else None
+
+    def body(self, env: dict[str, Value], sides: dict[int, Mask], machine: Evaluator) -> Value:
+        """The integrand itself, on the sides given."""
+        body = self.plan.body
+        return machine.evaluate(body, {n: env[n] for n in body.params}, self.plan.trace(sides))
+
+    def inside(
+        self, number: int, env: dict[str, Value], batch: int, sides: dict[int, Mask], machine: Evaluator,
+        root: Ints | None = None,
+    ) -> tuple[Array, Array]:  # fmt: skip
+        """The integrand of variable `number` (with the variables further in integrated out) and its errors: (m, B)."""
+        if number + 1 < len(self.plan.levels):
+            sums = self.run(number + 1, env, batch, sides, machine, root)
+            return sums.v, sums.e
+        machine.count(batch)
+        value = self.body(env, sides, machine.tracking())
+        cells = components(value)
+        values, errors = np.empty((len(cells), batch)), np.zeros((len(cells), batch))
+        for i, cell in enumerate(cells):
+            values[i] = cell.v
+            errors[i] = 0.0 if cell.e is None else cell.e
+        return values, errors

@@ -1,0 +1,389 @@
+"""The integrals of a batch over one variable: nodes, values, estimates, refinement.
+
+Owns `Work`. Segments are cut into pieces; each piece is integrated by a Gauss rule; what the next variable in gives
+at the nodes comes from the same procedure one level down. Pieces whose estimate is too large are halved, all of them
+in one go. For a derivative two forms are computed from the same values:
+
+    fixed:  D int F = int D_theta F  +  sum over ends of segments of F at the end times the end's speed
+    moving: D int F = int (D_theta F + v dF/dx + F dv/dx), v a velocity that agrees with the speed at every end
+
+(Reynolds' transport theorem.) Each has its own error estimate; the better one is the answer.
+"""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from potto.integrate.adaptive.divergence import endless, given_up
+from potto.integrate.adaptive.error_budget import Tally, filled, slack
+from potto.integrate.adaptive.refinement import doubtful, missed_peak, stragglers, too_coarse
+from potto.integrate.adaptive.reynolds import Ends, Totals, note_cancelling, sums, totals
+from potto.integrate.adaptive.roundoff import few_doubles, misplaced, noise, shake, together
+from potto.integrate.adaptive.undefined import mend
+from potto.integrate.decomposition.degeneracies import look_for_steps
+from potto.integrate.pieces import Evaluator, Pieces, Sums, column, gather, joined, spread, still
+from potto.integrate.plan import LevelPlan
+from potto.integrate.rules import substitution
+from potto.integrate.rules.gauss import EPS, Rule, gauss, truncation
+from potto.integrate.rules.substitution import Segments
+from potto.kernels.cells import Array, Cell, Ints, Mask, Number, Value, pad
+
+if TYPE_CHECKING:
+    from potto.integrate.adaptive.iterated import Iteration
+
+CHUNK = 1 << 15  # points per kernel call: a few buffers of this length fit the second-level cache
+MOST_HALVINGS = 64
+# Nodes for pieces that were too coarse: first more of them on the same piece, then on halves.
+HIGH_ORDER = HALF_ORDER = 14
+MORE = 6  # for graded pieces, on which what is smooth is a polynomial, whose end looks like a fast decay
+# The relative error of a piece up to which more nodes promise more than halves do.
+PROMISING = 1e-2
+DOUBTFUL_ROUNDS = 8
+LONG = 8  # after how many halvings it is looked for members that take longer than the others
+BESIDE = 1e-9  # how far from the ends of a segment, in parts of it, it is looked at just inside
+
+
+@dataclass
+class Work:
+    """The integrals of one batch over one variable."""
+
+    parent: Iteration
+    number: int
+    level: LevelPlan
+    env: dict[str, Value]
+    seg: Segments
+    sides: dict[int, Mask]
+    machine: Evaluator
+    moving: bool
+    batch: int
+    root: Ints | None = None
+    slack: Array | None = None
+    conflict: bool = False
+    width: int = 1
+    ends: Ends | None = None
+    # How many times what it comes to an integral further in adds up: for values, for tangents.
+    cancels: Array = field(init=False)
+    hidden: Array = field(init=False)  # what is added up further in, on the average, where it comes to nothing
+    endless: Array | None = None  # (k, B) the tangents that are infinite, with their signs; 0 for others
+    filled: Array | None = None  # (B,) which part of the range integrands take up, where that is known
+    misplaced: Array | None = None  # (m, k, S) what the rounding of the ends of segments means for the fixed form
+
+    def __post_init__(self) -> None:
+        self.k = self.machine.directions
+        self.cancels, self.hidden = np.ones((2, self.batch)), np.zeros((2, self.batch))
+        self.last = self.number + 1 == len(self.parent.plan.levels)
+        # Without forced sides there are no values on a surface: only the moving form does without them.
+        self.both = self.moving and not self.parent.plan.hides
+        self.inner = self.machine.with_directions(self.k + 1) if self.moving else self.machine
+
+    # Channels: per component the value, then per direction the moving form, then (if both) the fixed form
+
+    def integrate(self) -> Sums:
+        count = self.seg.a.size
+        if count == 0:
+            shape = (1, self.batch)
+            t, et = np.zeros((2, 1, self.k, self.batch))
+            return Sums(np.zeros(shape), np.zeros(shape), t, et, gross=np.zeros((2, self.batch)))
+        zero, one = np.zeros(count), np.ones(count)
+        ends = self.ends = self.end_values()
+        whole = Pieces(np.arange(count), zero, one, np.zeros(count, dtype=np.int64))
+        fresh = self.measure(whole, self.enough() or self.parent.order, True)
+        if self.last and self.parent.extent is not None:
+            self.parent.extent.saw_values(self, fresh)
+        if self.conflict and not self.last:
+            look_for_steps(self, fresh)
+        found = totals(self, fresh, ends)
+        if self.good_enough(fresh, found, ends):
+            return sums(self, found, ends)
+        self.endless = endless(self, found)
+        tally = Tally(self, fresh)
+        self.filled = filled(self, fresh)
+        done = self.refine(fresh, ends, tally)
+        for _ in range(DOUBTFUL_ROUNDS):
+            found = totals(self, done, ends)
+            bad = doubtful(self, done, found)
+            if bad is None or self.machine.exhausted():
+                break
+            halves = self.halve(done.pick(bad))
+            halves = self.replaced(done.pick(bad), halves, HALF_ORDER, tally)
+            done = done.pick(~bad).join(self.refine(halves, ends, tally))
+        else:
+            found = totals(self, done, ends)
+        return given_up(self, done, found, sums(self, found, ends))
+
+    def enough(self) -> int | None:
+        """How many nodes do for an integrand that is a polynomial between its cuts: so many that it is 0 where it is 0
+        at all of them, since they also tell its size."""
+        degree = self.parent.plan.degree if self.last and not self.seg.kind.any() else None
+        return None if degree is None or degree >= self.parent.order else degree + 1
+
+    def good_enough(self, p: Pieces, found: Totals, ends: Ends | None) -> bool:
+        """Whether whole segments do as they are for every member, by the strictest reading of what is asked for."""
+        if self.number and self.root is not None:
+            return False  # what each may err is measured by members of the outermost batch: that takes a tally
+        scale = np.abs(found.size if self.number else found.integral)[:, : 1 + self.k]
+        if self.number:
+            scale = scale.max(axis=-1, keepdims=True)
+        error = found.error[:, : 1 + self.k]
+        if found.fixed is not None:
+            error = np.concatenate((error[:, :1], np.minimum(found.moving[1], found.fixed[1])), axis=1)
+        if not (error <= 0.5 * np.maximum(self.machine.atol, self.machine.rtol * scale)).all():
+            return False
+        if ends is not None and missed_peak(self, p, ends).any():
+            return False
+        return doubtful(self, p, found) is None
+
+    def refine(self, fresh: Pieces, ends: Any, tally: Tally) -> Pieces:
+        """More nodes, then halves, for what is too coarse until nothing is; what is accepted stays accepted."""
+        accepted: list[Pieces] = []
+        for turn in range(MOST_HALVINGS):
+            found = too_coarse(self, fresh, ends, tally)
+            if found is None:
+                break
+            if self.machine.exhausted():
+                owners = self.seg.owner[fresh.segment[found[0] | found[1]]]
+                self.machine.note_unfinished("the budget of evaluations is spent", self.below(np.unique(owners)))
+                if ends is not None:  # what is known to be missing
+                    fresh.error[:, missed_peak(self, fresh, ends)] = np.inf
+                break
+            bad, waiting = found
+            if turn >= LONG and (late := stragglers(self, fresh, bad)).any():
+                bad, waiting = bad & ~late, waiting & ~late
+                if not bad.any():
+                    break
+            accepted.append(fresh.pick(~bad & ~waiting))
+            coarse, later = fresh.pick(bad), fresh.pick(waiting)
+            later.excess[:] = 0.0
+            nearly = (coarse.error <= PROMISING * coarse.size).all(axis=0) if turn == 0 else np.zeros(0, dtype=bool)
+            if nearly.any():
+                near, far = coarse.pick(nearly), coarse.pick(~nearly)
+                fresh = self.replaced(near, near.places(slice(None)), HIGH_ORDER, tally)
+                if far.segment.size:
+                    fresh = fresh.join(self.replaced(far, self.halve(far), HALF_ORDER, tally))
+            else:
+                fresh = self.replaced(coarse, self.halve(coarse), HALF_ORDER, tally)
+            if later.segment.size:
+                fresh = fresh.join(later)
+        accepted.append(fresh)
+        return joined(accepted)
+
+    def replaced(self, old: Pieces, new: Pieces, order: int, tally: Tally) -> Pieces:
+        """The new pieces that stand for the old ones, measured; the books follow."""
+        copies = new.u0.size // old.u0.size
+        new = self.measure(new, order)
+        if (graded := np.nonzero((new.end != 0) & (new.error <= PROMISING * new.size).all(axis=0))[0]).size:
+            new.held_against(self.measure(new.places(graded), order + MORE), graded)
+        new.excess, new.stuck = np.tile(old.excess, copies), np.tile(old.stuck, copies)
+        tally.replace(self, old, new)
+        return new
+
+    def halve(self, p: Pieces) -> Pieces:
+        """Two pieces for each; the one at the end of its segment is graded towards that end."""
+        middle = 0.5 * (p.u0 + p.u1)
+        left = np.where((p.u0 == 0) & (p.end <= 0) & (p.lean < 0), p.lean, np.minimum(p.end, 0))
+        right = np.where((p.u1 == 1) & (p.end >= 0) & (p.lean > 0), p.lean, np.maximum(p.end, 0))
+        return Pieces(
+            np.concatenate((p.segment, p.segment)),
+            np.concatenate((p.u0, middle)),
+            np.concatenate((middle, p.u1)),
+            np.concatenate((left, right)),
+        )
+
+    def measure(self, p: Pieces, order: int, whole: bool = False) -> Pieces:
+        """Integrals, errors and rounding floors of pieces, chunk by chunk, by the rule with `order` nodes.
+
+        `whole`: the pieces are the segments.
+        """
+        rows = max(1, CHUNK // order)
+        if p.segment.size > rows:
+            return joined(
+                [
+                    self.measure(p.places(part), order)
+                    for part in (slice(i, i + rows) for i in range(0, p.segment.size, rows))
+                ]
+            )
+        rule = gauss(order)
+        if whole:
+            seg = self.seg
+            x, weight, label = substitution.points(seg, rule.nodes[None])
+        else:
+            seg = self.seg.pick(p.segment)
+            u, rest, du = substitution.grade(p.u0, p.u1, p.end, rule.nodes)
+            x, dx, label = substitution.points(seg, u, rest)
+            weight = dx * du
+        if seg.kind.any() or p.end.any():
+            x = substitution.off_the_ends(seg, x)
+        off = None
+        if weight.shape[1] == 1 and few_doubles(seg, weight):
+            off, label = substitution.displaced(seg, x, label)
+        h, inner = self.values(seg, p.segment, x, label, weight)
+        if not whole:
+            mend(self, seg, p.segment, u, du, h, inner)
+        if off is not None:
+            part = off * (seg.b - seg.a)[:, None] / weight
+            slope = h @ rule.derivative
+            h = np.where(np.isfinite(slope) & (np.abs(part) < 0.1), h - part * slope, h)
+        self.estimate(p, seg, h, rule, shake(p, seg, x, weight, off is not None))
+        if self.k and seg.kind.any():
+            p.floor = p.floor + (np.abs(h) * substitution.trembling(seg, x)) @ rule.weights
+        if inner is not None:
+            p.floor = p.floor + np.abs(inner) @ rule.weights
+        return p
+
+    def estimate(self, p: Pieces, seg: Segments, h: Array, rule: Rule, shake: Array) -> None:
+        """Integrals of pieces from the values of their channels (C, P, n), their errors and rounding floors."""
+        coefficients = h @ rule.transform
+        size, height = np.abs(coefficients), np.abs(h)
+        p.integral = coefficients[..., 0]
+        exact = self.enough()
+        p.error = truncation(size) if exact is None or rule.nodes.size < exact else np.zeros(size.shape[:-1])
+        p.coefficients, p.heights = coefficients, height
+        p.size = height @ rule.weights
+        if self.ends is not None:
+            stride = height.shape[0] // self.width
+            p.most = height[::stride].max(axis=-1)
+            p.ends = np.concatenate(np.moveaxis(coefficients[::stride] @ rule.ends, -1, 0))
+            p.tail = size[::stride, :, -2:].sum(axis=-1)
+        else:
+            p.most = p.ends = p.tail = np.empty((0, p.u0.size))
+        p.floor = 4 * EPS * p.size + (size @ rule.slopes) * shake
+        if self.ends is not None and self.last and not self.parent.tracked:
+            p.floor += noise(self.ends, self.width, p, seg)
+        if self.k:
+            # speeds are rounded too, and so are the places of the cuts, which matters where they are close together
+            place = np.maximum(seg.ea, seg.eb) / (seg.b - seg.a)
+            place = np.where(np.isfinite(place), place, 0.0)
+            tangents = p.floor.reshape(self.width, -1, p.u0.size)[:, 1:]
+            tangents *= 4
+            tangents += place * p.size.reshape(self.width, -1, p.u0.size)[:, 1:]
+            if self.both and not self.last:
+                at_ends = (coefficients @ rule.ends).reshape(self.width, -1, p.u0.size, 2)[:, 1 + self.k :]
+                index, lost = misplaced(p, seg, at_ends)
+                if self.misplaced is None:
+                    self.misplaced = np.zeros((self.width, self.k, self.seg.a.size))
+                self.misplaced[:, :, p.segment[index]] = lost
+        broken = ~np.isfinite(p.integral)
+        if broken.any():
+            p.error = np.where(broken, np.inf, p.error)
+
+    def values(self, seg: Segments, index: Ints, x: Array, label: Array, weight: Array) -> tuple[Array, Array | None]:
+        """The channels at the nodes, times the weight: (C, P, n), and the errors that came with them."""
+        f, fx, ft, e, et, common = self.integrand(index, x, weight)
+        m, k = f.shape[0], self.k
+        rows = 1 + k + (k if self.both else 0)
+        h = np.empty((m, rows, *x.shape))
+        h[:, 0] = f
+        if self.moving:
+            for d in range(k):
+                v, dv = substitution.velocity(seg, label, d)
+                h[:, 1 + d] = ft[:, d] + fx * v + f * dv
+                if self.both:
+                    h[:, 1 + k + d] = ft[:, d]
+        elif k:
+            h[:, 1:] = ft
+        h *= weight
+        self.width = m
+        bound = None
+        if e is not None:
+            bound = np.zeros((m, rows, *x.shape))
+            bound[:, 0] = e
+            if et is not None and k:
+                bound[:, 1 : 1 + k] = et[:, :k]
+                if self.moving:
+                    for d in range(k):
+                        v, dv = substitution.velocity(seg, label, d)
+                        bound[:, 1 + d] += np.abs(v) * et[:, k] + np.abs(dv) * e
+                        if common is not None:
+                            bound[:, 1 + d] -= together(common, ft, fx, v, d)
+                    if self.both:
+                        bound[:, 1 + k :] = et[:, :k]
+            bound = (bound * np.abs(weight)).reshape(m * rows, *x.shape)
+        return h.reshape(m * rows, *x.shape), bound
+
+    def integrand(
+        self, index: Ints, x: Array, weight: Array | None = None
+    ) -> tuple[Array, Any, Any, Array | None, Array | None, Array | None]:
+        """F, dF/dx, D_theta F (each with a leading axis of components), error bounds, and the part of the tangents'
+        that is one factor of all of them, at nodes (P, n).
+
+        weight: (P, n) or (P, 1), how much the nodes of a rule count, but for its own weights.
+        """
+        owner = self.seg.owner[index]
+        k, name = self.k, self.level.variable
+        tangent: tuple[Number | None, ...] = (None,) * k + ((1.0,) if self.moving else ())
+        names = self.parent.plan.body.params if self.last else self.env
+        here = {n: pad(v, self.inner.directions) for n, v in self.env.items() if n in names}
+        if self.last:
+            env = column(gather(here, owner))
+            env[name] = Cell(x, None, tangent)
+            masks = {g: m[index][:, None] if isinstance(m, np.ndarray) else m for g, m in self.sides.items()}
+            self.machine.count(x.size)
+            return *spread(self.parent.body(env, masks, self.inner), x.shape, k, self.moving), None
+        n = x.shape[1]
+        flat = np.repeat(np.arange(index.size), n)
+        env = gather(here, owner[flat])
+        env[name] = Cell(x.reshape(-1), None, tangent)
+        masks = {g: m[index[flat]] if isinstance(m, np.ndarray) else m for g, m in self.sides.items()}
+        root = self.below(owner[flat])
+        if weight is None or self.filled is None:
+            less = self.inherited(owner, n)
+        else:
+            less = slack(self, owner, np.broadcast_to(np.abs(weight), x.shape))
+        sums = self.parent.run(self.number + 1, env, x.size, masks, self.inner, root, less)
+        if sums.gross is not None:
+            note_cancelling(self, sums, sums.gross, owner[flat])
+        shape = (sums.v.shape[0], *x.shape)
+        t = sums.t.reshape(shape[0], -1, *x.shape)
+        et = sums.et.reshape(t.shape)
+        common = sums.common if sums.common is None else sums.common.reshape(t.shape)
+        return sums.v.reshape(shape), t[:, k] if self.moving else None, t[:, :k], sums.e.reshape(shape), et, common
+
+    def inherited(self, owner: Ints, n: int) -> Array | None:
+        """How many times the error may be larger of the nodes of members that have less weight than others."""
+        return None if self.slack is None else np.repeat(self.slack[owner], n)
+
+    def below(self, owner: Ints) -> Ints | None:
+        """For members of the next batch, the members of the outermost one."""
+        if self.number == 0:
+            return owner if self.batch > 1 else None
+        return None if self.root is None else self.root[owner]
+
+    def end_values(self) -> Ends | None:
+        """F at both ends of every segment, sides as on the segment; None where it is not needed."""
+        hinted = any(level.level.hints for level in self.parent.plan.levels[self.number :])
+        if not self.last and not hinted and not (self.moving and self.sweeps()):
+            return None
+        seg, frozen, plan = self.seg, self.machine.with_directions(0), self.parent.plan
+        names = plan.body.params if self.last else self.env
+        both = np.concatenate((seg.owner, seg.owner))
+        here = gather({n: still(v) for n, v in self.env.items() if n in names}, both)
+        here[self.level.variable] = Cell(np.concatenate(self.just_inside()))
+        sides = {g: np.concatenate((m, m)) if isinstance(m, np.ndarray) else m for g, m in self.sides.items()}
+        costs = self.machine.costs
+        with nullcontext() if costs is None else costs.ends(seg.ta, seg.tb, self.parent.machine.directions):
+            f, e = self.parent.inside(self.number, here, both.size, sides, frozen, self.below(both))
+        count = seg.a.size
+        e = np.where(np.isfinite(e), e, 0.0)  # where F is infinite
+        return Ends(f[:, :count], f[:, count:], e[:, :count], e[:, count:])
+
+    def just_inside(self) -> tuple[Array, Array]:
+        """The ends of segments; points next to them where on the ends themselves it is not known what is further in."""
+        seg = self.seg
+        if self.parent.plan.hides:
+            width = np.where(np.isfinite(seg.b - seg.a), seg.b - seg.a, 0.0)
+            return seg.a + BESIDE * width, seg.b - BESIDE * width
+        if self.last or not seg.blur.any():
+            return seg.a, seg.b
+        aside = np.where((seg.kind == substitution.LINEAR) & (seg.blur < BESIDE * (seg.b - seg.a)), seg.blur, 0.0)
+        return seg.a + aside[0], seg.b - aside[1]
+
+    def sweeps(self) -> bool:
+        """Whether an end moves at which the integrand may jump: not where only something further in changes."""
+        seg = self.seg
+        follows = np.zeros(seg.a.size + 1, dtype=bool)
+        follows[1:-1] = (seg.owner[1:] == seg.owner[:-1]) & (seg.a[1:] == seg.b[:-1])
+        return bool(seg.ta[:, ~(follows[:-1] & (seg.rank == 1))].any() or seg.tb[:, ~follows[1:]].any())

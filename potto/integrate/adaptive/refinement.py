@@ -1,0 +1,133 @@
+"""Which pieces are not accurate enough, and which are as accurate as they can be.
+
+Owns `too_coarse`, `stragglers`, `missed_peak` and `doubtful`. A piece is refined until its error is a small enough part
+of what it is added to, or until what is left of it is rounding. Estimates see only what the nodes see, so the ends of
+segments and the agreement of two forms of each derivative are looked at besides.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from potto.integrate.adaptive.error_budget import Tally
+from potto.integrate.adaptive.reynolds import Ends, Totals
+from potto.integrate.pieces import Pieces
+from potto.integrate.rules import substitution
+from potto.kernels.cells import Array, Bools
+
+if TYPE_CHECKING:
+    from potto.integrate.adaptive.panel_batch import Work
+
+# How much larger than at the nodes an integrand must be at an end of a segment to be taken for a peak.
+PEAK = 8.0
+# How many times its last terms an interpolant may be off at an end of a segment.
+MISLED = 200.0
+# An error that is still above this share of itself on a half of its piece is not one of truncation. It is taken for
+# rounding at once where it is below so much of what is added up, after three times where it is below so much of the
+# answer, which may be far smaller.
+STUCK = 0.35
+NOISE = (1e-12, 1e-9)
+# Members that take longer than the others are left to be done by themselves if they are one in so many.
+STRAGGLERS = 16
+
+
+def too_coarse(work: Work, p: Pieces, ends: Any, tally: Tally) -> Any:
+    """Masks of the pieces to halve, and of those to look at again later; None if there are none to halve.
+
+    As long as a peak of an integral is not resolved, its total says nothing, and so what its other pieces may err
+    is not known: they wait.
+    """
+    owner = work.seg.owner[p.segment]
+    rows, m = p.integral.shape[0] // work.width, work.width
+    error, floor = p.error.reshape(m, rows, -1), p.floor.reshape(m, rows, -1)
+    k = work.k
+    if work.both:  # per direction the better of the two forms
+        better = np.minimum(error[:, 1 : 1 + k], error[:, 1 + k :])
+        error = np.concatenate((error[:, :1], better), axis=1)
+        floor = floor[:, : 1 + k]
+    if work.endless is not None:
+        error = error.copy()
+        error[:, 1 : 1 + k] = np.where(work.endless[:, owner] == 0, error[:, 1 : 1 + k], 0.0)
+    off, rounding = error.reshape(-1, p.segment.size), floor.reshape(-1, p.segment.size)
+    bad = (off > tally.shares(work, owner)) & (off > 8 * rounding)
+    bad = bad.any(axis=0) & ~noisy(p, np.where(bad, off, 0.0), tally.gross[owner], tally.whole(work)[owner])
+    wide = (p.u1 - p.u0) >= 1e-14
+    waiting = np.zeros(bad.size, dtype=bool)
+    if ends is not None:
+        peak = missed_peak(work, p, ends) & wide
+        if peak.any():
+            blind = np.zeros(work.batch, dtype=bool)
+            blind[owner[peak]] = True
+            waiting = bad & blind[owner] & ~peak & wide
+            bad = (bad & ~blind[owner]) | peak
+    bad &= wide
+    return (bad, waiting) if bad.any() else None
+
+
+def stragglers(work: Work, p: Pieces, bad: Bools) -> Bools:
+    """The pieces of the few members that are still refined when all others are done: they go on by themselves."""
+    late: Bools = np.zeros(bad.size, dtype=bool)
+    members = work.below(work.seg.owner[p.segment])
+    if members is None:
+        return late
+    few = np.unique(members[bad])
+    if STRAGGLERS * few.size <= int(members.max()) + 1:
+        work.machine.note_unfinished("it takes longer than others that are evaluated with it", few)
+        late |= np.isin(members, few)
+    return late
+
+
+def noisy(p: Pieces, off: Array, gross: Array, whole: Array) -> Bools:
+    """Pieces whose errors are small and stay as they are however they are refined: what is left is rounding.
+
+    off: (C, P) the errors that are too large; gross: (P,) what is added up, without regard to sign; whole: (P,) the
+    size of the answer, values and tangents together.
+    """
+    worst = off.max(axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        excess = np.where(gross > 0, worst / gross, np.inf)
+    p.stuck = np.where((p.excess > 0) & (excess > STUCK * p.excess), p.stuck + 1, 0)
+    p.excess = excess
+    return np.asarray(((excess <= NOISE[0]) & (p.stuck >= 1)) | ((worst <= NOISE[1] * whole) & (p.stuck >= 3)))
+
+
+def missed_peak(work: Work, p: Pieces, ends: Ends) -> Any:
+    """Pieces at an end of their segment where the integrand is not what its values at the nodes lead to.
+
+    Either it is far larger there than at any node, or it is off the interpolant through the nodes by far more
+    than the interpolant's last terms: something narrow sits at the end.
+    """
+    seg = work.seg
+    reach = seg.b - seg.a
+    width = np.where(np.isinf(reach), 1.0, reach)[p.segment] * (p.u1 - p.u0)  # x = a + u/(1 - u) has the slope 1 at a
+    plain = (seg.kind[p.segment] == substitution.LINEAR) & (p.end == 0)
+    bad = np.zeros(p.segment.size, dtype=bool)
+    m = work.width
+    for f, touches, led in ((ends.low, p.u0 == 0, p.ends[:m]), (ends.high, p.u1 == 1, p.ends[m:])):
+        for c in range(m):
+            at_end = f[c][p.segment] * width
+            known = touches & np.isfinite(at_end)
+            bad |= known & (np.abs(at_end) > PEAK * p.most[c])
+            off = np.abs(at_end - led[c])
+            bad |= known & plain & (off > MISLED * p.tail[c] + 1e-8 * p.most[c])
+    return bad
+
+
+def doubtful(work: Work, p: Pieces, found: Totals) -> Any:
+    """All pieces of the integrals whose two derivatives do not agree: something between the nodes was missed."""
+    if found.fixed is None or found.apart is None:
+        return None
+    doubt = found.apart > 4 * (found.moving[1] + found.fixed[1])
+    if work.endless is not None:
+        doubt &= work.endless == 0
+    if not doubt.any():
+        return None
+    doubt &= found.apart > 1e-9 * (np.abs(found.moving[0]) + 1e-3 * found.size[:, 1 : 1 + work.k])
+    doubt &= found.apart > NOISE[0] * found.size[:, :1]
+    if not doubt.any():
+        return None
+    owners = np.asarray(doubt.any(axis=(0, 1)))
+    bad = owners[work.seg.owner[p.segment]] & (p.u1 - p.u0 > 1e-14)
+    return bad if bad.any() else None

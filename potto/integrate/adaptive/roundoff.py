@@ -1,0 +1,94 @@
+"""What rounding does to the integral over a piece.
+
+Owns `shake` and `few_doubles` (of nodes), `noise` (of the integrand), `misplaced` (of the ends of segments) and
+`together` (of derivatives that move with the nodes).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from potto.integrate.adaptive.reynolds import Ends
+from potto.integrate.pieces import Pieces
+from potto.integrate.rules import substitution
+from potto.integrate.rules.gauss import EPS
+from potto.integrate.rules.substitution import Segments
+from potto.kernels.cells import Array, Ints
+
+# The rounding of a node, in units of the last place, that noise in a steep integrand is blamed on.
+NODE_ROUNDING = 0.5
+# From how many lengths of a piece away from 0 on the rounding of its nodes is put right.
+FAR = 8
+# Up to how many times their rounding apart an end and a turning place are one.
+ITSELF = 4.0
+
+
+def few_doubles(seg: Segments, weight: Array) -> bool:
+    """Whether pieces are so far from 0 for their length that the rounding of nodes is worth putting right."""
+    far = np.maximum(np.abs(seg.a), np.abs(seg.b))
+    return bool((NODE_ROUNDING * far > FAR * weight[:, 0]).any())
+
+
+def shake(p: Pieces, seg: Segments, x: Array, weight: Array, put_right: bool) -> Array:
+    """The rounding of nodes, as a part of the piece: (P,).
+
+    Far from 0, where few doubles lie in a piece, a node is not where the rule wants it; but how far off it is is
+    known exactly, and the interpolant's slope puts that right but for its square.
+    """
+    if weight.shape[1] > 1:
+        shake = NODE_ROUNDING * EPS * np.abs(x).max(axis=-1) / np.abs(weight).max(axis=-1)
+    else:
+        shake = NODE_ROUNDING * EPS * np.maximum(np.abs(seg.a), np.abs(seg.b)) / weight[:, 0]
+        if put_right:
+            shake = np.minimum(shake, shake * shake + 2 * EPS * p.u1 / (p.u1 - p.u0))
+    return np.where(shake <= 1.0, shake, np.where(np.isfinite(shake), 1.0, 0.0))
+
+
+def noise(ends: Ends, width: int, p: Pieces, seg: Segments) -> Array:
+    """What the integrand's own rounding, kept track of at the ends of segments, comes to in each channel: (C, P).
+
+    More than a few units in the last place where terms of parameters cancel, or where sines of them have large
+    arguments. What only grows towards one end is rounding of the variable, which is counted elsewhere.
+    """
+    shares = [
+        np.divide(e, np.abs(f), out=np.full(f.shape, np.inf), where=(f != 0) & np.isfinite(f))
+        for f, e in ((ends.low, ends.low_error), (ends.high, ends.high_error))
+    ]
+    share = np.minimum(*shares)
+    share = np.where((share > 4 * EPS) & (share < 1), share, 0.0)[:, p.segment]
+    share = np.where(seg.kind == substitution.LINEAR, share, 0.0)  # at a turning point little is left to be rounded
+    sizes = p.size.reshape(width, -1, p.u0.size)
+    return np.asarray((share[:, None] * sizes).reshape(p.size.shape))
+
+
+def misplaced(p: Pieces, seg: Segments, at_ends: Array) -> tuple[Ints, Array]:
+    """What is gained or lost in the fixed form as the ends of whole segments are off by a rounding.
+
+    The interior derivative jumps where the integrand has a kink; next to a place where sections turn it is as large as
+    one likes. at_ends: the channels of the interior derivative at both ends (m, k, P, 2). Returns the pieces that are
+    whole segments (I,), and what it is for each (m, k, I).
+    """
+    index = np.nonzero((p.u0 == 0) & (p.u1 == 1) & (p.end == 0))[0]
+    part, u = seg.pick(index), np.array([[0.0, 1.0]])
+    slope = np.abs(np.broadcast_to(substitution.points(part, u)[1], (index.size, 2)))
+    turn, end = np.stack((part.left, part.right), axis=1), np.stack((part.a, part.b), axis=1)
+    rounded = np.where(np.isfinite(turn), EPS * np.abs(turn), 0.0)
+    off = np.stack((part.ea, part.eb), axis=1) + rounded
+    with np.errstate(invalid="ignore"):  # of an end that is the turning place itself the map takes care
+        counts = (slope > 0) & np.isfinite(slope) & ~(np.abs(end - turn) <= ITSELF * rounded)
+    share = np.divide(off, slope, out=np.zeros_like(off), where=counts)
+    lost = np.abs(at_ends[:, :, index]) * np.minimum(share, 1.0)
+    return index, np.where(np.isfinite(lost), lost, 0.0).sum(axis=-1)
+
+
+def together(common: Array, ft: Array, fx: Array, v: Array, d: int) -> Array:
+    """How much less D F/D theta + v dF/dx errs than its two parts by themselves, by a factor that they share: next to a
+    fold, where both are as large as one likes, what they come to is not.
+
+    common: (m, k + 1, P, n) the errors that are due to such a factor, the last those of dF/dx.
+    """
+    apart = common[:, d] + np.abs(v) * common[:, -1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        factor = np.fmax(common[:, d] / np.abs(ft[:, d]), common[:, -1] / np.abs(fx))
+        joint = np.fmin(factor, 1.0) * np.abs(ft[:, d] + v * fx)
+    return np.where(np.isfinite(joint), np.maximum(apart - joint, 0.0), 0.0)

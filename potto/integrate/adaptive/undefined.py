@@ -1,0 +1,182 @@
+"""Places at which the integrand is not defined: nodes that rounding puts there, and conditions that have no value.
+
+Owns `mend`, `sides_at`, `lost_members`, `fallen` and `guarded_samples`.
+
+Close to an end of a segment where roots merge an integrand like 1/sqrt(r^2 - x^2 - y^2) has a radicand of the size of
+its rounding, and may come out as nan. There, in the coordinate that the segment is run through by, it is smooth: its
+values a little further in stand for those.
+
+A condition is not defined where a builtin in it is not: [sqrt(1 + x) < 2] at x = -2. If nothing guards it there, the
+integral is not a number, and it is told where.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Container, Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from potto.core.printer import format_term
+from potto.integrate.decomposition.coincidences import Scene, placed, surfaces_at
+from potto.integrate.decomposition.vanishing import vanishes
+from potto.integrate.pieces import Evaluator, gather, still, take
+from potto.integrate.plan import LevelPlan, Plan, function_of
+from potto.integrate.rules import substitution
+from potto.integrate.rules.substitution import Segments
+from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value
+
+if TYPE_CHECKING:
+    from potto.integrate.adaptive.panel_batch import Work
+
+UNDEFINED = "a condition has no value"
+# Where a segment is looked at, as parts of it: in the middle, and where that is a pole (of sin(x)/x, say) elsewhere.
+LOOKED_AT = (0.5, 0.3, 0.8)
+
+# As close as this to an end, in the coordinate, values are taken for those at this distance: the closest that will do.
+CLOSE = (1e-6, 1e-4, 1e-2)
+# As close as this to an end an integral further in, that nothing comes of there, is taken for that at this distance.
+UNREACHED = 1e-12
+
+
+def mend(work: Work, seg: Segments, index: Ints, u: Array, du: Array, h: Array, bounds: Array | None) -> None:
+    """Put values, and bounds of their errors, from further in where channels (C, P, n) are no numbers.
+
+    u, du: (P, n) as for the map.
+    """
+    turning = np.isin(seg.kind, (substitution.LEFT, substitution.RIGHT, substitution.BOTH))[:, None]
+    for close in CLOSE if turning.any() else ():
+        bad = ~np.isfinite(h).all(axis=0) & turning & ((u < close) | (u > 1 - close))
+        rows = np.nonzero(bad.any(axis=1))[0]
+        if not rows.size:
+            break
+        part, inner = seg.pick(rows), np.clip(u[rows], close, 1 - close)
+        x, slope, label = substitution.points(part, inner)
+        found, errors = work.values(part, index[rows], x, label, slope * np.broadcast_to(du, u.shape)[rows])
+        h[:, rows] = np.where(bad[rows], found, h[:, rows])
+        if bounds is not None and errors is not None:
+            bounds[:, rows] = np.where(bad[rows], errors, bounds[:, rows])
+    if bounds is not None and not np.isfinite(h).all():
+        _unreached(work, seg, index, u, du, h, bounds)
+
+
+def _unreached(work: Work, seg: Segments, index: Ints, u: Array, du: Array, h: Array, bounds: Array) -> None:
+    """Values for nodes so close to an end that integrals further in give up: of 1/(x + y) along y at x = 1e-20.
+
+    Nothing is known of them but that they count little if values grow slowly; they may be off by all that they are.
+    """
+    plain = (seg.kind == substitution.LINEAR)[:, None]
+    bad = ~np.isfinite(h).all(axis=0) & plain & ((u < UNREACHED) | (u > 1 - UNREACHED))
+    rows = np.nonzero(bad.any(axis=1))[0]
+    if rows.size:
+        part, inner = seg.pick(rows), np.clip(u[rows], UNREACHED, 1 - UNREACHED)
+        x, slope, label = substitution.points(part, inner)
+        found, errors = work.values(part, index[rows], x, label, slope * np.broadcast_to(du, u.shape)[rows])
+        off = np.abs(found) if errors is None else np.abs(found) + errors
+        h[:, rows] = np.where(bad[rows], found, h[:, rows])
+        bounds[:, rows] = np.where(bad[rows], off, bounds[:, rows])
+
+
+def sides_at(level: LevelPlan, env: dict[str, Value], seg: Segments, machine: Evaluator) -> list[tuple[Array, Array]]:
+    """The surfaces that a level decides the sides of, in the middle of segments, with their rounding, (S,) each.
+
+    They are nan where they are not defined anywhere on the segment.
+    """
+    found: list[tuple[Array, Array]] = []
+    for share in LOOKED_AT:
+        x, _, _ = substitution.points(seg, np.full((seg.a.size, 1), share))
+        here, _ = placed(level, seg.owner, x[:, 0], {n: v for n, v in env.items() if n in level.surfaces.params}, {})
+        now = surfaces_at(level, here, seg.a.size, machine)
+        if not found:
+            found = now
+        else:
+            found = [
+                (np.where(np.isnan(v), w, v), np.where(np.isnan(v), off, e))
+                for (v, e), (w, off) in zip(found, now, strict=True)
+            ]
+        if not any(np.isnan(v).any() for v, _ in found):
+            break
+    return found
+
+
+def lost_members(scene: Scene, seg: Segments, undefined: dict[int, Bools], alive: Ints | None) -> Ints:
+    """The members whose integrand is not a number on one of the segments on which a surface is not defined.
+
+    undefined: by group, those segments; alive: the segments that count, None for all. It is told where the first is.
+    """
+    index = np.nonzero(np.any(list(undefined.values()), axis=0))[0]
+    index = index if alive is None else np.intersect1d(index, alive)
+    patterns = np.stack([mask[index] for mask in undefined.values()])
+    lost: list[Ints] = []
+    for pattern in np.unique(patterns, axis=1).T:
+        part = index[(patterns == pattern[:, None]).all(axis=0)]
+        gone = [g for g, there in zip(undefined, pattern, strict=True) if there]
+        x, _, _ = substitution.points(seg.pick(part), np.full((part.size, 1), LOOKED_AT[0]))
+        here, _ = placed(scene.level, seg.owner[part], x[:, 0], scene.env, {})
+        sides = {g: take(mask, part) for g, mask in scene.sides.items() if g not in gone}
+        frozen, root = scene.machine.with_directions(0), scene.below(seg.owner[part])
+        f, _ = scene.parent.inside(scene.number, here, part.size, sides, frozen, root)
+        bad = np.nonzero(np.isnan(f).any(axis=0))[0]
+        if bad.size:
+            lost.append(seg.owner[part[bad]])
+            members = scene.below(lost[-1])
+            _tell(scene.parent.plan, gone[0], here, int(bad[0]), scene.machine, members)
+    return np.unique(np.concatenate(lost)) if lost else np.zeros(0, dtype=np.int64)
+
+
+def fallen(
+    plan: Plan, env: dict[str, Value], n: int, machine: Evaluator, groups: Container[int]
+) -> Iterator[tuple[int, Bools, Bools]]:
+    """The sides on which samples fall of the surfaces of some groups, and where a surface is not defined, (n,) each."""
+    for group in plan.groups:
+        if group.number in groups:
+            function = function_of(group.cut.surface)
+            value = machine.with_directions(0).evaluate(function, {p: still(env[p]) for p in function.params}, None)
+            assert isinstance(value, Cell)
+            at = np.broadcast_to(value.v, (n,))
+            yield group.number, at >= 0 if group.up_at_zero else at > 0, np.isnan(at)
+
+
+def guarded_samples(
+    plan: Plan, env: dict[str, Value], sides: dict[int, Mask], index: Ints, machine: Evaluator
+) -> Bools:
+    """Which of some samples whose integrand is not a number count for 0: a factor that is 0 there guards them.
+
+    Of the others it is told where the first is, if it is a condition that has no value there. sides: those forced.
+    """
+    below: dict[int, Mask] = {g: take(mask, index) for g, mask in sides.items()}
+    above = dict(below)
+    undefined: list[tuple[int, Bools]] = []
+    here = gather(env, index)
+    free = {group.number for group in plan.groups} - sides.keys()
+    for number, side, lost in fallen(plan, here, index.size, machine, free):
+        below[number], above[number] = side, side | lost
+        undefined.append((number, lost))
+    zero = np.broadcast_to(vanishes(plan.vanishing, below) & vanishes(plan.vanishing, above), index.shape)
+    for number, lost in undefined:
+        if (lost & ~zero).any():
+            _tell(plan, number, here, int(np.nonzero(lost & ~zero)[0][0]), machine)
+            break
+    return zero
+
+
+def _tell(
+    plan: Plan, group: int, env: dict[str, Value], member: int, machine: Evaluator, members: Ints | None = None
+) -> None:
+    """Note that the surface of a group is not defined at one of the places of an environment.
+
+    At infinity nothing needs to be defined: there is no sample there, and no node of a rule.
+    """
+    surface = plan.groups[group].cut.surface
+    places = []
+    for level in plan.levels:
+        cell = env.get(level.variable)
+        if level.variable in surface.free and isinstance(cell, Cell):
+            values = np.ravel(cell.v)
+            place = float(values[member % values.size])
+            if math.isinf(place):
+                return
+            places.append(f"{level.variable} = {place:.6g}")
+    where = f" at {', '.join(places)}" if places else ""
+    machine.note_unfinished(f"{UNDEFINED}{where}: it asks for the sign of {format_term(surface)}", members, UNDEFINED)

@@ -1,0 +1,304 @@
+"""Surfaces that lie on a bound, or on one another: what lies between them on either side of the present parameters.
+
+Owns `count_places`. A cut counts only strictly inside the bounds, and cuts at one place are integrated as one that
+moves with the first. What is missing follows from the integrand with surfaces flipped, in the order in which they are
+met as the parameters grow, or shrink:
+
+    at one place:  sum over crossings, left to right, of speed * (F before - F after)
+    at a bound:    sum over the stretches between it and the surfaces that come in of F there - F further in, times the
+                   rate at which the stretch grows
+
+Growing parameters put slower surfaces to the left of faster ones, shrinking ones to the right. Where both ways come to
+the same (jumps that are added up), that is the derivative; else there are two, and both are told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from potto.core.printer import format_term
+from potto.core.terms import Term
+from potto.integrate.decomposition.cuts import Cuts, Edge, Meeting, as_array
+from potto.integrate.pieces import Evaluator, Folded, Sided, Sums, gather, mostly, still, take
+from potto.integrate.plan import LevelPlan
+from potto.integrate.rules.gauss import EPS
+from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value
+
+if TYPE_CHECKING:
+    from potto.integrate.adaptive.iterated import Iteration
+
+MOST_AT_ONE_PLACE = 4
+SURE = 1.001  # what rounding may add to a bound
+# Beside a place, in its own size: where surfaces that are 0 at it, to so many times their rounding, have a side. And
+# the part of how they change up to there that the rounding of the place itself comes to.
+BESIDE, CLEAR = 1e-7, 4.0
+MISPLACED = CLEAR * EPS / BESIDE
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One variable of an iteration as it is being integrated: everything that is needed to evaluate its integrand."""
+
+    parent: Iteration
+    number: int
+    level: LevelPlan
+    env: dict[str, Value]
+    sides: dict[int, Mask]
+    machine: Evaluator
+    batch: int = 1
+    root: Ints | None = None
+
+    def below(self, owner: Ints) -> Ints | None:
+        """The members of the outermost batch that some of this one belong to; None if there is but one."""
+        if self.number == 0:
+            return owner if self.batch > 1 else None
+        return None if self.root is None else self.root[owner]
+
+    def counted(self, owner: Ints) -> Bools:
+        """Which of a batch count: not single nodes of the variables further out."""
+        return np.isin(owner, mostly(owner, self.root, self.batch)) if self.number else np.ones(owner.size, dtype=bool)
+
+    def flips(self, cuts: Sequence[int], owner: Ints, x: Array, above: bool) -> tuple[Array, Array]:
+        """F just beside x with every subset of some cuts' surfaces flipped: (2^n, m, B); bit i stands for cut i.
+
+        And the errors of that. Two sections of one surface flip it twice, one at which it only touches 0 not at all.
+        """
+        here, inner = around(self.level, owner, x, above, self.env, self.sides, self.machine)
+        _, beyond = around(self.level, owner, x, not above, self.env, self.sides, self.machine)
+        groups = [group_of(self.level, cut) for cut in cuts]
+        frozen = self.machine.with_directions(0)
+        found = []
+        with nullcontext() if self.machine.costs is None else self.machine.costs.apart():
+            for bits in range(1 << len(groups)):
+                flipped = [g for i, g in enumerate(groups) if bits >> i & 1]
+                way = {
+                    g: np.asarray(beyond[g]) if groups.count(g) == 1 else ~np.asarray(inner[g])
+                    for g in flipped
+                    if flipped.count(g) % 2
+                }
+                both = {**inner, **way}
+                found.append(self.parent.inside(self.number, here, owner.size, both, frozen, self.below(owner)))
+        return np.stack([f for f, _ in found]), np.stack([e for _, e in found])
+
+    def as_it_falls(self, owner: Ints, x: Array) -> Array:
+        """F at x itself, (m, B): a surface that is 0 there is on the side that its comparison says."""
+        here, sides = placed(self.level, owner, x, self.env, self.sides)
+        if self.level.decided:
+            groups = self.parent.plan.groups
+            values = zip(self.level.decided, surfaces_at(self.level, here, owner.size, self.machine), strict=True)
+            up = [v >= 0 if groups[g].up_at_zero else v > 0 for g, (v, _) in values]
+            sides = decided(self.level, sides, up)
+        frozen, root = self.machine.with_directions(0), self.below(owner)
+        return self.parent.inside(self.number, here, owner.size, sides, frozen, root)[0]
+
+    def surface(self, cut: int) -> Term:
+        return self.level.level.cuts[cut].surface
+
+
+def count_places(scene: Scene, cuts: Cuts, sums: Sums) -> None:
+    """Add to the tangents what surfaces on bounds and on one another contribute; say where they have two sides."""
+    level, machine = scene.level, scene.machine
+    places: list[tuple[Ints, Callable[[], tuple[Array, Array, Array]], bool, Sided]] = []
+    for meeting in cuts.meetings:
+        named = Sided(level.variable, scene.surface(meeting.cuts[0]), scene.surface(meeting.cuts[1]))
+        met = meeting.pick(scene.counted(meeting.owner))
+        places.append((met.owner, lambda m=met: at_one_place(scene, m), True, named))  # type: ignore[misc]
+    for group in _on_one_bound(cuts.edges, cuts.sign.size):
+        named = Sided(level.variable, scene.surface(group[0].cut))
+        on = [edge.pick(scene.counted(edge.owner)) for edge in group]
+        places.append((on[0].owner, lambda g=on: at_a_bound(scene, g), False, named))  # type: ignore[misc]
+    for owner, changes, counts, named in places:
+        if not owner.size:
+            continue
+        forward, backward, scale = changes()
+        unknown = ~(np.isfinite(forward) & np.isfinite(backward))
+        if unknown.any():
+            _not_known(scene, sums, owner, unknown, named)
+            forward, backward = np.where(unknown, 0.0, forward), np.where(unknown, 0.0, backward)
+        base = sums.t[:, :, owner]
+        differ = np.abs(forward - backward) > 1e-12 * (np.abs(base) + scale + 1e-300)
+        if machine.side:
+            sums.t[:, :, owner] = base + (forward if machine.side > 0 else backward)
+            continue
+        sums.t[:, :, owner] = base + (forward if counts else np.where(differ, 0.0, forward))
+        two = differ.any(axis=(0, 1))
+        if two.any():
+            machine.note_sided(named, scene.below(owner[two]))
+
+
+def count_slivers(scene: Scene, cuts: Cuts, sums: Sums) -> None:
+    """Add to the errors what may lie between surfaces that rounding does not tell apart."""
+    for found in cuts.slivers:
+        sliver = found.pick(scene.counted(found.owner))
+        if not sliver.owner.size:
+            continue
+        f, _ = scene.flips(sliver.cuts, sliver.owner, sliver.x, not sliver.upper)
+        apart = np.abs(f - f[0]).max(axis=0)
+        lost = SURE * apart * sliver.width
+        lost = np.where(np.isfinite(lost), lost, 0.0)
+        at = (slice(None), sliver.owner)
+        swept = lost * np.where(np.isfinite(sliver.speed), sliver.speed, 0.0)
+        either = apart[:, None] * np.where(np.isfinite(sliver.passes), sliver.passes, 0.0)
+        sums.et[:, :, sliver.owner] += swept[:, None] + np.where(np.isfinite(either), either, 0.0)
+        sums.e[at] += lost
+        if len(sliver.cuts) == 1 and sums.gross is not None:
+            # What lies between two roundings of a bound is rounding of the bound, if there is nothing else, and what
+            # is swept there is one of the sides that the derivative has.
+            empty = (sums.v[at] == 0).all(axis=0)
+            sums.gross[0, sliver.owner] += np.where(empty, lost.max(axis=0), 0.0) / EPS
+            sums.gross[1, sliver.owner] += swept.max(axis=0) / EPS
+
+
+def note_folds(scene: Scene, cuts: Cuts) -> None:
+    """Say where sections of a surface appear or merge just here. At single nodes further out that is no matter."""
+    levels, number = scene.parent.plan.levels, scene.number
+    for fold in cuts.folds:
+        counts = scene.counted(fold.owner)
+        if not counts.any():
+            continue
+        owner, x = fold.owner[counts], float(fold.x[counts][0])
+        here = [scene.env.get(level.variable) for level in levels[:number]]
+        outer = [as_array(cell.v, cuts.sign.size)[owner[0]] for cell in here if isinstance(cell, Cell)]
+        named = Sided(levels[number].variable, levels[number].level.cuts[fold.cut].surface, fold=True)
+        all_of_it = None if number else tuple(map(int, owner))
+        place = Folded(number, fold.cut, x, all_of_it, tuple(map(float, outer)))
+        scene.machine.note_fold(named, place, scene.below(owner))
+
+
+def _not_known(scene: Scene, sums: Sums, owner: Ints, unknown: Bools, named: Sided) -> None:
+    sums.et[:, :, owner] = np.where(unknown, np.inf, sums.et[:, :, owner])
+    assert named.surface is not None
+    members = scene.below(owner[unknown.any(axis=(0, 1))])
+    if named.other is None:
+        where = f"{format_term(named.surface)} = 0 lies on a bound of `{scene.level.variable}`"
+        scene.machine.note_unfinished(f"{where}, and beyond it the integrand is not finite", members)
+    else:
+        where = f"{format_term(named.surface)} = 0 and {format_term(named.other)} = 0 coincide"
+        scene.machine.note_unfinished(f"{where}, and what lies between them is not known", members)
+
+
+def at_one_place(scene: Scene, meeting: Meeting) -> tuple[Array, Array, Array]:
+    """What the forward and the backward derivative have beyond that of the merged cut, (m, k, B); and their size."""
+    v, count = meeting.speeds, len(meeting.cuts)
+    if count > MOST_AT_ONE_PLACE:
+        nothing = np.full((1, *v.shape[1:]), np.nan)
+        return nothing, nothing, np.zeros_like(nothing)
+    f, _ = scene.flips(meeting.cuts, meeting.owner, meeting.x, False)
+    merged = (f[0] - f[-1])[:, None] * meeting.merged_t
+    found = []
+    for sign in (1, -1):
+        order = np.argsort(sign * v, axis=0, kind="stable")
+        after = np.cumsum(1 << order, axis=0)
+        speed = np.take_along_axis(v, order, axis=0)
+        crossed = [(picked(f, a - (1 << o)) - picked(f, a)) * s for a, o, s in zip(after, order, speed, strict=True)]
+        found.append(np.sum(crossed, axis=0) - merged)
+    scale = np.abs(f).max(axis=0)[:, None] * np.abs(v).max(axis=0)
+    return found[0], found[1], scale
+
+
+def at_a_bound(scene: Scene, edges: Sequence[Edge]) -> tuple[Array, Array, Array]:
+    """What the forward and the backward derivative have beyond that without these surfaces, (m, k, B); their size."""
+    first = edges[0]
+    inward = np.stack([e.bound_t - e.root_t if e.upper else e.root_t - e.bound_t for e in edges])
+    if len(edges) > MOST_AT_ONE_PLACE:
+        nothing = np.full((1, *inward.shape[1:]), np.nan)
+        return nothing, nothing, np.zeros_like(nothing)
+    f, _ = scene.flips([e.cut for e in edges], first.owner, first.x, not first.upper)
+    found = []
+    for sign in (1, -1):
+        speed = np.maximum(sign * inward, 0.0)
+        order = np.argsort(-speed, axis=0, kind="stable")
+        after, speed = np.cumsum(1 << order, axis=0), np.take_along_axis(speed, order, axis=0)
+        growth = speed - np.append(speed[1:], np.zeros((1, *speed.shape[1:])), axis=0)
+        gained = [
+            np.where(g > 0, (picked(f, a) - f[0][:, None]) * g, 0.0) for a, g in zip(after, growth, strict=True)
+        ]
+        found.append(sign * np.sum(gained, axis=0))
+    return found[0], found[1], np.abs(f[0])[:, None] + np.abs(f[-1])[:, None]
+
+
+def picked(f: Array, bits: Ints) -> Array:
+    """Of F by subsets (2^n, m, B) the one for each direction and member (k, B): (m, k, B)."""
+    return np.moveaxis(f[bits, :, np.arange(bits.shape[1])], -1, 0)
+
+
+def _on_one_bound(edges: Sequence[Edge], batch: int) -> list[list[Edge]]:
+    """Edges with those others that lie on the same bound of the same members, members with the same ones together.
+
+    Where two sections of one surface meet on a bound it folds there, and which of them come in is not known.
+    """
+    out: list[list[Edge]] = []
+    for upper in (False, True):
+        here = [e for e in edges if e.upper == upper]
+        if not here:
+            continue
+        on = np.zeros((len(here), batch), dtype=bool)
+        for n, edge in enumerate(here):
+            on[n, edge.owner] = True
+        for pattern in np.unique(on[:, on.any(axis=0)], axis=1).T:
+            owner = np.nonzero((on == pattern[:, None]).all(axis=0))[0]
+            group = [e.pick(np.isin(e.owner, owner)) for e, there in zip(here, pattern, strict=True) if there]
+            if len({e.cut for e in group}) == len(group):
+                out.append(group)
+    return out
+
+
+def group_of(level: LevelPlan, cut: int) -> int:
+    """The group whose side a cut of the level decides."""
+    return level.decided[[i for i, c in enumerate(level.level.cuts) if c.decides].index(cut)]
+
+
+def around(
+    level: LevelPlan, owner: Ints, x: Array, above: bool, env: dict[str, Value], sides: dict[int, Mask],
+    machine: Evaluator,
+) -> tuple[dict[str, Value], dict[int, Mask]]:  # fmt: skip
+    """The environment of some members at x, and the sides of all surfaces just above or just below it."""
+    here, inner = placed(level, owner, x, env, sides)
+    if not level.decided:
+        return here, inner
+    step = BESIDE * (1 + np.abs(x)) * (1 if above else -1)
+    at, beside = (surfaces_at(level, {**here, level.variable: Cell(place)}, owner.size, machine)
+                  for place in (x, x + step))  # fmt: skip
+    up = [
+        np.where(np.abs(v) > CLEAR * e + MISPLACED * np.abs(w - v), v, w) >= 0
+        for (v, e), (w, _) in zip(at, beside, strict=True)
+    ]
+    return here, decided(level, inner, up)
+
+
+def placed(
+    level: LevelPlan, owner: Ints, x: Array, env: dict[str, Value], sides: dict[int, Mask]
+) -> tuple[dict[str, Value], dict[int, Mask]]:
+    """The environment of some members at x, where nothing moves, and the sides that were decided further out."""
+    here = gather({n: still(v) for n, v in env.items()}, owner)
+    here[level.variable] = Cell(x)
+    return here, {g: take(m, owner) for g, m in sides.items()}
+
+
+def surfaces_at(
+    level: LevelPlan, here: dict[str, Value], count: int, machine: Evaluator
+) -> list[tuple[Array, Array]]:
+    """The surfaces that a level decides the sides of, with their rounding, (B,) each."""
+    env = {n: here[n] for n in level.surfaces.params}
+    values = machine.with_directions(0).tracking().evaluate(level.surfaces, env, None)
+    assert isinstance(values, tuple)
+    found = []
+    for value in values:
+        assert isinstance(value, Cell)
+        found.append((as_array(value.v, count), as_array(0.0 if value.e is None else value.e, count)))
+    return found
+
+
+def decided(level: LevelPlan, sides: dict[int, Mask], up: Sequence[Bools]) -> dict[int, Mask]:
+    """The sides of all surfaces so far, with those of this level as their own terms say."""
+    sides = dict(sides)
+    for g, side, turned in zip(level.decided, up, level.turned, strict=True):
+        for outer in turned:
+            side = side ^ np.logical_not(sides[outer])
+        sides[g] = side
+    return sides

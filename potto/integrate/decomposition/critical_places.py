@@ -1,0 +1,233 @@
+"""Where systems of equations have solutions: the critical places of integrals further in, found by numbers.
+
+Owns `critical_rows`. Boxes over which the enclosure of an equation leaves out 0 hold no solution. On the others one
+step of Krawczyk's operator either leaves nothing, or shows that there is just one solution and closes in on it, or
+leaves a smaller box, which is halved (Krawczyk 1969; Neumaier, Interval Methods for Systems of Equations, 1990). Where
+that never settles, since surfaces touch, both ends of what is left are cuts. Such cuts need not move: what is
+integrated is continuous there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from potto.calculus.decomposition.critical import Critical, slopes_of
+from potto.core.terms import Term
+from potto.integrate.decomposition.cuts import SEARCHED, Row, as_array
+from potto.integrate.decomposition.root_isolation import between, flat
+from potto.integrate.plan import LevelPlan
+from potto.integrate.rules.gauss import EPS
+from potto.integrate.rules.intervals import Interval, enclosure
+from potto.kernels.cells import Array, Cell, Ints, Value
+
+ROUNDS = 120  # halvings of one side or all of them
+BOXES, BOXES_EACH = 1 << 14, 1 << 8  # at most so many open at once, or so many for each member
+FEW = 256  # boxes up to which all sides of one are halved at once
+FINEST = 2.0**-40  # of the range: a box so narrow along the variable that is cut is not looked at more closely
+INFLATED = 0.1  # by how much a box is larger on which a solution is looked for: it may lie on the edge of one
+SAME = 2.0**-44  # of the range: solutions no farther apart are one
+SHRUNK = 0.7  # of a side: what a step leaves no larger is not halved
+POLISH = 6
+BEYOND = 0.125  # how far beyond its range a turning place is looked for, which the map of nodes takes care of
+
+Places = list[tuple[Array, Array]]
+
+
+def critical_rows(level: LevelPlan, env: dict[str, Value], lo: Cell, hi: Cell, batch: int, machine: Any) -> list[Row]:
+    """The cuts of one variable at places where what lies further in meets, appears, merges or turns."""
+    low, high = as_array(np.minimum(lo.v, hi.v), batch), as_array(np.maximum(lo.v, hi.v), batch)
+    around = BEYOND * np.where(np.isfinite(high - low), high - low, 0.0)
+    rows: list[Row] = []
+    for system in level.level.critical:
+        beyond = around if system.turning else 0.0
+        found = _places(system, level.variable, env, low - beyond, high + beyond)
+        if found is None:
+            machine.note_incomplete(f"where {level.variable} is cut")
+            continue
+        rows += [Row(x, (), -1, system.turning, off) for x, off in found]
+    return rows
+
+
+def _places(system: Critical, variable: str, env: dict[str, Value], low: Array, high: Array) -> Places | None:
+    """The solutions, in rows, and how far off each may be; None if not all are known."""
+    slopes = slopes_of(system, variable)
+    if slopes is None:
+        return None
+    ends = tuple(end for w in system.within for end in (w.lo, w.hi))
+    names = (variable, *(w.variable for w in system.within))
+    terms, env = flat((*system.equations, *slopes, *ends), env)
+    n = len(names)
+    if not all(equation.free.intersection(names) for equation in terms[:n]):
+        return []  # what the parameters alone decide is 0 everywhere, or nowhere
+    fixed: dict[str, Array] = {}
+    for name in frozenset().union(*(t.free for t in terms)).difference(names):
+        value = env[name]
+        if not isinstance(value, Cell):
+            return None
+        fixed[name] = as_array(value.v, low.size)
+    search = _Search(names, fixed, terms[:n], terms[n : n + n * n], terms[n + n * n :])
+    found = search.solved(low, high)
+    if found is None:
+        return None
+    owner, place, width = found
+    return _as_rows(owner, place, width, SAME * np.where(np.isfinite(high - low), high - low, 1.0), low.size)
+
+
+@dataclass
+class _Search:
+    """A search for all solutions, over boxes (n, 2, P): the variable that is cut, then those further in."""
+
+    names: tuple[str, ...]
+    fixed: dict[str, Array]
+    equations: Sequence[Term]
+    slopes: Sequence[Term]
+    ends: Sequence[Term]
+    found: list[tuple[Ints, Array, Array]] = field(default_factory=list)
+
+    def solved(self, low: Array, high: Array) -> tuple[Ints, Array, Array] | None:
+        """Whose the solutions are, where they are along the variable that is cut, and how far off they may be.
+
+        None where there are too many boxes.
+        """
+        owner, box = self.whole(low, high)
+        most = max(BOXES, BOXES_EACH * low.size)
+        tiny = FINEST * (high - low)
+        for _ in range(ROUNDS):
+            if not owner.size:
+                break
+            if owner.size > most:
+                return None
+            owner, box = self.narrowed(owner, box)
+            narrow = ~(box[0, 1] - box[0, 0] > np.maximum(tiny[owner], 4 * EPS * np.abs(box[0]).max(axis=0)))
+            self.leave(owner[narrow], box[:, :, narrow])
+            owner, box = self.halved(owner[~narrow], box[:, :, ~narrow])
+        self.leave(owner, box)
+        if not self.found:
+            return np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0)
+        return tuple(np.concatenate(parts) for parts in zip(*self.found, strict=True))  # type: ignore[return-value]
+
+    def leave(self, owner: Ints, box: Array) -> None:
+        """Both ends of boxes that may hold solutions, as such."""
+        for end in box[0]:
+            self.found.append((owner, end, np.zeros(owner.size)))
+
+    def whole(self, low: Array, high: Array) -> tuple[Ints, Array]:
+        """The box of each member that has one: of the variables further in what their bounds allow."""
+        box = {n: (v, v) for n, v in self.fixed.items()} | {self.names[0]: (low, high)}
+        there = low < high
+        rows = {self.names[0]: (low, high)}
+        for i in reversed(range(1, len(self.names))):  # the outermost of those within comes last in them
+            (a, b), (c, d) = enclosure(tuple(self.ends[2 * i - 2 : 2 * i]), box)
+            ends = (as_array(np.fmin(a, c), low.size), as_array(np.fmax(b, d), low.size))
+            box[self.names[i]] = rows[self.names[i]] = ends
+            there = there & (ends[0] < ends[1])
+        owner = np.nonzero(there)[0]
+        return owner, np.stack([np.stack([end[owner] for end in rows[name]]) for name in self.names])
+
+    def enclosed(self, terms: Sequence[Term], owner: Ints, box: Array) -> Array:
+        """Enclosures of terms: (terms, 2, P)."""
+        at: dict[str, Interval] = {n: (v[owner], v[owner]) for n, v in self.fixed.items()}
+        at |= {name: (side[0], side[1]) for name, side in zip(self.names, box, strict=True)}
+        found = enclosure(tuple(terms), at)
+        return np.stack([np.stack([np.broadcast_to(end, owner.shape) for end in ends]) for ends in found])
+
+    def narrowed(self, owner: Ints, box: Array) -> tuple[Ints, Array]:
+        """What is left of boxes by one step; those with one solution are solved, and gone."""
+        f = self.enclosed(self.equations, owner, box)
+        may = ((f[:, 0] <= 0) & (f[:, 1] >= 0)).all(axis=0)
+        owner, box = owner[may], box[:, :, may]
+        if not owner.size:
+            return owner, box
+        side = box[:, 1] - box[:, 0]
+        with np.errstate(all="ignore"):
+            wide = np.stack((box[:, 0] - INFLATED * side, box[:, 1] + INFLATED * side), axis=1)
+            step = self.step(owner, wide)
+            known = np.isfinite(step).all(axis=(0, 1)) & np.isfinite(wide).all(axis=(0, 1))
+            one = known & ((step[:, 0] > wide[:, 0]) & (step[:, 1] < wide[:, 1])).all(axis=0)
+            lo = np.where(known, np.maximum(box[:, 0], step[:, 0]), box[:, 0])
+            hi = np.where(known, np.minimum(box[:, 1], step[:, 1]), box[:, 1])
+        gone = known & (lo > hi).any(axis=0)
+        self.polished(owner[one & ~gone], step[:, :, one & ~gone])
+        rest = ~(one | gone)
+        return owner[rest], np.stack((lo, hi), axis=1)[:, :, rest]
+
+    def step(self, owner: Ints, box: Array) -> Array:
+        """Krawczyk's operator: m - C f(m) + (1 - C J(box)) (box - m); not finite where it can't be had."""
+        n = len(self.names)
+        slopes = self.enclosed(self.slopes, owner, box)
+        middle, radius = 0.5 * (box[:, 0] + box[:, 1]), 0.5 * (box[:, 1] - box[:, 0])
+        f = self.enclosed(self.equations, owner, np.stack((middle, middle), axis=1))
+        mid = np.moveaxis(0.5 * (slopes[:, 0] + slopes[:, 1]), -1, 0).reshape(-1, n, n)
+        rad = np.moveaxis(0.5 * (slopes[:, 1] - slopes[:, 0]), -1, 0).reshape(-1, n, n)
+        inverse = _inverse(mid)
+        size = np.abs(inverse)
+        off = np.abs(np.eye(n) - inverse @ mid) + size @ rad + 8 * n * EPS * (size @ np.abs(mid))
+        reach = np.einsum("pij,jp->ip", off, radius)
+        value, spread = 0.5 * (f[:, 0] + f[:, 1]), 0.5 * (f[:, 1] - f[:, 0])
+        place = middle - np.einsum("pij,jp->ip", inverse, value)
+        reach += np.einsum("pij,jp->ip", size, spread) + 4 * EPS * np.abs(place)
+        return np.stack((place - reach, place + reach), axis=1)
+
+    def polished(self, owner: Ints, box: Array) -> None:
+        """Note boxes with one solution each, as small as they get."""
+        if not owner.size:
+            return
+        with np.errstate(all="ignore"):
+            for _ in range(POLISH):
+                step = self.step(owner, box)
+                lo, hi = np.maximum(box[:, 0], step[:, 0]), np.minimum(box[:, 1], step[:, 1])
+                fine = np.isfinite(step).all(axis=(0, 1)) & (lo <= hi).all(axis=0)
+                better = np.where(fine, np.stack((lo, hi), axis=1), box)
+                done = (better[0, 1] - better[0, 0] > 0.5 * (box[0, 1] - box[0, 0])).all()
+                box = better
+                if done:
+                    break
+        self.found.append((owner, 0.5 * (box[0, 0] + box[0, 1]), 0.5 * (box[0, 1] - box[0, 0])))
+
+    @staticmethod
+    def halved(owner: Ints, box: Array) -> tuple[Ints, Array]:
+        """Boxes halved along all sides while they are few, else each along its longest."""
+        n = box.shape[0]
+        every = owner.size <= FEW
+        size = (box[:, 1] - box[:, 0]) / np.maximum(1.0, np.abs(box).max(axis=1))
+        longest = np.where(np.isnan(size), np.inf, size).argmax(axis=0)
+        for i in range(n):
+            cut = np.ones(owner.size, dtype=bool) if every else longest == i
+            if not cut.any():
+                continue
+            left, right = box.copy(), box[:, :, cut].copy()
+            middle = between(box[i, 0], box[i, 1])
+            left[i, 1] = np.where(cut, middle, box[i, 1])
+            right[i, 0] = middle[cut]
+            owner, box = np.concatenate((owner, owner[cut])), np.concatenate((left, right), axis=2)
+            longest = np.concatenate((longest, np.full(int(cut.sum()), -1)))
+        return owner, box
+
+
+def _inverse(matrices: Array) -> Array:
+    """The inverse of each matrix (P, n, n); not finite where there is none."""
+    n = matrices.shape[-1]
+    fine: Any = np.isfinite(matrices).all(axis=(1, 2))
+    fine[fine] = np.linalg.det(matrices[fine]) != 0
+    found = np.full(matrices.shape, np.nan)
+    found[fine] = np.linalg.inv(matrices[fine]) if fine.any() else np.zeros((0, n, n))
+    return found
+
+
+def _as_rows(owner: Ints, places: Array, width: Array, same: Array, batch: int) -> Places:
+    """Places in order, one of those at one place for each member, as rows padded with nan."""
+    order = np.lexsort((places, owner))
+    owner, places, width = owner[order], places[order], width[order]
+    apart = places[1:] - places[:-1] > width[1:] + width[:-1] + same[owner[1:]] + 8 * EPS * np.abs(places[1:])
+    new: Any = np.ones(owner.size, dtype=bool)
+    new[1:] = (owner[1:] != owner[:-1]) | apart
+    owner, places, width = owner[new], places[new], width[new]
+    count = np.bincount(owner, minlength=batch)
+    rows, off = np.full((2, int(count.max(initial=0)), batch), np.nan)
+    at = np.arange(owner.size) - (np.cumsum(count) - count)[owner], owner
+    rows[at], off[at] = places, width + SEARCHED * EPS * np.abs(places)
+    return list(zip(rows, off, strict=True))

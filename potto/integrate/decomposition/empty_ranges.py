@@ -1,0 +1,151 @@
+"""Ranges of length zero: there is nothing to integrate over, and the derivative is not 0, since their bounds move.
+
+Owns `Collapsed`, `collapsed_ranges` and `count_collapsed`. A little beside the parameters the range is a short one
+between its bounds, and what jumps at its place cuts it, each as far along as it is fast. What the integral grows by is
+the sum over these stretches of the integrand there times the rate at which the stretch grows (Leibniz' rule, with the
+integrand to be taken between the surfaces). Where growing and shrinking parameters give two answers, both are told.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from potto.integrate.decomposition.coincidences import MOST_AT_ONE_PLACE, Scene, picked
+from potto.integrate.decomposition.cuts import SEARCHED, Row, as_array, tangents
+from potto.integrate.pieces import Sided, Sums
+from potto.integrate.plan import LevelPlan
+from potto.integrate.rules.gauss import EPS
+from potto.kernels.cells import Array, Bools, Cell, Ints
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+
+@dataclass(frozen=True)
+class Collapsed:
+    """Ranges of length zero of some members: `owner` (m,), place x (m,), and the cuts that jump there.
+
+    low, high: how the bounds move, (k, m); speeds: how the cuts do, (n, k, m); off: how far apart the bounds may be by
+    rounding, (m,).
+    """
+
+    cuts: tuple[int, ...]
+    owner: Ints
+    x: Array
+    low: Array
+    high: Array
+    speeds: Array
+    off: Array
+
+    def at_rest(self) -> Collapsed:
+        """The same ranges with nothing that moves."""
+        nothing = {name: np.zeros_like(getattr(self, name)) for name in ("low", "high", "speeds")}
+        return replace(self, **nothing)
+
+
+def collapsed_ranges(
+    level: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, directions: int
+) -> list[Collapsed]:
+    """The ranges of length zero among those of a batch; those with the same jumps at their place together."""
+    low, high = as_array(lo.v, batch), as_array(hi.v, batch)
+    empty: Bools = (low == high) & np.isfinite(low)
+    if not empty.any():
+        return []
+    tl, th = (tangents(bound.t, batch, directions) for bound in (lo, hi))
+    off = sum(np.broadcast_to(0.0 if bound.e is None else bound.e, batch) for bound in (lo, hi))
+    jumps = [row for row in rows if row.cut >= 0 and level.level.cuts[row.cut].decides]
+    found = []
+    for owner, here in _by_jumps(jumps, low, empty):
+        speeds = np.zeros((len(here), directions, owner.size))
+        for n, row in enumerate(here):
+            speeds[n] = tangents(row.t, batch, directions)[:, owner]
+        cuts = tuple(row.cut for row in here)
+        moves = tl[:, owner], th[:, owner], speeds
+        found.append(Collapsed(cuts, owner, low[owner], *moves, np.asarray(off)[owner]))
+    return found
+
+
+def _by_jumps(jumps: list[Row], x: Array, empty: Bools) -> Iterator[tuple[Ints, list[Row]]]:
+    """Members whose range is empty, with the jumps at its place."""
+    on = np.zeros((len(jumps), x.size), dtype=bool)
+    for n, row in enumerate(jumps):
+        near = SEARCHED * EPS * np.abs(x) if row.e is None else row.e
+        on[n] = np.abs(as_array(row.x, x.size) - x) <= near
+    if not on[:, empty].any():
+        yield np.nonzero(empty)[0], []
+        return
+    for pattern in np.unique(on[:, empty], axis=1).T:
+        owner = np.nonzero(empty & (on == pattern[:, None]).all(axis=0))[0]
+        yield owner, [row for row, there in zip(jumps, pattern, strict=True) if there]
+
+
+def count_collapsed(scene: Scene, found: list[Collapsed], sums: Sums) -> Sums:
+    """The sums with what ranges of length zero grow by, and what rounding of their bounds may hide."""
+    for ranges in found:
+        if len(ranges.cuts) > MOST_AT_ONE_PLACE:
+            _unknown(scene, ranges, sums, f"more than {MOST_AT_ONE_PLACE} surfaces meet where a range has length zero")
+            continue
+        if ranges.cuts and scene.parent.plan.hides:
+            _unknown(scene, ranges, sums, "an inner integral jumps where a range has length zero")
+            continue
+        f, e = scene.flips(ranges.cuts, ranges.owner, ranges.x, False)
+        sums = _with_components(sums, f.shape[1])
+        folds = len(set(ranges.cuts)) < len(ranges.cuts)  # what that comes to is known from beside the parameters alone
+        backward, forward = (np.zeros(1) if folds else _growth(f, ranges, sign) for sign in (-1, 1))
+        size, at = np.abs(f).max(axis=0), (slice(None), slice(None), ranges.owner)
+        rates = np.abs(ranges.low) + np.abs(ranges.high)
+        differ = np.abs(forward - backward) > 1e-12 * size[:, None] * rates
+        if scene.machine.side:
+            growth = forward if scene.machine.side > 0 else backward
+        else:
+            as_it_falls = scene.as_it_falls(ranges.owner, ranges.x)[:, None] * (ranges.high - ranges.low)
+            growth = np.where(differ | folds, as_it_falls, forward)
+            two = differ.any(axis=(0, 1))
+            if two.any():
+                named = Sided(scene.level.variable, scene.surface(ranges.cuts[0]))
+                scene.machine.note_sided(named, scene.below(ranges.owner[two]))
+        sums.t[at] = growth
+        sums.et[at] = e.max(axis=0)[:, None] * rates + 4 * EPS * np.abs(growth)
+        sums.e[:, ranges.owner] = np.where(ranges.off > 0, size * ranges.off, 0.0)
+        _note_gross(sums, ranges.owner, size[:, None] * rates)
+        if np.isnan(sums.t[at]).any():
+            _unknown(scene, ranges, sums, "the integrand is not defined where a range has length zero")
+        sums.et[at] = np.where(np.isinf(sums.t[at]), np.inf, sums.et[at])
+    return sums
+
+
+def _growth(f: Array, ranges: Collapsed, sign: int) -> Array:
+    """The rate for parameters that grow, or shrink: (components, k, m). f: by subsets of the cuts that lie below."""
+    low, high, speeds = sign * ranges.low, sign * ranges.high, sign * ranges.speeds
+    first, last = np.minimum(low, high), np.maximum(low, high)
+    order = np.argsort(speeds, axis=0, kind="stable")
+    passed = np.concatenate((np.zeros((1, *low.shape), dtype=np.int64), np.cumsum(1 << order, axis=0)))
+    ends = np.clip(np.take_along_axis(speeds, order, axis=0), first, last)
+    lengths = np.diff(np.concatenate((first[None], ends, last[None])), axis=0)
+    stretches = zip(passed, lengths, strict=True)
+    grown = [np.where(length > 0, picked(f, which) * length, 0.0) for which, length in stretches]
+    return np.asarray(sign * np.where(high < low, -1.0, 1.0) * np.sum(grown, axis=0))
+
+
+def _with_components(sums: Sums, count: int) -> Sums:
+    """Sums over nothing at all don't know how many components there are."""
+    missing = count - sums.v.shape[0]
+    if missing <= 0:
+        return sums
+    parts = (np.concatenate([x] + [x[:1]] * missing) for x in (sums.v, sums.e, sums.t, sums.et))
+    return Sums(*parts, gross=sums.gross)
+
+
+def _note_gross(sums: Sums, owner: Ints, rates: Array) -> None:
+    """What these members add up without regard to sign is at the least what goes in and out at their bounds."""
+    gross = np.zeros((2, sums.v.shape[1])) if sums.gross is None else sums.gross.copy()
+    gross[1, owner] = np.maximum(gross[1, owner], rates.max(axis=(0, 1), initial=0.0))
+    sums.gross = gross
+
+
+def _unknown(scene: Scene, ranges: Collapsed, sums: Sums, reason: str) -> None:
+    sums.et[:, :, ranges.owner] = np.inf
+    scene.machine.note_unfinished(reason, scene.below(ranges.owner))

@@ -1,0 +1,62 @@
+"""Stretches so narrow that rounding hides on which side of a surface they lie.
+
+Owns `count_narrow`. Between two cuts 1e-17 apart a surface is 0 to rounding, and which side is taken is an accident.
+Hardly anything depends on it but a derivative, where the ends of the stretch move apart: so what the integrand is on
+the other side, as far as it differs, is part of the error.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from contextlib import nullcontext
+
+import numpy as np
+
+from potto.integrate.decomposition.coincidences import Scene, placed
+from potto.integrate.pieces import Sums, take
+from potto.integrate.rules import substitution
+from potto.integrate.rules.substitution import Segments
+from potto.kernels.cells import Array, Bools, Ints, Mask
+
+MOST_SURFACES = 4  # whose sides are turned round in all combinations, at one stretch
+
+
+def count_narrow(
+    scene: Scene, seg: Segments, sides: Mapping[int, Mask], doubtful: Mapping[int, Bools], sums: Sums
+) -> None:
+    """Add to the errors what the integrand is on other sides of narrow stretches: doubtful says, by group, of which.
+
+    At single nodes of the variables further out that is no matter.
+    """
+    there = np.stack(list(doubtful.values()))
+    index = np.nonzero(there.any(axis=0))[0]
+    index = index[scene.counted(seg.owner[index])]
+    if not index.size:
+        return
+    for pattern in np.unique(there[:, index], axis=1).T:
+        part = index[(there[:, index] == pattern[:, None]).all(axis=0)]
+        groups = [g for g, doubt in zip(doubtful, pattern, strict=True) if doubt]
+        owner = seg.owner[part]
+        apart = _difference(scene, seg, sides, groups, part) if len(groups) <= MOST_SURFACES else np.full(1, np.inf)
+        for c, rows in enumerate(np.broadcast_to(apart, (sums.v.shape[0], part.size))):
+            np.add.at(sums.e[c], owner, rows * (seg.b - seg.a)[part])
+            for d, spreads in enumerate(np.abs(seg.tb - seg.ta)[:, part]):
+                np.add.at(sums.et[c, d], owner, np.where(spreads > 0, rows * spreads, 0.0))
+
+
+def _difference(scene: Scene, seg: Segments, sides: Mapping[int, Mask], groups: list[int], part: Ints) -> Array:
+    """How far the integrand in the middle of some segments is from what it is with sides of some groups turned round,
+    any of them: (m, S)."""
+    x, _, _ = substitution.points(seg.pick(part), np.full((part.size, 1), 0.5))
+    here, _ = placed(scene.level, seg.owner[part], x[:, 0], scene.env, {})
+    own = {g: take(mask, part) for g, mask in sides.items()}
+    frozen, root = scene.machine.with_directions(0), scene.below(seg.owner[part])
+    found = []
+    with nullcontext() if scene.machine.costs is None else scene.machine.costs.apart():
+        for turned in itertools.product((False, True), repeat=len(groups)):
+            flipped = {g: np.logical_not(own[g]) for g, turn in zip(groups, turned, strict=True) if turn}
+            f, _ = scene.parent.inside(scene.number, here, part.size, {**own, **flipped}, frozen, root)
+            found.append(f)
+    apart = np.max([np.abs(f - found[0]) for f in found], axis=0)
+    return np.where(np.isfinite(apart), apart, np.inf)

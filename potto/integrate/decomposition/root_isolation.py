@@ -1,0 +1,195 @@
+"""Intervals with one root each: of a surface along one variable, for a whole batch at once.
+
+Owns `isolated`, `flat`, `between` and `at_label`. A cell over which the enclosure of the surface leaves out 0 has no
+root; one over which that of its slope does has at most one, and the signs at its ends tell. All others are halved. So
+no root is missed, however narrow what brings it forth; what is given up on, once there are too many cells, is told.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from potto.core.terms import Branch, Proj, Term, Var, children, postorder, rebuild, var
+from potto.integrate.rules.intervals import Interval, enclosure, everywhere
+from potto.kernels.cells import Array, Bools, Cell, Ints, Value
+
+FINEST = 48  # halvings of the whole
+FAR = (2.0**100, 2.0**30, 2.0**9)  # where signs are looked at that infinity does not tell
+OUTSIDE = 64  # how many of the smallest cells away from one a sign is asked for
+CELLS, CELLS_EACH = 1 << 16, 1 << 9  # at most so many open at once, or so many for each member
+
+
+@dataclass
+class Brackets:
+    """owner: (r,) whose; a, b: (r,) ends of cells with a sign change each. complete: whether these are all."""
+
+    owner: Ints
+    a: Array
+    b: Array
+    complete: bool
+
+
+def isolated(surface: Term, slope: Term, variable: str, env: dict[str, Value], low: Array, high: Array) -> Brackets:
+    """The sign changes of a surface between bounds (B,), which may be infinite."""
+    (surface, slope), env = flat((surface, slope), env)
+    fixed: dict[str, Interval] = {}
+    for name in surface.free - {variable}:
+        value = env[name]
+        assert isinstance(value, Cell)
+        fixed[name] = value.v, value.v
+    cells = _Cells(surface, slope, variable, fixed, low, high)
+    there = np.nonzero(low < high)[0]
+    owner, s0, s1 = there, np.zeros(there.size), np.ones(there.size)
+    found: list[tuple[Ints, Array, Array]] = []
+    most = max(CELLS, CELLS_EACH * there.size)
+    complete = True
+    for _ in range(FINEST):
+        if not owner.size:
+            break
+        if owner.size > most:
+            complete = False
+            break
+        settled, crossed, open_ = cells.judged(owner, s0, s1)
+        found.append((owner[settled][crossed], s0[settled][crossed], s1[settled][crossed]))
+        owner, s0, s1 = owner[open_], s0[open_], s1[open_]
+        middle = 0.5 * (s0 + s1)
+        owner, s0, s1 = np.concatenate((owner, owner)), np.concatenate((s0, middle)), np.concatenate((middle, s1))
+    crossed = cells.crossed(owner, s0, s1)
+    found.append((owner[crossed], s0[crossed], s1[crossed]))
+    if complete and owner.size:
+        found.append(_around_poles(cells, owner[~crossed], s0[~crossed], s1[~crossed], found))
+    owners, s0, s1 = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return Brackets(owners, cells.x(owners, s0), cells.x(owners, s1), complete)
+
+
+def _around_poles(
+    cells: _Cells, owner: Ints, s0: Array, s1: Array, found: list[tuple[Ints, Array, Array]]
+) -> tuple[Ints, Array, Array]:
+    """Places with a sign change among the smallest cells, next to each other, that say nothing by themselves.
+
+    So close to a pole no enclosure has a sign: it is asked for a little outside. What was found there already is left.
+    """
+    order = np.lexsort((s0, owner))
+    owner, s0, s1 = owner[order], s0[order], s1[order]
+    width = 2.0**-FINEST
+    first = np.ones(owner.size, dtype=bool)
+    first[1:] = (owner[1:] != owner[:-1]) | (s0[1:] > s1[:-1] + width)
+    starts = np.nonzero(first)[0]
+    if not starts.size:
+        return owner, s0, s1
+    owner, s0, s1 = owner[starts], s0[starts], np.maximum.reduceat(s1, starts)
+    s0, s1 = np.maximum(s0 - OUTSIDE * width, 0.0), np.minimum(s1 + OUTSIDE * width, 1.0)
+    crossed = cells.crossed(owner, s0, s1)
+    for o, a, b in found:
+        for i in np.nonzero(crossed)[0]:
+            crossed[i] = not ((o == owner[i]) & (b >= s0[i]) & (a <= s1[i])).any()
+    return owner[crossed], s0[crossed], s1[crossed]
+
+
+def flat(terms: tuple[Term, ...], env: dict[str, Value]) -> tuple[list[Term], dict[str, Value]]:
+    """Terms with a name of its own for each component of a tuple, and their values."""
+    parts: dict[Term, Value] = {}
+    memo: dict[Term, Term] = {}
+    for node in postorder(*terms):
+        if isinstance(node, Var) and isinstance(env.get(node.name), tuple):
+            parts[node] = env[node.name]
+        if isinstance(node, Proj) and node.term in parts:
+            parts[node] = parts[node.term][node.index]  # type: ignore[index]
+            memo[node] = var(f"component {len(parts)}")
+        else:
+            memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
+    named = {new.name: parts[old] for old, new in memo.items() if old in parts and isinstance(new, Var)}
+    return [memo[term] for term in terms], {**env, **named}
+
+
+def between(a: Array, b: Array) -> Array:
+    """A point between the ends, also of what is not finite."""
+    middle = 0.5 * (a + b)
+    up, down = np.maximum(2 * np.abs(a), 1.0), -np.maximum(2 * np.abs(b), 1.0)
+    far = np.where(np.isinf(b), up, np.where(np.isinf(a), down, middle))
+    return np.where(np.isinf(a) & np.isinf(b), 0.0, far)
+
+
+def at_label(low: Array, high: Array, s: Array) -> Array:
+    """The places of labels in [0, 1] between bounds that may be infinite."""
+    with np.errstate(all="ignore"):
+        x = low + (high - low) * s
+        if np.isfinite(x).all():
+            return np.where(s == 1, high, x)
+        up, down = low + s / (1 - s), high - (1 - s) / s
+        whole = (2 * s - 1) / (4 * s * (1 - s))
+    x = np.where(np.isinf(high), np.where(np.isinf(low), whole, up), np.where(np.isinf(low), down, x))
+    return np.where(s == 0, low, np.where(s == 1, high, x))
+
+
+@dataclass
+class _Cells:
+    surface: Term
+    slope: Term
+    variable: str
+    fixed: dict[str, Interval]
+    low: Array
+    high: Array
+
+    def __post_init__(self) -> None:
+        self.total = everywhere(self.surface)
+        self.branches = tuple(node.surface for node in postorder(self.surface) if isinstance(node, Branch))
+
+    def x(self, owner: Ints, s: Array) -> Array:
+        """The places of labels in [0, 1], also where a bound is infinite."""
+        return at_label(self.low[owner], self.high[owner], s)
+
+    def at(self, owner: Ints) -> dict[str, Interval]:
+        return {n: (v[0][owner], v[1][owner]) if isinstance(v[0], np.ndarray) else v for n, v in self.fixed.items()}
+
+    def judged(self, owner: Ints, s0: Array, s1: Array) -> tuple[Ints, Bools, Ints]:
+        """The cells with at most one root, whether they have one, and the cells that are to be halved."""
+        a, b = self.x(owner, s0), self.x(owner, s1)
+        box = {**self.at(owner), self.variable: (a, b)}
+        (lo, hi), (least, most) = (
+            tuple(np.broadcast_to(end, a.shape) for end in ends) for ends in enclosure((self.surface, self.slope), box)
+        )
+        middle = self.x(owner, 0.5 * (s0 + s1))
+        here = enclosure((self.surface,), {**self.at(owner), self.variable: (middle, middle)})[0]
+        reach = np.maximum(b - middle, middle - a)
+        with np.errstate(invalid="ignore", over="ignore"):  # mean values: closer than the enclosure in small cells
+            far = np.maximum(np.abs(least), np.abs(most)) * reach
+            apart = (here[0] - far > 0) | (here[1] + far < 0)
+            steady = (least >= 0) | (most <= 0)
+        if not self.total:  # a slope says nothing across the edge of where the surface has a value
+            whole = ~(self.nowhere(owner, a) | self.nowhere(owner, b))
+            apart, steady = apart & whole, steady & whole
+        for low, high in enclosure(self.branches, box):  # nor across a jump
+            one = (low > 0) | (high < 0)
+            apart, steady = apart & one, steady & one
+        free = (lo > 0) | (hi < 0) | np.isnan(lo) | apart
+        settled = ~free & steady
+        index = np.nonzero(settled)[0]
+        return index, self.crossed(owner[index], s0[index], s1[index]), np.nonzero(~free & ~settled)[0]
+
+    def nowhere(self, owner: Ints, x: Array) -> Bools:
+        lo, _ = enclosure((self.surface,), {**self.at(owner), self.variable: (x, x)})[0]
+        return np.broadcast_to(np.isnan(lo), x.shape)
+
+    def value(self, owner: Ints, x: Array) -> Array:
+        """The surface at places, nan where nothing is known of it."""
+        lo, hi = enclosure((self.surface,), {**self.at(owner), self.variable: (x, x)})[0]
+        with np.errstate(invalid="ignore"):
+            return np.broadcast_to(np.where((lo == -np.inf) & (hi == np.inf), np.nan, 0.5 * (lo + hi)), x.shape)
+
+    def crossed(self, owner: Ints, s0: Array, s1: Array) -> Bools:
+        """Whether the surface's sign changes over cells. A root on an end belongs to the cell on its right."""
+        values = []
+        for s in (s0, s1):
+            x = self.x(owner, s)
+            value = self.value(owner, x)
+            for size in FAR:  # at infinity the terms of a sum may have no sum
+                lost = np.isnan(value) & np.isinf(x)
+                if not lost.any():
+                    break
+                value = np.where(lost, self.value(owner, np.where(lost, np.copysign(size, x), x)), value)
+            values.append(value)
+        left, right = values
+        return np.asarray((left * np.sign(right) < 0) | ((left == 0) & (right != 0)) | ((right == 0) & (s1 == 1)))

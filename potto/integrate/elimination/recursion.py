@@ -1,0 +1,257 @@
+"""Integrals over many variables as integrals over one, each of a table of the one before.
+
+Owns `Eliminated`, `eliminated` (what is known of the steps before any number) and `one_by_one` (the numbers). What each
+step leaves in the number that it depends on, the places where a surface enters or leaves the bounds, are the pieces of
+its table, and the cuts of the next step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from potto.calculus.algebra.affine import affine
+from potto.calculus.algebra.ranges import range_of
+from potto.calculus.decomposition.elimination import Step, eliminate
+from potto.calculus.decomposition.sweep import MOST_CENTERS, Level, cut_along, points_of, sweep
+from potto.calculus.surfaces.case_split import cased
+from potto.calculus.surfaces.discontinuities import Finding, Kind, Resolve, TooDeep, findings, undecided
+from potto.core.simplify import simplify
+from potto.core.terms import Deriv, Integral, Lam, Term, Tuple, const, integral, substitute, tuple_
+from potto.integrate.adaptive.iterated import Iteration
+from potto.integrate.decomposition.vanishing import vanishing_of
+from potto.integrate.elimination.interpolants import Table, finite, tabulated
+from potto.integrate.pieces import Evaluator, Sums, still
+from potto.integrate.plan import Plan, function_of, group_levels, level_plan
+from potto.integrate.rules.gauss import EPS
+from potto.kernels.cells import Array, Cell, Mask, Value, pad
+
+START_ORDER = 16
+# The accuracy of each step as a part of what is asked for.
+SHARE = 0.02
+FINEST = 1e-14
+AFFORDABLE = 1_000_000  # evaluations: more than that is no good use of one number
+SLIVER = 16  # roundings of its ends, that a piece of a table is longer than
+MOST_PLACES = 64  # where the integral over one variable is not smooth in the number that it depends on
+
+# A place in the state of a step, as a surface, and what is there.
+Place = tuple[Term, Kind]
+
+
+@dataclass(frozen=True)
+class Eliminated:
+    """The steps, outermost first: the plan of each, and where its integral is not smooth, or has a peak."""
+
+    steps: tuple[Step, ...]
+    plans: tuple[Plan, ...]
+    places: tuple[tuple[Place, ...], ...]
+
+
+def eliminated(term: Integral, resolve: Resolve) -> Eliminated | None:
+    """What is known of an integral's steps; None where it has none."""
+    steps = eliminate(term)
+    if steps is None:
+        return None
+    plans: list[Plan] = []
+    places: list[tuple[Place, ...]] = []
+    further: tuple[Place, ...] = ()
+    state = ""
+    for step in reversed(steps):
+        try:
+            found = _planned(step, further, state, resolve, _centers(term, step.variable, resolve))
+        except TooDeep:
+            return None
+        if found is None:
+            return None
+        plan, further = found
+        state = step.state or ""
+        if len(further) > MOST_PLACES:
+            return None
+        plans.append(plan)
+        places.append(further)
+    return Eliminated(steps, tuple(reversed(plans)), tuple(reversed(places)))
+
+
+def _planned(
+    step: Step, further: Sequence[Place], state: str, resolve: Resolve, centers: Iterable[Finding]
+) -> tuple[Plan, tuple[Place, ...]] | None:
+    """The plan of one step, and where its integral is not smooth in its state.
+
+    further: where that of the next step is not, in terms of `state`. centers: further ones that the variable has.
+    """
+    body = step.weight if step.passed is None else tuple_((step.weight, step.passed))
+    term = cased(integral((step.variable,), ((step.lo, step.hi),), body))
+    body = term.body
+    weight = body.items[0] if step.passed is not None and isinstance(body, Tuple) else body
+    unknown: set[Term] = set()
+
+    def known(head: Term) -> Lam | Deriv | None:
+        function = resolve(head)
+        if function is None:
+            unknown.add(head)
+        return function
+
+    found = [*findings(body, known), *centers]
+    if unknown or any(f.kind == "jump" and step.variable in f.surface.free and not f.path for f in found):
+        return None
+    hides = False  # what is further in jumps in what is passed on, and can't be told which side to take
+    for surface, kind in further if step.passed is not None else ():
+        assert step.passed is not None
+        found.append(Finding(kind, substitute(surface, {state: step.passed})))
+        hides |= kind == "jump"
+    steps = [f for f in found if f.kind == "jump" and step.variable not in f.surface.free]
+    swept = sweep(term, (f for f in found if f not in steps), known, undecided)
+    for cut in swept.levels[0].cuts:
+        if cut.decides and cut.product:
+            steps += (Finding("jump", factor.form) for factor in cut.product.outer)
+    levels, groups = group_levels(swept.levels)
+    numbers = {j.path: (g.number, j.orientation) for g in groups for j in g.cut.jumps}
+    vanishing = vanishing_of(body, numbers, weight)
+    plan = Plan(term, levels, groups, function_of(body), vanishing, (), hides=hides)
+    places = (f for f in (*steps, *swept.outer) if f.critical is None)
+    return plan, tuple((f.surface, f.kind) for f in places if step.state in f.surface.free)
+
+
+def _centers(term: Integral, variable: str, resolve: Resolve) -> list[Finding]:
+    """The centers that the integrand has in one variable, whatever the others are."""
+    names = set(term.variables)
+    return [f for f in findings(term.body, resolve) if f.kind == "center" and f.surface.free & names == {variable}]
+
+
+@dataclass
+class _Tabled(Iteration):
+    """The integral of one step: weight times what is further in, by its table, or the number that it is."""
+
+    further: Table | Cell | None = None
+
+    def body(self, env: dict[str, Value], sides: dict[int, Mask], machine: Evaluator) -> Value:
+        value, k = super().body(env, sides, machine.tracking()), self.machine.directions
+        if self.further is None:
+            return value
+        if isinstance(self.further, Cell):
+            assert isinstance(value, Cell)
+            return _times(value, self.further)
+        assert isinstance(value, tuple)
+        weight, passed = value
+        assert isinstance(weight, Cell) and isinstance(passed, Cell)
+        return _times(weight, self.further.at(passed, k, machine.directions))
+
+
+def one_by_one(known: Eliminated, machine: Any, env: dict[str, Value]) -> Sums | None:
+    """The integral, each step from the table of the next; None where one can't be made."""
+    settings = machine.settings
+    most = min(settings.max_evals, int(machine.books.spent) + AFFORDABLE)
+    finer = replace(settings, rtol=max(SHARE * settings.rtol, FINEST), atol=0.0, max_evals=most)
+    fine = replace(machine, settings=finer)
+    spans = _spans(known.steps, env)
+    further: Table | Cell | None = None
+    sums: Sums | None = None
+    rows = list(zip(known.steps, known.plans, known.places, spans, strict=True))
+    for step, plan, places, span in reversed(rows):
+        below = further
+        if step.state is None:
+            sums = _Tabled(plan, fine, START_ORDER, tracked=True, further=below).run(0, env, 1, {}, fine)
+            further = _cell(sums)
+            if isinstance(below, Table) and not below.seen:
+                return None
+            continue
+        if not np.isfinite(span).all():
+            return None
+        # As one inside another: how much each may err is measured by the largest of all.
+        inside = replace(plan, levels=(*plan.levels, *plan.levels))
+        iteration = _Tabled(inside, fine, START_ORDER, tracked=True, further=further)
+        further = _table(iteration, step.state, places, span, fine, env)
+        if further is None or (isinstance(below, Table) and not below.seen):
+            return None
+    return sums
+
+
+def _table(
+    iteration: Iteration, state: str, places: Sequence[Place], span: tuple[float, float], machine: Any,
+    env: dict[str, Value],
+) -> Table | None:  # fmt: skip
+    cuts = tuple(replace(cut_along(at, state), turning=kind == "edge", steps=kind == "jump")
+                 for at, kind in places if kind != "center")  # fmt: skip
+    hints = points_of((at for at, kind in places if kind == "center"), state)[:MOST_CENTERS]
+    level = level_plan(Level(state, const(span[0]), const(span[1]), hints, cuts), (), ())
+    found, _ = iteration.cut(level, env, 1, machine)
+    segments = found.segments
+    size = np.maximum(np.abs(segments.a), np.abs(segments.b))
+    segments = segments.pick(segments.b - segments.a > SLIVER * EPS * size)  # a span is rounded outwards
+
+    def function(x: Array, speeds: Array) -> Sums:
+        """Without speeds values alone."""
+        wide = machine.with_directions(len(speeds))
+        here = {name: pad(value, wide.directions) if len(speeds) else still(value) for name, value in env.items()}
+        together = np.zeros(x.size, dtype=np.int64)  # what single nodes meet is no matter
+        with machine.books.apart() as met:
+            sums = iteration.run(1, {**here, state: Cell(x, None, tuple(speeds))}, x.size, {}, wide, together)
+        if not len(speeds):  # at the ends of pieces: derivatives are not asked for
+            met.folds.clear()
+            met.sided.clear()
+        machine.books.met.take(met, None)
+        return sums
+
+    if found.conflict or not segments.a.size or not finite(segments).all():
+        return None
+    return tabulated(segments, machine.directions, function, machine.rtol)
+
+
+def _spans(steps: Sequence[Step], env: dict[str, Value]) -> list[tuple[float, float]]:
+    """Between which numbers the state of each step is."""
+    box: dict[str, tuple[float, float]] = {}
+    for name, value in env.items():
+        if isinstance(value, Cell):
+            box[name] = (float(np.ravel(value.v)[0]),) * 2
+    spans: list[tuple[float, float]] = []
+    before: Step | None = None
+    for step in steps:
+        span = (-np.inf, np.inf)
+        if step.state is not None and before is not None and before.passed is not None:
+            span = box[step.state] = _span(before, before.passed, box)
+        spans.append(span)
+        lo, hi = range_of(step.lo, box), range_of(step.hi, box)
+        box[step.variable] = (min(lo.lo, hi.lo), max(lo.hi, hi.hi))
+        before = step
+    return spans
+
+
+def _span(step: Step, passed: Term, box: dict[str, tuple[float, float]]) -> tuple[float, float]:
+    """Between which numbers is what a step passes on: what is affine in the variable has its extremes at the bounds."""
+    found = range_of(passed, box)
+    if affine(passed, (step.variable,)) is None:
+        return found.lo, found.hi
+    ends = [range_of(simplify(substitute(passed, {step.variable: end})), box) for end in (step.lo, step.hi)]
+    return max(found.lo, min(end.lo for end in ends)), min(found.hi, max(end.hi for end in ends))
+
+
+def _cell(sums: Sums) -> Cell:
+    return Cell(float(sums.v[0, 0]), float(sums.e[0, 0]), tuple(map(float, sums.t[0, :, 0])),
+                tuple(map(float, sums.et[0, :, 0])))  # fmt: skip
+
+
+def _times(a: Cell, b: Cell) -> Cell:
+    """The product; 0 where the first is 0, whatever the other is."""
+    wide = max(len(a.t), len(b.t))
+
+    def part(x: Any) -> Any:
+        return 0.0 if x is None else x
+
+    def of(x: tuple[Any, ...], d: int) -> Any:
+        return part(x[d]) if d < len(x) else 0.0
+
+    nothing = np.asarray(a.v) == 0
+    v, e = np.where(nothing, 0.0, b.v), np.where(nothing, 0.0, part(b.e))
+    value = a.v * v
+    error = np.abs(a.v) * e + np.abs(v) * part(a.e) + 2 * EPS * np.abs(value)
+    t, et = [], []
+    for d in range(wide):
+        at, bt = of(a.t, d), np.where(nothing, 0.0, of(b.t, d))
+        aet, bet = of(a.et, d), np.where(nothing, 0.0, of(b.et, d))
+        t.append(at * v + a.v * bt)
+        et.append(np.abs(at) * e + np.abs(v) * aet + np.abs(a.v) * bet + np.abs(bt) * part(a.e)
+                  + 2 * EPS * (np.abs(at * v) + np.abs(a.v * bt)))  # fmt: skip
+    return Cell(value, error, tuple(t), tuple(et))

@@ -1,0 +1,312 @@
+"""One integral between known cuts, straight through: no pieces, no refinement, as many nodes as were proved enough.
+
+Owns `Straight` and `straight`. Where all cuts are closed forms and on every cell between them the integrand is one
+analytic formula, `proofs` says beforehand how many nodes do. What is left is a short program: bounds and cuts as
+formulas of the variables further out, the nodes between them, the formula at the nodes, weighted sums. Its derivative
+is that of the program, whose nodes move with the parameters (Reynolds' transport theorem: a surface that moves takes
+its nodes along, so that no boundary term is left). Its rounding is kept track of as everywhere outside of integrals, by
+a running error analysis from the bounds to the sums. Whatever is not plain here is left to `levels`.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from potto.core.terms import (
+    Branch,
+    Const,
+    Integral,
+    Lam,
+    Term,
+    children,
+    postorder,
+    prim,
+    rebuild,
+    tuple_,
+)
+from potto.integrate.fixed.moving_sums import Totals, evaluated, function_of, summed
+from potto.integrate.pieces import Evaluator, Sums
+from potto.integrate.rules.complex_enclosures import enclosable
+from potto.integrate.rules.gauss import EPS
+from potto.integrate.rules.proved_orders import Cell as Stretch
+from potto.integrate.rules.proved_orders import Region, proved
+from potto.kernels.cells import Cell, Value
+
+if TYPE_CHECKING:
+    from potto.integrate.plan import LevelPlan
+
+MOST_VARIABLES, MOST_CUTS, MOST_CELLS, MOST_NODES, MOST_TERMS = 3, 8, 24, 60_000, 300
+# The truncation error that is proved for the value, as a part of the accuracy that is asked for; nobody gains by less
+# than LOOSEST.
+MARGIN = 1e-3
+LOOSEST = 1e-8
+# How many times its rounding a surface must be away from 0, and cuts from each other.
+CLEAR = 64.0
+# A region of parameters: this part of the power of two below a parameter's size, or below the first variable's range.
+REGION = 2.0**-5
+TINY = 1e-280
+# How far off a rule may be for a sum that cancels, as a part of what it is when nothing does.
+NOISE = 1e-12
+MOST_REGIONS = 512
+UNKNOWN = object()
+
+Path = tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True)
+class Straight:
+    """The terms of an integral for this way: frames per variable (bounds, then cuts), the integrand without calls.
+
+    jumps: per variable the surfaces that it crosses, with the rows of the frame that are their places. turning: the
+    rows where something is like a square root. surfaces: what the integrand's branches depend on, as one function to a
+    tuple. names: parameters.
+    """
+
+    variables: tuple[str, ...]
+    frames: tuple[Lam, ...]
+    jumps: tuple[tuple[tuple[Term, tuple[int, ...]], ...], ...]
+    turning: tuple[frozenset[int], ...]
+    body: Term
+    surfaces: Lam
+    names: tuple[str, ...]
+    faces: dict[tuple[bool, ...], Term] = field(default_factory=dict, compare=False)
+    regions: dict[Any, object] = field(default_factory=dict, compare=False)
+
+    @property
+    def items(self) -> tuple[tuple[Term, ...], ...]:
+        return tuple(children(frame.body) for frame in self.frames)
+
+    def face(self, sides: tuple[bool, ...]) -> Term:
+        """The integrand on one side of each of its surfaces."""
+        found = self.faces.get(sides)
+        if found is None:
+            side = dict(zip(children(self.surfaces.body), sides, strict=True))
+            found = self.faces[sides] = _on_sides(self.body, side)
+        return found
+
+
+def straight(term: Integral, body: Term, levels: Sequence[LevelPlan]) -> Straight | None:
+    """The terms for this way; None if a cut has no closed form, or the integrand no formula that can be bounded.
+
+    body: the integrand with calls carried out.
+    """
+    if len(levels) > MOST_VARIABLES or any(_not_plain(level) for level in levels):
+        return None
+    nodes = postorder(body)
+    if len(nodes) > MOST_TERMS:
+        return None
+    surfaces = tuple(dict.fromkeys(node.surface for node in nodes if isinstance(node, Branch)))
+    cuts = (cut for level in levels for cut in children(level.frame.body))
+    if not all(map(enclosable, (*surfaces, _all_sides(body), *cuts))):
+        return None
+    frames = tuple(level.frame for level in levels)
+    free = body.free.union(*(frame.body.free for frame in frames)) - set(term.variables)
+    jumps = tuple(
+        tuple(
+            (cut.surface, tuple(row for row, (at, _) in enumerate(level.rows, 2) if at == number))
+            for number, cut in enumerate(level.level.cuts)
+            if cut.jumps
+        )
+        for level in levels
+    )
+    turning = tuple(frozenset(row for row, (_, turns) in enumerate(level.rows, 2) if turns) for level in levels)
+    return Straight(term.variables, frames, jumps, turning, body, function_of(tuple_(surfaces)), tuple(sorted(free)))
+
+
+def _not_plain(level: LevelPlan) -> bool:
+    return bool(level.searched or level.families or any(level.turned)) or len(level.rows) > MOST_CUTS
+
+
+def _all_sides(body: Term) -> Term:
+    """A term with everything in it that the integrand has on any of its sides."""
+    memo: dict[Term, Term] = {}
+    for node in postorder(body):
+        if isinstance(node, Branch):
+            memo[node] = prim("add", memo[node.then], memo[node.orelse])
+        else:
+            memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
+    return memo[body]
+
+
+def _on_sides(body: Term, sides: Mapping[Term, bool]) -> Term:
+    memo: dict[Term, Term] = {}
+    for node in postorder(body):
+        if isinstance(node, Branch):
+            memo[node] = memo[node.then if sides[node.surface] else node.orelse]
+        else:
+            memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
+    return memo[body]
+
+
+# Where the cells are
+
+
+class _NotPlain(Exception):
+    """Something that this way does not provide for: a cut on a bound, a surface that is 0 in a cell's middle."""
+
+
+def _cells(
+    plan: Straight, machine: Evaluator, env: dict[str, Value], frame: tuple[Cell, ...]
+) -> tuple[tuple[Stretch, ...], float]:
+    """The cells between the cuts, with the integrand on each; those on which it is 0 left out. And the least length.
+
+    frame: the bounds and cuts of the outermost variable.
+    """
+    tracked = machine.with_directions(machine.directions if machine.costs is not None else 0).tracking()
+    cells: list[Stretch] = []
+    here, shortest = dict(env), math.inf
+
+    def over(i: int, path: Path) -> None:
+        nonlocal shortest
+        if i == len(plan.variables):
+            face = plan.face(_sides(plan, tracked, here))
+            dark = isinstance(face, Const) and face.value == 0
+            if machine.costs is not None:
+                machine.costs.stretches(1, 0 if dark else 1)
+            if not dark:
+                cells.append(Stretch(path, face))
+            return
+        values = evaluated(plan.frames[i], tracked, here) if i else frame
+        for low, high, middle, length in _stretches(plan, i, tracked, values):
+            here[plan.variables[i]] = Cell(middle)
+            shortest = min(shortest, length)
+            over(i + 1, (*path, (low, high)))
+
+    over(0, ())
+    return tuple(cells), shortest
+
+
+def _stretches(
+    plan: Straight, i: int, machine: Evaluator, values: tuple[Cell, ...]
+) -> list[tuple[int, int, float, float]]:
+    """Between which rows of the frame one variable runs, the middles and the lengths."""
+    if machine.costs is not None:
+        for surface, rows in plan.jumps[i]:
+            roots = [(values[row].v, values[row].t) for row in rows]
+            machine.costs.saw(surface, roots, values[0].v, values[1].v, machine.directions > 0)
+    places = []
+    for row, cell in enumerate(values):
+        x, e = float(cell.v), float(cell.e or 0.0)
+        if not math.isfinite(x) or not math.isfinite(e):
+            raise _NotPlain
+        places.append((x, CLEAR * e, row))
+    lo, hi, rest = places[0], places[1], places[2:]
+    kept = [lo]
+    for place in sorted(rest):
+        if place[0] >= lo[0] - lo[1] - place[1] and place[0] <= hi[0] + hi[1] + place[1]:
+            kept.append(place)
+    if not plan.turning[i].isdisjoint(row for _, _, row in kept):
+        raise _NotPlain
+    kept.append(hi)
+    if any(b[0] - a[0] <= a[1] + b[1] for a, b in itertools.pairwise(kept)):
+        raise _NotPlain
+    return [(a[2], b[2], 0.5 * (a[0] + b[0]), b[0] - a[0]) for a, b in itertools.pairwise(kept)]
+
+
+def _sides(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> tuple[bool, ...]:
+    if not children(plan.surfaces.body):
+        return ()
+    sides = []
+    for cell in evaluated(plan.surfaces, machine, env):
+        x = float(cell.v)
+        if not abs(x) > CLEAR * float(cell.e or 0.0):
+            raise _NotPlain
+        sides.append(x > 0)
+    return tuple(sides)
+
+
+# What is proved
+
+
+def _region(
+    plan: Straight, cells: tuple[Stretch, ...], values: Mapping[str, float], reach: float, shortest: float, rtol: float
+) -> Region | None:
+    """What is known of the rules for these cells, in the region in which the parameters lie; proved once.
+
+    Regions are as large as the parameters, or as the domain where that is larger; if nothing can be proved of those,
+    as the parameters alone, then as the shortest stretch.
+    """
+    sizes = [{n: max(abs(v), reach) for n, v in values.items()}]
+    if any(abs(v) < reach / 8 for v in values.values()):
+        sizes.append({n: abs(v) or reach for n, v in values.items()})
+    if shortest < reach / 8:
+        sizes.append({n: min(abs(v) or reach, shortest) for n, v in values.items()})
+    for size in sizes:
+        places = []
+        for name, value in values.items():
+            step = 2.0 ** math.floor(math.log2(size[name])) * REGION
+            if step < TINY:
+                return None
+            places.append((name, round(value / (2 * step)) * 2 * step, step))
+        key = (cells, tuple(places), rtol)
+        region = plan.regions.get(key, UNKNOWN)
+        if region is UNKNOWN:
+            if len(plan.regions) >= MOST_REGIONS:
+                plan.regions.clear()
+            middle, radius = {n: m for n, m, _ in places}, {n: r for n, _, r in places}
+            region = proved(plan.variables, plan.items, cells, middle, radius, MARGIN * rtol)
+            plan.regions[key] = region
+        if region is not None:
+            return region  # type: ignore[return-value]
+    return None
+
+
+# The integral
+
+
+def certain(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Sums | None:
+    """The integral for one set of parameters; None where something about it is not plain."""
+    if machine.frozen or machine.side:
+        return None
+    values: dict[str, float] = {}
+    for name in plan.names:
+        cell = env.get(name)
+        if not isinstance(cell, Cell) or cell.arrays() or not math.isfinite(cell.v):
+            return None
+        values[name] = float(cell.v)
+    frame = evaluated(plan.frames[0], machine.tracking(), env)
+    try:
+        cells, shortest = _cells(plan, machine, env, frame)
+    except _NotPlain:
+        return None
+    k = machine.directions
+    if not cells:
+        v, e, gross = np.zeros((1, 1)), np.zeros((1, 1)), np.zeros((2, 1))
+        return Sums(v, e, np.zeros((1, k, 1)), np.zeros((1, k, 1)), gross=gross)
+    region = None
+    if len(cells) <= MOST_CELLS:
+        reach = float(frame[1].v - frame[0].v)
+        region = _region(plan, cells, values, reach, shortest, min(machine.rtol, LOOSEST))
+    if region is None or sum(region.outer) * math.prod(region.inner) > MOST_NODES:
+        return None
+    sums = summed(plan.variables, plan.frames, region, machine, env, frame)
+    return None if sums is None else _accurate(sums, region, machine, [env[name] for name in plan.names])
+
+
+def _accurate(found: Totals, region: Region, machine: Evaluator, parameters: Sequence[Value]) -> Sums | None:
+    """The answer, if it is as accurate as was asked for, or as its rounding allows."""
+    k = machine.directions
+    truncation = [region.error]
+    for d in range(k):
+        speeds = {}
+        for name, cell in zip(region.radius, parameters, strict=True):
+            assert isinstance(cell, Cell)
+            t = cell.t[d] if d < len(cell.t) else None
+            speeds[name] = 0.0 if t is None else float(t)
+        truncation.append(region.rate(speeds))
+    errors, unit = [], EPS * max(found.gross)
+    for x, rounding, gross, beyond in zip(found.number, found.rounding, found.gross, truncation, strict=True):
+        asked = 0.5 * max(machine.atol, machine.rtol * abs(x))
+        if not (rounding <= asked and beyond <= max(asked, NOISE * gross, unit)):
+            return None
+        errors.append(rounding + beyond)
+    v, t = np.array(found.number[:1]), np.array(found.number[1:])
+    e, et = np.array(errors[:1]), np.array(errors[1:])
+    added = np.array([[found.gross[0]], [max(found.gross[1:], default=0.0)]])
+    return Sums(v[None], e[None], t[None, :, None], et[None, :, None], gross=added)

@@ -1,0 +1,192 @@
+"""Members of a batch that nothing cuts: their boxes are integrated whole, by one product rule.
+
+Owns `Box` and `uncut`. Of a picture's pixels all but a few lie on one side of every surface. Where a surface is affine
+in each variable of integration, its extremes over a box are at the corners, so that signs there tell whether it
+crosses. Such a box needs no cuts and has no boundary terms: a small product of Gauss rules does, whose coefficients
+tell in each variable whether it was enough. What is not shown to be smooth and accurate here is left to `levels`.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from potto.calculus.surfaces.discontinuities import Finding
+from potto.core.terms import Integral, Lam, Prim, Term, lam, postorder, tuple_
+from potto.integrate.pieces import Evaluator, Sums, components, still
+from potto.integrate.rules.gauss import EPS, gauss, truncation
+from potto.kernels.cells import Array, Bools, Cell, Value, map_arrays
+
+MOST_VARIABLES = 3
+# Nodes per variable: first few, then more for the boxes that need them.
+ORDERS = (4, 8)
+POINTS = 1 << 15
+# How near to 0, of its size, a surface at a corner may be before it counts as crossing.
+NEAR = 1e-9
+NODE_ROUNDING = 0.5
+
+
+@dataclass(frozen=True)
+class Box:
+    """Bounds and surfaces of an integral over a box, as functions of parameters, and of parameters and variables."""
+
+    variables: tuple[str, ...]
+    bounds: Lam
+    surfaces: Lam
+    body: Lam
+
+
+def box_of(term: Integral, found: Iterable[Finding], body: Lam) -> Box | None:
+    """The box of an integral, or None if its bounds depend on its variables or a surface may hide between corners."""
+    names = frozenset(term.variables)
+    bounds = tuple(bound for pair in term.bounds for bound in pair)
+    if len(names) > MOST_VARIABLES or any(b.free & names for b in bounds) or any(term.hints):
+        return None
+    if any(isinstance(node, Integral) for node in postorder(term.body)):
+        return None
+    surfaces = tuple(dict.fromkeys(f.surface for f in found if f.surface.free & names))
+    if not all(affine_in_each(surface, names) for surface in surfaces):
+        return None
+    shown = tuple_(surfaces)
+    return Box(term.variables, _function(tuple_(bounds)), _function(shown), body)
+
+
+def _function(term: Term) -> Lam:
+    return lam(tuple(sorted(term.free)), term)
+
+
+def affine_in_each(term: Term, names: frozenset[str]) -> bool:
+    """Whether a term is affine in each of some variables while the others stand still, by its form."""
+    if not term.free & names or term.__class__.__name__ == "Var":
+        return True
+    if not isinstance(term, Prim):
+        return False
+    if term.op in ("add", "neg"):
+        return all(affine_in_each(a, names) for a in term.args)
+    if term.op == "mul":
+        apart = sum(len(a.free & names) for a in term.args) == len(term.free & names)
+        return apart and all(affine_in_each(a, names) for a in term.args)
+    if term.op == "div":
+        return not term.args[1].free & names and affine_in_each(term.args[0], names)
+    return False
+
+
+def uncut(box: Box, machine: Evaluator, env: dict[str, Value], batch: int) -> tuple[Bools, Sums] | None:
+    """Which members were integrated here, and the sums of all (zero for the others); None if none were."""
+    bounds = machine.evaluate(box.bounds, {n: env[n] for n in box.bounds.params}, None)
+    assert isinstance(bounds, tuple)
+    edges = []
+    for cell in bounds:
+        assert isinstance(cell, Cell)
+        if cell.e is not None or any(t is not None for t in cell.t):
+            return None  # a bound that moves has boundary terms of its own
+        edges.append(np.broadcast_to(cell.v, (batch,)))
+    low, high = np.stack(edges[::2]), np.stack(edges[1::2])
+    free = _free_of_surfaces(box, machine, env, low, high)
+    if not free.any():
+        return None
+    done: Bools = np.zeros(batch, dtype=bool)
+    sums: Sums | None = None
+    for order in ORDERS:
+        todo = np.nonzero(free & ~done)[0]
+        size = max(1, POINTS // order ** len(box.variables))
+        for index in (todo[i : i + size] for i in range(0, todo.size, size)):
+            here = {n: map_arrays(env[n], lambda a, index=index: a[index]) for n in box.body.params if n in env}
+            found = _product(box, machine, here, low[:, index], high[:, index], order)
+            if found is None:
+                return None
+            part, good = found
+            if sums is None:
+                sums = _empty(part, batch)
+            taken = index[good]
+            done[taken] = True
+            for name in ("v", "e", "t", "et", "gross"):
+                getattr(sums, name)[..., taken] = getattr(part, name)[..., good]
+    return (done, sums) if sums is not None and done.any() else None
+
+
+def _empty(like: Sums, batch: int) -> Sums:
+    parts = (np.zeros((*getattr(like, name).shape[:-1], batch)) for name in ("v", "e", "t", "et"))
+    return Sums(*parts, gross=np.zeros((2, batch)))
+
+
+def _free_of_surfaces(box: Box, machine: Evaluator, env: dict[str, Value], low: Array, high: Array) -> Bools:
+    """Members whose box is finite and not empty, with every surface on one side of it."""
+    free: Bools = np.asarray(np.isfinite(high - low).all(axis=0) & (high > low).all(axis=0))
+    corners = list(itertools.product((0, 1), repeat=len(box.variables)))
+    here = {n: still(env[n]) for n in box.surfaces.params if n in env}
+    for n, variable in enumerate(box.variables):
+        ends = (low[n], high[n])
+        here[variable] = Cell(np.stack([ends[corner[n]] for corner in corners]))
+    still_machine = machine.with_directions(0)
+    values = still_machine.evaluate(box.surfaces, {n: here[n] for n in box.surfaces.params}, None)
+    assert isinstance(values, tuple)
+    for value in values:
+        assert isinstance(value, Cell)
+        at = np.broadcast_to(value.v, (len(corners), low.shape[1]))
+        near = NEAR * np.abs(at).max(axis=0)
+        free = np.asarray(free & ((at > near).all(axis=0) | (at < -near).all(axis=0)))
+    return free
+
+
+@lru_cache(maxsize=16)
+def _tensor(order: int, count: int) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+    """Nodes of each variable over the product grid, (n^d, 1) each; weights of the last j variables, j = 0 ... d."""
+    rule = gauss(order)
+    grids = np.meshgrid(*(rule.nodes,) * count, indexing="ij")
+    weights = [np.ones(1)]
+    for _ in range(count):
+        weights.append(np.outer(weights[-1], rule.weights).reshape(-1))
+    return tuple(g.reshape(-1, 1) for g in grids), tuple(weights)
+
+
+def _product(
+    box: Box, machine: Evaluator, env: dict[str, Value], low: Array, high: Array, order: int
+) -> tuple[Sums, Bools] | None:
+    """The integrals over some boxes by the product rule, and for which of them it is accurate enough."""
+    nodes, weights = _tensor(order, len(box.variables))
+    size, k = high - low, machine.directions
+    here = dict(env)
+    for n, variable in enumerate(box.variables):
+        here[variable] = Cell(low[n] + size[n] * nodes[n], None, (None,) * k)
+    machine.count(low.shape[1] * nodes[0].size)
+    cells = components(machine.evaluate(box.body, {n: here[n] for n in box.body.params}, None))
+    if any(c.e is not None or any(e is not None for e in c.et) for c in cells):
+        return None  # values of integrals, which have errors of their own
+    h = np.empty((len(cells), 1 + k, nodes[0].size, low.shape[1]))
+    for c, cell in enumerate(cells):
+        h[c, 0] = cell.v
+        for d, tangent in enumerate(cell.t or (None,) * k):
+            h[c, 1 + d] = 0.0 if tangent is None else tangent
+    channels = h.reshape(-1, *h.shape[2:])
+    integral, error, floor = _estimated(channels, order, np.maximum(np.abs(low), np.abs(high)) / size, weights)
+    volume = size.prod(axis=0)
+    asked = np.maximum(0.5 * machine.rtol * np.abs(integral), 0.5 * machine.atol / volume)
+    good: Bools = (error <= np.maximum(asked, 8 * floor)).all(axis=0)
+    shape = (len(cells), 1 + k, low.shape[1])
+    total, bound = (integral * volume).reshape(shape), ((error + floor) * volume).reshape(shape)
+    most = (weights[-1] @ np.abs(h)).max(axis=0) * volume
+    gross = np.stack((most[0], most[1:].max(axis=0, initial=0.0)))
+    return Sums(total[:, 0], bound[:, 0], total[:, 1:], bound[:, 1:], gross=gross), good
+
+
+def _estimated(h: Array, order: int, far: Array, weights: tuple[Array, ...]) -> tuple[Array, Array, Array]:
+    """Mean values of channels over boxes, from values at nodes (C, n^d, B); truncation errors and rounding, (C, B).
+
+    far: how far from 0 a box lies in each variable, in its own lengths.
+    """
+    rule, boxes = gauss(order), h.shape[-1]
+    error = np.zeros((h.shape[0], boxes))
+    floor = 4 * EPS * (weights[-1] @ np.abs(h))
+    for distance, rest in zip(far, reversed(weights[:-1]), strict=True):  # one variable after another, outermost first
+        coefficients = rule.transform.T @ h.reshape(h.shape[0], order, -1)
+        sizes = np.abs(coefficients).reshape(h.shape[0], order, rest.size, boxes)
+        mean = np.moveaxis(sizes[:, :, 0] if rest.size == 1 else np.einsum("r,cnrb->cnb", rest, sizes), 1, -1)
+        error += truncation(mean)
+        floor += (mean @ rule.slopes) * np.minimum(NODE_ROUNDING * EPS * distance, 1.0)
+        h = coefficients[:, 0].reshape(h.shape[0], rest.size, boxes)
+    return h[:, 0], error, floor

@@ -1,0 +1,1 @@
+"""Sampling: the cube, replicates, and what crosses surfaces."""

@@ -1,0 +1,194 @@
+"""The domain of an integral as the image of the unit cube.
+
+Owns `Chart`: each variable runs from bound to bound as its label runs from 0 to 1, so that a moving or a slanted domain
+is a fixed cube, and no point is ever outside of it. Points carry the tangents of the parameters (labels held fixed)
+and, where asked for, those by labels.
+
+Cuts are known here too. A stretch between two of them that is so narrow that points would hardly fall in it gets a
+share of the points all the same, and these count for less (`crowded`): means stay unbiased, and nothing thin between
+surfaces is missed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from potto.integrate.decomposition.cuts import as_array, frame_rows
+from potto.integrate.pieces import still
+from potto.integrate.plan import LevelPlan, Plan
+from potto.integrate.rules.gauss import EPS
+from potto.kernels.cells import Array, Cell, Number, Value, map_arrays, pad
+
+
+@dataclass
+class Point:
+    """A chunk of points: the environment with the variables put in, and dx/du as a cell."""
+
+    env: dict[str, Value]
+    volume: Cell
+
+
+@dataclass(frozen=True)
+class Chart:
+    """The chart of one plan, for one set of parameters. share: the least part of the points for a stretch of labels."""
+
+    plan: Plan
+    machine: Any
+    env: dict[str, Value]
+    share: float = 0.0
+
+    def start(self, count: int, directions: int) -> Point:
+        """No variable placed yet."""
+        env = {n: pad(map_arrays(v, lambda a: np.repeat(a, count)), directions) for n, v in self.env.items()}
+        return Point(env, Cell(1.0, None, (None,) * directions))
+
+    def place(
+        self, point: Point, labels: Sequence[Array | None], first: int, stop: int,
+        marked: Mapping[int, int] | None = None, held: int | None = None, directions: int | None = None,
+        crowding: Container[int] = (),
+    ) -> Point:  # fmt: skip
+        """The point with the variables first..stop-1 put at their labels; those whose label is None are left out.
+
+        marked: the directions in which labels move. held: the variable that parameters don't move; its bounds' motion
+        is someone else's affair. crowding: the variables whose labels are given as drawn, to be `crowded`.
+        """
+        k = self.machine.directions if directions is None else directions
+        env, volume = dict(point.env), point.volume
+        machine = self.machine.with_directions(k)
+        for number in range(first, stop):
+            u = labels[number]
+            if u is None:
+                continue
+            level = self.plan.levels[number]
+            lo, hi = self.bounds(level, env, machine)
+            weight: Array | None = None
+            if self.share and number in crowding:
+                u, weight = self.crowded(level, env, u)
+            x, length = stretch(lo, hi, u, k)
+            if marked and number in marked:
+                rates = list(x.t)
+                before = rates[marked[number]]
+                rates[marked[number]] = length.v if before is None else before + length.v
+                x = Cell(x.v, None, tuple(rates))
+            if held is not None and number >= held:
+                x = Cell(x.v, None, tuple(None if d < self.machine.directions else y for d, y in enumerate(x.t)))
+            env[level.variable] = x
+            volume = _times(volume, length)
+            if weight is not None:
+                volume = _times(volume, Cell(weight))
+        return Point(env, volume)
+
+    def crowded(self, level: LevelPlan, env: dict[str, Value], u: Array) -> tuple[Array, Array | None]:
+        """Labels for drawn numbers, and their weights: so that every stretch between cuts gets its share of points."""
+        if not level.rows:
+            return u, None
+        here = {name: still(env[name]) for name in level.frame.params}
+        values = self.machine.with_directions(0).evaluate(level.frame, here, None)
+        assert isinstance(values, tuple)
+        lo, hi, rows = frame_rows(level, values)
+        with np.errstate(invalid="ignore", over="ignore"):
+            cuts = np.stack([label_of(lo, hi, as_array(row.x, u.size)) for row in rows if row.cut >= 0] or [u[:0]])
+        if not cuts.size:
+            return u, None
+        inside = (cuts > 0) & (cuts < 1)
+        ends = np.concatenate((np.zeros((1, u.size)), np.where(inside, cuts, 1.0), np.ones((1, u.size))))
+        return crowd(np.sort(ends, axis=0), self.share, u)
+
+    def bounds(self, level: LevelPlan, env: dict[str, Value], machine: Any) -> tuple[Cell, Cell]:
+        values = machine.evaluate(level.bounds, {p: env[p] for p in level.bounds.params}, None)
+        assert isinstance(values, tuple)
+        lo, hi = values
+        assert isinstance(lo, Cell) and isinstance(hi, Cell)
+        return (_held(lo), _held(hi)) if self.machine.frozen else (lo, hi)
+
+
+def crowd(ends: Array, share: float, u: Array) -> tuple[Array, Array | None]:
+    """Points of [0, 1] for numbers u (n,) evenly spread over it, and the weights with which they count.
+
+    ends: (s + 1, n) the ends of stretches, from 0 to 1. A stretch shorter than `share` gets that much of the points.
+    """
+    length = np.diff(ends, axis=0)
+    thin = (length > 8 * EPS) & (length < share)
+    if not thin.any():
+        return u, None
+    count = thin.sum(axis=0)
+    least = np.minimum(share, 0.5 / np.maximum(count, 1))
+    rest = 1 - np.where(thin, length, 0.0).sum(axis=0)
+    part = np.where(thin, least, length * ((1 - count * least) / rest))
+    upto = np.cumsum(part, axis=0)
+    at = np.minimum((u >= upto).sum(axis=0), length.shape[0] - 1)[None]
+    start, size, whole = (np.take_along_axis(x, at, axis=0)[0] for x in (upto - part, part, length))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        weight = np.where(size > 0, whole / size, 1.0)
+    first = np.take_along_axis(ends, at, axis=0)[0]
+    return np.clip(first + (u - start) * weight, first, first + whole), weight
+
+
+def _held(bound: Cell) -> Cell:
+    """A bound that stands still."""
+    return Cell(bound.v, bound.e, (None,) * len(bound.t))
+
+
+def label_of(lo: Cell, hi: Cell, x: Array) -> Array:
+    """The label of a point between the bounds: the inverse of `stretch`."""
+    n = x.size
+    low, high = as_array(lo.v, n), as_array(hi.v, n)
+    a, b = np.minimum(low, high), np.maximum(low, high)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        finite = (x - low) / (high - low)
+        if np.isfinite(a).all() and np.isfinite(b).all():
+            return finite
+        up, down = np.isinf(b), np.isinf(a)
+        whole = (1 + 2 * x / (1 + np.sqrt(1 + 4 * x * x))) / 2  # the w of w/(1 - w^2) = x, from (-1, 1) to (0, 1)
+        one = np.where(up, (x - a) / (1 + (x - a)), 1 / (1 + (b - x)))
+        return np.where(up & down, whole, np.where(up | down, one, finite))
+
+
+def stretch(lo: Cell, hi: Cell, u: Array, k: int) -> tuple[Cell, Cell]:
+    """The point at label u of [lo, hi] and dx/du, as cells; infinite ends by the same maps as in quadrature."""
+    low, high = as_array(lo.v, u.size), as_array(hi.v, u.size)
+    sign = np.where(high < low, -1.0, 1.0)
+    a, b = np.minimum(low, high), np.maximum(low, high)
+    rate = tuple(_minus(hi.t, lo.t, d) for d in range(k))
+    if np.isfinite(a).all() and np.isfinite(b).all():
+        t = tuple(_mix(lo.t, hi.t, d, u) for d in range(k))
+        return Cell(low + (high - low) * u, None, t), Cell(high - low, None, rate)
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        w = 2 * u - 1
+        up, down = np.isinf(b), np.isinf(a)
+        one = np.where(up, a + u / (1 - u), b - (1 - u) / u)
+        x = np.where(up & down, w / (1 - w * w), np.where(up | down, one, low + (high - low) * u))
+        ends = np.where(up, 1 / (1 - u) ** 2, 1 / (u * u))
+        slope = np.where(up & down, 2 * (1 + w * w) / (1 - w * w) ** 2, np.where(up | down, ends, b - a))
+        label = np.where(up | down, np.where(np.isinf(high), 0.0, 1.0), u)  # a bound's motion carries all points along
+    t = tuple(_mix(lo.t, hi.t, d, label) for d in range(k))
+    finite = ~(up | down)
+    rate = tuple(None if r is None else np.where(finite, r, 0.0) for r in rate)
+    return Cell(x, None, t), Cell(sign * slope, None, rate)
+
+
+def _minus(a: tuple[Any, ...], b: tuple[Any, ...], d: int) -> Number | None:
+    p, q = (x[d] if d < len(x) else None for x in (a, b))
+    if p is None:
+        return None if q is None else -q
+    return p if q is None else p - q  # type: ignore[no-any-return]
+
+
+def _mix(a: tuple[Any, ...], b: tuple[Any, ...], d: int, label: Array) -> Number | None:
+    p, q = (x[d] if d < len(x) else None for x in (a, b))
+    if p is None and q is None:
+        return None
+    return (0.0 if p is None else p) * (1 - label) + (0.0 if q is None else q) * label
+
+
+def _times(a: Cell, b: Cell) -> Cell:
+    def part(p: Any, q: Any) -> Any:
+        terms = [x * y for x, y in ((p, b.v), (q, a.v)) if x is not None]
+        return None if not terms else sum(terms[1:], terms[0])
+
+    k = max(len(a.t), len(b.t))
+    return Cell(a.v * b.v, None, tuple(map(part, a.t or (None,) * k, b.t or (None,) * k)))

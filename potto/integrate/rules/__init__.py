@@ -1,0 +1,1 @@
+"""Rules of integration: Gauss, changes of variable, Sobol, and enclosures that prove how many nodes are enough."""

@@ -1,0 +1,199 @@
+"""Interval arithmetic over batches: which values a term can take on boxes.
+
+Owns `enclosure`. Bounds are wide enough to hold every value that the term takes, rounding included, and get closer as
+the boxes get smaller; where nothing is known they are infinite, and where the term has no value anywhere on a box
+(the root of what is negative all over) they are nan. (Moore, Kearfott and Cloud, Introduction to Interval Analysis,
+2009.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from potto.core.terms import Branch, Const, If, Prim, Term, postorder
+from potto.integrate.rules.gauss import EPS
+from potto.kernels.support import OPS
+from potto.primitives import PRIMITIVES, Primitive
+from potto.primitives.bounds import between_turns
+from potto.primitives.walking import Domain
+
+Interval = tuple[Any, Any]  # lower and upper bounds, numbers or arrays
+
+ANYTHING: Interval = (-np.inf, np.inf)
+NOWHERE: Interval = (np.nan, np.nan)  # of a term that has no value on a box
+ROUNDING = 4 * EPS  # of one operation, functions of libraries included, relative
+
+
+def everywhere(term: Term) -> bool:
+    """Whether a term has a value wherever it is evaluated, poles aside."""
+    return not any(isinstance(n, Prim) and (_narrow(n.op) or _fractional(n)) for n in postorder(term))
+
+
+def _narrow(op: str) -> bool:
+    return PRIMITIVES[op].within != ANYTHING
+
+
+def _fractional(node: Prim) -> bool:
+    exponent = node.args[-1]
+    return node.op == "pow" and not (isinstance(exponent, Const) and exponent.value.is_integer())
+
+
+def enclosure(terms: tuple[Term, ...], box: Mapping[str, Interval]) -> list[Interval]:
+    """Bounds of the values of terms, which are `enclosable`, for variables in a box."""
+    with np.errstate(all="ignore"):
+        return INTERVALS.walk(terms, box, {})
+
+
+class _Intervals(Domain[Interval]):
+    """Bounds of batches: arithmetic as below, everything else by the rules of the entries."""
+
+    def constant(self, node: Const) -> Interval:
+        return node.value, node.value  # nan is what a guard leaves where there is no value
+
+    def unknown(self) -> Interval:
+        return ANYTHING
+
+    def builtin(self, node: Prim, known: Mapping[Term, Interval]) -> Interval:
+        args = [known[arg] for arg in node.args]
+        rule = _ARITHMETIC.get(node.op)
+        return _defined(args, rule(node, args)) if rule is not None else self.apply(node.op, args)
+
+    def rule(self, entry: Primitive) -> Callable[..., Interval] | None:
+        return _rule(entry.name)
+
+    def other(self, node: Term, known: Mapping[Term, Interval]) -> Interval:
+        if not isinstance(node, Branch | If):
+            return ANYTHING
+        a, b = known[node.then], known[node.orelse]
+        either = np.fmin(a[0], b[0]), np.fmax(a[1], b[1])
+        if isinstance(node, If):
+            return either
+        lo, hi = known[node.surface]
+        least, most = (np.where(lo > 0, x, np.where(hi < 0, y, z)) for x, y, z in zip(a, b, either, strict=True))
+        return least, most
+
+
+INTERVALS = _Intervals()
+
+
+@lru_cache(maxsize=256)
+def _rule(op: str) -> Callable[..., Interval] | None:
+    entry = PRIMITIVES[op]
+    if entry.interval is None and not entry.piecewise_monotone:
+        return None
+    return lambda *args: _by_entry(entry, args)
+
+
+def _by_entry(entry: Primitive, args: tuple[Interval, ...]) -> Interval:
+    if entry.interval is not None:
+        result = entry.interval(OPS, *args)
+    else:
+        result = between_turns(OPS, entry.name, entry.within, entry.turns or (), args[0])
+    room: Any = ROUNDING
+    if entry.ulp != 1:
+        lower, upper = (entry.places(*ends) for ends in zip(*args, strict=True))
+        room = np.minimum(ROUNDING + EPS * np.maximum(lower, upper), 1.0)
+    lo, hi = _defined(args, result, room, entry.off)
+    least, most = entry.image
+    return (lo if least == -np.inf else np.maximum(lo, least)), (hi if most == np.inf else np.minimum(hi, most))
+
+
+def _defined(args: Sequence[Interval], result: tuple[Any, ...], room: Any = ROUNDING, off: float = 0.0) -> Interval:
+    """Rounded outwards; nan (inf - inf) becomes no bound, but where an argument has no value, neither has the result.
+
+    Neither has what is infinite all over. A third item of the result says where the builtin itself is not defined.
+    """
+    lo, hi = result[0], result[1]
+    nowhere = (lo == np.inf) | (hi == -np.inf)
+    lo = np.where(np.isnan(lo), -np.inf, lo - room * np.abs(lo) - off)
+    hi = np.where(np.isnan(hi), np.inf, hi + room * np.abs(hi) + off)
+    if len(result) == 3:
+        nowhere = nowhere | result[2]
+    for a in args:
+        nowhere = nowhere | np.isnan(a[0])
+    if np.any(nowhere):
+        lo, hi = np.where(nowhere, np.nan, lo), np.where(nowhere, np.nan, hi)
+    return lo, hi
+
+
+def _add(node: Prim, args: list[Interval]) -> Interval:
+    lo, hi = args[0]
+    for a in args[1:]:
+        lo, hi = lo + a[0], hi + a[1]
+        size = np.maximum(np.abs(lo), np.abs(hi)) + np.maximum(np.abs(a[0]), np.abs(a[1]))
+        slack = np.where(np.isfinite(size), EPS * size, 0.0)  # of operands that cancel
+        lo, hi = lo - slack, hi + slack
+    return lo, hi
+
+
+def _neg(node: Prim, args: list[Interval]) -> Interval:
+    return -args[0][1], -args[0][0]
+
+
+def _times(a: Interval, b: Interval) -> Interval:
+    corners = [np.where((x == 0) | (y == 0), 0.0, x * y) for x in a for y in b]
+    lo, hi = corners[0], corners[0]
+    for c in corners[1:]:
+        lo, hi = np.minimum(lo, c), np.maximum(hi, c)
+    return lo, hi
+
+
+def _mul(node: Prim, args: list[Interval]) -> Interval:
+    by_term = dict(zip(node.args, args, strict=True))
+    result: Interval = (1.0, 1.0)
+    for arg, interval in by_term.items():
+        result = _times(result, _whole_power(interval, node.args.count(arg)))
+    return result
+
+
+def _inverse(a: Interval) -> Interval:
+    apart = (a[0] > 0) | (a[1] < 0)
+    return np.where(apart, np.divide(1.0, a[1]), -np.inf), np.where(apart, np.divide(1.0, a[0]), np.inf)
+
+
+def _div(node: Prim, args: list[Interval]) -> tuple[Any, Any, Any]:
+    return *_times(args[0], _inverse(args[1])), _zero(args[1])
+
+
+def _zero(a: Interval) -> Any:
+    """Where a divisor is 0 all over: the quotient is no number anywhere."""
+    return (np.asarray(a[0]) == 0) & (np.asarray(a[1]) == 0)
+
+
+def _whole_power(a: Interval, n: int) -> Interval:
+    if n == 1:
+        return a
+    p, q = np.power(a[0], float(n)), np.power(a[1], float(n))
+    if n % 2:
+        return p, q
+    inside = (a[0] <= 0) & (a[1] >= 0)
+    return np.where(inside, 0.0, np.minimum(p, q)), np.maximum(p, q)
+
+
+def _pow(node: Prim, args: list[Interval]) -> tuple[Any, Any] | tuple[Any, Any, Any]:
+    base, (low, high) = args
+    exponent = node.args[1]
+    if isinstance(exponent, Const) and exponent.value == 0:
+        return np.ones_like(base[0]), np.ones_like(base[1])  # also at 0
+    if isinstance(exponent, Const) and exponent.value.is_integer() and 0 < abs(exponent.value) < 1e6:
+        whole = _whole_power(base, int(abs(exponent.value)))
+        return whole if exponent.value > 0 else (*_inverse(whole), _zero(whole))
+    if isinstance(exponent, Const) and exponent.value > 0:
+        least, most = (np.power(np.maximum(end, 0.0), exponent.value) for end in base)
+        return least, most, base[1] < 0
+    corners = np.stack(np.broadcast_arrays(*(np.power(b, e) for b in base for e in (low, high))))
+    fine = base[0] > 0
+    return np.where(fine, corners.min(axis=0), -np.inf), np.where(fine, corners.max(axis=0), np.inf)
+
+
+_ARITHMETIC: dict[str, Callable[[Prim, list[Interval]], tuple[Any, ...]]] = {
+    "add": _add,
+    "neg": _neg,
+    "mul": _mul,
+    "div": _div,
+    "pow": _pow,
+}

@@ -1,0 +1,98 @@
+"""How numbers are asked for: the method, the accuracy and the limits of an evaluation.
+
+Owns `Settings` and the settings in force, which belong to the thread (or task) that set them. Knows nothing of what
+obeys them: the runtime reads them, the faces set them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, fields, replace
+from types import MappingProxyType
+from typing import Literal, get_args
+
+from potto.diagnostics import PottoError, declare
+from potto.source import Span
+
+BAD_SETTING = declare("P0520", "a setting that does not exist or cannot have this value")
+
+Method = Literal["auto", "quadrature", "mc", "qmc"]
+METHODS: tuple[str, ...] = get_args(Method)
+
+# The relative accuracy that samples are held against where nobody asked for another one: an error of 4 standard errors
+# of 10,000 samples of a condition that holds half of the time is 4 % of the answer.
+SAMPLED = 0.05
+
+
+class Unasked(float):
+    """A tolerance that nobody asked for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """What an evaluation is asked for.
+
+    method: how integrals are estimated; "auto" cuts and integrates by quadrature where the dimension allows it.
+    rtol, atol: the accuracy asked for; an estimate converged when its error is within `max(atol, rtol * |value|)`.
+    Where nobody asked, `mc` and `qmc` are held against SAMPLED, which is within the reach of `samples`. What cancels to
+    0 has converged when its error is within 1e-12 of what cancels (`runtime/answers/convergence.py`).
+    samples: points of a Monte Carlo estimate.
+    seed: where its random numbers start; equal seeds give equal answers.
+    max_evals: the most evaluations of an integrand before the answer comes as it is, marked as not converged.
+    """
+
+    method: Method = "auto"
+    rtol: float = Unasked(1e-10)
+    atol: float = 0.0
+    samples: int = 100_000
+    seed: int = 0
+    max_evals: int = 20_000_000
+
+    def asked(self, drawn: bool) -> float:
+        """The relative accuracy that an answer is held against; `drawn` if it is made of samples."""
+        if drawn and self.method in ("mc", "qmc") and isinstance(self.rtol, Unasked):
+            return SAMPLED
+        return self.rtol
+
+
+DEFAULTS = Settings()
+_changes: ContextVar[Mapping[str, object]] = ContextVar("potto_settings", default=MappingProxyType({}))
+
+
+def current(base: Settings = DEFAULTS) -> Settings:
+    """The settings in force in this thread or task; `base` counts where nothing is set, as a project says it."""
+    changes = _changes.get()
+    return replace(base, **changes) if changes else base  # type: ignore[arg-type]
+
+
+def problem(name: str, value: object) -> str | None:
+    """Why `value` cannot be the setting `name`, or None if it can."""
+    if name == "method":
+        return None if value in METHODS else f"method must be one of {', '.join(METHODS)}, not {value!r}"
+    if name not in {field.name for field in fields(Settings)}:
+        return f"there is no setting `{name}`; there are {', '.join(field.name for field in fields(Settings))}"
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return f"{name} must be a number, not {value!r}"
+    if name in ("rtol", "atol"):
+        return None if 0 <= value < math.inf else f"{name} must be a number >= 0, not {value!r}"
+    least = 0 if name == "seed" else 1
+    if not isinstance(value, int):
+        return f"{name} must be a whole number, not {value!r}"
+    return None if value >= least else f"{name} must be at least {least}, not {value!r}"
+
+
+@contextmanager
+def settings(**changes: object) -> Iterator[Settings]:
+    """Change the settings for the `with` block: `with potto.settings(method="mc", samples=10_000, seed=7): ...`."""
+    for name, value in changes.items():
+        complaint = problem(name, value)
+        if complaint is not None:
+            raise PottoError([BAD_SETTING(Span(0, 0), complaint)])
+    token = _changes.set({**_changes.get(), **changes})
+    try:
+        yield current()
+    finally:
+        _changes.reset(token)

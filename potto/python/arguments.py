@@ -1,0 +1,227 @@
+"""Python values as values of Potto, and answers over arrays in the shape that was asked for.
+
+Owns the conversion of arguments and its complaints. Numbers are doubles; arrays broadcast against each other and
+become one flat batch; tuples are tuples, lists are lists, functions of Potto are functions. Nothing else is accepted.
+"""
+
+from __future__ import annotations
+
+import numbers
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from potto.diagnostics import PottoError, declare
+from potto.kernels.cells import Cell, Value
+from potto.kernels.errors import wrong_call
+from potto.runtime.answers.estimate import Estimate
+from potto.runtime.answers.printing import format_digits
+from potto.source import Span
+from potto.types import format_type
+from potto.types.types import Diffeo, Dist, Function, ListOf, Real, TupleOf, Type, resolve, result_of
+
+NO_KIND = declare("P0523", "a Python value that is no value of Potto")
+
+ToFunction = Callable[[Any], Value | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """What arrays a call was given: the shape that they broadcast to; None when there are only numbers."""
+
+    shape: tuple[int, ...] | None
+
+    def flat(self, array: np.ndarray[Any, np.dtype[np.float64]]) -> Any:
+        """An array as a part of the batch. An empty batch is run with one point, whose answer is dropped."""
+        assert self.shape is not None
+        if 0 in self.shape:
+            return np.ones(1)
+        return np.ascontiguousarray(np.broadcast_to(array, self.shape)).reshape(-1)
+
+    def shaped(self, estimate: Estimate) -> Estimate:
+        """The estimate with every number as an array of the batch's shape; as a float if there were no arrays."""
+        if self.shape is None and all(
+            part is None or part.__class__ is float
+            for part in (estimate.value, estimate.error, estimate.tangent, estimate.tangent_error)
+        ):
+            return estimate
+        parts = (estimate.value, estimate.error, estimate.tangent, estimate.tangent_error)
+        value, error, tangent, tangent_error = map(self._restored, parts)
+        shaped = replace(estimate, value=value, error=error, tangent=tangent, tangent_error=tangent_error)
+        if self.shape is None:
+            return replace(shaped, member_converged=None, reason_members={})
+        masks = estimate.reason_members or dict.fromkeys(estimate.reasons, True)
+        missed = {why: self._mask(where) for why, where in masks.items()}
+        converged = ~np.logical_or.reduce([np.zeros(self.shape, dtype=bool), *missed.values()])
+        return replace(shaped, member_converged=converged, reason_members=missed)
+
+    def _mask(self, mask: Any) -> Any:
+        """A mask of the batch's members in its shape."""
+        assert self.shape is not None
+        count = int(np.prod(self.shape))
+        return np.broadcast_to(np.asarray(mask).reshape(-1)[:count], (count,)).reshape(self.shape)
+
+    def _restored(self, part: Any) -> Any:
+        if part is None:
+            return None
+        if isinstance(part, tuple | list):
+            return type(part)(self._restored(item) for item in part)
+        if self.shape is None:
+            return float(part)
+        if 0 in self.shape:
+            return np.empty(self.shape)
+        count = int(np.prod(self.shape))
+        return np.broadcast_to(np.asarray(part, dtype=float).reshape(-1), (count,)).reshape(self.shape).copy()
+
+
+def batch_of(arguments: Iterable[tuple[str, Any]]) -> Batch:
+    """The batch that named arguments make together. Raises PottoError if their shapes do not go together."""
+    shapes = [(name, array.shape) for name, argument in arguments for array in _arrays(argument)]
+    if not shapes:
+        return Batch(None)
+    try:
+        return Batch(np.broadcast_shapes(*(shape for _, shape in shapes)))
+    except ValueError:
+        told = ", ".join(f"`{name}` has shape {shape}" for name, shape in shapes)
+        raise wrong_call(f"these arrays do not broadcast against each other: {told}") from None
+
+
+def _arrays(argument: Any) -> Iterable[np.ndarray[Any, Any]]:
+    if isinstance(argument, Estimate):
+        argument = (argument.value, argument.tangent)
+    if isinstance(argument, np.ndarray) and argument.ndim:
+        yield argument
+    elif isinstance(argument, tuple | list):
+        for item in argument:
+            yield from _arrays(item)
+
+
+def value_of(name: str, argument: Any, batch: Batch, to_function: ToFunction) -> Value:
+    """A Python value as a value of Potto. Raises PottoError for one that is none."""
+    function = to_function(argument)
+    if function is not None:
+        return function
+    if isinstance(argument, float):
+        return Cell(float(argument))
+    if isinstance(argument, bool | np.bool_):
+        raise no_kind(name, argument, "write 1.0 or 0.0")
+    if isinstance(argument, numbers.Real):
+        return Cell(_double(name, argument))
+    if isinstance(argument, Estimate):
+        return _estimate(name, argument, batch, to_function)
+    if isinstance(argument, np.ndarray):
+        return _array(name, argument, batch)
+    if isinstance(argument, tuple):
+        return tuple(value_of(name, item, batch, to_function) for item in argument)
+    if isinstance(argument, list):
+        return [value_of(name, item, batch, to_function) for item in argument]
+    raise no_kind(name, argument, "numbers, numpy arrays, tuples, lists and functions of Potto are accepted")
+
+
+def _double(name: str, argument: Any) -> float:
+    try:
+        return float(argument)
+    except (OverflowError, ValueError):
+        raise no_kind(name, argument, "this number does not fit into a double") from None
+
+
+def _array(name: str, argument: np.ndarray[Any, Any], batch: Batch) -> Value:
+    if argument.dtype.kind not in "fiu":
+        raise no_kind(name, argument, "an array must hold real numbers")
+    if argument.ndim == 0:
+        return Cell(float(argument))
+    return Cell(batch.flat(argument.astype(np.float64)))
+
+
+def _estimate(name: str, argument: Estimate, batch: Batch, to_function: ToFunction) -> Value:
+    """An answer as an argument, with the error that it has."""
+    if isinstance(argument.value, float) and argument.tangent is None:
+        return Cell(argument.value, argument.error or None)
+    plain = argument.value if argument.tangent is None else (argument.value, argument.tangent)
+    if plain is None:
+        raise no_kind(name, argument, "this answer is a function and not a number")
+    return value_of(name, plain, batch, to_function)
+
+
+def evenly(lo: float, hi: float, count: int) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """So many numbers at equal distances, both ends included."""
+    return np.linspace(lo, hi, count)
+
+
+def no_kind(name: str, argument: Any, help: str) -> PottoError:
+    kind = type(argument).__name__
+    if isinstance(argument, np.ndarray):
+        kind = f"array of {argument.dtype}"
+    return PottoError([NO_KIND(Span(0, 0), f"the argument `{name}` cannot be given a Python {kind}", help=help)])
+
+
+def misfit(name: str, argument: Any, type: Type, own: Type | None) -> str | None:
+    """Why an argument cannot have a parameter's type, or None; only kinds are compared, not what varies.
+
+    `own` is the type of an argument that is a function.
+    """
+    type = resolve(type)
+    if isinstance(type, Real) and own is None and isinstance(argument, float | int):
+        return None
+    complaint = _complaint(name, argument, type, own)
+    return None if complaint is None else f"`{name}` is {format_type(type)}: {complaint}"
+
+
+def _complaint(name: str, argument: Any, type: Type, own: Type | None) -> str | None:
+    match type:
+        case Function() | Diffeo():
+            if own is None:
+                return f"a function is needed, not {_kind(argument)}"
+            if _is_dual(result_of(type)) and not _is_dual(result_of(own)):
+                return "the derivative of a function is needed, `potto.deriv(…)` of the one that is given"
+            return None
+        case _ if own is not None:
+            return "not a function" if isinstance(type, Real | Dist | TupleOf | ListOf) else None
+        case TupleOf(items, dual):
+            return _tuple_misfit(name, argument, items, dual)
+        case ListOf():
+            return None if isinstance(argument, list) else f"a list is needed, not {_kind(argument)}"
+        case Real() | Dist():
+            fits = not isinstance(argument, tuple | list)
+            return None if fits else f"a number is needed, not {_kind(argument)}"
+        case _:
+            return None
+
+
+def _is_dual(type: Type) -> bool:
+    """A dual, or a tuple of them."""
+    return isinstance(type, TupleOf) and (type.dual or all(_is_dual(resolve(item)) for item in type.items))
+
+
+def _tuple_misfit(name: str, argument: Any, items: tuple[Type, ...], dual: bool) -> str | None:
+    if dual and not isinstance(argument, tuple | list):
+        return None  # a number given for a dual has tangent 0
+    if isinstance(argument, Estimate):
+        return None
+    if not isinstance(argument, tuple) or len(argument) != len(items):
+        what = "a dual `(value, tangent)`" if dual else f"a tuple of {len(items)}"
+        return f"{what} is needed, not {_kind(argument)}"
+    return None
+
+
+def _kind(argument: Any) -> str:
+    if isinstance(argument, tuple | list):
+        return f"a {type(argument).__name__} of {len(argument)}"
+    return f"a Python {type(argument).__name__}"
+
+
+def moving(head: str, given: Iterable[tuple[tuple[Any, ...], dict[str, Any]]]) -> str:
+    """The call of a derivative with a tangent for its first number, as it is written; nothing for one of arrays."""
+    text = head
+    for args, kwargs in given:
+        words: list[str] = []
+        for name, argument in (*(("", argument) for argument in args), *kwargs.items()):
+            if not isinstance(argument, int | float):
+                return ""
+            number = format_digits(float(argument), 12)
+            number = f"({number}, 1)" if text == head and not words else number
+            words.append(f"{name}={number}" if name else number)
+        text += f"({', '.join(words)})"
+    return text

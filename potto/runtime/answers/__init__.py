@@ -1,0 +1,1 @@
+"""Answers: estimates, whether they converged, what to do, and how they print."""

@@ -1,0 +1,158 @@
+"""Whether an answer is as accurate as was asked for; and if not, why, member by member.
+
+Owns `Reasons`, `missed`, `missing` and `allowance`. Converged means: the error is within `rtol * |value|`, or within
+`atol`. An answer that is 0 because its parts cancel has no digits that could be relative to it. It is accurate enough
+if it is relative to what is added up without regard to sign: there its error is within `rtol`, and within CANCELS,
+which is what rounding leaves. That is no licence to lose a small summand beside large ones (1e16 - 1e16 + 1): where the
+integrand adds anything, what is added up counts as 1 at most, so that CANCELS is an absolute bound.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from potto.core.terms import Branch, Const, Integral, Prim, Proj, Term, Tuple, Var, children
+from potto.integrate.pieces import Sums
+from potto.kernels.cells import Array, Bools
+from potto.projects.settings import Settings
+from potto.runtime.answers.advice import INFINITE, NO_VALUE, TOO_FEW
+
+CANCELS = 1e-12
+# What is added up counts as so much at most, where something small could be lost in it.
+UNIT = 1.0
+# What is a speck, beside the largest of a batch.
+SPECK = 1e-15
+# From which part of a value on an error is more than rounding, and up to which it is nothing else.
+LOST, ROUNDED = 0.1, 1e-6
+
+# A reason, and of which members of a batch: a mask, or True for all of them.
+Reasons = dict[str, Any]
+
+
+@lru_cache(maxsize=4096)
+def adds_nothing(body: Term) -> bool:
+    """Whether no summand can be lost beside a larger one: products and builtins alone, under whatever conditions."""
+    todo, seen = [body], set()
+    while todo:
+        term = todo.pop()
+        if term in seen:
+            continue
+        seen.add(term)
+        if isinstance(term, Branch):
+            todo += (term.then, term.orelse)
+        elif isinstance(term, Const | Var | Tuple | Proj) or (isinstance(term, Prim) and term.op not in ("add", "sub")):
+            todo += children(term)
+        else:
+            return False
+    return True
+
+
+def allowance(term: Integral, sums: Sums, rtol: float) -> Any:
+    """The error of each of a batch of integrals up to which it, or its derivative, is 0 as accurately as asked for."""
+    most = np.inf if adds_nothing(term.body) else UNIT
+    share = min(rtol, CANCELS)
+    if sums.v.size == 1 and sums.gross is not None:  # numpy takes its time over a single number
+        gross, rates = float(sums.gross[0, 0]), float(max(sums.gross[1, 0], *map(abs, sums.t.flat), 0.0))
+        return share * max(min(gross, most) if gross < np.inf else 0.0, min(rates, UNIT) if rates < np.inf else 0.0)
+    value, rate = np.abs(sums.v).max(axis=0), np.abs(sums.t).max(axis=(0, 1), initial=0.0)
+    if sums.gross is not None:
+        value, rate = np.maximum(sums.gross[0], value), np.maximum(sums.gross[1], rate)
+    value = np.where(np.isfinite(value), np.minimum(value, most), 0.0)
+    return share * np.maximum(value, np.where(np.isfinite(rate), np.minimum(rate, UNIT), 0.0))
+
+
+def missing(term: Integral, sums: Sums, settings: Settings) -> Bools:
+    """The members of a batch of integrals for which it pays to look further: values or derivatives are not as accurate
+    as was asked for, and what is off is no speck beside what the others come to."""
+    within = allowance(term, sums, settings.rtol)
+    out: Bools = np.zeros(sums.v.shape[-1], dtype=bool)
+    for number, error in ((sums.v, sums.e), (sums.t, sums.et)):
+        size = np.abs(number)
+        speck = SPECK * np.max(size, axis=-1, keepdims=True, initial=0.0, where=np.isfinite(size))
+        fine = error <= np.maximum(np.maximum(settings.atol, settings.rtol * size), np.maximum(within, speck))
+        out |= ~fine.reshape(-1, out.size).all(axis=0)
+    return out
+
+
+def widest(before: Any, after: Any) -> Any:
+    """Two allowances, numbers or arrays over batches, as one; of batches that do not go together the least."""
+    if isinstance(before, float) and isinstance(after, float):
+        return max(before, after)
+    try:
+        return np.maximum(before, after)
+    except ValueError:
+        return max(float(np.min(before)), float(np.min(after)))
+
+
+def missed(value: Any, error: Any, within: Any, settings: Settings, drawn: bool) -> Reasons:
+    """Why numbers are not as accurate as was asked for. `drawn`: they are made of samples; within: see `allowance`."""
+    rtol = settings.asked(drawn)
+    if isinstance(value, float) and isinstance(error, float) and error <= rtol * abs(value) < np.inf:
+        return {}
+    v, e = np.abs(np.asarray(value, dtype=float)), np.asarray(error, dtype=float)
+    v, e = np.broadcast_arrays(v, e)
+    if np.ndim(within) and np.shape(within) != v.shape:
+        try:
+            within = np.broadcast_to(within, v.shape)
+        except ValueError:
+            within = float(np.min(within, initial=np.inf))
+    bad = ~((e <= rtol * v) | (e <= settings.atol) | (e <= within)) | np.isnan(v)
+    bad = np.where(np.isinf(v), ~np.isfinite(e), bad)  # an infinity may be known to be one
+    if not bad.any():
+        return {}
+    reasons: Reasons = {}
+    for reason, holds in _told(v, e, drawn):
+        here = bad & holds
+        if here.any():
+            reasons[reason] = here if v.ndim else True
+            bad = bad & ~here
+    return reasons
+
+
+def _told(v: Array, e: Array, drawn: bool) -> Sequence[tuple[str, Any]]:
+    """The reasons in the order in which they count, and where each is one."""
+    nan = np.isnan(v)
+    with np.errstate(invalid="ignore"):
+        lost, rounded = e > LOST * v, e < ROUNDED * v
+    return (
+        (NO_VALUE, nan & np.isinf(e)),
+        ("the value is not a number", nan),
+        (INFINITE, np.isinf(v)),
+        ("the error is not known", ~np.isfinite(e)),
+        (TOO_FEW, np.full(v.shape, drawn)),
+        ("no accuracy was reached: the integral diverges, its integrand is too rough, or rounding hides it", lost),
+        ("rounding limits the accuracy", rounded),
+        ("the error estimate is too large", np.full(v.shape, True)),
+    )
+
+
+def merged(into: Reasons, more: Mapping[str, Any]) -> None:
+    """Add reasons, each of the members of either. Masks that do not go together are of all."""
+    for reason, where in more.items():
+        before = into.get(reason, False)
+        if before is True or where is True:
+            into[reason] = True
+            continue
+        try:
+            into[reason] = np.logical_or(before, where)
+        except ValueError:
+            into[reason] = True
+
+
+def members_of(where: Any, shape: tuple[int, ...]) -> Array:
+    """A mask of members, or True, as a mask over a batch of this shape."""
+    if np.ndim(where) and np.shape(where) == shape:
+        return np.asarray(where)
+    return np.full(shape, bool(np.any(where)))
+
+
+def converged_members(reasons: Reasons, shape: tuple[int, ...]) -> Array:
+    """Which members of a batch have no reason against them."""
+    bad = np.zeros(shape, dtype=bool)
+    for where in reasons.values():
+        bad |= members_of(where, shape)
+    return np.asarray(~bad)

@@ -1,0 +1,150 @@
+"""Values as text and as plain data: what `print` shows and what machines get.
+
+Owns the forms of values of every kind, and how a pair becomes a dual; the digits are chosen in `printing`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from potto.core.terms import App, Deriv, Global, If, Lam, Term, Var
+from potto.kernels.cells import Cell, Value
+from potto.runtime.answers.estimate import Estimate
+from potto.runtime.answers.printing import format_bounds, format_numbers, format_tuple, with_error
+from potto.runtime.evaluation.functions import Derivative
+from potto.runtime.evaluation.machine import Linker
+
+NOTHING: Mapping[str, Value] = MappingProxyType({})
+MISSED = " (not converged)"  # what is said behind an answer that missed its tolerance
+
+
+def format_value(value: Value) -> str:
+    """A value as `print` shows it: numbers to the digits that their errors support."""
+    if isinstance(value, Cell):
+        return format_numbers(value.v, 0.0 if value.e is None else value.e)
+    if isinstance(value, tuple):
+        return format_tuple([format_value(item) for item in value])
+    if isinstance(value, list):
+        return f"[{', '.join(format_value(item) for item in value)}]"
+    return "<derivative>" if isinstance(value, Derivative) else "<function>"
+
+
+def format_answer(estimate: Estimate) -> str:
+    """An answer as it stands on a line: see `answer_text`."""
+    if estimate.text is not None:
+        return estimate.text
+    return answer_text(*pair(estimate), estimate.converged)
+
+
+def answer_text(value: Any, error: Any, converged: bool) -> str:
+    """The digits of an answer that hold; of one that missed its tolerance all digits beside the error, and that."""
+    return format_numbers(value, error) if converged else with_error(value, error) + MISSED
+
+
+def interval(estimate: Estimate) -> str:
+    """The answer with its error bars; what missed its tolerance says so."""
+    if estimate.text is not None:
+        return estimate.text
+    return with_error(*pair(estimate)) + ("" if estimate.converged else MISSED)
+
+
+def bounds(estimate: Estimate) -> str:
+    """The errors alone, in the form of the answer."""
+    return format_bounds(pair(estimate)[1])
+
+
+def tangent_of(dual: Estimate) -> Estimate:
+    """The tangent of a dual as an answer of its own."""
+    return replace(dual, value=dual.tangent, error=dual.tangent_error, tangent=None, tangent_error=None)
+
+
+def pair(estimate: Estimate) -> tuple[Any, Any]:
+    """The numbers of an answer and their errors, in the form in which they are shown: a dual is a pair."""
+    if estimate.tangent is None:
+        return estimate.value, estimate.error
+    return (estimate.value, estimate.tangent), (estimate.error, estimate.tangent_error)
+
+
+def format_estimate(estimate: Estimate) -> str:
+    """The digits of an answer that hold, a dual as `(value, tangent)`: as a program may write them."""
+    return estimate.text if estimate.text is not None else format_numbers(*pair(estimate))
+
+
+# For machines
+
+
+def json_number(value: Any) -> Any:
+    """A number for JSON: all its digits; nan and infinities as strings. Tuples, lists and arrays as arrays."""
+    if value is None:
+        return None
+    if isinstance(value, tuple | list):
+        return [json_number(item) for item in value]
+    if isinstance(value, np.ndarray) and value.ndim:
+        return [json_number(item) for item in value]
+    number = float(value)
+    if math.isfinite(number):
+        return number
+    return "nan" if math.isnan(number) else ("inf" if number > 0 else "-inf")
+
+
+def estimate_json(estimate: Estimate, type: str | None = None) -> dict[str, Any]:
+    """The object that `potto eval --json` promises."""
+    answer: dict[str, Any] = {
+        "value": json_number(estimate.value),
+        "error": json_number(estimate.error),
+        "tangent": json_number(estimate.tangent),
+        "tangent_error": json_number(estimate.tangent_error),
+        "converged": estimate.converged,
+        "evals": estimate.evals,
+        "seconds": round(estimate.seconds, 7),
+        "compile_seconds": round(estimate.compile_seconds, 7),
+        "method": estimate.method,
+        "type": type,
+    }
+    if estimate.reasons:
+        answer["reasons"] = list(estimate.reasons)
+    if estimate.notes:
+        answer["notes"] = [str(note) for note in estimate.notes]
+    if estimate.text is not None:
+        answer["text"] = estimate.text
+    return answer
+
+
+# Duals
+
+
+def gives_dual(term: Term, linker: Linker, env: Mapping[str, Value] = NOTHING) -> bool:
+    """Whether the value of a term is that of a derivative, and so a dual: found by following what is called. `env` has
+    what its free names stand for."""
+    groups = 0
+    for _ in range(1000):
+        match term:
+            case App():
+                term, groups = term.function, groups + 1
+            case Global():
+                term = linker.term(term.module, term.name)
+            case Lam() if groups:
+                term, groups = term.body, groups - 1
+            case If():
+                term = term.then
+            case Deriv():
+                return groups > 0
+            case Var(name=name):
+                return groups > 0 and isinstance(env.get(name), Derivative)
+            case _:
+                return False
+    return False
+
+
+def as_dual(estimate: Estimate) -> Estimate:
+    """The estimate of a pair `(value, tangent)` with the tangent in its own place."""
+    if not (isinstance(estimate.value, tuple) and len(estimate.value) == 2) or estimate.tangent is not None:
+        return estimate
+    (value, tangent), (error, tangent_error) = estimate.value, estimate.error
+    return replace(estimate, value=value, error=error, tangent=tangent, tangent_error=tangent_error)

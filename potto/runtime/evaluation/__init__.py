@@ -1,0 +1,1 @@
+"""What evaluates a program: the machine, functions as values, calls, sums, duals."""

@@ -1,0 +1,120 @@
+"""Calling derivatives: duals in, duals out.
+
+Owns `call_derivative` (the derivative of a function, called with pairs) and `call_paired` (a function written by hand
+for duals, standing for the function whose derivative it is). One direction of differentiation is carried by the
+kernels of the function itself; under a derivative already being taken the function is first replaced by its dual as a
+term, which is then differentiated like any other.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from potto.calculus.inlining.currying import sizes_of
+from potto.kernels import errors
+from potto.kernels.cells import Cell, Trace, Value
+from potto.runtime.evaluation.functions import Closure, Derivative, Paired
+
+if TYPE_CHECKING:
+    from potto.runtime.evaluation.machine import Machine
+
+
+def call_derivative(
+    machine: Machine, function: Derivative, groups: tuple[tuple[Value, ...], ...], trace: Trace | None
+) -> Value:
+    from potto.runtime.evaluation.compared import compared
+    from potto.runtime.evaluation.machine import fit
+    from potto.runtime.evaluation.second_derivatives import dual_function
+
+    primal = function.primal
+    if isinstance(primal, Derivative):
+        primal = dual_function(machine, primal.primal)
+        machine.books.second = True
+    if machine.directions or isinstance(primal, Paired):
+        machine.books.second = machine.books.second or machine.directions > 0
+        return machine.call(dual_function(machine, primal), groups, None)
+    _, arities = machine.linker_shape(primal.lam, sizes_of(groups))
+    carrying = machine.with_directions(1)
+    dual_groups = tuple(
+        tuple(merge(arg) for arg in fit(group, arity)) for group, arity in zip(groups, arities, strict=False)
+    )
+    value = split(carrying.call(primal.padded(1), dual_groups, trace))
+    return compared(machine, function.primal, groups, value) if isinstance(function.primal, Derivative) else value
+
+
+def merge(arg: Value) -> Value:
+    """A dual as a number that carries its tangent; a plain number has tangent 0."""
+    if isinstance(arg, Cell):
+        return Cell(arg.v, arg.e, (None,))
+    if isinstance(arg, Derivative):
+        return arg.primal.padded(1)
+    if isinstance(arg, Closure):
+        return Paired(arg.padded(1))
+    if isinstance(arg, list):
+        return [merge(item) for item in arg]
+    if not isinstance(arg, tuple):
+        raise errors.wrong_call("a derivative takes duals, pairs `(value, tangent)`")
+    if len(arg) == 2 and all(isinstance(part, Cell) for part in arg):
+        v, t = arg
+        assert isinstance(v, Cell) and isinstance(t, Cell)
+        return Cell(v.v, v.e, (_unit(t),), (t.e,))
+    if len(arg) == 2 and all(isinstance(part, tuple) for part in arg):
+        values, tangents = arg
+        assert isinstance(values, tuple) and isinstance(tangents, tuple)
+        if len(values) == len(tangents):
+            return tuple(merge((v, t)) for v, t in zip(values, tangents, strict=True))
+    raise errors.wrong_call("a derivative takes duals, pairs `(value, tangent)`")
+
+
+def _unit(t: Cell) -> float | None:
+    """The tangent, with a constant 1 and 0 as kernels recognize them."""
+    if isinstance(t.v, (int, float)):
+        return None if t.v == 0 and t.e is None else float(t.v)
+    return t.v  # type: ignore[return-value]
+
+
+def split(value: Value) -> Value:
+    """A value that carries a tangent as a dual: (value, tangent), componentwise two tuples."""
+    if isinstance(value, Cell):
+        t = value.t[0] if value.t else None
+        et = value.et[0] if value.et else None
+        return (Cell(value.v, value.e), Cell(0.0 if t is None else t, et))
+    if isinstance(value, tuple):
+        pairs = [split(item) for item in value]
+        return (tuple(p[0] for p in pairs), tuple(p[1] for p in pairs))  # type: ignore[index]
+    if isinstance(value, Closure):
+        return Derivative(value)
+    raise errors.wrong_call("a derivative cannot give a list")
+
+
+def call_paired(
+    machine: Machine, function: Paired, groups: tuple[tuple[Value, ...], ...], trace: Trace | None
+) -> Value:
+    """Call a function on duals for each direction that is carried."""
+    k = machine.directions
+    still = machine.with_directions(0)
+    v: Cell | None = None
+    t: list[object] = []
+    et: list[object] = []
+    for d in range(max(k, 1)):
+        pairs = tuple(tuple(_pair(arg, d) for arg in group) for group in groups)
+        result = still.call(function.pairs.still(), pairs, trace)
+        if not (isinstance(result, tuple) and len(result) == 2 and all(isinstance(r, Cell) for r in result)):
+            raise errors.wrong_call("a function given for a derivative must give a pair `(value, tangent)`")
+        assert isinstance(result[0], Cell) and isinstance(result[1], Cell)
+        v = result[0]
+        t.append(result[1].v)
+        et.append(result[1].e)
+    assert v is not None
+    return Cell(v.v, v.e, tuple(t[:k]), tuple(et[:k]))  # type: ignore[arg-type]
+
+
+def _pair(arg: Value, d: int) -> Value:
+    if isinstance(arg, Cell):
+        t = arg.t[d] if arg.t else None
+        return (Cell(arg.v, arg.e), Cell(0.0 if t is None else t, arg.et[d] if arg.et else None))
+    if isinstance(arg, tuple):
+        return tuple(_pair(item, d) for item in arg)
+    if isinstance(arg, Closure):
+        return Derivative(arg)
+    raise errors.wrong_call("a list has no derivative")

@@ -1,0 +1,391 @@
+"""The machine: what kernels ask for while they run.
+
+Owns `Machine`. It knows the program's definitions (through `Linker`), the settings and the books of one evaluation,
+and how many directions of differentiation are carried. Machines with other numbers of directions share everything
+else. Calls, lazy sides, sums and integrals of generated code come here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from potto.calculus.differentiation.deltas import PRODUCT_OF_DELTAS
+from potto.calculus.differentiation.tangents import Shape
+from potto.calculus.inlining.currying import sizes_of, uncurry
+from potto.calculus.surfaces.branch_cuts import opened
+from potto.core.terms import Branch, Deriv, Global, Hole, If, Integral, Lam, Sum, Term, lam, postorder
+from potto.core.terms import Delta as DeltaTerm
+from potto.diagnostics import PottoError
+from potto.integrate.costs import Costs
+from potto.integrate.pieces import Folded, Sided, still
+from potto.kernels import errors
+from potto.kernels.cells import Cell, Ints, Number, Pattern, Trace, Value, pad, pattern
+from potto.kernels.chunks import in_chunks, many
+from potto.kernels.compile import Kernel, counts, kernel
+from potto.projects.settings import Settings
+from potto.runtime.evaluation.functions import Closure, Derivative, Paired
+from potto.runtime.evaluation.reach import Reach
+from potto.runtime.evaluation.record import Books, Sides, note
+
+DEEPEST_CALLS = 3000
+MOST_TERMS = 10_000_000
+OVERDRAFT = 3
+
+
+class Linker:
+    """The definitions that a program refers to. `lookup` gives the term of a definition or raises PottoError.
+
+    held: definitions that have a value already, which is not computed again.
+    """
+
+    def __init__(self, lookup: Callable[[str, str], Term], held: Mapping[tuple[str, str], Value] | None = None) -> None:
+        self.lookup = lookup
+        self.held = held if held is not None else {}
+        self.terms: dict[tuple[str, str], Term] = {}
+        self.exactness: dict[Term, bool] = {}
+        self.reach = Reach(lambda name: self.term(name.module, name.name))
+        self.placed: dict[tuple[Integral, tuple[Shape, ...], bool], Term] = {}
+        self.constants: dict[tuple[str, str, Settings], Value] = {}
+        self.duals: dict[tuple[Lam, bool], Lam] = {}
+        self.reaches: dict[tuple[Term, ...], tuple[tuple[str, str, bytes], ...]] = {}
+        self.kernels: dict[tuple[Lam, tuple[Pattern, ...], int, bool], Kernel] = {}  # the ones met, without a lookup
+
+    def term(self, module: str, name: str) -> Term:
+        key = (module, name)
+        if key not in self.terms:
+            self.terms[key] = opened(self.lookup(module, name))
+        return self.terms[key]
+
+    def inexact(self, term: Term) -> bool:
+        """Whether a value of the term may carry an integration error: whether an integral is reached from it."""
+        found = self.exactness.get(term)
+        if found is not None:
+            return found
+        self.exactness[term] = False  # while a recursion comes back here
+        result = False
+        for node in postorder(term):
+            if isinstance(node, Integral) or (
+                isinstance(node, Global) and self.inexact(self.term(node.module, node.name))
+            ):
+                result = True
+                break
+        self.exactness[term] = result
+        return result
+
+    def reached(self, *terms: Term) -> tuple[tuple[str, str, bytes], ...]:
+        """The definitions that terms lead to, with the digests of what they are: what a plan depends on."""
+        found = self.reaches.get(terms)
+        if found is None:
+            seen: dict[Global, bytes] = {}
+            todo: list[Term] = list(terms)
+            while todo:
+                for node in postorder(todo.pop()):
+                    if isinstance(node, Global) and node not in seen:
+                        term = self.term(node.module, node.name)
+                        seen[node] = term.digest
+                        todo.append(term)
+            found = tuple(sorted((g.module, g.name, digest) for g, digest in seen.items()))
+            self.reaches[terms] = found
+        return found
+
+    def function(self, head: Term) -> Lam | Deriv | None:
+        """The function, or derivative of one, that a Global leads to, through definitions that are other names."""
+        for _ in range(100):
+            if isinstance(head, Lam | Deriv):
+                return head
+            if not isinstance(head, Global):
+                return None
+            head = self.term(head.module, head.name)
+        return None
+
+
+@dataclass
+class Machine:
+    """One evaluation, carrying `directions` tangents; `rounding` where rounding errors are kept track of.
+
+    frozen: surfaces, bounds and deltas stand still, so that tangents are those of the integrands alone.
+    side: -1 or 1 where one-sided derivatives are wanted, for parameters that shrink or grow.
+    """
+
+    linker: Linker
+    settings: Settings
+    books: Books
+    directions: int = 0
+    rounding: bool = True
+    root: bool = True
+    frozen: bool = False
+    side: int = 0
+
+    @property
+    def rtol(self) -> float:
+        return self.settings.rtol
+
+    @property
+    def atol(self) -> float:
+        return self.settings.atol
+
+    def with_directions(self, directions: int) -> Machine:
+        if directions == self.directions:
+            return self
+        return Machine(
+            self.linker, self.settings, self.books, directions, self.rounding, self.root, self.frozen, self.side
+        )
+
+    def inside(self) -> Machine:
+        """The machine for an integrand: rounding is estimated by the integrator, not kept track of."""
+        if not (self.rounding or self.root):
+            return self
+        return Machine(self.linker, self.settings, self.books, self.directions, False, False, self.frozen, self.side)
+
+    def tracking(self) -> Machine:
+        """The machine with rounding errors kept track of."""
+        if self.rounding:
+            return self
+        return Machine(
+            self.linker, self.settings, self.books, self.directions, True, self.root, self.frozen, self.side
+        )
+
+    # Books
+
+    @property
+    def costs(self) -> Costs | None:
+        return self.books.costs
+
+    def count(self, evaluations: int) -> None:
+        self.books.count(evaluations, self.settings.max_evals)
+
+    def sampled(self, share: float, limit: bool) -> None:
+        """So much of the sampling of an integral is done, with `limit` of the most that it may take; 0 begins it."""
+        gauge = self.books.gauge
+        if gauge is not None:
+            gauge.samplings += share == 0
+            gauge.sampled(share, limit)
+
+    def exhausted(self) -> bool:
+        return self.books.spent > self.settings.max_evals
+
+    def overdrawn(self) -> bool:
+        """Whether integrals inside of integrals have spent far more than the budget: what is left is given up."""
+        return self.books.spent > OVERDRAFT * self.settings.max_evals
+
+    def note_edge(self, what: Sided, sides: Sides, members: Ints | None = None) -> None:
+        self.books.met.edges.append((what, sides, members))
+
+    def note_sided(self, what: Sided, members: Ints | None = None) -> None:
+        """What an integral finds that stands in another one: how much it comes to, that one will say."""
+        note(self.books.met.sided, what, members)
+
+    def note_fold(self, what: Sided, where: Folded, members: Ints | None = None) -> None:
+        """Where sections of a surface appear or merge: only what is beside the parameters tells about derivatives."""
+        self.books.met.note_fold(what, where, members)
+
+    def note_unfinished(self, reason: str, members: Ints | None = None, once: str = "") -> None:
+        """Why the answer is not as accurate as was asked; of reasons that begin with `once`, the first will do."""
+        self.books.met.note_unfinished(reason, members, once)
+
+    def note_incomplete(self, what: str) -> None:
+        note(self.books.met.incomplete, what, None)
+
+    def note_degenerate(self, variable: str, members: Ints | None = None) -> None:
+        note(self.books.met.degenerate, variable, members)
+
+    # Terms over batches
+
+    def evaluate(self, function: Lam, env: dict[str, Value], trace: Trace | None) -> Value:
+        """The value of a function of free variables (in sorted order) in an environment."""
+        return self.run(function, [env[p] for p in function.params], trace)
+
+    def run(self, function: Lam, args: list[Value], trace: Trace | None) -> Value:
+        k = self.directions
+        key = (function, tuple([pattern(a, k) for a in args]), k, self.rounding)
+        found = self.linker.kernels.get(key)
+        if found is None:
+            found = self.linker.kernels[key] = kernel(function, key[1], k, self.rounding, self)
+        else:
+            counts.reused += 1
+        if found.plain and many(args):
+            return in_chunks(found, self, trace, args)
+        return found.run(self, trace, *args)
+
+    def term(self, term: Term, env: dict[str, Value]) -> Value:
+        return self.evaluate(lam(tuple(sorted(term.free)), term), env, None)
+
+    def part(self, term: Term, env: dict[str, Value]) -> Value:
+        return self.term(term, env)
+
+    # Definitions and functions
+
+    def inexact(self, term: Term) -> bool:
+        return self.linker.inexact(term)
+
+    def global_value(self, module: str, name: str) -> Value:
+        term = self.linker.term(module, name)
+        if isinstance(term, Lam):
+            return Closure(term, {}, self.rounding or self.linker.inexact(term), (module, name))
+        known = self.linker.held.get((module, name))
+        if known is not None:
+            self.books.used[module, name] = known
+            return pad(known, self.directions)
+        key = (module, name, self.settings)
+        if key not in self.linker.constants:
+            self.enter()
+            still = replace(self, directions=0, rounding=True, frozen=False)
+            self.linker.constants[key] = still.term(term, {})
+            self.books.depth -= 1
+        return pad(self.linker.constants[key], self.directions)
+
+    def closure(self, function: Lam, captured: dict[str, Value]) -> Value:
+        return Closure(function, captured, self.rounding or self.linker.inexact(function) or _any_inexact(captured))
+
+    def derived(self, function: Value) -> Value:
+        if not isinstance(function, Closure):
+            raise errors.wrong_call("`deriv` needs a function", "write the integral as a function of its parameters")
+        return Derivative(function)
+
+    def project(self, value: Value, index: int) -> Value:
+        if isinstance(value, (tuple, list)) and index < len(value):
+            return value[index]
+        raise errors.wrong_call(f"this value has no component {index + 1}")
+
+    def fail(self, term: Hole | DeltaTerm) -> Value:
+        if isinstance(term, Hole):
+            kind = errors.NO_MEASURE if term.measure else errors.BROKEN
+            raise PottoError([kind(errors.NOWHERE, term.reason)])
+        message = "a delta has a meaning only under an integral over its variables"
+        raise PottoError([errors.NO_MEANING(errors.NOWHERE, message)])
+
+    # Calls
+
+    def enter(self) -> None:
+        self.books.depth += 1
+        if self.books.depth > DEEPEST_CALLS:
+            self.books.depth = 0
+            raise PottoError([errors.TOO_DEEP(
+                errors.NOWHERE, f"more than {DEEPEST_CALLS:,} calls inside each other",
+                help="make sure that the condition that ends the recursion becomes true",
+            )])  # fmt: skip
+
+    def call(self, function: Value, groups: tuple[tuple[Value, ...], ...], trace: Trace | None) -> Value:
+        if not isinstance(function, Closure):
+            if not groups:
+                return function
+            raise errors.wrong_call("this is called, but it is not a function", "to multiply, write `*`")
+        if isinstance(function, Derivative):
+            from potto.runtime.evaluation.duals import call_derivative
+
+            return call_derivative(self, function, groups, trace)
+        if isinstance(function, Paired):
+            from potto.runtime.evaluation.duals import call_paired
+
+            return call_paired(self, function, groups, trace)
+        self.enter()
+        whole, arities = self.linker_shape(function.lam, sizes_of(groups))
+        args = [function.captured[n] for n in sorted(function.captured)]
+        for group, arity in zip(groups, arities):
+            args.extend(fit(group, arity))
+        value = self.run(whole, args, trace)
+        self.books.depth -= 1
+        return value
+
+    def linker_shape(self, function: Lam, sizes: tuple[int, ...]) -> tuple[Lam, tuple[int, ...]]:
+        """The function with captured names and as many groups of parameters as are given at once; with the size of
+        each group."""
+        key = (function, sizes)
+        found = _shapes.get(key)
+        if found is None:
+            params, body = uncurry(function, sizes)
+            arities: list[int] = []
+            inner: Term = function
+            for size in sizes:
+                arities.append(len(inner.params) if isinstance(inner, Lam) else size)
+                inner = inner.body if isinstance(inner, Lam) else inner
+            captured = tuple(sorted(function.free))
+            found = (lam(captured + params, body), tuple(arities))
+            if len(_shapes) > 10_000:
+                _shapes.clear()
+            _shapes[key] = found
+        return found
+
+    # Branches, sums
+
+    def falls(self, surface: Number, strict: bool) -> tuple[Any, Any]:
+        """Which side a surface falls on, and nan wherever it is nan."""
+        mask = surface > 0 if strict else surface >= 0
+        if self.directions and self.books.second and np.any(surface == 0):
+            raise PottoError([PRODUCT_OF_DELTAS(
+                errors.NOWHERE,
+                "the second derivative does not exist here: two surfaces coincide, or one passes through a corner",
+                notes=("it would hold a product of deltas on the same surface",),
+                help="move the parameters apart, or differentiate only once",
+            )])  # fmt: skip
+        if surface.__class__ is float:
+            return mask, (surface if surface != surface else None)
+        bad = np.isnan(surface)
+        return mask, (np.where(bad, np.nan, 0.0) if bad.any() else None)
+
+    def lazy(self, mask: Any, term: If | Branch, env: dict[str, Value], traces: tuple[Any, Any]) -> Value:
+        from potto.runtime.evaluation.selection import lazy
+
+        return lazy(self, mask, term, env, traces)
+
+    def sum(self, term: Sum, lo: Value, hi: Value, env: dict[str, Value], trace: Trace | None) -> Value:
+        from potto.runtime.evaluation.sums import total
+
+        return total(self, term, lo, hi, env, trace)
+
+    # Integrals
+
+    def integral(self, term: Integral, env: dict[str, Value]) -> Value:
+        from potto.runtime.evaluation.directional import stepped
+        from potto.runtime.integration.driver import integrate
+        from potto.runtime.integration.preparation import filled, held, placed, prepared, shape_of
+
+        term, env = filled(term, env, self.linker.reach)
+        names = term.free
+        key = (term, tuple([shape_of(env[name]) for name in names]), self.directions > 0)
+        known = self.linker.placed.get(key)
+        if known is None:
+            shapes = dict(zip(names, key[1]))
+            known = self.linker.placed[key] = placed(term, self.linker.reach, shapes.get, self.directions > 0)
+        if not isinstance(known, Integral):
+            return stepped(self, known, {n: env[n] for n in known.free})
+        term = known
+        if self.frozen:
+            term, stopped = held(term)
+            env = {**env, **{new: pad(still(env[old]), self.directions) for old, new in stopped}}
+        ready = prepared(term, self.linker.reach)
+        if ready is not term:
+            return self.evaluate(lam(tuple(sorted(ready.free)), ready), {n: env[n] for n in ready.free}, None)
+        return integrate(self, term, env)
+
+
+_shapes: dict[tuple[Lam, tuple[int, ...]], tuple[Lam, tuple[int, ...]]] = {}
+
+
+def _any_inexact(values: dict[str, Value]) -> bool:
+    def inexact(value: Value) -> bool:
+        if isinstance(value, Cell):
+            return value.e is not None
+        if isinstance(value, (tuple, list)):
+            return any(map(inexact, value))
+        return isinstance(value, Closure) and value.inexact
+
+    return any(map(inexact, values.values()))
+
+
+def fit(group: tuple[Value, ...], arity: int) -> tuple[Value, ...]:
+    """A group of arguments as the parameters take it: a tuple spread out, or several made into one tuple."""
+    if len(group) == arity:
+        return group
+    if len(group) == 1 and isinstance(group[0], tuple) and len(group[0]) == arity:
+        return group[0]
+    if arity == 1 and len(group) > 1:
+        return (tuple(group),)
+    raise errors.wrong_call(f"{len(group)} argument(s) given to a function that takes {arity}")
+
+
+__all__ = ["Books", "Linker", "Machine", "fit"]

@@ -1,0 +1,83 @@
+"""What terms lead to, through definitions: derivatives, jumps, integrals.
+
+Owns `Reach`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from potto.calculus.inlining.expand import Resolve
+from potto.core.terms import Branch, Delta, Deriv, Global, Integral, Prim, Term, Var, outside, postorder
+from potto.primitives import PRIMITIVES
+
+
+class Reach:
+    """What is reached from terms, through definitions."""
+
+    def __init__(self, resolve: Resolve) -> None:
+        self.resolve = resolve
+        self.known: dict[Term, frozenset[type]] = {}
+        self.known_branches: dict[Term, int] = {}
+        self.known_derived: dict[Term, frozenset[type]] = {}
+        self.known_spikes: dict[Term, bool] = {}
+
+    def kinds(self, term: Term) -> frozenset[type]:
+        """Deriv, Branch and Integral, where there are such terms; Prim for a builtin with a kink."""
+        found = self.known.get(term)
+        if found is None:
+            found = self.known[term] = frozenset(self._found(term))
+        return found
+
+    def branches(self, term: Term) -> int:
+        """How many conditions there are, those of each definition once."""
+        found = self.known_branches.get(term)
+        if found is None:
+            found = self.known_branches[term] = sum(isinstance(node, Branch) for node in self._all(term))
+        return found
+
+    def derived(self, term: Term) -> frozenset[type]:
+        """What is reached from the functions that are derived; of one that is a parameter, it may be anything."""
+        found = self.known_derived.get(term)
+        if found is None:
+            heads = {node.function for node in self._all(term) if isinstance(node, Deriv)}
+            kinds = (self.kinds(term if isinstance(head, Var) else head) for head in heads)
+            found = self.known_derived[term] = frozenset[type]().union(*kinds)
+        return found
+
+    def deltas(self, term: Term) -> bool:
+        """Whether something that jumps is derived, or something that bends twice."""
+        found = self.derived(term)
+        return Branch in found or found >= {Deriv, Prim}
+
+    def spikes(self, function: Term) -> bool:
+        """Whether what a function gives has deltas that no integral of its own is around."""
+        found = self.known_spikes.get(function)
+        if found is None:
+            self.known_spikes[function] = False  # of a recursion: what it adds itself is found without it
+            found = self.known_spikes[function] = any(self._spiky(node) for node in outside(function, (Integral,)))
+        return found
+
+    def _spiky(self, node: Term) -> bool:
+        if isinstance(node, Global):
+            known = self.resolve(node)
+            return known is not None and self.spikes(known)
+        return isinstance(node, Delta)
+
+    def _all(self, term: Term) -> Iterator[Term]:
+        seen: set[Term] = set()
+        todo = [term]
+        while todo:
+            for node in postorder(todo.pop()):
+                yield node
+                if isinstance(node, Global) and node not in seen:
+                    seen.add(node)
+                    known = self.resolve(node)
+                    todo += [] if known is None else [known]
+
+    def _found(self, term: Term) -> Iterator[type]:
+        for node in self._all(term):
+            if isinstance(node, Deriv | Branch | Integral):
+                yield type(node)
+            elif isinstance(node, Prim) and PRIMITIVES[node.op].kinks(*node.args):
+                yield Prim

@@ -1,0 +1,1 @@
+"""An integral from its term to its jets: methods, batches, second looks."""

@@ -1,0 +1,88 @@
+"""What is tried for an integral: variables eliminated, cut along, or sampled, and which of them innermost.
+
+Owns `too_many`, `many`, `orders`, `preferred` and `trials`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
+
+from potto.core.terms import Integral, integral
+from potto.runtime.integration.plans import Linked, plan_for
+
+if TYPE_CHECKING:
+    from potto.runtime.evaluation.machine import Machine
+
+# Up to how many variables iterated quadrature is never in question; what it takes beyond them, in evaluations, and how
+# much of that is acceptable. From LOOSE on, a relative accuracy is reached by fewer samples.
+MOST_LEVELS = 3
+PER_LEVEL, AFFORDABLE = 12, 1_000_000
+LOOSE = 1e-3
+FEW_NODES = 30_000  # up to which iterated quadrature is no slower
+# Evaluations that are spent on one order of two variables before another one is tried; how many times those of one
+# variable more.
+TRIAL, TRIAL_FACTOR = 12_000, 25
+
+
+def too_many(machine: Machine, term: Integral, linked: Linked) -> bool:
+    """Whether an integral has too many variables and surfaces for quadrature, or too few digits are asked for."""
+    if len(term.variables) <= MOST_LEVELS:
+        return False
+    return machine.settings.rtol >= LOOSE or expected(machine, term, linked) > AFFORDABLE
+
+
+def many(machine: Machine, term: Integral, linked: Linked) -> bool:
+    """Whether it pays to look whether the variables can be eliminated."""
+    return len(term.variables) > MOST_LEVELS and not machine.frozen and expected(machine, term, linked) > FEW_NODES
+
+
+def expected(machine: Machine, term: Integral, linked: Linked) -> int:
+    """About how many evaluations iterated quadrature takes."""
+    return PER_LEVEL ** len(term.variables) * 2 ** plan_for(machine, term, linked).doublings  # type: ignore[no-any-return]
+
+
+def orders(term: Integral) -> Iterator[Integral]:
+    """The integral as it is written, then with other variables innermost, where the bounds allow it.
+
+    A surface that runs along the innermost variable has no section in it; another variable then takes its place.
+    """
+    yield term
+    names = set(term.variables)
+    if any((lo.free | hi.free) & names for lo, hi in term.bounds):
+        return
+    count = len(term.variables)
+    for last in range(count - 1):
+        index = [i for i in range(count) if i != last] + [last]
+        yield integral(
+            tuple(term.variables[i] for i in index),
+            tuple(term.bounds[i] for i in index),
+            term.body,
+            tuple(term.hints[i] for i in index),
+        )
+
+
+def trials(machine: Machine, term: Integral, linked: Linked, outermost: bool) -> Iterator[tuple[Integral, int | None]]:
+    """Orders, and how many evaluations may go into trying them: where a jump is searched for, roots that merge further
+    out at places that are not known may make one order a hundred times as expensive as another."""
+    found = preferred(machine, term, linked)
+    if isinstance(found, list) and outermost and len(found) > 1 and searches(machine, found[0], linked):
+        most = TRIAL * TRIAL_FACTOR ** max(len(term.variables) - 2, 0)
+        yield from ((order, most) for order in found)
+    yield from ((order, None) for order in found)
+
+
+def preferred(machine: Machine, term: Integral, linked: Linked) -> Iterable[Integral]:
+    """The orders, those first in which the fewest jumps have to be searched for; a list where any have."""
+    if not searches(machine, term, linked):
+        return orders(term)
+    return sorted(orders(term), key=lambda order: searches(machine, order, linked))
+
+
+def searches(machine: Machine, term: Integral, linked: Linked) -> int:
+    """How many jumps are searched for, having no closed form in the variable that they cut; 0 where none would be.
+
+    Each leaves, besides what it takes, unknown places further out where its roots merge.
+    """
+    plan = plan_for(machine, term, linked)
+    return sum(cut.decides for level in plan.levels for cut in level.searched)

@@ -1,0 +1,101 @@
+"""Derivatives by differences of values, where no other way to them has digits.
+
+Owns `by_differences`. The boundary term of a curved surface in three variables is infinite at its own boundary, so that
+a second derivative by boundary terms keeps few digits; the first derivative has nearly all. Central differences of
+order 8 at two steps say what the next derivative is, and by how much they differ how well; the noise of the values and
+a gap between the sides that does not shrink with the step (a kink) speak against them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from potto.integrate.pieces import Sums, still
+from potto.kernels.cells import Array, Cell, Value, map_arrays
+from potto.runtime.evaluation.functions import Closure
+from potto.runtime.integration.one_sided import moved
+from potto.runtime.integration.plans import Linked, link
+
+if TYPE_CHECKING:
+    from potto.runtime.evaluation.machine import Machine
+
+ROUGH = 1e-6  # from which relative error on another way is looked for
+FEW = 4  # members of a batch for which that is done
+REACH = 1 / 16  # the farthest point, as a part of the parameters
+SHRINKS = 0.6  # what a gap may be of itself when the step is halved
+WEIGHTS = np.array([4 / 5, -1 / 5, 4 / 105, -1 / 280])  # of v(ih) - v(-ih), over h, exact up to degree 8
+LOWER = np.array([3 / 4, -3 / 20, 1 / 60, 0.0])  # up to degree 6
+SURE = 4.0  # times what two estimates differ by
+CANCELLED = 1e-9  # the part of what was added up that a derivative may be uncertain by: a zero that is known for one
+
+
+def by_differences(
+    machine: Machine, linked: Linked, batch: int, sums: Sums, evaluated: Callable[[Linked], Sums]
+) -> None:
+    """Put derivatives by differences where those of the sums have no digits, if differences have more.
+
+    evaluated: the integral for other parameters, of one member, without tangents.
+    """
+    if batch > FEW or machine.exhausted():
+        return
+    rough = ~(sums.et <= ROUGH * np.abs(sums.t)) & np.isfinite(sums.v)[:, None] & ~(sums.et <= machine.atol)
+    if sums.gross is not None:
+        rough &= ~(sums.et <= CANCELLED * np.where(np.isfinite(sums.gross[1]), sums.gross[1], 0.0))
+    for member in np.nonzero(rough.any(axis=(0, 1)))[0]:
+        env = {n: map_arrays(v, lambda a, m=member: a[m]) for n, v in linked.env.items()}
+        for d in np.nonzero(rough[:, :, member].any(axis=0))[0]:
+            step = min(_reaches(env.values(), int(d)), default=0.0) * REACH / 4
+            if not 0 < step < np.inf:
+                continue
+            noise = 2 * np.abs(WEIGHTS).sum() / (step / 2) * sums.e[:, member]
+            if (sums.et[:, d, member] <= noise).all():
+                continue  # differences of values have no more digits
+            with machine.books.apart():
+                found = _derivative(env, int(d), step, evaluated)
+            if found is None:
+                continue
+            value, off = found
+            t, et = sums.t[:, d, member], sums.et[:, d, member]
+            better = np.isfinite(off) & ~(et <= off) & np.isfinite(value)
+            t[:], et[:] = np.where(better, value, t), np.where(better, off, et)
+
+
+def _reaches(values: Any, d: int) -> Iterator[float]:
+    """Of each number that moves, the step after which it is twice as large."""
+    for value in values:
+        if isinstance(value, Cell):
+            t = value.t[d] if d < len(value.t) else None
+            if t is not None and t != 0 and value.v != 0:
+                yield abs(float(value.v) / float(t))
+        elif isinstance(value, tuple):
+            yield from _reaches(value, d)
+        elif isinstance(value, Closure):
+            yield from _reaches(value.captured.values(), d)
+
+
+def _derivative(
+    env: dict[str, Value], d: int, step: float, evaluated: Callable[[Linked], Sums]
+) -> tuple[Array, Array] | None:
+    """The derivative of all components, and how far off it may be; None where values are missing or there is a kink."""
+
+    def at(h: float) -> tuple[Array, Array]:
+        found = evaluated(link({n: still(moved(v, h, d)) for n, v in env.items()}))
+        return found.v[:, 0], found.e[:, 0]
+
+    middle, noise = at(0.0)
+    estimates, gaps = [], []
+    for h in (step, step / 2):
+        points = [(at(i * h), at(-i * h)) for i in (1, 2, 3, 4)]
+        differences = np.array([up[0] - down[0] for up, down in points]) / h
+        errors = np.array([up[1] + down[1] for up, down in points]) / h
+        estimates.append((WEIGHTS @ differences, LOWER @ differences, np.abs(WEIGHTS) @ errors))
+        gaps.append(np.abs(points[0][0][0] - 2 * middle + points[0][1][0]) / h)
+    (wide, _, _), (value, lower, rounding) = estimates
+    if not (np.isfinite(value).all() and np.isfinite(wide).all()):
+        return None
+    if (gaps[1] > SHRINKS * gaps[0] + 8 * noise / step + 1e-9 * np.abs(value)).any():
+        return None
+    return value, SURE * (np.abs(value - wide) + np.abs(value - lower)) + rounding

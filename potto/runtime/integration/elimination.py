@@ -1,0 +1,47 @@
+"""Integrals over many variables by eliminating these one after the other, where that does.
+
+Owns `step_by_step`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from potto.core.terms import Integral
+from potto.integrate.elimination.recursion import one_by_one
+from potto.integrate.pieces import Sums
+from potto.kernels.cells import map_arrays
+from potto.runtime.evaluation.record import Met
+from potto.runtime.integration.plans import Linked, eliminated_for
+
+if TYPE_CHECKING:
+    from potto.runtime.evaluation.machine import Machine
+
+# How accurate the answer must be, relatively, instead of that of iteration, and instead of that of samples.
+ACCURATE, WORTH = 1e-8, 1e-4
+
+
+def step_by_step(machine: Machine, term: Integral, linked: Linked, batch: int, limit: float) -> Sums | None:
+    """The integrals of a batch, where each variable hands one number on; None where errors are larger than `limit`."""
+    known = eliminated_for(machine, term, linked)
+    if known is None:
+        return None
+    rows, books = [], machine.books
+    for i in range(batch):
+        with books.apart() as met:
+            env = {n: map_arrays(v, lambda a, i=i: float(a[i])) for n, v in linked.env.items()}
+            row = one_by_one(known, machine, env)
+        if row is None or met != Met() or not accurate(row, limit, machine):
+            return None
+        rows.append(row)
+    machine.books.methods.add("quadrature")
+    return Sums(*(np.concatenate([getattr(r, name) for r in rows], axis=-1) for name in ("v", "e", "t", "et")))
+
+
+def accurate(sums: Sums, limit: float, machine: Machine) -> bool:
+    """Whether the errors are within a relative limit."""
+    fine = sums.e <= np.maximum(limit * np.abs(sums.v), machine.atol)
+    size = np.maximum(np.abs(sums.t), np.abs(sums.v)[:, None])  # a rate may be 0
+    return bool(fine.all() and (sums.et <= np.maximum(limit * size, machine.atol)).all())

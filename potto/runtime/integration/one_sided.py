@@ -1,0 +1,277 @@
+"""Derivatives that are not the same on the two sides of the parameters.
+
+Owns `from_both_sides`, `beside_folds`, `beside_axes`, `one_direction` and `moved`. What surfaces on bounds and on one
+another contribute is known on either side (`integrate/decomposition/coincidences`). Where sections of a surface appear
+or merge just at the parameters they move infinitely fast, and nothing at this place tells the derivative: of [x^2 < t]
+at t = 0 it is 0 on one side and infinite on the other, of [x^2 + y^2 < t] 0 and pi. It is then looked at beside the
+parameters, in three steps towards them; and so it is where surfaces run along every variable, and have sections along
+none.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from potto.integrate.adaptive.divergence import BOUNDLESS
+from potto.integrate.decomposition.cuts import Row, frame_rows
+from potto.integrate.decomposition.sections import searched_rows
+from potto.integrate.pieces import INNER, Folded, Sided, Sums, still
+from potto.integrate.plan import Plan
+from potto.kernels.cells import Array, Cell, Value, map_arrays
+from potto.runtime.evaluation.functions import Closure
+from potto.runtime.integration.plans import Linked, link
+
+if TYPE_CHECKING:
+    from potto.runtime.evaluation.machine import Machine
+
+# The parameters' steps that are tried, and how far apart what folds may be after one, as a part of the range.
+STEPS = 2.0 ** np.arange(-1000.0, 1001.0, 4.0)
+APART = 2.0**-8
+CLOSER = 2.0**-8  # each step by this part of the one before
+# What successive differences may be of the one before where there is a limit, and what is no difference at all.
+SETTLING, SAME = 0.75, 1e-6
+MISSED = 1 / 16  # the least part of what is extrapolated that may be wrong
+# What is nearer to a fold than this lies at it, as far as steps that parameters notice can tell.
+TOGETHER = 1e-9
+MOST_MEMBERS = 16  # of a batch that are looked at
+
+
+def from_both_sides(
+    machine: Machine, plan: Plan, env: dict[str, Value], batch: int, sums: Sums,
+    iterated: Callable[[Plan, Machine, dict[str, Value], int], Sums],
+) -> None:  # fmt: skip
+    """Note the one-sided derivatives of an integral in which a part has two; where the whole has one, that is it."""
+    reasons = dict(machine.books.met.sided)
+    machine.books.met.sided.clear()
+    with machine.books.apart():
+        found = [iterated(plan, replace(machine, side=side), env, batch) for side in (-1, 1)]
+    backward, forward = (np.where(np.isfinite(part.et), part.t, np.nan) for part in found)
+    before, beyond = (np.where(np.isfinite(part.et), part.et, 0.0) for part in found)
+    same = np.abs(forward - backward) <= 1e-12 * (np.abs(forward) + np.abs(backward))
+    sums.t = np.where(same, forward, sums.t)
+    differ = np.nonzero(~same.all(axis=(0, 1)))[0]
+    for what, members in reasons.items():
+        there = differ if members is None else np.intersect1d(differ, members)
+        if there.size:
+            backward_, forward_, before_, beyond_ = (x[..., there] for x in (backward, forward, before, beyond))
+            machine.note_edge(what, (backward_, forward_, before_, beyond_), there)
+
+
+def beside_folds(
+    machine: Machine, plan: Plan, linked: Linked, batch: int, sums: Sums, evaluated: Callable[[Linked], Sums]
+) -> None:
+    """Put the one-sided derivatives of integrals at whose parameters a surface folds in their place, or note both.
+
+    evaluated: the integral for other parameters, of one member. What was noted of other surfaces lacks what folds.
+    """
+    folds = {what: where for what, (where, _) in machine.books.met.folds.items()}
+    with machine.books.apart():
+        found = [
+            (what, side)
+            for what, where in folds.items()
+            for side in _sides(machine, plan, linked, where.owner or range(batch), where, evaluated)
+        ]
+    for what, (member, d, backward, forward, off) in found:
+        t, et = sums.t[:, d, member], sums.et[:, d, member]
+        for _, sides, _ in machine.books.met.edges:
+            for side, one in zip(sides, (backward, forward, *off), strict=True):
+                if np.shape(side) == sums.t.shape:
+                    side[:, d, member] = one
+        if _same(backward, forward, off[0] + off[1]) and np.isfinite(forward).all():
+            known = np.isfinite(t) & (np.abs(t - forward) <= SAME * np.abs(forward) + et)
+            t[:], et[:] = np.where(known, t, forward), np.where(known, et, off[0] + off[1])
+            continue
+        t[:] = np.where(np.isfinite(t), t, np.where(np.isfinite(backward), backward, forward))
+        et[:] = np.where(np.isfinite(t), np.where(np.isfinite(et), et, 0.0), np.inf)
+        _endless(machine, backward, forward, t, et)
+        machine.note_edge(what, (backward, forward, *off))
+    machine.books.met.folds.clear()
+
+
+def beside_axes(
+    machine: Machine, plan: Plan, linked: Linked, batch: int, sums: Sums, variable: str,
+    evaluated: Callable[[Linked], Sums],
+) -> bool:  # fmt: skip
+    """The same where surfaces run along `variable`, and every other one. Whether all derivatives are known then."""
+    what = Sided(variable)
+    if batch > MOST_MEMBERS:
+        return False
+    machine.books.met.degenerate.clear()
+    with machine.books.apart():
+        found = list(_sides(machine, plan, linked, range(batch), None, evaluated))
+    moving = [any(any(_moving(v, d)) for v in linked.env.values()) for d in range(machine.directions)]
+    still_ones = batch * moving.count(False)
+    if len(found) + still_ones < batch * machine.directions:
+        return False
+    for member, d, backward, forward, off in found:
+        t, et = sums.t[:, d, member], sums.et[:, d, member]
+        if np.isnan(backward).any() or np.isnan(forward).any():
+            return False
+        if _same(backward, forward, off[0] + off[1]) and np.isfinite(forward).all():
+            t[:], et[:] = 0.5 * (backward + forward), np.abs(forward - backward) + off[0] + off[1]
+        else:
+            et[:] = np.abs(t)
+            _endless(machine, backward, forward, t, et)
+            machine.note_edge(what, (backward, forward, *off))
+    return True
+
+
+def _endless(machine: Machine, backward: Array, forward: Array, t: Array, et: Array) -> None:
+    """Put the infinity that is the derivative on both sides."""
+    both = np.isinf(forward) & (forward == backward)
+    t[:], et[:] = np.where(both, forward, t), np.where(both, np.inf, et)
+    if both.any():
+        machine.note_unfinished(BOUNDLESS)
+
+
+def _same(backward: Array, forward: Array, off: Array) -> bool:
+    size = np.maximum(np.abs(backward), np.abs(forward))
+    with np.errstate(invalid="ignore"):
+        near = np.abs(backward - forward) <= np.where(size < np.inf, SAME * size + off, 0.0)
+    return bool((near | (backward == forward)).all())
+
+
+def _sides(
+    machine: Machine, plan: Plan, linked: Linked, members: Sequence[int], where: Folded | None,
+    evaluated: Callable[[Linked], Sums],
+) -> Iterator[tuple[int, int, Array, Array, tuple[Array, Array]]]:  # fmt: skip
+    """Member, direction, the derivatives before and behind the parameters, of all components, and how far off each."""
+    for member in members[:MOST_MEMBERS]:
+        env = {n: map_arrays(v, lambda a, m=member: a[m]) for n, v in linked.env.items()}
+        for d in range(machine.directions):
+            sides = _both(machine, plan, env, d, where, evaluated)
+            if sides is not None:
+                yield (member, d, *sides)
+
+
+def _both(
+    machine: Machine, plan: Plan, env: dict[str, Value], d: int, where: Folded | None,
+    evaluated: Callable[[Linked], Sums],
+) -> tuple[Array, Array, tuple[Array, Array]] | None:  # fmt: skip
+    """The derivatives before and behind the parameters, of all components, and how far off each may be; None if nothing
+    moves in this direction."""
+    step = _step(machine, plan, env, d, where)
+    if step is None:
+        return None
+    sides, off = [], []
+    for sign in (-1.0, 1.0):
+        steps = [sign * step * CLOSER**i for i in range(3)]
+        found = [evaluated(link({n: moved(v, h, d) for n, v in env.items()})) for h in steps]
+        values = [np.where(np.isfinite(part.et[:, d, 0]), part.t[:, d, 0], np.nan) for part in found]
+        noise = np.sum([part.et[:, d, 0] for part in found], axis=0)
+        limits, missed = np.array([_limit(*three) for three in zip(*values, noise, strict=True)]).T
+        sides.append(limits)
+        off.append(np.where(np.isfinite(limits), missed + found[2].et[:, d, 0], 0.0))
+    return sides[0], sides[1], (off[0], off[1])
+
+
+def _step(machine: Machine, plan: Plan, env: dict[str, Value], d: int, where: Folded | None) -> float | None:
+    """The largest step that moves the roots that fold, or all roots, by a small part of the range, either way.
+
+    Where nobody knows the roots, since an integral further in has them, a small part of the parameters.
+    """
+    if where is not None and where.number == INNER:
+        sizes = [float(np.abs(cell.v)) for value in env.values() for cell in _moving(value, d)]
+        return APART**2 * max([1.0, *sizes]) if sizes else None
+    both = np.concatenate(([0.0], STEPS, -STEPS))
+    here = {n: moved(v, both, d, moving=False) for n, v in env.items()}
+    quiet, size = machine.with_directions(0), both.size
+    outer = () if where is None else where.outer
+    for number, level in enumerate(plan.levels[: 1 + (0 if where is None else where.number)]):
+        values = quiet.evaluate(level.frame, {n: here[n] for n in level.frame.params}, None)
+        assert isinstance(values, tuple)
+        lo, hi, rows = frame_rows(level, values)
+        rows += searched_rows(replace(level, searched=()), here, lo, hi, size, quiet)
+        low, high = (np.broadcast_to(np.nan_to_num(end.v, posinf=1e300, neginf=-1e300), (size,)) for end in (lo, hi))
+        middle = 0.5 * low + 0.5 * high
+        here[level.variable] = Cell(np.full(size, outer[number]) if number < len(outer) else middle)
+    off = np.zeros(size)
+    for row in rows:
+        if where is None or row.cut == where.cut:
+            x = np.broadcast_to(row.x, (size,))
+            if where is None:
+                x = np.where((x >= np.minimum(low, high)) & (x <= np.maximum(low, high)), x, np.nan)
+            start = x[0] if np.isfinite(x[0]) else _near(x) if where is None else where.place
+            off = np.fmax(off, np.abs(x - start))
+    fits = (off <= APART * _room(low, high, rows, where))[1:].reshape(2, -1).all(axis=0)
+    moves = (off > 0)[1:].reshape(2, -1).any(axis=0)
+    fits = np.logical_and.accumulate(fits) & moves
+    return float(STEPS[np.nonzero(fits)[0][-1]]) if fits.any() else None
+
+
+def _room(low: Array, high: Array, rows: Sequence[Row], where: Folded | None) -> Array:
+    """How far it is from one end of the range to the other, or from what folds to what else lies in it."""
+    reach = np.abs(high - low)
+    place = 0.0 if where is None else where.place
+    room = np.where((reach < 1e300) & (reach[0] > 0), reach, 1.0 + abs(place))
+    if where is None:
+        return room
+    others = [low, high, *(row.x for row in rows)]
+    gaps = [abs(float(np.broadcast_to(x, reach.shape)[0]) - place) for x in others]
+    near = [gap for gap in gaps if gap > TOGETHER * (1.0 + abs(place))]
+    return np.minimum(room, min(near, default=np.inf))
+
+
+def _near(x: Array) -> Array:
+    """Where a root is after the least of the steps after which there is one, in either direction."""
+    found = [x[1 + i * STEPS.size + there.argmax()] for i, there in enumerate(~np.isnan(x[1:]).reshape(2, -1))]
+    return np.concatenate(([np.nan], *(np.full(STEPS.size, place) for place in found)))
+
+
+def _moving(value: Value, d: int) -> Iterator[Cell]:
+    """The numbers in a value that move in a direction."""
+    if isinstance(value, Cell):
+        t = value.t[d] if d < len(value.t) else None
+        if t is not None and np.any(t):
+            yield value
+    elif isinstance(value, tuple):
+        for item in value:
+            yield from _moving(item, d)
+    elif isinstance(value, Closure):
+        for inner in value.captured.values():
+            yield from _moving(inner, d)
+
+
+def moved(value: Value, step: Any, d: int, moving: bool = True) -> Value:
+    """A value after so large a step along its tangents in direction d, which it keeps if it goes on `moving`."""
+    if isinstance(value, Cell):
+        t = value.t[d] if d < len(value.t) else None
+        v = value.v if t is None else value.v + step * t
+        return Cell(v, value.e, value.t, value.et) if moving else Cell(v)
+    if isinstance(value, tuple):
+        return tuple(moved(item, step, d, moving) for item in value)
+    if isinstance(value, Closure):
+        return value.change(lambda inner: moved(inner, step, d, moving))
+    return value if moving else still(value)
+
+
+def one_direction(value: Value, d: int) -> Value:
+    """A value that moves in direction d alone, as its only one."""
+    if isinstance(value, Cell):
+        return Cell(value.v, value.e, value.t[d : d + 1], value.et[d : d + 1])
+    if isinstance(value, tuple):
+        return tuple(one_direction(item, d) for item in value)
+    return value.change(lambda inner: one_direction(inner, d)) if isinstance(value, Closure) else value
+
+
+def _limit(far: float, nearer: float, nearest: float, noise: float) -> tuple[float, float]:
+    """Where three values at steps that shrink lead to, a number, an infinity, or nan where that does not show, and how
+    far off it may be: what is still to come, or what extrapolation may have missed of it."""
+    if not np.isfinite([far, nearer, nearest]).all():
+        return math.nan, 0.0
+    first, second = nearer - far, nearest - nearer
+    rate = min(max(abs(second / first), CLOSER), SETTLING) if first else CLOSER
+    coming = 2 * abs(second) * rate / (1 - rate)
+    if abs(second) <= max(SAME * abs(nearest), noise):
+        return nearest, coming
+    if abs(second) <= SETTLING * abs(first):
+        limit = nearest + second * second / (first - second)
+        zero = abs(limit) <= SAME * (abs(far) + abs(nearer))
+        return (0.0, abs(limit) + coming) if zero else (limit, coming * max(rate, MISSED))
+    grows = first * second > 0 and nearest * second > 0 and abs(first) > SAME * abs(nearest)
+    return (math.copysign(math.inf, nearest) if grows else math.nan), 0.0

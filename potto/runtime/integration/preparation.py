@@ -1,0 +1,258 @@
+"""Integrals made ready to be integrated.
+
+Owns `prepared`: deltas are integrated out, a sum under an integral becomes a sum of integrals, and an integrand that
+is a sum with many surfaces is taken apart, so that each part is cut along its own surfaces only. That keeps n
+conditions added up at a cost proportional to n. Owns `held` too: deltas that stand still.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+from potto.calculus.decomposition.joined import joined
+from potto.calculus.differentiation.deltas import without_deltas
+from potto.calculus.differentiation.derivative import NotSmooth
+from potto.calculus.differentiation.directional import shifted
+from potto.calculus.differentiation.dual import Differentiator
+from potto.calculus.differentiation.tangents import FUNCTION, NotShifted, Shape, Shapes
+from potto.calculus.inlining.expand import expanded
+from potto.calculus.solving.pivots import NoClosedForm
+from potto.calculus.surfaces.lifted import closed_value, lifted
+from potto.calculus.surfaces.nested_brackets import nested
+from potto.calculus.surfaces.trace import spine
+from potto.core.terms import (
+    App,
+    Branch,
+    Delta,
+    Deriv,
+    Global,
+    Integral,
+    Prim,
+    Sum,
+    Term,
+    Var,
+    add,
+    children,
+    deriv,
+    integral,
+    neg,
+    postorder,
+    rebuild,
+    substitute,
+    sum_,
+    var,
+)
+from potto.diagnostics import PottoError, declare
+from potto.kernels import errors
+from potto.kernels.cells import Cell, Value
+from potto.runtime.evaluation.functions import Closure, Derivative
+from potto.runtime.evaluation.reach import Reach
+
+NOT_COUNTED = declare("P0510", "deltas of a derivative that were not found")
+
+FEW = 4  # branches that one integrand may have before its summands are integrated apart
+
+
+@lru_cache(maxsize=4096)
+def prepared(term: Integral, reach: Reach) -> Term:
+    """An equal term, or the same one where there is nothing to be done. Raises PottoError (a product of deltas)."""
+    deltas = [node for node in postorder(term.body) if isinstance(node, Delta)]
+    if deltas:
+        apart = lifted(term, closed_value) if any(map(nested, (d.coordinates[0] for d in deltas))) else None
+        try:
+            return without_deltas(term if apart is None else apart.term)
+        except (NoClosedForm, NotSmooth) as problem:
+            raise PottoError([NOT_COUNTED(
+                errors.NOWHERE, f"a delta under this integral was not integrated out: {problem}",
+                help="let its argument be smooth, and solvable for one of the variables of integration",
+            )]) from None  # fmt: skip
+    body = term.body
+    if isinstance(body, Sum) and not (body.lo.free | body.hi.free) & set(term.variables):
+        return sum_(body.variable, body.lo, body.hi, _over(term, body.body))
+    if isinstance(body, Prim) and body.op == "neg":
+        inner = _over(term, body.args[0])
+        ready = prepared(inner, reach)
+        return neg(ready) if ready is not inner else term
+    if isinstance(body, Prim) and body.op == "add":
+        return _apart(term, body, reach)
+    return term
+
+
+def placed(term: Integral, reach: Reach, shapes: Shapes, again: bool) -> Term:
+    """The integral with the calls of definitions that place its deltas carried out: `delta(cond (x, y) c)`. Of a
+    derivative under it, of a function that jumps, the deltas count (`_counted`).
+
+    shapes: how the values of free variables are built. again: whether it is to be differentiated.
+    Integrals inside that can be joined with it are. Raises PottoError.
+    """
+    term = _opened(joined(term, reach.resolve), reach)
+    counted = _counted(term, reach, shapes, again)
+    if not isinstance(counted, Integral):
+        return counted
+    term, nodes = counted, postorder(counted)
+    if not any(isinstance(n, Delta) and any(isinstance(g, Global | App) for g in postorder(*n.coordinates))
+               for n in nodes):  # fmt: skip
+        return term
+    memo: dict[Term, Term] = {}
+    for node in nodes:
+        new = rebuild(node, tuple(memo[c] for c in children(node)))
+        memo[node] = expanded(new, reach.resolve) if isinstance(new, Delta) else new
+    return memo[term]
+
+
+def _opened(term: Integral, reach: Reach) -> Integral:
+    """With the calls carried out of functions that give deltas, `def peak(t, x) delta(x - t)`."""
+    calls = [node for node in postorder(term.body) if isinstance(node, App)]
+    if not any(reach.spikes(call.function) for call in calls):
+        return term
+    return _over(term, expanded(term.body, lambda g: reach.resolve(g) if reach.spikes(g) else None))
+
+
+def filled(term: Integral, env: dict[str, Value], reach: Reach) -> tuple[Integral, dict[str, Value]]:
+    """With the functions in the place of those parameters whose derivatives are taken in the integrand, that place its
+    deltas, or that lead to derivatives themselves; what they have captured joins the environment, renamed."""
+    given = {name: value for name in term.free if isinstance(value := env[name], Closure)}
+    derived = _derived_parameters(term) if given else ()
+    while given:
+        name, function = given.popitem()
+        order, primal = _underived(function)
+        if type(primal) is not Closure or not (name in derived or _matters(function, reach)):
+            continue
+        names = {captured: f"{captured}@{name}" for captured in primal.captured}
+        own: Term = substitute(primal.lam, {captured: var(new) for captured, new in names.items()})
+        for _ in range(order):
+            own = deriv(own)
+        found = substitute(term, {name: own})
+        assert isinstance(found, Integral)
+        term = found
+        joined = {new: primal.captured[captured] for captured, new in names.items()}
+        env = {**env, **joined}
+        given |= {new: value for new, value in joined.items() if isinstance(value, Closure)}
+        derived = _derived_parameters(term)
+    return term, env
+
+
+@lru_cache(maxsize=4096)
+def _derived_parameters(term: Integral) -> tuple[str, ...]:
+    """The functions among the parameters whose derivatives are taken in an integrand, or that place its deltas."""
+    nodes = postorder(term.body)
+    derived = {node.function for node in nodes if isinstance(node, Deriv)}
+    for node in nodes:
+        if isinstance(node, Delta):
+            derived |= {spine(part)[0] for part in postorder(*node.coordinates) if isinstance(part, App)}
+    return tuple(sorted({inner.name for inner in derived if isinstance(inner, Var)} & term.free))
+
+
+def _underived(function: Closure) -> tuple[int, Closure]:
+    order = 0
+    while isinstance(function, Derivative):
+        order, function = order + 1, function.primal
+    return order, function
+
+
+def _matters(function: Closure, reach: Reach) -> bool:
+    """Whether a function is a derivative of something that may jump, or leads to one."""
+    order, primal = _underived(function)
+    if reach.deltas(primal.lam) or reach.spikes(primal.lam) or (order and reach.kinds(primal.lam) & {Branch, Prim}):
+        return True
+    return any(_matters(value, reach) for value in primal.captured.values() if isinstance(value, Closure))
+
+
+def shape_of(value: Value) -> Shape:
+    """How a value is built: None is a number, FUNCTION a function, a tuple has the shapes of its items."""
+    if isinstance(value, tuple):
+        return tuple(map(shape_of, value))
+    return None if isinstance(value, Cell) else FUNCTION
+
+
+def _counted(term: Integral, reach: Reach, shapes: Shapes, again: bool) -> Term:
+    """An equal term in which no tangent has a delta that points don't see.
+
+    Kernels carry the tangents of derivatives from point to point, where a delta is nowhere: `D Real[x]` is
+    `(Real[x], Dist[x])` for what jumps. Where every jump has a closed form the deltas are written out; else the
+    integral is itself taken as a derivative (`shifted`), by numbers. For one that is to be differentiated once more
+    closed forms go first.
+    """
+    if not reach.deltas(term.body):
+        return term
+    by_numbers = Integral in reach.derived(term.body)
+    if again or not by_numbers:
+        spelled = _with_spikes(term, reach, again)
+        if spelled is not None:
+            return spelled
+    try:
+        found = shifted(term, reach.resolve, reach.deltas, shapes)
+    except NotShifted as problem:
+        if by_numbers and not again:
+            spelled = _with_spikes(term, reach, False)
+            if spelled is not None:
+                return spelled
+        raise PottoError([NOT_COUNTED(
+            errors.NOWHERE, f"the deltas of a derivative under this integral were not found: {problem}",
+            help="differentiate the integral as a whole",
+        )]) from None  # fmt: skip
+    return term if found is None else found
+
+
+def _with_spikes(term: Integral, reach: Reach, anyway: bool) -> Integral | None:
+    """The integrand with derivatives carried out; as it was if that brings no deltas over variables of integration,
+    unless that is wanted `anyway`: it shows where the tangents jump. None where some derivative has no closed form, or
+    is of what is not known."""
+    try:
+        body = Differentiator(reach.resolve).carried_out(term.body)
+    except (NoClosedForm, NotSmooth, PottoError):
+        return None
+    variables = frozenset(term.variables)
+    calls = (node for node in postorder(body) if isinstance(node, App) and node.free & variables)
+    if any(reach.deltas(call.function) for call in calls):
+        return None
+    before = {node for node in postorder(term.body) if isinstance(node, Delta)}
+    found = any(isinstance(n, Delta) and n not in before and n.coordinates[0].free & variables for n in postorder(body))
+    return _over(term, body) if found or anyway else term
+
+
+@lru_cache(maxsize=1024)
+def held(term: Integral) -> tuple[Integral, tuple[tuple[str, str], ...]]:
+    """The integral with what places its deltas under names of its own, to be given values without tangents.
+
+    The names are those of the parameters, with the new ones.
+    """
+    deltas = [node for node in postorder(term.body) if isinstance(node, Delta)]
+    bound = {name for node in postorder(term) if isinstance(node, Integral) for name in node.variables}
+    names = sorted({name for node in deltas for name in node.coordinates[0].free} - bound)
+    renamed = {name: var(f"{name}@still") for name in names}
+    memo: dict[Term, Term] = {}
+    for node in postorder(term):
+        new = rebuild(node, tuple(memo[child] for child in children(node)))
+        memo[node] = substitute(new, renamed) if isinstance(new, Delta) else new
+    result = memo[term]
+    assert isinstance(result, Integral)
+    return result, tuple((name, f"{name}@still") for name in names)
+
+
+def _over(term: Integral, body: Term) -> Integral:
+    return integral(term.variables, term.bounds, body, term.hints)
+
+
+def _apart(term: Integral, body: Prim, reach: Reach) -> Term:
+    """Summands with surfaces of their own integrated by themselves, the others together."""
+    counts = [_branches(arg, frozenset(term.variables), reach) for arg in body.args]
+    if sum(counts) <= FEW and not any(isinstance(arg, Sum) for arg in body.args):
+        return term
+    smooth = [arg for arg, count in zip(body.args, counts, strict=True) if not count and not isinstance(arg, Sum)]
+    rest = [arg for arg in body.args if arg not in smooth]
+    if len(rest) + bool(smooth) < 2:
+        return term
+    parts: list[Term] = [_over(term, add(*smooth))] if smooth else []
+    return add(*parts, *(_over(term, arg) for arg in rest))
+
+
+def _branches(term: Term, variables: frozenset[str], reach: Reach) -> int:
+    """The conditions that vary with some variables: written here, or in definitions that are called with them."""
+    count = 0
+    for node in postorder(term):
+        if isinstance(node, Branch):
+            count += bool(node.surface.free & variables)
+        elif isinstance(node, App) and isinstance(head := spine(node)[0], Global) and node.free & variables:
+            count += reach.branches(head)
+    return count

@@ -1,0 +1,120 @@
+"""Iterated quadrature of a batch by one plan: whole boxes first, the rest cut, so many members at a time.
+
+Owns `within`, `in_parts` and `iterated`.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from contextlib import AbstractContextManager
+from dataclasses import replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from potto.integrate.adaptive.iterated import Iteration
+from potto.integrate.fixed.tensor_product import uncut
+from potto.integrate.pieces import Sums
+from potto.integrate.plan import Plan
+from potto.kernels.cells import Array, Value, map_arrays
+
+if TYPE_CHECKING:
+    from potto.runtime.evaluation.machine import Machine
+
+START_ORDER = 11
+ORDERS = (4, 6, 8, 10)
+PILOTS = 64
+BATCH = 4096  # members integrated at once
+FEW = 64  # members for which it does not pay to look for those that nothing cuts
+
+
+def within(most: int | None, plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> Sums | None:
+    """Quadrature; None where it takes more than so many evaluations a member."""
+    if most is None or machine.books.spent + most >= machine.settings.max_evals:
+        return in_parts(plan, machine, env, batch)
+    tight = replace(machine, settings=replace(machine.settings, max_evals=math.ceil(machine.books.spent + most)))
+    with machine.books.apart() as met:
+        sums = in_parts(plan, tight, env, batch)
+    if tight.exhausted():
+        return None
+    machine.books.met.take(met, np.arange(batch))
+    return sums
+
+
+def in_parts(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> Sums:
+    """Quadrature: whole boxes first, where there are many, then a bounded number of members of the batch at a time."""
+    if batch < FEW or plan.box is None:
+        return iterated(plan, machine, env, batch)
+    with one_thread():
+        found = uncut(plan.box, machine, env, batch)
+    if found is None:
+        return iterated(plan, machine, env, batch)
+    done, sums = found
+    rest = np.nonzero(~done)[0]
+    if machine.costs is not None:
+        machine.costs.whole += batch - rest.size
+    if rest.size:
+        here = {n: map_arrays(v, operator.itemgetter(rest)) for n, v in env.items()}
+        with machine.books.apart() as met:
+            part = iterated(plan, machine, here, rest.size)
+        machine.books.met.take(met, rest)
+        for name in ("v", "e", "t", "et"):
+            getattr(sums, name)[..., rest] = getattr(part, name)
+        if part.gross is None or sums.gross is None:
+            sums.gross = None
+        else:
+            sums.gross[:, rest] = part.gross
+    return sums
+
+
+def iterated(
+    plan: Plan, machine: Machine, env: dict[str, Value], batch: int, start_order: int = START_ORDER
+) -> Sums:
+    """Iterated quadrature with cuts."""
+    if batch <= BATCH:
+        return Iteration(plan, machine, start_order).whole(env, batch)
+    with one_thread():
+        order = best_order(plan, machine, env, batch)
+        parts = []
+        for start in range(0, batch, BATCH):
+            index = slice(start, min(start + BATCH, batch))
+            here = {n: map_arrays(v, operator.itemgetter(index)) for n, v in env.items()}
+            with machine.books.apart() as met:
+                parts.append(Iteration(plan, machine, order).whole(here, index.stop - start))
+            machine.books.met.take(met, np.arange(index.start, index.stop))
+    m = max(p.v.shape[0] for p in parts)
+
+    def joined(name: str) -> Array:
+        rows = [getattr(p, name) for p in parts]
+        return np.concatenate([np.broadcast_to(r, (m, *r.shape[1:])) for r in rows], axis=-1)
+
+    gross = None if any(p.gross is None for p in parts) else np.concatenate([p.gross for p in parts], axis=-1)
+    return Sums(joined("v"), joined("e"), joined("t"), joined("et"), gross=gross)
+
+
+def best_order(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> int:
+    """The number of nodes to start with that is the cheapest for a few members spread over the batch."""
+    index = np.linspace(0, batch - 1, PILOTS).astype(np.int64)
+    here = {n: map_arrays(v, operator.itemgetter(index)) for n, v in env.items()}
+    costs = []
+    for order in ORDERS:
+        before = machine.books.evaluations
+        with machine.books.apart():
+            Iteration(plan, machine, order).run(0, here, PILOTS, {}, machine)
+        costs.append(machine.books.evaluations - before)
+    return ORDERS[costs.index(min(costs))]
+
+
+def one_thread() -> AbstractContextManager[object]:
+    """Many small products of matrices: threads only get in each other's way."""
+    limit: AbstractContextManager[object] = _threads().limit(limits=1, user_api="blas")
+    return limit
+
+
+@lru_cache(maxsize=1)
+def _threads() -> Any:
+    from threadpoolctl import ThreadpoolController  # ctypes and a look at every library loaded: for batches only
+
+    return ThreadpoolController()
