@@ -31,7 +31,7 @@ def counting() -> Iterator[None]:
 
 
 def books() -> Costs | None:
-    """Books to write in, if anyone asked for them."""
+    """Record to write in, if anyone asked for them."""
     return Costs() if _wanted.get() else None
 
 

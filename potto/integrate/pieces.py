@@ -10,51 +10,23 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from potto.core.terms import Lam, Term
+from potto.core.terms import Lam
 from potto.integrate.costs import Costs
+from potto.integrate.events import Event, Events, Members
 from potto.integrate.rules import substitution
 from potto.integrate.rules.gauss import gauss, leaning
 from potto.kernels.cells import Array, Cell, Ints, Mask, Trace, Value, map_arrays
 from potto.kernels.errors import not_a_number
 
-
-@dataclass(frozen=True)
-class Sided:
-    """Why derivatives on the two sides differ: a surface lies on a bound of a variable, or on another surface.
-
-    fold: or its sections along the variable appear or merge just here. Without a surface: some run along the variable.
-    """
-
-    variable: str
-    surface: Term | None = None
-    other: Term | None = None
-    fold: bool = False
-
-
-INNER = -1
 STRAY = 8
 TELLING = 4  # nodes, from which on values tell where a singularity is; a polynomial may need fewer
 
 
-@dataclass(frozen=True)
-class Folded:
-    """A fold: at which variable, of which of its cuts, where, and for which of the batch; None where for all.
-
-    outer: where that is in the variables further out. Of an integral inside of another one only that there is one: its
-    variables and its batch mean nothing outside, and the number is INNER.
-    """
-
-    number: int
-    cut: int
-    place: float
-    owner: tuple[int, ...] | None
-    outer: tuple[float, ...] = ()
-
-
 class Evaluator(Protocol):
-    """What integration asks of the machine: terms evaluated over batches, and the books.
+    """What integration asks of the machine: terms evaluated over batches, and where to note what it meets.
 
-    What is noted is true of `members` of the outermost batch; of all that there are, or of nobody knows which, if None.
+    Members are those of the outermost batch; None: all that there are, or nobody knows which. `apart`: the same machine
+    for what is to be known by itself of what it meets.
     """
 
     @property
@@ -74,11 +46,10 @@ class Evaluator(Protocol):
     def exhausted(self) -> bool: ...
     @property
     def side(self) -> int: ...
-    def note_sided(self, what: Sided, members: Ints | None = None) -> None: ...
-    def note_fold(self, what: Sided, where: Folded, members: Ints | None = None) -> None: ...
-    def note_unfinished(self, reason: str, members: Ints | None = None, once: str = ...) -> None: ...
-    def note_degenerate(self, variable: str, members: Ints | None = None) -> None: ...
-    def note_incomplete(self, what: str) -> None: ...
+    @property
+    def events(self) -> Events: ...
+    def apart(self) -> Evaluator: ...
+    def note(self, event: Event, members: Members = None) -> None: ...
 
 
 @dataclass

@@ -51,7 +51,7 @@ from potto.core.terms import (
 from potto.integrate.decomposition.vanishing import vanishing_of
 from potto.integrate.fixed.a_priori import Straight, straight
 from potto.integrate.fixed.tensor_product import Box, box_of
-from potto.kernels.cells import Mask, Trace, Value
+from potto.kernels.cells import Mask, Trace
 
 
 @dataclass(frozen=True)
@@ -124,10 +124,6 @@ class Plan:
     confused: bool = False
     folds: bool = False
     degree: int | None = None
-
-    def environment(self, env: dict[str, Value], everything: dict[str, Value]) -> dict[str, Value]:
-        """What the plan is evaluated in: also what functions have captured, if calls of them were carried out."""
-        return env if self.term.free <= env.keys() else everything
 
     def trace(self, sides: Mapping[int, Mask]) -> Trace | None:
         """The trace that forces the groups to the sides given: a mask, true where the canonical surface is >= 0."""

@@ -51,11 +51,10 @@ class Batch:
         value, error, tangent, tangent_error = map(self._restored, parts)
         shaped = replace(estimate, value=value, error=error, tangent=tangent, tangent_error=tangent_error)
         if self.shape is None:
-            return replace(shaped, member_converged=None, reason_members={})
-        masks = estimate.reason_members or dict.fromkeys(estimate.reasons, True)
-        missed = {why: self._mask(where) for why, where in masks.items()}
+            return replace(shaped, member_converged=None, shortfalls=dict.fromkeys(estimate.shortfalls, True))
+        missed = {why: self._mask(where) for why, where in estimate.shortfalls.items()}
         converged = ~np.logical_or.reduce([np.zeros(self.shape, dtype=bool), *missed.values()])
-        return replace(shaped, member_converged=converged, reason_members=missed)
+        return replace(shaped, member_converged=converged, shortfalls=missed)
 
     def _mask(self, mask: Any) -> Any:
         """A mask of the batch's members in its shape."""

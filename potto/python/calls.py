@@ -18,7 +18,7 @@ from potto.kernels.errors import wrong_call
 from potto.projects.settings import current
 from potto.python.arguments import Batch
 from potto.reports.render import Located, ProgramError
-from potto.runtime.answers.convergence import Reasons, converged_members, merged
+from potto.runtime.answers.convergence import Shortfalls, converged_members, merged
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.shown import as_dual, gives_dual
 from potto.runtime.evaluate import Clock, report
@@ -167,14 +167,12 @@ def _gathered(parts: list[Estimate], wrt: tuple[str, ...], given: dict[str, Valu
     common = {field.name: getattr(first, field.name) for field in fields(Estimate)}
     common["tangent"] = tangents[0] if len(wrt) == 1 else tangents
     common["tangent_error"] = bounds[0] if len(wrt) == 1 else bounds
-    common["reasons"] = tuple(dict.fromkeys(reason for part in parts for reason in part.reasons))
-    common["converged"] = all(part.converged for part in parts)
+    missing: Shortfalls = {}
+    for part in parts:
+        merged(missing, part.shortfalls)
+    common["shortfalls"], common["converged"] = missing, all(part.converged for part in parts)
     if first.member_converged is not None:
-        reasons: Reasons = {}
-        for part in parts:
-            merged(reasons, part.reason_members)
-        common["member_converged"] = converged_members(reasons, first.member_converged.shape)
-        common["reason_members"] = reasons
+        common["member_converged"] = converged_members(missing, first.member_converged.shape)
     return Gradient(**common, wrt=wrt)
 
 

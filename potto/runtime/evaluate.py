@@ -1,7 +1,7 @@
 """Evaluating a program: from a term (or a function and numbers) to an `Estimate`.
 
 Owns `evaluate` and `Program`. A program keeps its linker, so that definitions are looked up and constants computed
-once; every evaluation has books of its own.
+once; every evaluation has record of its own.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from potto.calculus.surfaces.discontinuities import TooDeep
 from potto.core.printer import format_term
 from potto.core.terms import Term
 from potto.diagnostics import PottoError
+from potto.integrate.events import INFINITE, ROUGH, Shortfall
 from potto.kernels import compile as compiling
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Value
 from potto.projects.settings import DEFAULTS, Settings
-from potto.runtime.answers.advice import INFINITE, ROUGH
-from potto.runtime.answers.convergence import CANCELS, Reasons, converged_members, members_of, merged, missed
+from potto.runtime.answers.convergence import CANCELS, Shortfalls, converged_members, members_of, merged, missed
 from potto.runtime.answers.estimate import Estimate, OneSided
 from potto.runtime.answers.inherited_errors import rough, widened
 from potto.runtime.evaluation.functions import Closure, Derivative
-from potto.runtime.evaluation.machine import Books, Linker, Machine
+from potto.runtime.evaluation.machine import Linker, Machine, Record
 
 Lookup = Callable[[str, str], Term]
 
@@ -38,7 +38,7 @@ class Program:
         self.linker = Linker(lookup, held)
 
     def machine(self, settings: Settings) -> Machine:
-        return Machine(self.linker, settings, Books())
+        return Machine(self.linker, settings, Record())
 
     def value(self, machine: Machine, term: Term, env: Mapping[str, Value] | None = None) -> Value:
         """The value of a term, with every internal limit turned into a PottoError."""
@@ -47,7 +47,7 @@ class Program:
             return guarded(lambda: machine.term(opened(term), dict(env or {})))
 
         value = found(machine)
-        return widened(value, machine, found) if machine.books.used and not machine.directions else value
+        return widened(value, machine, found) if machine.record.used and not machine.directions else value
 
     def evaluate(self, term: Term, settings: Settings = DEFAULTS, env: Mapping[str, Value] | None = None) -> Estimate:
         """The estimate of a term. Raises PottoError where the program has no value."""
@@ -100,19 +100,19 @@ class Clock:
 
 
 def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
-    books, settings = machine.books, machine.settings
-    method = "exact" if not books.methods else "+".join(sorted(books.methods))
+    record = machine.record
+    method = "exact" if not record.methods else "+".join(sorted(record.methods))
     stats: dict[str, Any] = {
         "kernels compiled": clock.compiled,
         "kernels reused": clock.reused,
-        "integrals": books.integrals,
-        "evaluations": books.evaluations,
+        "integrals": record.integrals,
+        "evaluations": record.evaluations,
     }
-    if books.costs is not None:
-        stats |= books.costs.told()
-    notes = tuple(_notes(books))
+    if record.costs is not None:
+        stats |= record.costs.told()
+    notes = tuple(_notes(record))
     common = {
-        "evals": books.evaluations,
+        "evals": record.evaluations,
         "seconds": clock.seconds,
         "compile_seconds": clock.spent,
         "method": method,
@@ -124,13 +124,15 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
         return Estimate(None, None, text=f"<{kind}>", **common)  # type: ignore[arg-type]
     if isinstance(value, list):
         parts = [report(item, machine, clock) for item in value]
-        reasons = dict.fromkeys(reason for part in parts for reason in part.reasons)
-        return Estimate([p.value for p in parts], [p.error for p in parts], converged=not reasons,
-                        reasons=tuple(reasons), **common)  # type: ignore[arg-type]  # fmt: skip
+        missing: Shortfalls = {}
+        for part in parts:
+            merged(missing, part.shortfalls)
+        return Estimate([p.value for p in parts], [p.error for p in parts], converged=not missing,
+                        shortfalls=missing, **common)  # type: ignore[arg-type]  # fmt: skip
     numbers, bounds = numbers_of(value), bounds_of(value)
     tangents, tangent_bounds = tangents_of(value)
     flat = _flat(numbers, bounds)
-    missing = _reasons([*flat, *_flat(tangents, tangent_bounds)], books, settings)
+    missing = _missing([*flat, *_flat(tangents, tangent_bounds)], machine)
     arrays = [np.shape(number) for number, _ in flat if number.__class__ is not float]
     shape = np.broadcast_shapes(*arrays) if arrays else ()
     return Estimate(
@@ -139,38 +141,39 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
         tangents,
         tangent_bounds,
         converged=not missing,
-        reasons=tuple(missing),
+        shortfalls={why: members_of(where, shape) if shape else True for why, where in missing.items()},
         member_converged=converged_members(missing, shape) if shape else None,
-        reason_members={why: members_of(where, shape) for why, where in missing.items()} if shape else {},
         **common,  # type: ignore[arg-type]
     )
 
 
-def _reasons(flat: list[tuple[Any, Any]], books: Books, settings: Settings) -> Reasons:
-    """Why the numbers are not as accurate as was asked for: as the books say, and for other members by their errors."""
-    reasons = {**books.reasons, **dict.fromkeys(books.met.unfinished, True)}
+def _missing(flat: list[tuple[Any, Any]], machine: Machine) -> Shortfalls:
+    """Why the numbers are not as accurate as was asked for: as was noted, and for other members by their errors."""
+    record, settings = machine.record, machine.settings
+    reasons = {**record.shortfalls, **{why: True for why, _ in machine.events.every(Shortfall)}}
     before = dict(reasons)
-    drawn = not books.methods.isdisjoint(("mc", "qmc"))
-    within = books.within if books.methods else CANCELS
+    drawn = not record.methods.isdisjoint(("mc", "qmc"))
+    within = record.within if record.methods else CANCELS
     for number, error in flat:
         found = missed(number, error, within, settings, drawn)
         if not found or any(where is True for where in before.values()):
             continue
-        if not books.methods:
+        if not record.methods:
             found.pop(INFINITE, None)  # of 1/0 no integral is to blame
-        if found and any(rough(answer, settings.rtol, settings.atol) for answer in books.used.values()):
+        if found and any(rough(answer, settings.rtol, settings.atol) for answer in record.used.values()):
             found = {ROUGH: np.logical_or.reduce(list(found.values()))}
         told = converged_members(before, np.shape(number))
         merged(reasons, {why: where & told if np.ndim(where) else where for why, where in found.items()})
     return {why: where for why, where in reasons.items() if np.any(where)}
 
 
-def _notes(books: Books) -> list[OneSided]:
+def _notes(record: Record) -> list[OneSided]:
     out: list[OneSided] = []
-    for what, sides in books.edges:
+    for edge in record.edges:
+        what = edge.cause
         other = None if what.other is None else f"{format_term(what.other)} = 0"
         surface = None if what.surface is None else f"{format_term(what.surface)} = 0"
-        backward, forward, *off = map(np.squeeze, sides)
+        backward, forward, *off = map(np.squeeze, edge.sides)
         note = OneSided(what.variable, surface, backward, forward, other, what.fold, *off)
         if not any((o.surface, o.variable, o.other) == (surface, what.variable, other) for o in out):
             out.append(note)

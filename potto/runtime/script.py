@@ -14,14 +14,13 @@ from typing import Any
 from potto.checking.spoiled import statement_errors
 from potto.diagnostics import Diagnostic, PottoError, declare
 from potto.elaborate import elaborate_expression
-from potto.integrate.adaptive.undefined import UNDEFINED
+from potto.integrate.events import DIVERGENT, ROUGH, UNDEFINED
 from potto.kernels.cells import Value
 from potto.kernels.errors import wrong_call
 from potto.modules import statements
 from potto.projects.settings import Settings
 from potto.query import Database
 from potto.reports.render import Located, ProgramError
-from potto.runtime.answers.advice import DIVERGENT, ROUGH, advice
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.shown import as_dual, format_answer, format_value, gives_dual
 from potto.runtime.evaluate import Clock, Program, report
@@ -161,20 +160,20 @@ def remarks(estimate: Estimate, place: Span, settings: Settings) -> Iterator[Dia
 
     Of an answer by sampling nobody expects the accuracy of quadrature; its digits say how good it is.
     """
-    if (_has_nan(estimate.value) or _has_nan(estimate.tangent)) and not DIVERGENT & {*estimate.reasons}:
-        why = [reason for reason in estimate.reasons if reason.startswith(UNDEFINED)]
+    if (_has_nan(estimate.value) or _has_nan(estimate.tangent)) and DIVERGENT.isdisjoint(estimate.shortfalls):
+        why = [shortfall for shortfall in estimate.shortfalls if shortfall.alike == UNDEFINED]
         yield NO_NUMBER(
             place,
-            f"this is not a number: {'; '.join(why)}" if why else "this is not a number",
-            help=advice(why) if why else "a builtin was used where it is not defined, or a parameter is not a number"
+            f"this is not a number: {'; '.join(map(str, why))}" if why else "this is not a number",
+            help=why[0].advice if why else "a builtin was used where it is not defined, or a parameter is not a number"
             " itself",
         )
-    elif not estimate.converged and settings.method in ("auto", "quadrature") and estimate.reasons != (ROUGH,):
+    elif not estimate.converged and settings.method in ("auto", "quadrature") and {*estimate.shortfalls} != {ROUGH}:
         reason = "; ".join(estimate.reasons)
         yield NOT_CONVERGED(
             place,
             f"this estimate did not reach the accuracy asked for: {reason}",
-            help=advice(estimate.reasons),
+            help=estimate.advice,
         )
     for note in estimate.notes:
         yield ONE_SIDED(place, str(note))

@@ -11,9 +11,9 @@ import re
 from collections.abc import Iterator
 
 from potto.evaluating.session import Defined, Imported, Valued
+from potto.integrate.events import ROUGH
 from potto.modules import statements
 from potto.modules.texts import chunks
-from potto.runtime.answers.advice import ROUGH
 from potto.syntax import nodes, tokenize
 from potto_repl.session import Conversation, Entry, plain_names
 
@@ -148,7 +148,7 @@ def _expected(value: Valued) -> str | None:
     if not value.estimates or "<" in value.text or "unknown" in value.text or "nan" in value.text:
         return None
     estimate = value.estimates[0]
-    if "mc" in estimate.method or ROUGH in estimate.reasons or not estimate.converged:
+    if "mc" in estimate.method or ROUGH in estimate.shortfalls or not estimate.converged:
         return None  # it was sampled, or made of what was: another seed, other digits; or it missed its tolerance
     return value.text
 

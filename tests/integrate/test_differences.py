@@ -10,7 +10,7 @@ import pytest
 
 import potto
 from potto.integrate.pieces import Sums
-from potto.kernels.cells import Cell
+from potto.kernels.cells import Cell, Value
 from potto.runtime.integration.differences import _derivative
 
 FUNCTIONS: list[tuple[Callable[[float], float], float | None]] = [
@@ -29,9 +29,10 @@ FUNCTIONS: list[tuple[Callable[[float], float], float | None]] = [
 def test_smooth_functions_have_one_and_kinks_none(number: int) -> None:
     f, exact = FUNCTIONS[number]
 
-    def evaluated(linked: object) -> Sums:
-        x = linked.env["x"].v  # type: ignore[attr-defined]
-        v = np.array([[f(x)]])
+    def evaluated(env: dict[str, Value]) -> Sums:
+        x = env["x"]
+        assert isinstance(x, Cell)
+        v = np.array([[f(x.v)]])
         return Sums(v, np.full((1, 1), 1e-15), np.zeros((1, 0, 1)), np.zeros((1, 0, 1)))
 
     found = _derivative({"x": Cell(1.0, None, (1.0,))}, 0, 1 / 64, evaluated)

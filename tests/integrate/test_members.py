@@ -186,5 +186,5 @@ def test_members_of_any_shape() -> None:
     assert answer.member_converged.shape == (2, 12)
     assert answer.member_converged[0].all() and not answer.member_converged[1].any()
     assert answer.reasons_of((1, 3)) and not answer.reasons_of((0, 3))
-    (mask,) = answer.reason_members.values()
+    (mask,) = answer.shortfalls.values()
     assert mask[1].all() and not mask[0].any()

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from potto.integrate.adaptive.reynolds import Totals
+from potto.integrate.events import BOUNDLESS
 from potto.integrate.pieces import Pieces, Sums
 from potto.integrate.rules import substitution
 from potto.integrate.rules.gauss import EPS, gauss
@@ -25,7 +26,6 @@ from potto.kernels.cells import Array, Bools, Ints
 if TYPE_CHECKING:
     from potto.integrate.adaptive.panel_batch import Work
 
-BOUNDLESS = "the derivative is infinite: there is a surface that moves infinitely fast"
 # The error of a value, as a part of what is added up, from which on it is no value; that of a piece which is to blame.
 HOPELESS, BLAMED = 1e-2, 1e-3
 # How many times the errors of integrals further in an error may be that is nothing else.
@@ -106,7 +106,7 @@ def endless(work: Work, found: Totals) -> Array | None:
     up, down = goes & rough.any(axis=0)
     if not goes.any():
         return None
-    work.machine.note_unfinished(BOUNDLESS, work.below(np.nonzero((up | down).any(axis=0))[0]))
+    work.machine.note(BOUNDLESS, work.below(np.nonzero((up | down).any(axis=0))[0]))
     return np.where(up & down, np.nan, np.where(up, np.inf, np.where(down, -np.inf, 0.0)))
 
 

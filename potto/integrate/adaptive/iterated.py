@@ -23,6 +23,7 @@ from potto.integrate.decomposition.empty_ranges import Collapsed, collapsed_rang
 from potto.integrate.decomposition.narrow_panels import count_narrow
 from potto.integrate.decomposition.sections import searched_rows
 from potto.integrate.decomposition.vanishing import vanishes
+from potto.integrate.events import UNSEEN_MEETING, sides_hidden
 from potto.integrate.pieces import Evaluator, Sums, components, take
 from potto.integrate.plan import LevelPlan, Plan
 from potto.integrate.rules.substitution import Segments
@@ -96,8 +97,7 @@ class Iteration:
         if settled.doubtful and not self.plan.hides:
             count_narrow(scene, seg, settled.sides, settled.doubtful, sums)
         if settled.unsure is not None and not number:  # single nodes of variables further out may lie on a surface
-            reason = f"rounding hides on which side of a surface stretches of `{level.variable}` lie"
-            machine.note_unfinished(reason, work.below(settled.unsure))
+            machine.note(sides_hidden(level.variable), work.below(settled.unsure))
             sums.e[:, settled.unsure] = sums.et[:, :, settled.unsure] = np.inf
         if cuts.lost is not None:
             sums.e += cuts.lost
@@ -117,9 +117,7 @@ class Iteration:
             if self.plan.hides:
                 places = [*(place.owner for place in cuts.meetings), *(place.owner for place in cuts.edges)]
                 met = np.unique(np.concatenate(places))
-                machine.note_unfinished(
-                    "surfaces meet, or lie on a bound, that an inner integral jumps at", scene.below(met)
-                )
+                machine.note(UNSEEN_MEETING, scene.below(met))
                 sums.et[:, :, met] = np.inf
             else:
                 count_places(scene, cuts, sums)

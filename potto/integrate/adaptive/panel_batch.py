@@ -25,6 +25,7 @@ from potto.integrate.adaptive.reynolds import Ends, Totals, note_cancelling, sum
 from potto.integrate.adaptive.roundoff import few_doubles, misplaced, noise, shake, together
 from potto.integrate.adaptive.undefined import mend
 from potto.integrate.decomposition.degeneracies import look_for_steps
+from potto.integrate.events import BUDGET_SPENT
 from potto.integrate.pieces import Evaluator, Pieces, Sums, column, gather, joined, spread, still
 from potto.integrate.plan import LevelPlan
 from potto.integrate.rules import substitution
@@ -146,7 +147,7 @@ class Work:
                 break
             if self.machine.exhausted():
                 owners = self.seg.owner[fresh.segment[found[0] | found[1]]]
-                self.machine.note_unfinished("the budget of evaluations is spent", self.below(np.unique(owners)))
+                self.machine.note(BUDGET_SPENT, self.below(np.unique(owners)))
                 if ends is not None:  # what is known to be missing
                     fresh.error[:, missed_peak(self, fresh, ends)] = np.inf
                 break

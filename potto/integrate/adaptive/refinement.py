@@ -13,6 +13,7 @@ import numpy as np
 
 from potto.integrate.adaptive.error_budget import Tally
 from potto.integrate.adaptive.reynolds import Ends, Totals
+from potto.integrate.events import LATE
 from potto.integrate.pieces import Pieces
 from potto.integrate.rules import substitution
 from potto.kernels.cells import Array, Bools
@@ -74,7 +75,7 @@ def stragglers(work: Work, p: Pieces, bad: Bools) -> Bools:
         return late
     few = np.unique(members[bad])
     if STRAGGLERS * few.size <= int(members.max()) + 1:
-        work.machine.note_unfinished("it takes longer than others that are evaluated with it", few)
+        work.machine.note(LATE, few)
         late |= np.isin(members, few)
     return late
 

@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from potto.core.printer import format_term
 from potto.integrate.decomposition.coincidences import Scene, placed, surfaces_at
 from potto.integrate.decomposition.vanishing import vanishes
+from potto.integrate.events import undefined
 from potto.integrate.pieces import Evaluator, gather, still, take
 from potto.integrate.plan import LevelPlan, Plan, function_of
 from potto.integrate.rules import substitution
@@ -30,7 +30,6 @@ from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value
 if TYPE_CHECKING:
     from potto.integrate.adaptive.panel_batch import Work
 
-UNDEFINED = "a condition has no value"
 # Where a segment is looked at, as parts of it: in the middle, and where that is a pole (of sin(x)/x, say) elsewhere.
 LOOKED_AT = (0.5, 0.3, 0.8)
 
@@ -179,4 +178,4 @@ def _tell(
                 return
             places.append(f"{level.variable} = {place:.6g}")
     where = f" at {', '.join(places)}" if places else ""
-    machine.note_unfinished(f"{UNDEFINED}{where}: it asks for the sign of {format_term(surface)}", members, UNDEFINED)
+    machine.note(undefined(where, surface), members)

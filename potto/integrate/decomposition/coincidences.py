@@ -21,10 +21,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from potto.core.printer import format_term
 from potto.core.terms import Term
 from potto.integrate.decomposition.cuts import Cuts, Edge, Meeting, as_array
-from potto.integrate.pieces import Evaluator, Folded, Sided, Sums, gather, mostly, still, take
+from potto.integrate.events import Fold, TwoSided, on_a_bound
+from potto.integrate.pieces import Evaluator, Sums, gather, mostly, still, take
 from potto.integrate.plan import LevelPlan
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value
@@ -103,13 +103,13 @@ class Scene:
 def count_places(scene: Scene, cuts: Cuts, sums: Sums) -> None:
     """Add to the tangents what surfaces on bounds and on one another contribute; say where they have two sides."""
     level, machine = scene.level, scene.machine
-    places: list[tuple[Ints, Callable[[], tuple[Array, Array, Array]], bool, Sided]] = []
+    places: list[tuple[Ints, Callable[[], tuple[Array, Array, Array]], bool, TwoSided]] = []
     for meeting in cuts.meetings:
-        named = Sided(level.variable, scene.surface(meeting.cuts[0]), scene.surface(meeting.cuts[1]))
+        named = TwoSided(level.variable, scene.surface(meeting.cuts[0]), scene.surface(meeting.cuts[1]))
         met = meeting.pick(scene.counted(meeting.owner))
         places.append((met.owner, lambda m=met: at_one_place(scene, m), True, named))  # type: ignore[misc]
     for group in _on_one_bound(cuts.edges, cuts.sign.size):
-        named = Sided(level.variable, scene.surface(group[0].cut))
+        named = TwoSided(level.variable, scene.surface(group[0].cut))
         on = [edge.pick(scene.counted(edge.owner)) for edge in group]
         places.append((on[0].owner, lambda g=on: at_a_bound(scene, g), False, named))  # type: ignore[misc]
     for owner, changes, counts, named in places:
@@ -128,7 +128,7 @@ def count_places(scene: Scene, cuts: Cuts, sums: Sums) -> None:
         sums.t[:, :, owner] = base + (forward if counts else np.where(differ, 0.0, forward))
         two = differ.any(axis=(0, 1))
         if two.any():
-            machine.note_sided(named, scene.below(owner[two]))
+            machine.note(named, scene.below(owner[two]))
 
 
 def count_slivers(scene: Scene, cuts: Cuts, sums: Sums) -> None:
@@ -164,22 +164,15 @@ def note_folds(scene: Scene, cuts: Cuts) -> None:
         owner, x = fold.owner[counts], float(fold.x[counts][0])
         here = [scene.env.get(level.variable) for level in levels[:number]]
         outer = [as_array(cell.v, cuts.sign.size)[owner[0]] for cell in here if isinstance(cell, Cell)]
-        named = Sided(levels[number].variable, levels[number].level.cuts[fold.cut].surface, fold=True)
+        named = TwoSided(levels[number].variable, levels[number].level.cuts[fold.cut].surface, fold=True)
         all_of_it = None if number else tuple(map(int, owner))
-        place = Folded(number, fold.cut, x, all_of_it, tuple(map(float, outer)))
-        scene.machine.note_fold(named, place, scene.below(owner))
+        event = Fold(named, number, fold.cut, x, all_of_it, tuple(map(float, outer)))
+        scene.machine.note(event, scene.below(owner))
 
 
-def _not_known(scene: Scene, sums: Sums, owner: Ints, unknown: Bools, named: Sided) -> None:
+def _not_known(scene: Scene, sums: Sums, owner: Ints, unknown: Bools, named: TwoSided) -> None:
     sums.et[:, :, owner] = np.where(unknown, np.inf, sums.et[:, :, owner])
-    assert named.surface is not None
-    members = scene.below(owner[unknown.any(axis=(0, 1))])
-    if named.other is None:
-        where = f"{format_term(named.surface)} = 0 lies on a bound of `{scene.level.variable}`"
-        scene.machine.note_unfinished(f"{where}, and beyond it the integrand is not finite", members)
-    else:
-        where = f"{format_term(named.surface)} = 0 and {format_term(named.other)} = 0 coincide"
-        scene.machine.note_unfinished(f"{where}, and what lies between them is not known", members)
+    scene.machine.note(on_a_bound(named), scene.below(owner[unknown.any(axis=(0, 1))]))
 
 
 def at_one_place(scene: Scene, meeting: Meeting) -> tuple[Array, Array, Array]:

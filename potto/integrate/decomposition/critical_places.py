@@ -19,6 +19,7 @@ from potto.calculus.decomposition.critical import Critical, slopes_of
 from potto.core.terms import Term
 from potto.integrate.decomposition.cuts import SEARCHED, Row, as_array
 from potto.integrate.decomposition.root_isolation import between, flat
+from potto.integrate.events import Unsearched
 from potto.integrate.plan import LevelPlan
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.intervals import Interval, enclosure
@@ -46,7 +47,7 @@ def critical_rows(level: LevelPlan, env: dict[str, Value], lo: Cell, hi: Cell, b
         beyond = around if system.turning else 0.0
         found = _places(system, level.variable, env, low - beyond, high + beyond)
         if found is None:
-            machine.note_incomplete(f"where {level.variable} is cut")
+            machine.note(Unsearched(level.variable))
             continue
         rows += [Row(x, (), -1, system.turning, off) for x, off in found]
     return rows

@@ -13,6 +13,7 @@ import numpy as np
 
 from potto.integrate.decomposition.coincidences import Scene, around
 from potto.integrate.decomposition.cuts import Cuts, Edge
+from potto.integrate.events import Degenerate
 from potto.integrate.pieces import Evaluator, Pieces, gather, still, take
 from potto.kernels.cells import Array, Bools, Cell, Value
 
@@ -51,7 +52,7 @@ def look_for_steps(work: Work, whole: Pieces) -> None:
     size = np.abs(values[0]) + np.abs(values[1]) + mean[:, follows] + mean[:, follows - 1]
     jumps = _jumps(steps, size)
     if jumps.any():
-        work.machine.note_degenerate(work.level.variable, work.below(np.unique(seg.owner[follows[jumps]])))
+        work.machine.note(Degenerate(work.level.variable), work.below(np.unique(seg.owner[follows[jumps]])))
 
 
 def brush(scene: Scene, cuts: Cuts) -> None:
@@ -79,7 +80,7 @@ def brush(scene: Scene, cuts: Cuts) -> None:
                 steps.append(np.abs(inside - beyond))
         jumps = _jumps(steps, np.abs(inside) + np.abs(beyond))
         if jumps.any():
-            machine.note_degenerate(level.variable, scene.below(edge.owner[jumps]))
+            machine.note(Degenerate(level.variable), scene.below(edge.owner[jumps]))
 
 
 def _jumps(steps: list[Array], size: Array) -> Bools:

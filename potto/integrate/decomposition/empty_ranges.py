@@ -15,7 +15,8 @@ import numpy as np
 
 from potto.integrate.decomposition.coincidences import MOST_AT_ONE_PLACE, Scene, picked
 from potto.integrate.decomposition.cuts import SEARCHED, Row, as_array, tangents
-from potto.integrate.pieces import Sided, Sums
+from potto.integrate.events import CROWDED, EMPTY_UNDEFINED, EMPTY_UNSEEN, Shortfall, TwoSided
+from potto.integrate.pieces import Sums
 from potto.integrate.plan import LevelPlan
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Bools, Cell, Ints
@@ -86,10 +87,10 @@ def count_collapsed(scene: Scene, found: list[Collapsed], sums: Sums) -> Sums:
     """The sums with what ranges of length zero grow by, and what rounding of their bounds may hide."""
     for ranges in found:
         if len(ranges.cuts) > MOST_AT_ONE_PLACE:
-            _unknown(scene, ranges, sums, f"more than {MOST_AT_ONE_PLACE} surfaces meet where a range has length zero")
+            _unknown(scene, ranges, sums, CROWDED)
             continue
         if ranges.cuts and scene.parent.plan.hides:
-            _unknown(scene, ranges, sums, "an inner integral jumps where a range has length zero")
+            _unknown(scene, ranges, sums, EMPTY_UNSEEN)
             continue
         f, e = scene.flips(ranges.cuts, ranges.owner, ranges.x, False)
         sums = _with_components(sums, f.shape[1])
@@ -105,14 +106,14 @@ def count_collapsed(scene: Scene, found: list[Collapsed], sums: Sums) -> Sums:
             growth = np.where(differ | folds, as_it_falls, forward)
             two = differ.any(axis=(0, 1))
             if two.any():
-                named = Sided(scene.level.variable, scene.surface(ranges.cuts[0]))
-                scene.machine.note_sided(named, scene.below(ranges.owner[two]))
+                named = TwoSided(scene.level.variable, scene.surface(ranges.cuts[0]))
+                scene.machine.note(named, scene.below(ranges.owner[two]))
         sums.t[at] = growth
         sums.et[at] = e.max(axis=0)[:, None] * rates + 4 * EPS * np.abs(growth)
         sums.e[:, ranges.owner] = np.where(ranges.off > 0, size * ranges.off, 0.0)
         _note_gross(sums, ranges.owner, size[:, None] * rates)
         if np.isnan(sums.t[at]).any():
-            _unknown(scene, ranges, sums, "the integrand is not defined where a range has length zero")
+            _unknown(scene, ranges, sums, EMPTY_UNDEFINED)
         sums.et[at] = np.where(np.isinf(sums.t[at]), np.inf, sums.et[at])
     return sums
 
@@ -146,6 +147,6 @@ def _note_gross(sums: Sums, owner: Ints, rates: Array) -> None:
     sums.gross = gross
 
 
-def _unknown(scene: Scene, ranges: Collapsed, sums: Sums, reason: str) -> None:
+def _unknown(scene: Scene, ranges: Collapsed, sums: Sums, why: Shortfall) -> None:
     sums.et[:, :, ranges.owner] = np.inf
-    scene.machine.note_unfinished(reason, scene.below(ranges.owner))
+    scene.machine.note(why, scene.below(ranges.owner))

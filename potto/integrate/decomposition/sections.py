@@ -16,6 +16,7 @@ from potto.calculus.solving.enclosable import slope_of
 from potto.core.terms import Lam, Term, lam
 from potto.integrate.decomposition.cuts import SEARCHED, Row, as_array
 from potto.integrate.decomposition.root_isolation import Brackets, between, isolated
+from potto.integrate.events import ROOTS_NOT_SEPARATED, TOO_MANY_ROOTS
 from potto.integrate.pieces import still
 from potto.integrate.plan import LevelPlan, function_of
 from potto.integrate.rules.gauss import EPS
@@ -69,7 +70,7 @@ def _family(
     spans = np.where(np.isfinite(first) & np.isfinite(last), last - first + 1, 0.0)
     count = float(spans.max(initial=0.0))
     if np.isinf(stack).any() or count > MOST_IN_FAMILY:
-        machine.note_unfinished("a condition has too many roots to cut at")
+        machine.note(TOO_MANY_ROOTS)
         count = min(count, MOST_IN_FAMILY)
     function = function_of(family.root)
     turning = level.level.cuts[cut].turning
@@ -93,7 +94,7 @@ def _search(
     else:
         brackets = isolated(surface, slope, variable, env, low, high)
         if not brackets.complete:
-            machine.note_unfinished("a condition without a closed form has too many roots, or roots too close together")
+            machine.note(ROOTS_NOT_SEPARATED)
         a, b = _padded(brackets, batch)
     roots, within = _polished(function, variable, env, a, b, machine)
     columns = zip(roots.T, within.T, strict=True)

@@ -24,6 +24,7 @@ from potto.core.terms import Deriv, Integral, Lam, Term, Tuple, const, integral,
 from potto.integrate.adaptive.iterated import Iteration
 from potto.integrate.decomposition.vanishing import vanishing_of
 from potto.integrate.elimination.interpolants import Table, finite, tabulated
+from potto.integrate.events import Fold, TwoSided
 from potto.integrate.pieces import Evaluator, Sums, still
 from potto.integrate.plan import Plan, function_of, group_levels, level_plan
 from potto.integrate.rules.gauss import EPS
@@ -143,7 +144,7 @@ class _Tabled(Iteration):
 def one_by_one(known: Eliminated, machine: Any, env: dict[str, Value]) -> Sums | None:
     """The integral, each step from the table of the next; None where one can't be made."""
     settings = machine.settings
-    most = min(settings.max_evals, int(machine.books.spent) + AFFORDABLE)
+    most = min(settings.max_evals, int(machine.record.spent) + AFFORDABLE)
     finer = replace(settings, rtol=max(SHARE * settings.rtol, FINEST), atol=0.0, max_evals=most)
     fine = replace(machine, settings=finer)
     spans = _spans(known.steps, env)
@@ -187,12 +188,11 @@ def _table(
         wide = machine.with_directions(len(speeds))
         here = {name: pad(value, wide.directions) if len(speeds) else still(value) for name, value in env.items()}
         together = np.zeros(x.size, dtype=np.int64)  # what single nodes meet is no matter
-        with machine.books.apart() as met:
-            sums = iteration.run(1, {**here, state: Cell(x, None, tuple(speeds))}, x.size, {}, wide, together)
+        apart = wide.apart()
+        sums = iteration.run(1, {**here, state: Cell(x, None, tuple(speeds))}, x.size, {}, apart, together)
         if not len(speeds):  # at the ends of pieces: derivatives are not asked for
-            met.folds.clear()
-            met.sided.clear()
-        machine.books.met.take(met, None)
+            apart.events.forget(Fold, TwoSided)
+        machine.events.take(apart.events, None)
         return sums
 
     if found.conflict or not segments.a.size or not finite(segments).all():

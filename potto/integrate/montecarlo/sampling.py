@@ -18,6 +18,7 @@ import numpy as np
 
 from potto.integrate.adaptive.iterated import Iteration
 from potto.integrate.adaptive.undefined import guarded_samples
+from potto.integrate.events import BUDGET_SPENT, NO_SAMPLE
 from potto.integrate.montecarlo.cube_map import Chart, Point
 from potto.integrate.montecarlo.rare_events import (
     MISSED,
@@ -76,10 +77,10 @@ def sample(plan: Plan, machine: Any, env: dict[str, Value], batch: int, method: 
 
     for i in range(batch):
         member = {n: map_arrays(v, _member(i)) for n, v in env.items()}
-        with machine.books.among(np.array([i])) as met:
-            rows.append(_plain(plan, machine, member, told) if method == "mc"
-                        else _quasi(plan, machine, member, method, told))  # fmt: skip
-        machine.books.met.take(met, np.array([i]))
+        with machine.among(np.array([i])) as alone:
+            rows.append(_plain(plan, alone, member, told) if method == "mc"
+                        else _quasi(plan, alone, member, method, told))  # fmt: skip
+        machine.events.take(alone.events, np.array([i]))
     return Sums(*(np.stack([getattr(r, name) for r in rows], axis=-1) for name in ("v", "e", "t", "et")))
 
 
@@ -95,7 +96,7 @@ def _plain(plan: Plan, machine: Any, env: dict[str, Value], told: Told) -> Sums:
     rare: list[Sums] = []
     means = list(run.means())
     each = 1 + SIDES * (len(means) - 1)
-    afforded = int((machine.settings.max_evals - machine.books.spent) / each)
+    afforded = int((machine.settings.max_evals - machine.record.spent) / each)
     count = min(machine.settings.samples, max(afforded, LEAST))
     fewest = count
     for number, (dims, f) in enumerate(means):
@@ -126,7 +127,7 @@ def _plain(plan: Plan, machine: Any, env: dict[str, Value], told: Told) -> Sums:
 def _say_if_cut(sums: Sums, machine: Any, cut: bool) -> None:
     """Say that more samples were asked for than evaluations allowed, where they would be wanted."""
     if (cut or machine.exhausted()) and not _enough(sums, machine.settings, machine.settings.asked(True)):
-        machine.note_unfinished("the budget of evaluations is spent")
+        machine.note(BUDGET_SPENT)
 
 
 def _random(generator: np.random.Generator, count: int, dims: int) -> Iterator[Array]:
@@ -144,7 +145,7 @@ def _quasi(plan: Plan, machine: Any, env: dict[str, Value], method: str, told: T
     found = Replicates(REPLICATES, STUDENT)
     count = 1 << min(max(4, int(np.log2(max(settings.samples // REPLICATES, 16)))), MOST)
     run.largest = [Largest() for _ in means]
-    done, size, before, cut = 0, min(FIRST, count), machine.books.spent, False
+    done, size, before, cut = 0, min(FIRST, count), machine.record.spent, False
     while size > 1 and size * REPLICATES * NODES * len(means) > settings.max_evals - before:
         size //= 2
     while done < count:
@@ -170,7 +171,7 @@ def _quasi(plan: Plan, machine: Any, env: dict[str, Value], method: str, told: T
             sums.e, sums.et = sums.e + rare.v, sums.et + rare.t
         if method == "auto" and _enough(sums, settings, settings.rtol):
             break
-        if cut := done < count and 2 * machine.books.spent - before > settings.max_evals:
+        if cut := done < count and 2 * machine.record.spent - before > settings.max_evals:
             break
     run.look(sums)
     _say_if_cut(sums, machine, cut)
@@ -296,7 +297,7 @@ class _Run:
     def look(self, mean: Sums) -> None:
         """Say so where all samples are 0, and give the error that this has in the worst case."""
         if not mean.v.any() and not mean.t.any():
-            self.machine.note_unfinished("no sample fell where it counts: the error estimate says nothing")
+            self.machine.note(NO_SAMPLE)
         if self.plan.groups:
             mean.e = np.where((mean.v == 0) & (mean.e == 0), np.inf, mean.e)
 

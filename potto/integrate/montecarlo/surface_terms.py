@@ -30,6 +30,7 @@ from potto.calculus.decomposition.sweep import Face, Product
 from potto.core.terms import App, Const, Prim, Term, const, mul, postorder, sub, var
 from potto.integrate.decomposition.cuts import Row, as_array, frame_rows
 from potto.integrate.decomposition.sections import searched_rows
+from potto.integrate.events import UNKNOWN_JUMP
 from potto.integrate.montecarlo.cube_map import Chart, Point, label_of
 from potto.integrate.montecarlo.lines import End, Line, label_name, leaving, line, offset
 from potto.integrate.montecarlo.pivot_choice import pivots
@@ -222,7 +223,7 @@ class Surface:
             rates[:, odd] = self.beside(labels, pivot, marked, point, root)[:, odd]
         unknown = inside & np.isnan(rates).any(axis=0)
         if unknown.any():
-            self.machine.note_unfinished("a condition jumps by itself where it is not known how that place moves")
+            self.machine.note(UNKNOWN_JUMP)
         counts = inside & (rates != 0).any(axis=0)
         costs = self.machine.costs
         if costs is not None:

@@ -1,6 +1,6 @@
 """Whether an answer is as accurate as was asked for; and if not, why, member by member.
 
-Owns `Reasons`, `missed`, `missing` and `allowance`. Converged means: the error is within `rtol * |value|`, or within
+Owns `Shortfalls`, `missed`, `missing` and `allowance`. Converged means: the error is within `rtol * |value|`, or within
 `atol`. An answer that is 0 because its parts cancel has no digits that could be relative to it. It is accurate enough
 if it is relative to what is added up without regard to sign: there its error is within `rtol`, and within CANCELS,
 which is what rounding leaves. That is no licence to lose a small summand beside large ones (1e16 - 1e16 + 1): where the
@@ -16,10 +16,20 @@ from typing import Any
 import numpy as np
 
 from potto.core.terms import Branch, Const, Integral, Prim, Proj, Term, Tuple, Var, children
+from potto.integrate.events import (
+    INFINITE,
+    NO_BOUND,
+    NO_DIGITS,
+    NO_VALUE,
+    NOT_A_NUMBER,
+    ROUNDED,
+    TOO_FEW,
+    TOO_LARGE,
+    Shortfall,
+)
 from potto.integrate.pieces import Sums
 from potto.kernels.cells import Array, Bools
 from potto.projects.settings import Settings
-from potto.runtime.answers.advice import INFINITE, NO_VALUE, TOO_FEW
 
 CANCELS = 1e-12
 # What is added up counts as so much at most, where something small could be lost in it.
@@ -27,10 +37,10 @@ UNIT = 1.0
 # What is a speck, beside the largest of a batch.
 SPECK = 1e-15
 # From which part of a value on an error is more than rounding, and up to which it is nothing else.
-LOST, ROUNDED = 0.1, 1e-6
+LOST, ONLY_ROUNDED = 0.1, 1e-6
 
-# A reason, and of which members of a batch: a mask, or True for all of them.
-Reasons = dict[str, Any]
+# Why answers are not as accurate as asked for, and of which members of a batch: a mask, or True for all of them.
+Shortfalls = dict[Shortfall, Any]
 
 
 @lru_cache(maxsize=4096)
@@ -88,7 +98,7 @@ def widest(before: Any, after: Any) -> Any:
         return max(float(np.min(before)), float(np.min(after)))
 
 
-def missed(value: Any, error: Any, within: Any, settings: Settings, drawn: bool) -> Reasons:
+def missed(value: Any, error: Any, within: Any, settings: Settings, drawn: bool) -> Shortfalls:
     """Why numbers are not as accurate as was asked for. `drawn`: they are made of samples; within: see `allowance`."""
     rtol = settings.asked(drawn)
     if isinstance(value, float) and isinstance(error, float) and error <= rtol * abs(value) < np.inf:
@@ -104,7 +114,7 @@ def missed(value: Any, error: Any, within: Any, settings: Settings, drawn: bool)
     bad = np.where(np.isinf(v), ~np.isfinite(e), bad)  # an infinity may be known to be one
     if not bad.any():
         return {}
-    reasons: Reasons = {}
+    reasons: Shortfalls = {}
     for reason, holds in _told(v, e, drawn):
         here = bad & holds
         if here.any():
@@ -113,24 +123,24 @@ def missed(value: Any, error: Any, within: Any, settings: Settings, drawn: bool)
     return reasons
 
 
-def _told(v: Array, e: Array, drawn: bool) -> Sequence[tuple[str, Any]]:
+def _told(v: Array, e: Array, drawn: bool) -> Sequence[tuple[Shortfall, Any]]:
     """The reasons in the order in which they count, and where each is one."""
     nan = np.isnan(v)
     with np.errstate(invalid="ignore"):
-        lost, rounded = e > LOST * v, e < ROUNDED * v
+        lost, rounded = e > LOST * v, e < ONLY_ROUNDED * v
     return (
         (NO_VALUE, nan & np.isinf(e)),
-        ("the value is not a number", nan),
+        (NOT_A_NUMBER, nan),
         (INFINITE, np.isinf(v)),
-        ("the error is not known", ~np.isfinite(e)),
+        (NO_BOUND, ~np.isfinite(e)),
         (TOO_FEW, np.full(v.shape, drawn)),
-        ("no accuracy was reached: the integral diverges, its integrand is too rough, or rounding hides it", lost),
-        ("rounding limits the accuracy", rounded),
-        ("the error estimate is too large", np.full(v.shape, True)),
+        (NO_DIGITS, lost),
+        (ROUNDED, rounded),
+        (TOO_LARGE, np.full(v.shape, True)),
     )
 
 
-def merged(into: Reasons, more: Mapping[str, Any]) -> None:
+def merged(into: Shortfalls, more: Mapping[Shortfall, Any]) -> None:
     """Add reasons, each of the members of either. Masks that do not go together are of all."""
     for reason, where in more.items():
         before = into.get(reason, False)
@@ -150,7 +160,7 @@ def members_of(where: Any, shape: tuple[int, ...]) -> Array:
     return np.full(shape, bool(np.any(where)))
 
 
-def converged_members(reasons: Reasons, shape: tuple[int, ...]) -> Array:
+def converged_members(reasons: Shortfalls, shape: tuple[int, ...]) -> Array:
     """Which members of a batch have no reason against them."""
     bad = np.zeros(shape, dtype=bool)
     for where in reasons.values():

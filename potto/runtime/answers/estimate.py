@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from potto.integrate.events import Shortfall
 from potto.runtime.answers.printing import concisely, format_number, format_seconds, format_tuple
 
 
@@ -58,6 +59,10 @@ def _number(x: Any, error: Any) -> str:
     return f"{format_number(flat[there[0]], off[there[0]])}{', ...' if there.size > 1 else ''}"
 
 
+# What `summary` shows otherwise, or not at all.
+UNSHOWN = ("notes", "stats", "shortfalls")
+
+
 @dataclass(frozen=True, repr=False)
 class Estimate:
     """The outcome of an evaluation.
@@ -66,7 +71,7 @@ class Estimate:
     tangent, tangent_error: the same of the derivative, where a dual was asked for; else None.
     converged: whether the accuracy asked for was reached, by all members of a batch; `reasons` says why not.
     member_converged: the same of each member, an array of the batch's shape; None for a single answer.
-    reason_members: of which members of a batch each reason is true, as a mask of its shape.
+    shortfalls: why not, with what helps, and of which members of a batch, as a mask of its shape; True for all.
     evals: evaluations of integrands. seconds, compile_seconds: time in all, and the part spent on making kernels.
     notes: what a careful reader should know (one-sided derivatives).
     """
@@ -80,20 +85,30 @@ class Estimate:
     seconds: float = 0.0
     compile_seconds: float = 0.0
     method: str = "exact"
-    reasons: tuple[str, ...] = ()
     notes: tuple[OneSided, ...] = ()
     stats: dict[str, Any] = field(default_factory=dict)
     text: str | None = None
     member_converged: Any = None
-    reason_members: Mapping[str, Any] = field(default_factory=dict)
+    shortfalls: Mapping[Shortfall, Any] = field(default_factory=dict)
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Why the answer is not as accurate as was asked: none, if it is."""
+        return tuple(why.message for why in self.shortfalls)
+
+    @property
+    def advice(self) -> str:
+        """What helps against the reasons, each advice once."""
+        return "; ".join(dict.fromkeys(why.advice for why in self.shortfalls))
 
     def reasons_of(self, index: Any) -> tuple[str, ...]:
         """Why one member of a batch is not as accurate as was asked: none, if it is."""
-        return tuple(why for why, where in self.reason_members.items() if where[index])
+        return tuple(why.message for why, where in self.shortfalls.items() if where is True or where[index])
 
     def summary(self) -> str:
         """All that is known, a line each."""
-        shown = {item.name: getattr(self, item.name) for item in fields(self) if item.name not in ("notes", "stats")}
+        shown = {item.name: getattr(self, item.name) for item in fields(self) if item.name not in UNSHOWN}
+        shown["reasons"] = self.reasons
         lines = [f"{name}: {value}" for name, value in shown.items() if value is not None and not _empty(value)]
         return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])
 

@@ -14,9 +14,10 @@ from dataclasses import replace
 import numpy as np
 
 from potto.diagnostics import PottoError
+from potto.integrate.events import Events
 from potto.kernels.cells import Cell, Number, Value
 from potto.runtime.evaluation.machine import Machine
-from potto.runtime.evaluation.record import Books
+from potto.runtime.evaluation.record import Record
 
 
 def rough(value: Value, rtol: float, atol: float) -> bool:
@@ -29,7 +30,7 @@ def rough(value: Value, rtol: float, atol: float) -> bool:
 def widened(value: Value, machine: Machine, again: Callable[[Machine], Value]) -> Value:
     """The value with errors as large as it is apart from those at both ends of each rough answer that it is made of."""
     settings = machine.settings
-    for key, held in list(machine.books.used.items()):
+    for key, held in list(machine.record.used.items()):
         if rough(held, settings.rtol, settings.atol):
             for ends in _ends(held):
                 value = _covering(value, [_at(machine, key, end, again) for end in ends])
@@ -52,13 +53,13 @@ def _at(machine: Machine, key: tuple[str, str], held: Value, again: Callable[[Ma
     """The value if the answer were another one; None where it has none then."""
     linker = copy.copy(machine.linker)
     linker.held, linker.constants = {**linker.held, key: held}, {}
-    other = replace(machine, linker=linker, books=Books(gauge=machine.books.gauge))
+    other = replace(machine, linker=linker, events=Events(), record=Record(gauge=machine.record.gauge))
     try:
         return again(other)
     except PottoError:
         return None
     finally:
-        machine.books.evaluations += other.books.evaluations
+        machine.record.evaluations += other.record.evaluations
 
 
 def _covering(value: Value, others: list[Value | None]) -> Value:

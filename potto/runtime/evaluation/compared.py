@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from potto.diagnostics import PottoError
+from potto.integrate.events import DISAGREE, Events
 from potto.kernels.cells import Cell, Value
 from potto.runtime.evaluation.functions import Closure, Derivative
-from potto.runtime.evaluation.record import Books
+from potto.runtime.evaluation.record import Record
 
 if TYPE_CHECKING:
     from potto.runtime.evaluation.machine import Machine
 
 SLACK = 1e-8  # of the largest number of the first derivative, beyond what both ways admit
-DISAGREE = "the second derivative is not known: its formula and numbers disagree about the first one"
 
 Groups = tuple[tuple[Value, ...], ...]
 
@@ -37,16 +37,16 @@ def compared(machine: Machine, inner: Derivative, groups: Groups, value: Value) 
 
     if not (isinstance(value, tuple) and len(value) == 2) or machine.frozen or not machine.root:
         return value
-    other = replace(machine, books=Books(costs=None, gauge=machine.books.gauge))
+    other = replace(machine, events=Events(), record=Record(costs=None, gauge=machine.record.gauge))
     try:
         first = call_derivative(other, inner, tuple(tuple(map(_value, group)) for group in groups), None)
     except (PottoError, _ByHand):
         return value
     finally:
-        machine.books.evaluations += other.books.evaluations
-    if other.books.reasons or _agree(value[0], first, SLACK * _largest(first)):
+        machine.record.evaluations += other.record.evaluations
+    if other.record.shortfalls or _agree(value[0], first, SLACK * _largest(first)):
         return value
-    machine.note_unfinished(DISAGREE)
+    machine.note(DISAGREE)
     return first, _unknown(value[1])
 
 

@@ -14,7 +14,7 @@ from potto.calculus.differentiation.deltas import PRODUCT_OF_DELTAS, STEP
 from potto.core.printer import format_term
 from potto.core.terms import ZERO, Term, substitute
 from potto.diagnostics import PottoError
-from potto.integrate.pieces import Sided
+from potto.integrate.events import TwoSided
 from potto.kernels import errors
 from potto.kernels.cells import Value
 
@@ -24,15 +24,15 @@ if TYPE_CHECKING:
 
 def stepped(machine: Machine, term: Term, env: dict[str, Value]) -> Value:
     """The value of a term that `shifted` made. Raises PottoError (P0505)."""
-    edges = machine.books.edges
+    edges = machine.record.edges
     before = len(edges)
     value = machine.term(term, env)
-    for place, (what, sides) in enumerate(edges[before:], before):
-        edges[place] = (_without_step(what), sides)
+    for place, edge in enumerate(edges[before:], before):
+        edges[place] = replace(edge, cause=_without_step(edge.cause))
     return value
 
 
-def _without_step(what: Sided) -> Sided:
+def _without_step(what: TwoSided) -> TwoSided:
     surface, other = (None if at is None else _still(at) for at in (what.surface, what.other))
     if surface is what.surface and other is what.other:
         return what

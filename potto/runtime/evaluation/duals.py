@@ -29,9 +29,9 @@ def call_derivative(
     primal = function.primal
     if isinstance(primal, Derivative):
         primal = dual_function(machine, primal.primal)
-        machine.books.second = True
+        machine.record.second = True
     if machine.directions or isinstance(primal, Paired):
-        machine.books.second = machine.books.second or machine.directions > 0
+        machine.record.second = machine.record.second or machine.directions > 0
         return machine.call(dual_function(machine, primal), groups, None)
     _, arities = machine.linker_shape(primal.lam, sizes_of(groups))
     carrying = machine.with_directions(1)

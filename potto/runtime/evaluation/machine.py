@@ -1,14 +1,15 @@
 """The machine: what kernels ask for while they run.
 
-Owns `Machine`. It knows the program's definitions (through `Linker`), the settings and the books of one evaluation,
+Owns `Machine`. It knows the program's definitions (through `Linker`), the settings and the record of one evaluation,
 and how many directions of differentiation are carried. Machines with other numbers of directions share everything
 else. Calls, lazy sides, sums and integrals of generated code come here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,8 @@ from potto.core.terms import Branch, Deriv, Global, Hole, If, Integral, Lam, Sum
 from potto.core.terms import Delta as DeltaTerm
 from potto.diagnostics import PottoError
 from potto.integrate.costs import Costs
-from potto.integrate.pieces import Folded, Sided, still
+from potto.integrate.events import Event, Events, Members
+from potto.integrate.pieces import still
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Ints, Number, Pattern, Trace, Value, pad, pattern
 from potto.kernels.chunks import in_chunks, many
@@ -29,7 +31,7 @@ from potto.kernels.compile import Kernel, counts, kernel
 from potto.projects.settings import Settings
 from potto.runtime.evaluation.functions import Closure, Derivative, Paired
 from potto.runtime.evaluation.reach import Reach
-from potto.runtime.evaluation.record import Books, Sides, note
+from potto.runtime.evaluation.record import Record
 
 DEEPEST_CALLS = 3000
 MOST_TERMS = 10_000_000
@@ -113,7 +115,8 @@ class Machine:
 
     linker: Linker
     settings: Settings
-    books: Books
+    record: Record
+    events: Events = field(default_factory=Events)
     directions: int = 0
     rounding: bool = True
     root: bool = True
@@ -131,67 +134,55 @@ class Machine:
     def with_directions(self, directions: int) -> Machine:
         if directions == self.directions:
             return self
-        return Machine(
-            self.linker, self.settings, self.books, directions, self.rounding, self.root, self.frozen, self.side
-        )
+        return replace(self, directions=directions)
 
     def inside(self) -> Machine:
         """The machine for an integrand: rounding is estimated by the integrator, not kept track of."""
         if not (self.rounding or self.root):
             return self
-        return Machine(self.linker, self.settings, self.books, self.directions, False, False, self.frozen, self.side)
+        return replace(self, rounding=False, root=False)
 
     def tracking(self) -> Machine:
         """The machine with rounding errors kept track of."""
         if self.rounding:
             return self
-        return Machine(
-            self.linker, self.settings, self.books, self.directions, True, self.root, self.frozen, self.side
-        )
+        return replace(self, rounding=True)
 
-    # Books
+    # Record
 
     @property
     def costs(self) -> Costs | None:
-        return self.books.costs
+        return self.record.costs
 
     def count(self, evaluations: int) -> None:
-        self.books.count(evaluations, self.settings.max_evals)
+        self.record.count(evaluations, self.settings.max_evals)
 
     def sampled(self, share: float, limit: bool) -> None:
         """So much of the sampling of an integral is done, with `limit` of the most that it may take; 0 begins it."""
-        gauge = self.books.gauge
+        gauge = self.record.gauge
         if gauge is not None:
             gauge.samplings += share == 0
             gauge.sampled(share, limit)
 
     def exhausted(self) -> bool:
-        return self.books.spent > self.settings.max_evals
+        return self.record.spent > self.settings.max_evals
 
     def overdrawn(self) -> bool:
         """Whether integrals inside of integrals have spent far more than the budget: what is left is given up."""
-        return self.books.spent > OVERDRAFT * self.settings.max_evals
+        return self.record.spent > OVERDRAFT * self.settings.max_evals
 
-    def note_edge(self, what: Sided, sides: Sides, members: Ints | None = None) -> None:
-        self.books.met.edges.append((what, sides, members))
+    def note(self, event: Event, members: Members = None) -> None:
+        self.events.note(event, members)
 
-    def note_sided(self, what: Sided, members: Ints | None = None) -> None:
-        """What an integral finds that stands in another one: how much it comes to, that one will say."""
-        note(self.books.met.sided, what, members)
+    def apart(self) -> Machine:
+        """The same machine for what is to be known by itself of what it meets: it has events of its own."""
+        return replace(self, events=Events())
 
-    def note_fold(self, what: Sided, where: Folded, members: Ints | None = None) -> None:
-        """Where sections of a surface appear or merge: only what is beside the parameters tells about derivatives."""
-        self.books.met.note_fold(what, where, members)
-
-    def note_unfinished(self, reason: str, members: Ints | None = None, once: str = "") -> None:
-        """Why the answer is not as accurate as was asked; of reasons that begin with `once`, the first will do."""
-        self.books.met.note_unfinished(reason, members, once)
-
-    def note_incomplete(self, what: str) -> None:
-        note(self.books.met.incomplete, what, None)
-
-    def note_degenerate(self, variable: str, members: Ints | None = None) -> None:
-        note(self.books.met.degenerate, variable, members)
+    @contextmanager
+    def among(self, index: Ints) -> Iterator[Machine]:
+        """The machine apart, for which these members are all that there are, with a budget of their own."""
+        with self.record.among(index.size):
+            yield self.apart()
 
     # Terms over batches
 
@@ -228,14 +219,14 @@ class Machine:
             return Closure(term, {}, self.rounding or self.linker.inexact(term), (module, name))
         known = self.linker.held.get((module, name))
         if known is not None:
-            self.books.used[module, name] = known
+            self.record.used[module, name] = known
             return pad(known, self.directions)
         key = (module, name, self.settings)
         if key not in self.linker.constants:
             self.enter()
             still = replace(self, directions=0, rounding=True, frozen=False)
             self.linker.constants[key] = still.term(term, {})
-            self.books.depth -= 1
+            self.record.depth -= 1
         return pad(self.linker.constants[key], self.directions)
 
     def closure(self, function: Lam, captured: dict[str, Value]) -> Value:
@@ -261,9 +252,9 @@ class Machine:
     # Calls
 
     def enter(self) -> None:
-        self.books.depth += 1
-        if self.books.depth > DEEPEST_CALLS:
-            self.books.depth = 0
+        self.record.depth += 1
+        if self.record.depth > DEEPEST_CALLS:
+            self.record.depth = 0
             raise PottoError([errors.TOO_DEEP(
                 errors.NOWHERE, f"more than {DEEPEST_CALLS:,} calls inside each other",
                 help="make sure that the condition that ends the recursion becomes true",
@@ -288,7 +279,7 @@ class Machine:
         for group, arity in zip(groups, arities):
             args.extend(fit(group, arity))
         value = self.run(whole, args, trace)
-        self.books.depth -= 1
+        self.record.depth -= 1
         return value
 
     def linker_shape(self, function: Lam, sizes: tuple[int, ...]) -> tuple[Lam, tuple[int, ...]]:
@@ -315,7 +306,7 @@ class Machine:
     def falls(self, surface: Number, strict: bool) -> tuple[Any, Any]:
         """Which side a surface falls on, and nan wherever it is nan."""
         mask = surface > 0 if strict else surface >= 0
-        if self.directions and self.books.second and np.any(surface == 0):
+        if self.directions and self.record.second and np.any(surface == 0):
             raise PottoError([PRODUCT_OF_DELTAS(
                 errors.NOWHERE,
                 "the second derivative does not exist here: two surfaces coincide, or one passes through a corner",
@@ -388,4 +379,4 @@ def fit(group: tuple[Value, ...], arity: int) -> tuple[Value, ...]:
     raise errors.wrong_call(f"{len(group)} argument(s) given to a function that takes {arity}")
 
 
-__all__ = ["Books", "Linker", "Machine", "fit"]
+__all__ = ["Linker", "Machine", "Record", "fit"]

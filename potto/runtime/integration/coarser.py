@@ -8,36 +8,35 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from potto.integrate.events import Degenerate, Fold, TwoSided
 from potto.integrate.pieces import Sums
 from potto.integrate.plan import Plan
-from potto.kernels.cells import Value
+from potto.runtime.integration.problem import Problem
 from potto.runtime.integration.quadrature import in_parts
-
-if TYPE_CHECKING:
-    from potto.runtime.evaluation.machine import Machine
 
 ENOUGH = 1e-3  # a relative error from which on it is tried
 TOLERANCES = (1e-6, 1e-3)  # that are asked for instead, one after the other, until one is reached
 EXTRA = 0.125  # the part of the budget that each may take beyond it
 
 
-def by_less(machine: Machine, plan: Plan, env: dict[str, Value], batch: int, sums: Sums) -> Sums:
+def by_less(problem: Problem, plan: Plan, sums: Sums) -> Sums:
     """The sums, or better ones that were found by asking for less, where the budget ran out with few digits.
 
     Not where the integrand calls for integrals, which would go far beyond any budget once more.
     """
+    machine = problem.machine
     if not machine.exhausted() or (sums.e <= ENOUGH * np.abs(sums.v)).all() or machine.inexact(plan.term.body):
         return sums
     for rtol in TOLERANCES:
-        most = math.ceil(machine.books.spent + EXTRA * machine.settings.max_evals)
-        loose = replace(machine, settings=replace(machine.settings, rtol=max(rtol, machine.rtol), max_evals=most))
-        with machine.books.apart() as met:
-            other = in_parts(plan, loose, env, batch)
-        if (other.e < sums.e).all() and (other.et <= sums.et).all() and not (met.sided or met.folds or met.degenerate):
+        most = math.ceil(machine.record.spent + EXTRA * machine.settings.max_evals)
+        settings = replace(machine.settings, rtol=max(rtol, machine.rtol), max_evals=most)
+        loose = replace(machine.apart(), settings=settings)
+        other = in_parts(plan, loose, problem.env, problem.batch)
+        met = loose.events.touched(problem.batch, TwoSided, Fold, Degenerate).any()
+        if (other.e < sums.e).all() and (other.et <= sums.et).all() and not met:
             sums = other
         if (sums.e <= rtol * np.abs(sums.v)).all():
             break

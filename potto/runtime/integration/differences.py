@@ -8,19 +8,16 @@ a gap between the sides that does not shrink with the step (a kink) speak agains
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
 from potto.integrate.pieces import Sums, still
 from potto.kernels.cells import Array, Cell, Value, map_arrays
 from potto.runtime.evaluation.functions import Closure
-from potto.runtime.integration.one_sided import moved
-from potto.runtime.integration.plans import Linked, link
-
-if TYPE_CHECKING:
-    from potto.runtime.evaluation.machine import Machine
+from potto.runtime.integration.one_sided import Evaluated, moved
+from potto.runtime.integration.problem import Problem
 
 ROUGH = 1e-6  # from which relative error on another way is looked for
 FEW = 4  # members of a batch for which that is done
@@ -32,20 +29,19 @@ SURE = 4.0  # times what two estimates differ by
 CANCELLED = 1e-9  # the part of what was added up that a derivative may be uncertain by: a zero that is known for one
 
 
-def by_differences(
-    machine: Machine, linked: Linked, batch: int, sums: Sums, evaluated: Callable[[Linked], Sums]
-) -> None:
+def by_differences(problem: Problem, sums: Sums, evaluated: Evaluated) -> None:
     """Put derivatives by differences where those of the sums have no digits, if differences have more.
 
     evaluated: the integral for other parameters, of one member, without tangents.
     """
-    if batch > FEW or machine.exhausted():
+    machine = problem.machine
+    if problem.batch > FEW or machine.exhausted():
         return
     rough = ~(sums.et <= ROUGH * np.abs(sums.t)) & np.isfinite(sums.v)[:, None] & ~(sums.et <= machine.atol)
     if sums.gross is not None:
         rough &= ~(sums.et <= CANCELLED * np.where(np.isfinite(sums.gross[1]), sums.gross[1], 0.0))
     for member in np.nonzero(rough.any(axis=(0, 1)))[0]:
-        env = {n: map_arrays(v, lambda a, m=member: a[m]) for n, v in linked.env.items()}
+        env = {n: map_arrays(v, lambda a, m=member: a[m]) for n, v in problem.env.items()}
         for d in np.nonzero(rough[:, :, member].any(axis=0))[0]:
             step = min(_reaches(env.values(), int(d)), default=0.0) * REACH / 4
             if not 0 < step < np.inf:
@@ -53,8 +49,7 @@ def by_differences(
             noise = 2 * np.abs(WEIGHTS).sum() / (step / 2) * sums.e[:, member]
             if (sums.et[:, d, member] <= noise).all():
                 continue  # differences of values have no more digits
-            with machine.books.apart():
-                found = _derivative(env, int(d), step, evaluated)
+            found = _derivative(env, int(d), step, evaluated)
             if found is None:
                 continue
             value, off = found
@@ -77,12 +72,12 @@ def _reaches(values: Any, d: int) -> Iterator[float]:
 
 
 def _derivative(
-    env: dict[str, Value], d: int, step: float, evaluated: Callable[[Linked], Sums]
+    env: dict[str, Value], d: int, step: float, evaluated: Evaluated
 ) -> tuple[Array, Array] | None:
     """The derivative of all components, and how far off it may be; None where values are missing or there is a kink."""
 
     def at(h: float) -> tuple[Array, Array]:
-        found = evaluated(link({n: still(moved(v, h, d)) for n, v in env.items()}))
+        found = evaluated({n: still(moved(v, h, d)) for n, v in env.items()})
         return found.v[:, 0], found.e[:, 0]
 
     middle, noise = at(0.0)

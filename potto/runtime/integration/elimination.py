@@ -9,12 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from potto.core.terms import Integral
 from potto.integrate.elimination.recursion import one_by_one
 from potto.integrate.pieces import Sums
-from potto.kernels.cells import map_arrays
-from potto.runtime.evaluation.record import Met
-from potto.runtime.integration.plans import Linked, eliminated_for
+from potto.runtime.integration.plans import eliminated_for
+from potto.runtime.integration.problem import Problem
 
 if TYPE_CHECKING:
     from potto.runtime.evaluation.machine import Machine
@@ -23,20 +21,19 @@ if TYPE_CHECKING:
 ACCURATE, WORTH = 1e-8, 1e-4
 
 
-def step_by_step(machine: Machine, term: Integral, linked: Linked, batch: int, limit: float) -> Sums | None:
+def step_by_step(problem: Problem, limit: float) -> Sums | None:
     """The integrals of a batch, where each variable hands one number on; None where errors are larger than `limit`."""
-    known = eliminated_for(machine, term, linked)
+    known = eliminated_for(problem.machine, problem.term, problem.linked)
     if known is None:
         return None
-    rows, books = [], machine.books
-    for i in range(batch):
-        with books.apart() as met:
-            env = {n: map_arrays(v, lambda a, i=i: float(a[i])) for n, v in linked.env.items()}
-            row = one_by_one(known, machine, env)
-        if row is None or met != Met() or not accurate(row, limit, machine):
+    rows = []
+    for i in range(problem.batch):
+        machine = problem.machine.apart()
+        row = one_by_one(known, machine, problem.picked(np.array([i])).env)
+        if row is None or machine.events or not accurate(row, limit, machine):
             return None
         rows.append(row)
-    machine.books.methods.add("quadrature")
+    problem.machine.record.methods.add("quadrature")
     return Sums(*(np.concatenate([getattr(r, name) for r in rows], axis=-1) for name in ("v", "e", "t", "et")))
 
 

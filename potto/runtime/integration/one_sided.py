@@ -17,18 +17,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from potto.integrate.adaptive.divergence import BOUNDLESS
 from potto.integrate.decomposition.cuts import Row, frame_rows
 from potto.integrate.decomposition.sections import searched_rows
-from potto.integrate.pieces import INNER, Folded, Sided, Sums, still
+from potto.integrate.events import BOUNDLESS, INNER, Degenerate, Fold, OneSidedDerivatives, TwoSided
+from potto.integrate.pieces import Sums, still
 from potto.integrate.plan import Plan
 from potto.kernels.cells import Array, Cell, Value, map_arrays
 from potto.runtime.evaluation.functions import Closure
-from potto.runtime.integration.plans import Linked, link
+from potto.runtime.integration.problem import Problem
+from potto.runtime.integration.quadrature import iterated
 
 if TYPE_CHECKING:
     from potto.runtime.evaluation.machine import Machine
 
+# The integral of one member at other parameters.
+Evaluated = Callable[[dict[str, Value]], Sums]
 # The parameters' steps that are tried, and how far apart what folds may be after one, as a part of the range.
 STEPS = 2.0 ** np.arange(-1000.0, 1001.0, 4.0)
 APART = 2.0**-8
@@ -41,45 +44,39 @@ TOGETHER = 1e-9
 MOST_MEMBERS = 16  # of a batch that are looked at
 
 
-def from_both_sides(
-    machine: Machine, plan: Plan, env: dict[str, Value], batch: int, sums: Sums,
-    iterated: Callable[[Plan, Machine, dict[str, Value], int], Sums],
-) -> None:  # fmt: skip
+def from_both_sides(problem: Problem, plan: Plan, sums: Sums) -> Sums:
     """Note the one-sided derivatives of an integral in which a part has two; where the whole has one, that is it."""
-    reasons = dict(machine.books.met.sided)
-    machine.books.met.sided.clear()
-    with machine.books.apart():
-        found = [iterated(plan, replace(machine, side=side), env, batch) for side in (-1, 1)]
+    causes, machine = problem.events.every(TwoSided), problem.machine
+    problem.events.forget(TwoSided)
+    sides = (replace(machine.apart(), side=side) for side in (-1, 1))
+    found = [iterated(plan, one_side, problem.env, problem.batch) for one_side in sides]
     backward, forward = (np.where(np.isfinite(part.et), part.t, np.nan) for part in found)
     before, beyond = (np.where(np.isfinite(part.et), part.et, 0.0) for part in found)
     same = np.abs(forward - backward) <= 1e-12 * (np.abs(forward) + np.abs(backward))
-    sums.t = np.where(same, forward, sums.t)
     differ = np.nonzero(~same.all(axis=(0, 1)))[0]
-    for what, members in reasons.items():
+    for cause, members in causes:
         there = differ if members is None else np.intersect1d(differ, members)
         if there.size:
-            backward_, forward_, before_, beyond_ = (x[..., there] for x in (backward, forward, before, beyond))
-            machine.note_edge(what, (backward_, forward_, before_, beyond_), there)
+            sided = (x[..., there] for x in (backward, forward, before, beyond))
+            machine.note(OneSidedDerivatives(cause, *sided), there)
+    return replace(sums, t=np.where(same, forward, sums.t))
 
 
-def beside_folds(
-    machine: Machine, plan: Plan, linked: Linked, batch: int, sums: Sums, evaluated: Callable[[Linked], Sums]
-) -> None:
+def beside_folds(problem: Problem, plan: Plan, sums: Sums, evaluated: Evaluated) -> None:
     """Put the one-sided derivatives of integrals at whose parameters a surface folds in their place, or note both.
 
     evaluated: the integral for other parameters, of one member. What was noted of other surfaces lacks what folds.
     """
-    folds = {what: where for what, (where, _) in machine.books.met.folds.items()}
-    with machine.books.apart():
-        found = [
-            (what, side)
-            for what, where in folds.items()
-            for side in _sides(machine, plan, linked, where.owner or range(batch), where, evaluated)
-        ]
-    for what, (member, d, backward, forward, off) in found:
+    machine, events = problem.machine, problem.events
+    found = [
+        (fold.cause, side)
+        for fold, _ in events.every(Fold)
+        for side in _sides(problem, plan, fold.owner or range(problem.batch), fold, evaluated)
+    ]
+    for cause, (member, d, backward, forward, off) in found:
         t, et = sums.t[:, d, member], sums.et[:, d, member]
-        for _, sides, _ in machine.books.met.edges:
-            for side, one in zip(sides, (backward, forward, *off), strict=True):
+        for edge, _ in events.every(OneSidedDerivatives):
+            for side, one in zip(edge.sides, (backward, forward, *off), strict=True):
                 if np.shape(side) == sums.t.shape:
                     side[:, d, member] = one
         if _same(backward, forward, off[0] + off[1]) and np.isfinite(forward).all():
@@ -89,22 +86,18 @@ def beside_folds(
         t[:] = np.where(np.isfinite(t), t, np.where(np.isfinite(backward), backward, forward))
         et[:] = np.where(np.isfinite(t), np.where(np.isfinite(et), et, 0.0), np.inf)
         _endless(machine, backward, forward, t, et)
-        machine.note_edge(what, (backward, forward, *off))
-    machine.books.met.folds.clear()
+        machine.note(OneSidedDerivatives(cause, backward, forward, *off))
+    events.forget(Fold)
 
 
-def beside_axes(
-    machine: Machine, plan: Plan, linked: Linked, batch: int, sums: Sums, variable: str,
-    evaluated: Callable[[Linked], Sums],
-) -> bool:  # fmt: skip
+def beside_axes(problem: Problem, plan: Plan, sums: Sums, variable: str, evaluated: Evaluated) -> bool:
     """The same where surfaces run along `variable`, and every other one. Whether all derivatives are known then."""
-    what = Sided(variable)
+    machine, batch = problem.machine, problem.batch
     if batch > MOST_MEMBERS:
         return False
-    machine.books.met.degenerate.clear()
-    with machine.books.apart():
-        found = list(_sides(machine, plan, linked, range(batch), None, evaluated))
-    moving = [any(any(_moving(v, d)) for v in linked.env.values()) for d in range(machine.directions)]
+    problem.events.forget(Degenerate)
+    found = list(_sides(problem, plan, range(batch), None, evaluated))
+    moving = [any(any(_moving(v, d)) for v in problem.env.values()) for d in range(machine.directions)]
     still_ones = batch * moving.count(False)
     if len(found) + still_ones < batch * machine.directions:
         return False
@@ -117,7 +110,7 @@ def beside_axes(
         else:
             et[:] = np.abs(t)
             _endless(machine, backward, forward, t, et)
-            machine.note_edge(what, (backward, forward, *off))
+            machine.note(OneSidedDerivatives(TwoSided(variable), backward, forward, *off))
     return True
 
 
@@ -126,7 +119,7 @@ def _endless(machine: Machine, backward: Array, forward: Array, t: Array, et: Ar
     both = np.isinf(forward) & (forward == backward)
     t[:], et[:] = np.where(both, forward, t), np.where(both, np.inf, et)
     if both.any():
-        machine.note_unfinished(BOUNDLESS)
+        machine.note(BOUNDLESS)
 
 
 def _same(backward: Array, forward: Array, off: Array) -> bool:
@@ -137,21 +130,19 @@ def _same(backward: Array, forward: Array, off: Array) -> bool:
 
 
 def _sides(
-    machine: Machine, plan: Plan, linked: Linked, members: Sequence[int], where: Folded | None,
-    evaluated: Callable[[Linked], Sums],
+    problem: Problem, plan: Plan, members: Sequence[int], where: Fold | None, evaluated: Evaluated
 ) -> Iterator[tuple[int, int, Array, Array, tuple[Array, Array]]]:  # fmt: skip
     """Member, direction, the derivatives before and behind the parameters, of all components, and how far off each."""
     for member in members[:MOST_MEMBERS]:
-        env = {n: map_arrays(v, lambda a, m=member: a[m]) for n, v in linked.env.items()}
-        for d in range(machine.directions):
-            sides = _both(machine, plan, env, d, where, evaluated)
+        env = {n: map_arrays(v, lambda a, m=member: a[m]) for n, v in problem.env.items()}
+        for d in range(problem.machine.directions):
+            sides = _both(problem.machine.apart(), plan, env, d, where, evaluated)
             if sides is not None:
                 yield (member, d, *sides)
 
 
 def _both(
-    machine: Machine, plan: Plan, env: dict[str, Value], d: int, where: Folded | None,
-    evaluated: Callable[[Linked], Sums],
+    machine: Machine, plan: Plan, env: dict[str, Value], d: int, where: Fold | None, evaluated: Evaluated
 ) -> tuple[Array, Array, tuple[Array, Array]] | None:  # fmt: skip
     """The derivatives before and behind the parameters, of all components, and how far off each may be; None if nothing
     moves in this direction."""
@@ -161,7 +152,7 @@ def _both(
     sides, off = [], []
     for sign in (-1.0, 1.0):
         steps = [sign * step * CLOSER**i for i in range(3)]
-        found = [evaluated(link({n: moved(v, h, d) for n, v in env.items()})) for h in steps]
+        found = [evaluated({n: moved(v, h, d) for n, v in env.items()}) for h in steps]
         values = [np.where(np.isfinite(part.et[:, d, 0]), part.t[:, d, 0], np.nan) for part in found]
         noise = np.sum([part.et[:, d, 0] for part in found], axis=0)
         limits, missed = np.array([_limit(*three) for three in zip(*values, noise, strict=True)]).T
@@ -170,7 +161,7 @@ def _both(
     return sides[0], sides[1], (off[0], off[1])
 
 
-def _step(machine: Machine, plan: Plan, env: dict[str, Value], d: int, where: Folded | None) -> float | None:
+def _step(machine: Machine, plan: Plan, env: dict[str, Value], d: int, where: Fold | None) -> float | None:
     """The largest step that moves the roots that fold, or all roots, by a small part of the range, either way.
 
     Where nobody knows the roots, since an integral further in has them, a small part of the parameters.
@@ -204,7 +195,7 @@ def _step(machine: Machine, plan: Plan, env: dict[str, Value], d: int, where: Fo
     return float(STEPS[np.nonzero(fits)[0][-1]]) if fits.any() else None
 
 
-def _room(low: Array, high: Array, rows: Sequence[Row], where: Folded | None) -> Array:
+def _room(low: Array, high: Array, rows: Sequence[Row], where: Fold | None) -> Array:
     """How far it is from one end of the range to the other, or from what folds to what else lies in it."""
     reach = np.abs(high - low)
     place = 0.0 if where is None else where.place

@@ -32,14 +32,14 @@ FEW = 64  # members for which it does not pay to look for those that nothing cut
 
 def within(most: int | None, plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> Sums | None:
     """Quadrature; None where it takes more than so many evaluations a member."""
-    if most is None or machine.books.spent + most >= machine.settings.max_evals:
+    if most is None or machine.record.spent + most >= machine.settings.max_evals:
         return in_parts(plan, machine, env, batch)
-    tight = replace(machine, settings=replace(machine.settings, max_evals=math.ceil(machine.books.spent + most)))
-    with machine.books.apart() as met:
-        sums = in_parts(plan, tight, env, batch)
+    settings = replace(machine.settings, max_evals=math.ceil(machine.record.spent + most))
+    tight = replace(machine.apart(), settings=settings)
+    sums = in_parts(plan, tight, env, batch)
     if tight.exhausted():
         return None
-    machine.books.met.take(met, np.arange(batch))
+    machine.events.take(tight.events, np.arange(batch))
     return sums
 
 
@@ -57,9 +57,9 @@ def in_parts(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) ->
         machine.costs.whole += batch - rest.size
     if rest.size:
         here = {n: map_arrays(v, operator.itemgetter(rest)) for n, v in env.items()}
-        with machine.books.apart() as met:
-            part = iterated(plan, machine, here, rest.size)
-        machine.books.met.take(met, rest)
+        apart = machine.apart()
+        part = iterated(plan, apart, here, rest.size)
+        machine.events.take(apart.events, rest)
         for name in ("v", "e", "t", "et"):
             getattr(sums, name)[..., rest] = getattr(part, name)
         if part.gross is None or sums.gross is None:
@@ -81,9 +81,9 @@ def iterated(
         for start in range(0, batch, BATCH):
             index = slice(start, min(start + BATCH, batch))
             here = {n: map_arrays(v, operator.itemgetter(index)) for n, v in env.items()}
-            with machine.books.apart() as met:
-                parts.append(Iteration(plan, machine, order).whole(here, index.stop - start))
-            machine.books.met.take(met, np.arange(index.start, index.stop))
+            apart = machine.apart()
+            parts.append(Iteration(plan, apart, order).whole(here, index.stop - start))
+            machine.events.take(apart.events, np.arange(index.start, index.stop))
     m = max(p.v.shape[0] for p in parts)
 
     def joined(name: str) -> Array:
@@ -100,10 +100,10 @@ def best_order(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) 
     here = {n: map_arrays(v, operator.itemgetter(index)) for n, v in env.items()}
     costs = []
     for order in ORDERS:
-        before = machine.books.evaluations
-        with machine.books.apart():
-            Iteration(plan, machine, order).run(0, here, PILOTS, {}, machine)
-        costs.append(machine.books.evaluations - before)
+        before = machine.record.evaluations
+        apart = machine.apart()
+        Iteration(plan, apart, order).run(0, here, PILOTS, {}, apart)
+        costs.append(machine.record.evaluations - before)
     return ORDERS[costs.index(min(costs))]
 
 

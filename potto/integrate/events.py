@@ -1,0 +1,275 @@
+"""What integrals meet that whoever asked for them must know: events, as values beside the sums that they are about.
+
+Owns every kind of event, and `Events`, which says which members of a batch met what. An event that leaves an answer
+less accurate than was asked for is a `Shortfall`, with its message and with what helps against it. The others are
+looked into before an answer leaves (`runtime/integration/solving`): a fold, a surface along an axis, two sides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
+
+import numpy as np
+
+from potto.core.printer import format_term
+from potto.core.terms import Term
+from potto.kernels.cells import Array, Bools, Ints
+
+E = TypeVar("E", bound="Event")
+# Of which members of a batch something is true; None: nobody knows which, so it may be any.
+Members = Ints | None
+INNER = -1
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that integration met. Events with one key are one; the first stands for all."""
+
+    @property
+    def key(self) -> object:
+        return self
+
+    def outside(self) -> Event:
+        """The event as an integral further out meets it."""
+        return self
+
+    def at(self, kept: Bools) -> Event:
+        """The event of some of the members that met it."""
+        return self
+
+
+@dataclass(frozen=True)
+class TwoSided(Event):
+    """Why derivatives on the two sides differ: a surface lies on a bound of a variable, or on another surface.
+
+    fold: or its sections along the variable appear or merge just here. Without a surface: some run along the variable.
+    """
+
+    variable: str
+    surface: Term | None = None
+    other: Term | None = None
+    fold: bool = False
+
+
+@dataclass(frozen=True)
+class Fold(Event):
+    """Sections of a surface appear or merge: at which variable, of which of its cuts, where, and for which members.
+
+    outer: where that is in the variables further out. owner: None where for all. Of an integral inside of another one
+    only that there is one: its variables and its batch mean nothing outside, and the number is INNER.
+    """
+
+    cause: TwoSided
+    number: int
+    cut: int
+    place: float
+    owner: tuple[int, ...] | None
+    outer: tuple[float, ...] = ()
+
+    @property
+    def key(self) -> object:
+        return Fold, self.cause
+
+    def outside(self) -> Event:
+        return Fold(self.cause, INNER, 0, 0.0, None)
+
+
+@dataclass(frozen=True)
+class Degenerate(Event):
+    """Surfaces run along a variable and have no section in it: another order of the variables may do."""
+
+    variable: str
+
+
+@dataclass(frozen=True)
+class Unsearched(Event):
+    """The search for the places at which a variable is to be cut was given up."""
+
+    variable: str
+
+
+@dataclass(frozen=True, eq=False)
+class OneSidedDerivatives(Event):
+    """The derivatives backward and forward, and how far off each may be: (..., members) each."""
+
+    cause: TwoSided
+    backward: Array
+    forward: Array
+    backward_error: Array
+    forward_error: Array
+
+    @property
+    def sides(self) -> tuple[Array, Array, Array, Array]:
+        return self.backward, self.forward, self.backward_error, self.forward_error
+
+    def at(self, kept: Bools) -> Event:
+        return OneSidedDerivatives(self.cause, *(side[..., kept] for side in self.sides))
+
+
+LESS = "ask for less accuracy (`--rtol`)"
+MORE = "allow more evaluations (`--max-evals`) or " + LESS
+POLE = (
+    "more evaluations are of no use to an integral that diverges: look for a pole in the domain or at its ends, or a "
+    "tail that falls too slowly, and leave it out by the bounds or a condition"
+)
+BESIDE = "more evaluations change nothing: ask at parameters beside these"
+JOIN = "write both integrals as one: `integral ([..], [..]) .. d(x, y)`"
+
+
+@dataclass(frozen=True)
+class Shortfall(Event):
+    """Why an answer is not as accurate as was asked for, and what helps.
+
+    blind: where integration did not look nothing is known of the answer, whatever the rules on its panels say. alike:
+    what all of a kind have in common, of which the first one says enough.
+    """
+
+    message: str
+    advice: str = field(default=MORE, compare=False)
+    blind: bool = field(default=False, compare=False)
+    alike: str = field(default="", compare=False)
+
+    @property
+    def key(self) -> object:
+        return self.alike or self
+
+    def __str__(self) -> str:
+        return self.message
+
+
+BUDGET_SPENT = Shortfall(
+    "the budget of evaluations is spent", f"{MORE}; if no number of them is enough, the integral may diverge"
+)
+TOO_MANY_ROOTS = Shortfall(
+    "a condition has too many roots to cut at", "shorten the domain, or sample (`--method mc`)", blind=True
+)
+ROOTS_NOT_SEPARATED = replace(
+    TOO_MANY_ROOTS, message="a condition without a closed form has too many roots, or roots too close together"
+)
+BOUNDLESS = Shortfall("the derivative is infinite: there is a surface that moves infinitely fast", BESIDE)
+LATE = Shortfall("it takes longer than others that are evaluated with it")
+UNSEEN_MEETING = Shortfall("surfaces meet, or lie on a bound, that an inner integral jumps at", JOIN)
+UNCOUNTED_JUMP = Shortfall("a condition jumps inside an inner integral where its boundary term is not counted", JOIN)
+UNKNOWN_JUMP = Shortfall("a condition jumps by itself where it is not known how that place moves")
+CROWDED = Shortfall("too many surfaces meet where a range has length zero", BESIDE)
+EMPTY_UNSEEN = Shortfall("an inner integral jumps where a range has length zero", JOIN)
+EMPTY_UNDEFINED = Shortfall("the integrand is not defined where a range has length zero", BESIDE)
+TOO_MANY_CASES = Shortfall(
+    "conditions inside of conditions make more cases than can be told apart",
+    "write fewer brackets inside of one condition",
+)
+ALONG_AXES = Shortfall(
+    "surfaces run along the axes of several variables of integration at once: their boundary terms are not all counted",
+    "turn the variables of integration, so that no surface runs along several of their axes",
+)
+NO_SAMPLE = Shortfall(
+    "no sample fell where it counts: the error estimate says nothing",
+    "sample more (`--samples`), or integrate by `--method quadrature`",
+)
+DISAGREE = Shortfall("the second derivative is not known: its formula and numbers disagree about the first one")
+
+# What numbers say by themselves.
+NO_VALUE = Shortfall("the integral has no value, or none within reach", POLE)
+NOT_A_NUMBER = Shortfall(
+    "the value is not a number",
+    "look for a builtin that is used where it is not defined, and guard it with a condition",
+)
+INFINITE = Shortfall("the integral is infinite, or beyond what numbers can hold", POLE)
+NO_BOUND = Shortfall("the error is not known")
+TOO_FEW = Shortfall("so many samples give fewer digits than were asked for", f"sample more (`--samples`) or {LESS}")
+NO_DIGITS = Shortfall(
+    "no accuracy was reached: the integral diverges, its integrand is too rough, or rounding hides it",
+    f"{POLE}; if the integrand is only rough, sampling gives a few digits (`--method mc`)",
+)
+ROUNDED = Shortfall(
+    "rounding limits the accuracy", f"more evaluations cannot help, the numbers have no more digits: {LESS}"
+)
+TOO_LARGE = Shortfall("the error estimate is too large")
+# Of this a reader need not be warned: that answer came with its error.
+ROUGH = Shortfall("an answer that it is made of is no more accurate")
+DIVERGENT = frozenset((INFINITE, NO_VALUE))
+
+
+def sides_hidden(variable: str) -> Shortfall:
+    message = f"rounding hides on which side of a surface stretches of `{variable}` lie"
+    return Shortfall(message, ROUNDED.advice)
+
+
+def on_a_bound(cause: TwoSided) -> Shortfall:
+    """What lies beyond a bound on which a surface lies, or between surfaces that coincide, is not finite."""
+    assert cause.surface is not None
+    surface = format_term(cause.surface)
+    if cause.other is None:
+        message = f"{surface} = 0 lies on a bound of `{cause.variable}`, and beyond it the integrand is not finite"
+        return Shortfall(message, f"{BESIDE}, where the surface lies inside or outside")
+    both = f"{surface} = 0 and {format_term(cause.other)} = 0 coincide"
+    return Shortfall(f"{both}, and what lies between them is not known", BESIDE)
+
+
+UNDEFINED = "a condition has no value"
+
+
+def undefined(where: str, surface: Term) -> Shortfall:
+    """A condition asks for the sign of what is not defined."""
+    return Shortfall(
+        f"{UNDEFINED}{where}: it asks for the sign of {format_term(surface)}",
+        "leave such places out by the bounds, or guard the condition: `if [x > -1] then [sqrt(1 + x) < t] else 0`",
+        alike=UNDEFINED,
+    )
+
+
+class Events:
+    """What was met, and by which members of the batch."""
+
+    def __init__(self) -> None:
+        self._met: dict[object, tuple[Event, Members]] = {}
+
+    def __bool__(self) -> bool:
+        return bool(self._met)
+
+    def __iter__(self) -> Iterator[tuple[Event, Members]]:
+        return iter(self._met.values())
+
+    def note(self, event: Event, members: Members = None) -> None:
+        """Add an event, or the members that met it as well."""
+        first, known = self._met.get(event.key, (event, members))
+        both = None if members is None or known is None else np.union1d(known, members)
+        self._met[event.key] = first, both
+
+    def take(self, other: Events, index: Members) -> None:
+        """Add what a part of the batch has met, whose members are those of `index` here; None: nobody knows which."""
+        for event, members in other:
+            self.note(event, index if members is None or index is None else index[members])
+
+    def every(self, kind: type[E]) -> list[tuple[E, Members]]:
+        """The events of a kind, with who met them."""
+        return [(event, members) for event, members in self if isinstance(event, kind)]
+
+    def forget(self, *kinds: type[Event]) -> None:
+        self._met = {key: (event, who) for key, (event, who) in self._met.items() if not isinstance(event, kinds)}
+
+    def touched(self, size: int, *kinds: type[Event]) -> Bools:
+        """The members of a batch that met something of these kinds; all of them where nobody knows who did."""
+        mask = np.zeros(size, dtype=bool)
+        for event, members in self:
+            if isinstance(event, kinds or Event):
+                mask[slice(None) if members is None else members] = True
+        return mask
+
+    def known(self, *kinds: type[Event]) -> bool:
+        """Whether it is known of each of these kinds who met it."""
+        return all(members is not None for event, members in self if isinstance(event, kinds))
+
+    def of(self, index: Ints, *kinds: type[Event]) -> Events:
+        """What some members have met, who are numbered anew; what is known of nobody is true of all."""
+        found = Events()
+        for event, members in self:
+            if not isinstance(event, kinds or Event):
+                continue
+            if members is None:
+                found.note(event)
+            elif (kept := np.isin(members, index)).any():
+                found.note(event.at(kept), np.searchsorted(index, members[kept]))
+        return found

@@ -1,0 +1,262 @@
+"""An integral by the first method that settles it, and then by whatever makes the answer better.
+
+Owns `solve`, `METHODS` and the improvers. A method answers a problem, or None where it is not for it. An improver takes
+an answer, and what was met on the way to it, to one that is no worse; each says where it can help.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from potto.core.terms import Integral
+from potto.integrate.events import (
+    ALONG_AXES,
+    TOO_MANY_CASES,
+    UNCOUNTED_JUMP,
+    Degenerate,
+    Fold,
+    OneSidedDerivatives,
+    Shortfall,
+    TwoSided,
+    Unsearched,
+)
+from potto.integrate.fixed.a_priori import certain
+from potto.integrate.pieces import Sums, still
+from potto.integrate.plan import Plan
+from potto.kernels.cells import Ints, Value
+from potto.runtime.answers.convergence import missing
+from potto.runtime.integration.choices import many, orders, preferred, too_many, trials
+from potto.runtime.integration.coarser import by_less
+from potto.runtime.integration.differences import by_differences
+from potto.runtime.integration.elimination import ACCURATE, WORTH, step_by_step
+from potto.runtime.integration.folds import beside_another
+from potto.runtime.integration.members import Ways, by_members
+from potto.runtime.integration.one_sided import beside_axes, beside_folds, from_both_sides, one_direction
+from potto.runtime.integration.plans import link
+from potto.runtime.integration.problem import Problem
+from potto.runtime.integration.quadrature import in_parts, iterated, within
+
+Method = Callable[[Problem], Sums | None]
+Improver = Callable[[Problem, Integral, Sums], Sums]
+
+# From how many errors of the value on an error of a derivative is looked at again from another side, and for how many
+# members at most.
+STEEP = 1e3
+MOST_SPOILT = 256
+
+
+def solve(problem: Problem) -> Sums:
+    """What an integral amounts to."""
+    for method in METHODS if problem.outermost else (along_cuts,):
+        found = method(problem)
+        if found is not None:
+            return found
+    raise AssertionError("cuts are for every integral")
+
+
+# Methods
+
+
+def by_elimination(problem: Problem) -> Sums | None:
+    """One variable after the other, where each hands on one number."""
+    machine, term, linked = problem.machine, problem.term, problem.linked
+    if machine.settings.method in ("mc", "qmc") or not many(machine, term, linked):
+        return None
+    return step_by_step(problem, WORTH if _too_many(problem) else ACCURATE)
+
+
+def by_samples(problem: Problem) -> Sums | None:
+    """All variables at once, where that was asked for, or where they are too many for rules."""
+    from potto.integrate.montecarlo.sampling import sample
+
+    method = problem.machine.settings.method
+    if method not in ("mc", "qmc") and not _too_many(problem):
+        return None
+    plan = problem.plan()
+    sums = counted(problem, plan, sample(plan, problem.machine, problem.env, problem.batch, method), drawn=True)
+    problem.machine.record.methods.add("mc" if method == "mc" else "qmc")
+    sums.et[:, :, _blind(problem)] = np.inf  # what crosses those that were left out is not known
+    return sums
+
+
+def as_a_batch(problem: Problem) -> Sums | None:
+    """Many members together, and one by one where they meet something."""
+    if problem.batch == 1:
+        return None
+    ways = Ways(
+        orders=lambda: preferred(problem.machine, problem.term, problem.linked),
+        whole=lambda order, part: in_parts(part.plan(order), part.machine, part.env, part.batch),
+        settled=lambda order, part, sums: improved(part, order, counted(part, part.plan(order), sums), TOGETHER),
+        directions=one_by_one,
+        single=solve,
+    )
+    problem.machine.record.methods.add("quadrature")
+    return by_members(problem, ways, lambda sums: missing(problem.term, sums, problem.machine.settings))
+
+
+def along_cuts(problem: Problem) -> Sums:
+    """Iterated quadrature, in the first order of the variables in which no surface runs along the one that it cuts."""
+    machine, env, batch, events = problem.machine, problem.env, problem.batch, problem.events
+    machine.record.methods.add("quadrature")
+    for order, most in trials(machine, problem.term, problem.linked, problem.outermost):
+        events.forget(Degenerate)
+        plan = problem.plan(order)
+        if batch == 1 and plan.straight is not None:
+            plain = certain(plan.straight, machine, env)
+            if plain is not None:
+                return plain
+        found = within(most, plan, machine, env, batch)
+        if found is not None:
+            sums = counted(problem, plan, found)
+            if not events.every(Degenerate):
+                sums = improved(problem, order, sums, ALONE if problem.outermost else INSIDE)
+                return unbounded(problem, sums) if problem.outermost else sums
+    return _along_axes(problem, plan, sums)
+
+
+def _along_axes(problem: Problem, plan: Plan, sums: Sums) -> Sums:
+    """Surfaces run along every variable: each direction by itself, or beside the parameters."""
+    machine, events = problem.machine, problem.events
+    if problem.outermost and machine.directions > 1:
+        return one_by_one(problem)
+    if problem.outermost:
+        variable = min(event.variable for event, _ in events.every(Degenerate))
+        resting = link({n: still(v) for n, v in problem.env.items()})
+        quiet = replace(problem, machine=machine.with_directions(0), linked=resting, outermost=False)
+        values = solve(quiet)
+        sums = replace(sums, v=values.v, e=values.e)
+        if beside_axes(problem, plan, sums, variable, partial(_beside, problem)):
+            return unbounded(problem, sums)
+    machine.note(ALONG_AXES)
+    return replace(sums, et=np.full_like(sums.et, np.inf))
+
+
+METHODS: tuple[Method, ...] = (by_elimination, by_samples, as_a_batch, along_cuts)
+
+
+def _too_many(problem: Problem) -> bool:
+    return problem.machine.settings.method == "auto" and too_many(problem.machine, problem.term, problem.linked)
+
+
+def one_by_one(problem: Problem) -> Sums:
+    """The sums with each direction by itself: what runs along one variable may not move in it."""
+    parts = []
+    for d in range(problem.machine.directions):
+        alone = link({n: one_direction(v, d) for n, v in problem.env.items()})
+        parts.append(solve(replace(problem, machine=problem.machine.with_directions(1), linked=alone, outermost=True)))
+    t, et = (np.concatenate([getattr(part, name) for part in parts], axis=1) for name in ("t", "et"))
+    return Sums(parts[0].v, parts[0].e, t, et)
+
+
+def _beside(problem: Problem, env: dict[str, Value]) -> Sums:
+    return solve(problem.moved(env))
+
+
+# What of an answer is known
+
+
+def counted(problem: Problem, plan: Plan, sums: Sums, drawn: bool = False) -> Sums:
+    """The sums, with derivatives that no one vouches for where not all jumps could be taken account of, and of values
+    that are not `drawn` where it is not known where they are."""
+    if plan.confused:
+        problem.machine.note(TOO_MANY_CASES)
+        e = sums.e if drawn else np.full_like(sums.e, np.inf)
+        return replace(sums, e=e, et=np.full_like(sums.et, np.inf))
+    if problem.machine.directions and not plan.reaches:
+        problem.machine.note(UNCOUNTED_JUMP)
+        return replace(sums, et=np.full_like(sums.et, np.inf))
+    return sums
+
+
+def unbounded(problem: Problem, sums: Sums) -> Sums:
+    """Rules on panels that should have been cut further are good for nothing."""
+    blind = _blind(problem)
+    if blind.size:
+        sums.e[:, blind], sums.et[:, :, blind] = np.inf, np.inf
+    return sums
+
+
+def _blind(problem: Problem) -> Ints:
+    """The members of which a part was not seen."""
+    mask = np.zeros(problem.batch, dtype=bool)
+    for shortfall, members in problem.events.every(Shortfall):
+        if shortfall.blind:
+            mask[slice(None) if members is None else members] = True
+    return np.nonzero(mask)[0]
+
+
+# Improvers
+
+
+def improved(problem: Problem, order: Integral, sums: Sums, improvers: Sequence[Improver]) -> Sums:
+    for improve in improvers:
+        sums = improve(problem, order, sums)
+    return sums
+
+
+def with_fewer_digits(problem: Problem, order: Integral, sums: Sums) -> Sums:
+    """Where the budget ran out."""
+    return by_less(problem, problem.plan(order), sums)
+
+
+def beside_folds_unseen(problem: Problem, order: Integral, sums: Sums) -> Sums:
+    """Where a surface is searched for, and it could not be searched for where it folds."""
+    plan = problem.plan(order)
+    if plan.folds or problem.events.every(Unsearched):
+        return beside_another(problem, order, sums)
+    return sums
+
+
+def on_both_sides(problem: Problem, order: Integral, sums: Sums) -> Sums:
+    """Where parts have two derivatives."""
+    if not problem.events.every(TwoSided) or problem.machine.side:
+        return sums
+    return from_both_sides(problem, problem.plan(order), sums)
+
+
+def at_folds(problem: Problem, order: Integral, sums: Sums) -> Sums:
+    """Where sections appear or merge just at the parameters."""
+    if problem.events.every(Fold):
+        beside_folds(problem, problem.plan(order), sums, partial(_beside, problem))
+    return sums
+
+
+def in_another_order(problem: Problem, order: Integral, sums: Sums) -> Sums:
+    """The better, member by member, of sums and of those with another variable innermost, where rounding spoilt a few.
+
+    A surface that is all but parallel to the innermost variable has a section in it that is steep, so that a rounded
+    node further out misplaces it; along another variable it is flat.
+    """
+    machine = problem.machine
+    spoilt = ((sums.et > machine.rtol * np.abs(sums.t)) & (sums.et > STEEP * sums.e[:, None])).any(axis=(0, 1))
+    spoilt &= ~np.isinf(sums.et).any(axis=(0, 1))
+    if problem.events.every(Shortfall) or not spoilt.any() or spoilt.sum() > MOST_SPOILT:
+        return sums
+    index = np.nonzero(spoilt)[0]
+    few = replace(problem, linked=problem.picked(index), batch=index.size)
+    for other in itertools.islice(orders(order), 1, None):
+        part = few.apart()
+        found = iterated(problem.plan(other), part.machine, part.env, index.size)
+        better = (found.et < sums.et[:, :, index]) & ~part.events.touched(index.size)
+        sums.t[:, :, index] = np.where(better, found.t, sums.t[:, :, index])
+        sums.et[:, :, index] = np.where(better, found.et, sums.et[:, :, index])
+    return sums
+
+
+def by_values(problem: Problem, order: Integral, sums: Sums) -> Sums:
+    """Where derivatives have few digits and values many."""
+    machine = problem.machine
+    if machine.directions and not machine.side and not problem.events.every(OneSidedDerivatives):
+        quiet = replace(problem, machine=machine.with_directions(0))
+        by_differences(problem, sums, partial(_beside, quiet))
+    return sums
+
+
+ALONE = (with_fewer_digits, beside_folds_unseen, on_both_sides, at_folds, in_another_order, by_values)
+TOGETHER = (beside_folds_unseen, on_both_sides, in_another_order)
+INSIDE = (beside_folds_unseen,)
