@@ -15,7 +15,7 @@ import numpy as np
 from potto.calculus.surfaces.branch_cuts import opened
 from potto.calculus.surfaces.discontinuities import TooDeep
 from potto.core.printer import format_term
-from potto.core.terms import Term
+from potto.core.terms import Integral, Term
 from potto.diagnostics import PottoError
 from potto.integrate.events import INFINITE, ROUGH, Shortfall
 from potto.kernels import compile as compiling
@@ -25,17 +25,29 @@ from potto.projects.settings import DEFAULTS, Settings
 from potto.runtime.answers.convergence import CANCELS, Shortfalls, converged_members, members_of, merged, missed
 from potto.runtime.answers.estimate import Estimate, OneSided
 from potto.runtime.answers.inherited_errors import rough, widened
+from potto.runtime.evaluation.duals import call_derivative, call_paired
 from potto.runtime.evaluation.functions import Closure, Derivative
-from potto.runtime.evaluation.machine import Linker, Machine, Record
+from potto.runtime.evaluation.machine import Linker, Machine, Record, Semantics
+from potto.runtime.evaluation.selection import lazy
+from potto.runtime.evaluation.sums import total
 
 Lookup = Callable[[str, str], Term]
+
+
+def _integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
+    from potto.runtime.integration.driver import integral  # loaded with the first integral: a prompt is there before
+
+    return integral(machine, term, env)
+
+
+SEMANTICS = Semantics(call_derivative, call_paired, lazy, total, _integral)
 
 
 class Program:
     """The definitions that terms refer to, for any number of evaluations; those `held` have their values already."""
 
     def __init__(self, lookup: Lookup, held: Mapping[tuple[str, str], Value] | None = None) -> None:
-        self.linker = Linker(lookup, held)
+        self.linker = Linker(lookup, SEMANTICS, held)
 
     def machine(self, settings: Settings) -> Machine:
         return Machine(self.linker, settings, Record())

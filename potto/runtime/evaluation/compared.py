@@ -8,7 +8,6 @@ formula misses a part, and nothing is known of its derivative.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,10 +15,8 @@ from potto.diagnostics import PottoError
 from potto.integrate.events import DISAGREE, Events
 from potto.kernels.cells import Cell, Value
 from potto.runtime.evaluation.functions import Closure, Derivative
+from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.record import Record
-
-if TYPE_CHECKING:
-    from potto.runtime.evaluation.machine import Machine
 
 SLACK = 1e-8  # of the largest number of the first derivative, beyond what both ways admit
 
@@ -33,13 +30,11 @@ class _ByHand(Exception):
 def compared(machine: Machine, inner: Derivative, groups: Groups, value: Value) -> Value:
     """What the derivative of a derivative gives for duals of duals, with the first derivative put right where it is
     wrong, and the error of the second one without bound then."""
-    from potto.runtime.evaluation.duals import call_derivative
-
     if not (isinstance(value, tuple) and len(value) == 2) or machine.frozen or not machine.root:
         return value
     other = replace(machine, events=Events(), record=Record(costs=None, gauge=machine.record.gauge))
     try:
-        first = call_derivative(other, inner, tuple(tuple(map(_value, group)) for group in groups), None)
+        first = other.call(inner, tuple(tuple(map(_value, group)) for group in groups), None)
     except (PottoError, _ByHand):
         return value
     finally:

@@ -8,7 +8,6 @@ without the step.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from potto.calculus.differentiation.deltas import PRODUCT_OF_DELTAS, STEP
 from potto.core.printer import format_term
@@ -17,9 +16,7 @@ from potto.diagnostics import PottoError
 from potto.integrate.events import TwoSided
 from potto.kernels import errors
 from potto.kernels.cells import Value
-
-if TYPE_CHECKING:
-    from potto.runtime.evaluation.machine import Machine
+from potto.runtime.evaluation.machine import Machine
 
 
 def stepped(machine: Machine, term: Term, env: dict[str, Value]) -> Value:

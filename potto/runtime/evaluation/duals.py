@@ -8,24 +8,18 @@ term, which is then differentiated like any other.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from potto.calculus.inlining.currying import sizes_of
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Trace, Value
+from potto.runtime.evaluation.compared import compared
 from potto.runtime.evaluation.functions import Closure, Derivative, Paired
-
-if TYPE_CHECKING:
-    from potto.runtime.evaluation.machine import Machine
+from potto.runtime.evaluation.machine import Machine, fit
+from potto.runtime.evaluation.second_derivatives import dual_function
 
 
 def call_derivative(
     machine: Machine, function: Derivative, groups: tuple[tuple[Value, ...], ...], trace: Trace | None
 ) -> Value:
-    from potto.runtime.evaluation.compared import compared
-    from potto.runtime.evaluation.machine import fit
-    from potto.runtime.evaluation.second_derivatives import dual_function
-
     primal = function.primal
     if isinstance(primal, Derivative):
         primal = dual_function(machine, primal.primal)

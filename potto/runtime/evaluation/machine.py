@@ -23,7 +23,6 @@ from potto.core.terms import Delta as DeltaTerm
 from potto.diagnostics import PottoError
 from potto.integrate.costs import Costs
 from potto.integrate.events import Event, Events, Members
-from potto.integrate.pieces import still
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Ints, Number, Pattern, Trace, Value, pad, pattern
 from potto.kernels.chunks import in_chunks, many
@@ -38,14 +37,36 @@ MOST_TERMS = 10_000_000
 OVERDRAFT = 3
 
 
+Groups = tuple[tuple[Value, ...], ...]
+
+
+@dataclass(frozen=True)
+class Semantics:
+    """What is done by more than kernels: derivatives called, conditionals with one side taken, sums, integrals.
+
+    derivative: of a function, called with duals; paired: a function on duals that was written by hand.
+    """
+
+    derivative: Callable[[Machine, Derivative, Groups, Trace | None], Value]
+    paired: Callable[[Machine, Paired, Groups, Trace | None], Value]
+    conditional: Callable[[Machine, Any, If | Branch, dict[str, Value], tuple[Any, Any]], Value]
+    sum: Callable[[Machine, Sum, Value, Value, dict[str, Value], Trace | None], Value]
+    integral: Callable[[Machine, Integral, dict[str, Value]], Value]
+
+
 class Linker:
     """The definitions that a program refers to. `lookup` gives the term of a definition or raises PottoError.
 
     held: definitions that have a value already, which is not computed again.
     """
 
-    def __init__(self, lookup: Callable[[str, str], Term], held: Mapping[tuple[str, str], Value] | None = None) -> None:
-        self.lookup = lookup
+    def __init__(
+        self,
+        lookup: Callable[[str, str], Term],
+        semantics: Semantics,
+        held: Mapping[tuple[str, str], Value] | None = None,
+    ) -> None:
+        self.lookup, self.semantics = lookup, semantics
         self.held = held if held is not None else {}
         self.terms: dict[tuple[str, str], Term] = {}
         self.exactness: dict[Term, bool] = {}
@@ -260,19 +281,15 @@ class Machine:
                 help="make sure that the condition that ends the recursion becomes true",
             )])  # fmt: skip
 
-    def call(self, function: Value, groups: tuple[tuple[Value, ...], ...], trace: Trace | None) -> Value:
+    def call(self, function: Value, groups: Groups, trace: Trace | None) -> Value:
         if not isinstance(function, Closure):
             if not groups:
                 return function
             raise errors.wrong_call("this is called, but it is not a function", "to multiply, write `*`")
         if isinstance(function, Derivative):
-            from potto.runtime.evaluation.duals import call_derivative
-
-            return call_derivative(self, function, groups, trace)
+            return self.linker.semantics.derivative(self, function, groups, trace)
         if isinstance(function, Paired):
-            from potto.runtime.evaluation.duals import call_paired
-
-            return call_paired(self, function, groups, trace)
+            return self.linker.semantics.paired(self, function, groups, trace)
         self.enter()
         whole, arities = self.linker_shape(function.lam, sizes_of(groups))
         args = [function.captured[n] for n in sorted(function.captured)]
@@ -319,39 +336,15 @@ class Machine:
         return mask, (np.where(bad, np.nan, 0.0) if bad.any() else None)
 
     def lazy(self, mask: Any, term: If | Branch, env: dict[str, Value], traces: tuple[Any, Any]) -> Value:
-        from potto.runtime.evaluation.selection import lazy
-
-        return lazy(self, mask, term, env, traces)
+        return self.linker.semantics.conditional(self, mask, term, env, traces)
 
     def sum(self, term: Sum, lo: Value, hi: Value, env: dict[str, Value], trace: Trace | None) -> Value:
-        from potto.runtime.evaluation.sums import total
-
-        return total(self, term, lo, hi, env, trace)
+        return self.linker.semantics.sum(self, term, lo, hi, env, trace)
 
     # Integrals
 
     def integral(self, term: Integral, env: dict[str, Value]) -> Value:
-        from potto.runtime.evaluation.directional import stepped
-        from potto.runtime.integration.driver import integrate
-        from potto.runtime.integration.preparation import filled, held, placed, prepared, shape_of
-
-        term, env = filled(term, env, self.linker.reach)
-        names = term.free
-        key = (term, tuple([shape_of(env[name]) for name in names]), self.directions > 0)
-        known = self.linker.placed.get(key)
-        if known is None:
-            shapes = dict(zip(names, key[1]))
-            known = self.linker.placed[key] = placed(term, self.linker.reach, shapes.get, self.directions > 0)
-        if not isinstance(known, Integral):
-            return stepped(self, known, {n: env[n] for n in known.free})
-        term = known
-        if self.frozen:
-            term, stopped = held(term)
-            env = {**env, **{new: pad(still(env[old]), self.directions) for old, new in stopped}}
-        ready = prepared(term, self.linker.reach)
-        if ready is not term:
-            return self.evaluate(lam(tuple(sorted(ready.free)), ready), {n: env[n] for n in ready.free}, None)
-        return integrate(self, term, env)
+        return self.linker.semantics.integral(self, term, env)
 
 
 _shapes: dict[tuple[Lam, tuple[int, ...]], tuple[Lam, tuple[int, ...]]] = {}

@@ -6,8 +6,6 @@ replaced by its symbolic dual, whose boundary terms are ordinary terms, and that
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from potto.calculus.differentiation.derivative import NotSmooth
 from potto.calculus.differentiation.dual import dual_function as symbolic
 from potto.calculus.solving.pivots import NoClosedForm
@@ -15,9 +13,7 @@ from potto.core.terms import Global, Lam, Term
 from potto.diagnostics import PottoError
 from potto.kernels import errors
 from potto.runtime.evaluation.functions import Closure, Derivative, Paired
-
-if TYPE_CHECKING:
-    from potto.runtime.evaluation.machine import Machine
+from potto.runtime.evaluation.machine import Machine
 
 
 def dual_function(machine: Machine, function: Closure) -> Closure:

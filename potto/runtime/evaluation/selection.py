@@ -6,7 +6,7 @@ evaluated on its own members, and the results put together again.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,9 +14,7 @@ from potto.calculus.surfaces.trace import part
 from potto.core.terms import Branch, If
 from potto.kernels.cells import Array, Cell, Number, Trace, Value, all_arrays, map_arrays, map_trace
 from potto.kernels.errors import wrong_call
-
-if TYPE_CHECKING:
-    from potto.runtime.evaluation.machine import Machine
+from potto.runtime.evaluation.machine import Machine
 
 
 def lazy(machine: Machine, mask: Any, term: If | Branch, env: dict[str, Value], traces: tuple[Any, Any]) -> Value:

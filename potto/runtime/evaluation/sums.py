@@ -5,7 +5,7 @@ Owns `total`. Where no side is forced in the terms, all of them are evaluated in
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,9 +14,7 @@ from potto.diagnostics import PottoError
 from potto.kernels import errors
 from potto.kernels.cells import Array, Cell, Number, Trace, Value, all_arrays, map_arrays
 from potto.kernels.whole import UNIT_ROUNDOFF
-
-if TYPE_CHECKING:
-    from potto.runtime.evaluation.machine import Machine
+from potto.runtime.evaluation.machine import Machine
 
 MOST_TERMS = 10_000_000
 CHUNK = 1 << 18

@@ -6,13 +6,10 @@ Owns `too_many`, `many`, `orders`, `preferred` and `trials`.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING
 
 from potto.core.terms import Integral, integral
+from potto.runtime.evaluation.machine import Machine
 from potto.runtime.integration.plans import Linked, plan_for
-
-if TYPE_CHECKING:
-    from potto.runtime.evaluation.machine import Machine
 
 # Up to how many variables iterated quadrature is never in question; what it takes beyond them, in evaluations, and how
 # much of that is acceptable. From LOOSE on, a relative accuracy is reached by fewer samples.

@@ -1,6 +1,6 @@
 """Integrals as kernels meet them: over whatever batch they stand in.
 
-Owns `integrate`: makes the batch one axis, tells members apart for which there are different plans, has each part
+Owns `integral`: makes the batch one axis, tells members apart for which there are different plans, has each part
 solved (`solving`), and gives the result the shape of the batch again.
 """
 
@@ -10,29 +10,51 @@ import math
 import operator
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from potto.calculus.surfaces.discontinuities import TooDeep
-from potto.core.terms import Integral
+from potto.core.terms import Integral, lam
 from potto.diagnostics import PottoError
 from potto.integrate.events import BUDGET_SPENT
-from potto.integrate.pieces import Sums
+from potto.integrate.pieces import Sums, still
 from potto.kernels import errors
-from potto.kernels.cells import Array, Cell, Ints, Number, Value, all_arrays, map_arrays
+from potto.kernels.cells import Array, Cell, Ints, Number, Value, all_arrays, map_arrays, pad
 from potto.runtime.answers.convergence import allowance, widest
+from potto.runtime.evaluation.directional import stepped
+from potto.runtime.evaluation.machine import Machine
 from potto.runtime.integration.members import Whole
 from potto.runtime.integration.plans import Mixed, link, split_by_decisions
+from potto.runtime.integration.preparation import filled, held, placed, prepared, shape_of
 from potto.runtime.integration.problem import Problem
 from potto.runtime.integration.solving import solve
 
-if TYPE_CHECKING:
-    from potto.runtime.evaluation.machine import Machine
+
+def integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
+    """The value of an integral in an environment whose numbers may be batches of any shape: made ready, and solved."""
+    linker = machine.linker
+    term, env = filled(term, env, linker.reach)
+    names = term.free
+    key = (term, tuple([shape_of(env[name]) for name in names]), machine.directions > 0)
+    known = linker.placed.get(key)
+    if known is None:
+        shapes = dict(zip(names, key[1]))
+        known = linker.placed[key] = placed(term, linker.reach, shapes.get, machine.directions > 0)
+    if not isinstance(known, Integral):
+        return stepped(machine, known, {n: env[n] for n in known.free})
+    term = known
+    if machine.frozen:
+        term, stopped = held(term)
+        env = {**env, **{new: pad(still(env[old]), machine.directions) for old, new in stopped}}
+    ready = prepared(term, linker.reach)
+    if ready is not term:
+        return machine.evaluate(lam(tuple(sorted(ready.free)), ready), {n: env[n] for n in ready.free}, None)
+    return integrate(machine, term, env)
 
 
 def integrate(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
-    """The value of an integral in an environment whose numbers may be batches of any shape."""
+    """The value of an integral that is ready."""
     machine.enter()
     try:
         return _integrate(machine.inside(), term, env, machine.root)

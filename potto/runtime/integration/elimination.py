@@ -5,17 +5,13 @@ Owns `step_by_step`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from potto.integrate.elimination.recursion import one_by_one
 from potto.integrate.pieces import Sums
+from potto.runtime.evaluation.machine import Machine
 from potto.runtime.integration.plans import eliminated_for
 from potto.runtime.integration.problem import Problem
-
-if TYPE_CHECKING:
-    from potto.runtime.evaluation.machine import Machine
 
 # How accurate the answer must be, relatively, instead of that of iteration, and instead of that of samples.
 ACCURATE, WORTH = 1e-8, 1e-4

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -24,11 +24,9 @@ from potto.integrate.pieces import Sums, still
 from potto.integrate.plan import Plan
 from potto.kernels.cells import Array, Cell, Value, map_arrays
 from potto.runtime.evaluation.functions import Closure
+from potto.runtime.evaluation.machine import Machine
 from potto.runtime.integration.problem import Problem
 from potto.runtime.integration.quadrature import iterated
-
-if TYPE_CHECKING:
-    from potto.runtime.evaluation.machine import Machine
 
 # The integral of one member at other parameters.
 Evaluated = Callable[[dict[str, Value]], Sums]

@@ -10,7 +10,7 @@ import math
 import threading
 from collections import OrderedDict
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -23,9 +23,7 @@ from potto.integrate.pieces import still
 from potto.integrate.plan import Plan, make
 from potto.kernels.cells import Array, Bools, Cell, Value, map_arrays
 from potto.runtime.evaluation.functions import Closure, Derivative
-
-if TYPE_CHECKING:
-    from potto.runtime.evaluation.machine import Machine
+from potto.runtime.evaluation.machine import Machine
 
 MOST_PLANS = 1024
 

@@ -8,16 +8,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from potto.core.terms import Integral
 from potto.integrate.events import Events
 from potto.integrate.plan import Plan
 from potto.kernels.cells import Array, Ints, Value, map_arrays
+from potto.runtime.evaluation.machine import Machine
 from potto.runtime.integration.plans import Linked, link, plan_for
-
-if TYPE_CHECKING:
-    from potto.runtime.evaluation.machine import Machine
 
 
 @dataclass(frozen=True)

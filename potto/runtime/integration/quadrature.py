@@ -10,7 +10,7 @@ import operator
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -19,9 +19,7 @@ from potto.integrate.fixed.tensor_product import uncut
 from potto.integrate.pieces import Sums
 from potto.integrate.plan import Plan
 from potto.kernels.cells import Array, Value, map_arrays
-
-if TYPE_CHECKING:
-    from potto.runtime.evaluation.machine import Machine
+from potto.runtime.evaluation.machine import Machine
 
 START_ORDER = 11
 ORDERS = (4, 6, 8, 10)
