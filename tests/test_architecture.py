@@ -115,6 +115,31 @@ def test_a_module_imports_only_downwards(module: str) -> None:
             assert not wrong, f"{where}: {module} must not know {target}"
 
 
+def _reached(module: str, rooms: tuple[str, ...]) -> set[str]:
+    """What a module leads to, of these packages, by any import: inside of functions and for types alone, too."""
+    seen: set[str] = set()
+    todo = [module]
+    while todo:
+        at = todo.pop()
+        tree = ast.parse(MODULES[at].read_text(encoding="utf-8"))
+        for node in ast.walk(tree):
+            for alias in node.names if isinstance(node, ast.ImportFrom) and node.module else ():
+                full = f"{node.module}.{alias.name}"
+                target = full if full in MODULES else node.module
+                if target in MODULES and target not in seen and any(_inside(target, room) for room in rooms):
+                    seen.add(target)
+                    todo.append(target)
+    return seen
+
+
+NO_CIRCLES = ("potto.kernels", "potto.integrate", "potto.runtime")
+
+
+@pytest.mark.parametrize("module", [name for name in sorted(MODULES) if any(_inside(name, r) for r in NO_CIRCLES)])
+def test_numbers_have_no_import_circles(module: str) -> None:
+    assert module not in _reached(module, NO_CIRCLES)
+
+
 @pytest.mark.parametrize("module", sorted(MODULES))
 def test_only_its_owner_imports_a_library(module: str) -> None:
     for target, line in _imports(module, MODULES[module]):

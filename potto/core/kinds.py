@@ -306,3 +306,8 @@ ZERO = const(0.0)
 ONE = const(1.0)
 PI = const(math.pi, "pi")
 INF = const(math.inf, "inf")
+
+
+def function_of(term: Term) -> Lam:
+    """A term as a function of its free variables, in sorted order."""
+    return lam(tuple(sorted(term.free)), term)

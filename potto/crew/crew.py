@@ -13,7 +13,6 @@ from queue import Empty, SimpleQueue
 from threading import Lock, Thread
 from types import TracebackType
 
-import potto
 from potto.crew.pipes import Found, Task, packed, unpacked
 from potto.query import Database
 from potto.query.travel import Receiver
@@ -159,7 +158,7 @@ class _Helper:
 
     def __init__(self) -> None:
         pipe = subprocess.PIPE
-        command = [sys.executable, "-P", "-c", PROGRAM, str(Path(potto.__file__).parent.parent)]
+        command = [sys.executable, "-P", "-c", PROGRAM, str(Path(__file__).parents[2])]
         self.process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL)
         assert self.process.stdin is not None and self.process.stdout is not None
         self._tasks, self.answers = self.process.stdin, self.process.stdout

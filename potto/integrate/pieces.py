@@ -161,6 +161,16 @@ def joined(parts: list[Pieces]) -> Pieces:
     return Pieces(*(np.concatenate([getattr(p, n) for p in parts], axis=a) for n, a in zip(names, axes, strict=True)))
 
 
+@dataclass(frozen=True)
+class Ends:
+    """The integrand at both ends of every segment, sides as on the segment, and its rounding there: (m, S) each."""
+
+    low: Array
+    high: Array
+    low_error: Array
+    high_error: Array
+
+
 def mostly(owner: Ints, root: Ints | None, size: int) -> Ints:
     """Those of `owner`, nodes of a batch of `size`, which are not so few that they can only be single nodes of the
     variables further out, of measure zero, for their member of the outermost batch.

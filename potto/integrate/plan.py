@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -39,8 +38,8 @@ from potto.core.terms import (
     Sum,
     Term,
     Var,
+    function_of,
     integral,
-    lam,
     neg,
     outside,
     postorder,
@@ -51,46 +50,8 @@ from potto.core.terms import (
 from potto.integrate.decomposition.vanishing import vanishing_of
 from potto.integrate.fixed.a_priori import Straight, straight
 from potto.integrate.fixed.tensor_product import Box, box_of
+from potto.integrate.levels import Group, LevelPlan
 from potto.kernels.cells import Mask, Trace
-
-
-@dataclass(frozen=True)
-class LevelPlan:
-    """One variable: its frame (bounds, then candidate cuts, as one tuple term) and what the cuts are."""
-
-    level: Level
-    frame: Lam
-    rows: tuple[tuple[int, bool], ...]
-    searched: tuple[Cut, ...]
-    families: tuple[tuple[int, Any], ...]
-    decided: tuple[int, ...]
-    surfaces: Lam
-    turned: tuple[tuple[int, ...], ...]
-
-    @property
-    def variable(self) -> str:
-        return self.level.variable
-
-    @cached_property
-    def bounds(self) -> Lam:
-        """The bounds alone, as a pair."""
-        return function_of(tuple_((self.level.lo, self.level.hi)))
-
-
-@dataclass(frozen=True)
-class Group:
-    """A surface with jumps: which branches it decides, and along which traces."""
-
-    number: int
-    cut: Cut
-
-    @property
-    def up_at_zero(self) -> bool:
-        """On which side a stretch lies along which the canonical surface is 0: that of max(x, 0) > 0 where x < 0."""
-        if not self.cut.jumps:
-            return True
-        jump = self.cut.jumps[0]
-        return jump.strict != (jump.orientation > 0)
 
 
 @dataclass(frozen=True)
@@ -144,11 +105,6 @@ def _force(trace: Trace, path: tuple[int, ...], mask: Mask) -> None:
     for at in path[:-1]:
         trace = trace.setdefault(at, {})
     trace[path[-1]] = mask
-
-
-def function_of(term: Term) -> Lam:
-    """A term as a function of its free variables, in sorted order."""
-    return lam(tuple(sorted(term.free)), term)
 
 
 class _Asked:

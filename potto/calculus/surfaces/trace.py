@@ -20,6 +20,7 @@ from potto.core.terms import (
     Sum,
     Term,
     children,
+    function_of,
     lam,
     postorder,
     postorder_by,
@@ -90,11 +91,6 @@ def is_lazy(term: If | Branch) -> bool:
     return is_heavy(term.then, calls) or is_heavy(term.orelse, calls)
 
 
-def part(term: Term) -> Lam:
-    """A term as a function of its free variables, in sorted order."""
-    return lam(tuple(sorted(term.free)), term)
-
-
 def immediate(term: Term) -> tuple[Term, ...]:
     """The children that are evaluated together with the term itself."""
     match term:
@@ -127,8 +123,8 @@ def layout(term: Term) -> Layout:
         if isinstance(node, (If, Branch)) and is_lazy(node):
             if isinstance(node, Branch):
                 site(node, 2, Side(node))
-            site(node, 0, Part(node, 0, part(node.then)))
-            site(node, 1, Part(node, 1, part(node.orelse)))
+            site(node, 0, Part(node, 0, function_of(node.then)))
+            site(node, 1, Part(node, 1, function_of(node.orelse)))
         elif isinstance(node, Branch):
             site(node, 2, Side(node))
         elif isinstance(node, Sum):

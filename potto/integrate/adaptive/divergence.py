@@ -11,20 +11,19 @@ distances from the end that doubles have: of the area of x*y < t at t = 0, where
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from potto.integrate.adaptive.reynolds import Totals
 from potto.integrate.events import BOUNDLESS
+from potto.integrate.panels.iterated import siblings
+from potto.integrate.panels.panel_batch import PanelBatch
 from potto.integrate.pieces import Pieces, Sums
 from potto.integrate.rules import substitution
 from potto.integrate.rules.gauss import EPS, gauss
 from potto.integrate.rules.substitution import Segments
 from potto.kernels.cells import Array, Bools, Ints
-
-if TYPE_CHECKING:
-    from potto.integrate.adaptive.panel_batch import Work
 
 # The error of a value, as a part of what is added up, from which on it is no value; that of a piece which is to blame.
 HOPELESS, BLAMED = 1e-2, 1e-3
@@ -46,10 +45,10 @@ SLIVER = 256
 SMALLEST = 1e-12
 
 
-def given_up(work: Work, p: Pieces, found: Totals, sums: Sums) -> Sums:
+def given_up(work: PanelBatch, p: Pieces, found: Totals, sums: Sums) -> Sums:
     """The sums, without the values of integrals that diverge at the end of a segment."""
     error, size = found.error[:, 0], found.size[:, 0]
-    scale = np.stack([work.parent.siblings(row, work.root) for row in size]) if work.number else size
+    scale = np.stack([siblings(row, work.root) for row in size]) if work.number else size
     hopeless: Any = np.asarray(~(error <= HOPELESS * scale) & (size > 0))
     if not hopeless.any() or work.machine.exhausted():
         return sums
@@ -86,7 +85,7 @@ def given_up(work: Work, p: Pieces, found: Totals, sums: Sums) -> Sums:
                 np.where(gone[:, None], np.inf, sums.et), gross=sums.gross)  # fmt: skip
 
 
-def endless(work: Work, found: Totals) -> Array | None:
+def endless(work: PanelBatch, found: Totals) -> Array | None:
     """To which infinity derivatives go whose integrals are finite, 0 for others, nan for both at once: (k, B).
 
     None where all are finite, as far as can be told.
@@ -110,7 +109,7 @@ def endless(work: Work, found: Totals) -> Array | None:
     return np.where(up & down, np.nan, np.where(up, np.inf, np.where(down, -np.inf, 0.0)))
 
 
-def _without_end(work: Work, index: Ints, high: bool) -> list[Array]:
+def _without_end(work: PanelBatch, index: Ints, high: bool) -> list[Array]:
     """Of each direction the sign of what is integrated where it grows like 1/u, or faster, down to the smallest
     distances u from one end of a segment, in both forms of the derivative; else 0: (S,) each."""
     seg = work.seg.pick(index)
@@ -140,7 +139,7 @@ def _sharp(seg: Segments) -> Bools:
     return np.asarray((seg.b - seg.a > SLIVER * EPS * size) | ~np.isfinite(size))
 
 
-def _noise(work: Work, p: Pieces, errors: Array, blamed: Array) -> Bools:
+def _noise(work: PanelBatch, p: Pieces, errors: Array, blamed: Array) -> Bools:
     """Which of the pieces err by no more than the integrals further in do, which cancel: (P,)."""
     found: Bools = np.zeros(p.segment.size, dtype=bool)
     index = np.nonzero(blamed)[0]
@@ -156,7 +155,7 @@ def _noise(work: Work, p: Pieces, errors: Array, blamed: Array) -> Bools:
     return found
 
 
-def _growth(work: Work, index: Ints, high: bool) -> Array:
+def _growth(work: PanelBatch, index: Ints, high: bool) -> Array:
     """1 or -1 where the integrand goes to inf or -inf at an end too fast to be integrated, nan where it is not known
     what it does there, 0 where it does nothing of the kind, next to what it is elsewhere: (m, S)."""
     seg = work.seg.pick(index)

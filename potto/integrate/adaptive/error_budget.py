@@ -1,23 +1,18 @@
 """What the integrals of a batch amount to so far, and so how far off each of their pieces may be.
 
-Owns `Tally`, and `slack`: of nodes that hardly count, less is asked.
+Owns `Tally`, and `filled`: where an integrand takes up little of its range, nodes that hardly count need less accuracy.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from potto.integrate.panels.iterated import siblings
+from potto.integrate.panels.panel_batch import PanelBatch
 from potto.integrate.pieces import Pieces
 from potto.kernels.cells import Array, Ints
 
-if TYPE_CHECKING:
-    from potto.integrate.adaptive.panel_batch import Work
-
-
 LEAST = 1e-6  # the relative accuracy that is asked of every node
-MOST_SLACK = 1e6  # how many times the error of a node may be larger that hardly counts
 
 
 class Tally:
@@ -29,7 +24,7 @@ class Tally:
     the largest magnitude of what is added up, among all that go into the same answer.
     """
 
-    def __init__(self, work: Work, p: Pieces) -> None:
+    def __init__(self, work: PanelBatch, p: Pieces) -> None:
         owner = work.seg.owner[p.segment]
         self.count = np.bincount(owner, minlength=work.batch)
         x = self.channels(work, p)
@@ -40,12 +35,12 @@ class Tally:
         self.gross += np.bincount(owner, p.size.max(axis=0), minlength=work.batch)
         self.scale: Array | None = None
 
-    def channels(self, work: Work, p: Pieces) -> Array:
+    def channels(self, work: PanelBatch, p: Pieces) -> Array:
         x = p.size if work.number else p.integral
         rows = x.shape[0] // work.width
         return x.reshape(work.width, rows, -1)[:, : 1 + work.k].reshape(-1, x.shape[-1])
 
-    def replace(self, work: Work, old: Pieces, new: Pieces) -> None:
+    def replace(self, work: PanelBatch, old: Pieces, new: Pieces) -> None:
         for p, sign in ((old, -1), (new, 1)):
             owner = work.seg.owner[p.segment]
             np.add.at(self.count, owner, sign)
@@ -54,17 +49,17 @@ class Tally:
                 np.add.at(self.total[i], owner, sign * row)
         self.scale = None
 
-    def whole(self, work: Work) -> Array:
+    def whole(self, work: PanelBatch) -> Array:
         """The size of the answer that each of these integrals goes into, values and tangents together: (B,)."""
         largest = np.abs(self.total).max(axis=0)
-        return work.parent.siblings(largest, work.root) if work.number else largest
+        return siblings(largest, work.root) if work.number else largest
 
-    def shares(self, work: Work, owner: Ints) -> Array:
+    def shares(self, work: PanelBatch, owner: Ints) -> Array:
         """The error that one piece of each of these integrals may have: (m * (1 + k), P)."""
         if self.scale is None:
             scale = np.abs(self.total)
             if work.number:
-                scale = np.stack([work.parent.siblings(row, work.root) for row in scale])
+                scale = np.stack([siblings(row, work.root) for row in scale])
             self.scale = np.maximum(work.machine.atol, work.machine.rtol * scale)
         shares: Array = self.scale[:, owner] / (2 * self.count[owner])
         if work.slack is not None:  # what is not resolved at all says nothing of its error
@@ -73,7 +68,7 @@ class Tally:
         return shares
 
 
-def filled(work: Work, p: Pieces) -> Array:
+def filled(work: PanelBatch, p: Pieces) -> Array:
     """Which part of its range each integrand of a batch takes up, at the least: its mean over its largest, (B,)."""
     owner, length = work.seg.owner[p.segment], (work.seg.b - work.seg.a)[p.segment] * (p.u1 - p.u0)
     reach = np.bincount(owner, length, minlength=work.batch)
@@ -85,14 +80,3 @@ def filled(work: Work, p: Pieces) -> Array:
             part = np.bincount(owner, row, minlength=work.batch) / (most * reach)
         share = np.where(most > 0, np.fmin(share, np.nan_to_num(part)), share)
     return share
-
-
-def slack(work: Work, owner: Ints, weight: Array) -> Array:
-    """How many times the error of integrals further in may be larger at nodes that count less than the mean."""
-    assert work.filled is not None
-    seg, nodes = work.seg, np.bincount(owner, minlength=work.batch) * weight.shape[1]
-    reach = work.filled * np.bincount(seg.owner, seg.b - seg.a, minlength=work.batch)
-    mean = (np.where(np.isfinite(reach), reach, 0.0) / np.maximum(nodes, 1))[owner]  # far out what counts is small
-    with np.errstate(divide="ignore", invalid="ignore"):
-        times: Array = np.fmax(1.0, np.fmin(mean[:, None] / weight, MOST_SLACK)).ravel()
-    return times if work.slack is None else times * np.repeat(work.slack[owner], weight.shape[1])

@@ -11,21 +11,23 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from potto.core.terms import Term
-from potto.integrate.adaptive.magnitude import Extent
-from potto.integrate.adaptive.panel_batch import Work
-from potto.integrate.adaptive.undefined import lost_members, sides_at
-from potto.integrate.decomposition.coincidences import Scene, count_places, count_slivers, note_folds
+from potto.integrate.adaptive.refining import integrated
 from potto.integrate.decomposition.critical_places import critical_rows
 from potto.integrate.decomposition.cuts import Cuts, Row, at_rest, frame_rows, segments, standing
-from potto.integrate.decomposition.degeneracies import brush
 from potto.integrate.decomposition.effective_range import concentrated
-from potto.integrate.decomposition.empty_ranges import Collapsed, collapsed_ranges, count_collapsed
-from potto.integrate.decomposition.narrow_panels import count_narrow
 from potto.integrate.decomposition.sections import searched_rows
 from potto.integrate.decomposition.vanishing import vanishes
+from potto.integrate.degenerate.coincidences import Scene, count_places, count_slivers, note_folds
+from potto.integrate.degenerate.degeneracies import brush
+from potto.integrate.degenerate.empty_ranges import Collapsed, collapsed_ranges, count_collapsed
+from potto.integrate.degenerate.narrow_panels import count_narrow
+from potto.integrate.degenerate.undefined import lost_members, sides_at
 from potto.integrate.events import UNSEEN_MEETING, sides_hidden
+from potto.integrate.levels import LevelPlan
+from potto.integrate.panels.magnitude import Extent
+from potto.integrate.panels.panel_batch import PanelBatch
 from potto.integrate.pieces import Evaluator, Sums, components, take
-from potto.integrate.plan import LevelPlan, Plan
+from potto.integrate.plan import Plan
 from potto.integrate.rules.substitution import Segments
 from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value
 
@@ -89,8 +91,8 @@ class Iteration:
         if keep is not None:
             here, sides = seg.pick(keep), {g: take(m, keep) for g, m in sides.items()}
         moving = cuts.moving and machine.directions > 0
-        work = Work(self, number, level, env, here, sides, machine, moving, batch, root, slack, cuts.conflict)
-        sums = work.integrate()
+        work = PanelBatch(self, number, level, env, here, sides, machine, moving, batch, root, slack, cuts.conflict)
+        sums = integrated(work)
         if collapsed:
             sums = count_collapsed(scene, collapsed, sums)
         self.count_events(scene, cuts, sums)
@@ -136,15 +138,6 @@ class Iteration:
         lost = lost_members(scene, seg, settled.undefined, keep)
         rest = np.nonzero(~np.isin(seg.owner, lost))[0]
         return (rest if keep is None else np.intersect1d(keep, rest)), lost
-
-    @staticmethod
-    def siblings(scale: Array, root: Ints | None) -> Array:
-        """The largest magnitude among the members that are added up further out: what their accuracy is measured by."""
-        if root is None:
-            return np.full(scale.shape, scale.max()) if scale.size else scale
-        most = np.zeros(int(root.max()) + 1 if root.size else 0)
-        np.maximum.at(most, root, scale)
-        return most[root]
 
     def cut(
         self, level: LevelPlan, env: dict[str, Value], batch: int, machine: Evaluator

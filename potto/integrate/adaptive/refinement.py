@@ -7,19 +7,17 @@ segments and the agreement of two forms of each derivative are looked at besides
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from potto.integrate.adaptive.error_budget import Tally
-from potto.integrate.adaptive.reynolds import Ends, Totals
+from potto.integrate.adaptive.reynolds import Totals
 from potto.integrate.events import LATE
-from potto.integrate.pieces import Pieces
+from potto.integrate.panels.panel_batch import PanelBatch
+from potto.integrate.pieces import Ends, Pieces
 from potto.integrate.rules import substitution
 from potto.kernels.cells import Array, Bools
-
-if TYPE_CHECKING:
-    from potto.integrate.adaptive.panel_batch import Work
 
 # How much larger than at the nodes an integrand must be at an end of a segment to be taken for a peak.
 PEAK = 8.0
@@ -34,7 +32,7 @@ NOISE = (1e-12, 1e-9)
 STRAGGLERS = 16
 
 
-def too_coarse(work: Work, p: Pieces, ends: Any, tally: Tally) -> Any:
+def too_coarse(work: PanelBatch, p: Pieces, ends: Any, tally: Tally) -> Any:
     """Masks of the pieces to halve, and of those to look at again later; None if there are none to halve.
 
     As long as a peak of an integral is not resolved, its total says nothing, and so what its other pieces may err
@@ -67,7 +65,7 @@ def too_coarse(work: Work, p: Pieces, ends: Any, tally: Tally) -> Any:
     return (bad, waiting) if bad.any() else None
 
 
-def stragglers(work: Work, p: Pieces, bad: Bools) -> Bools:
+def stragglers(work: PanelBatch, p: Pieces, bad: Bools) -> Bools:
     """The pieces of the few members that are still refined when all others are done: they go on by themselves."""
     late: Bools = np.zeros(bad.size, dtype=bool)
     members = work.below(work.seg.owner[p.segment])
@@ -94,7 +92,7 @@ def noisy(p: Pieces, off: Array, gross: Array, whole: Array) -> Bools:
     return np.asarray(((excess <= NOISE[0]) & (p.stuck >= 1)) | ((worst <= NOISE[1] * whole) & (p.stuck >= 3)))
 
 
-def missed_peak(work: Work, p: Pieces, ends: Ends) -> Any:
+def missed_peak(work: PanelBatch, p: Pieces, ends: Ends) -> Any:
     """Pieces at an end of their segment where the integrand is not what its values at the nodes lead to.
 
     Either it is far larger there than at any node, or it is off the interpolant through the nodes by far more
@@ -116,7 +114,7 @@ def missed_peak(work: Work, p: Pieces, ends: Ends) -> Any:
     return bad
 
 
-def doubtful(work: Work, p: Pieces, found: Totals) -> Any:
+def doubtful(work: PanelBatch, p: Pieces, found: Totals) -> Any:
     """All pieces of the integrals whose two derivatives do not agree: something between the nodes was missed."""
     if found.fixed is None or found.apart is None:
         return None

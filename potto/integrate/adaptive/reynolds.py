@@ -7,26 +7,13 @@ Owns `Totals`. The fixed form adds what the moving ends of segments sweep to the
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from potto.integrate.pieces import Pieces, Sums
+from potto.integrate.panels.panel_batch import PanelBatch
+from potto.integrate.pieces import Ends, Pieces, Sums
 from potto.integrate.rules.gauss import EPS
-from potto.kernels.cells import Array, Ints
-
-if TYPE_CHECKING:
-    from potto.integrate.adaptive.panel_batch import Work
-
-
-@dataclass(frozen=True)
-class Ends:
-    """The integrand at both ends of every segment, sides as on the segment, and its rounding there: (m, S) each."""
-
-    low: Array
-    high: Array
-    low_error: Array
-    high_error: Array
+from potto.kernels.cells import Array
 
 
 @dataclass
@@ -45,7 +32,7 @@ class Totals:
     apart: Array | None
 
 
-def totals(work: Work, p: Pieces, ends: Ends | None) -> Totals:
+def totals(work: PanelBatch, p: Pieces, ends: Ends | None) -> Totals:
     k = work.k
     integral, error, size = added(work, np.concatenate((p.integral, p.error + p.floor, p.size)), p, 3)
     error = np.where(np.isnan(integral) | np.isnan(error), np.inf, error)
@@ -63,7 +50,7 @@ def totals(work: Work, p: Pieces, ends: Ends | None) -> Totals:
     return Totals(integral, error, size, moving, (value, bound), np.where(np.isfinite(apart), apart, 0.0))
 
 
-def added(work: Work, x: Array, p: Pieces, count: int) -> Array:
+def added(work: PanelBatch, x: Array, p: Pieces, count: int) -> Array:
     """Channels of pieces (count * C, P) added up per integral: (count, m, channels, B)."""
     owner, batch = work.seg.owner[p.segment], work.batch
     if batch == 1:
@@ -81,7 +68,7 @@ def added(work: Work, x: Array, p: Pieces, count: int) -> Array:
     return shaped
 
 
-def boundary(work: Work, ends: Ends) -> tuple[Array, Array]:
+def boundary(work: PanelBatch, ends: Ends) -> tuple[Array, Array]:
     """The fixed form's boundary terms (m, k, B), and their rounding."""
     seg = work.seg
     sizes = work.width, work.k, work.batch
@@ -99,7 +86,7 @@ def boundary(work: Work, ends: Ends) -> tuple[Array, Array]:
     return np.where(finite, out, 0.0), np.where(finite, rounding, np.inf)
 
 
-def cut_rounding(work: Work, ends: Ends) -> tuple[Array, Array]:
+def cut_rounding(work: PanelBatch, ends: Ends) -> tuple[Array, Array]:
     """What cuts misplaced by rounding cost, (m, B): the integrand's jump times the rounding of their places. And what
     cuts cost whose speeds are rounded, (m, k, B)."""
     seg = work.seg
@@ -122,7 +109,7 @@ def cut_rounding(work: Work, ends: Ends) -> tuple[Array, Array]:
     return total(seg.ea, seg.eb), np.stack(speeds, axis=1) if speeds else np.zeros((work.width, 0, work.batch))
 
 
-def added_up(work: Work, found: Totals) -> Array:
+def added_up(work: PanelBatch, found: Totals) -> Array:
     """What is added up for each of the batch, without regard to sign, here and further in: (2, B)."""
     size = np.where(np.isfinite(found.size), found.size, 0.0).max(axis=0)
     gross: Array = work.cancels * np.stack((size[0], size[1:].max(axis=0, initial=0.0)))
@@ -132,23 +119,7 @@ def added_up(work: Work, found: Totals) -> Array:
     return gross
 
 
-def note_cancelling(work: Work, inner: Sums, added: Array, owner: Ints) -> None:
-    """Keep how many times what they come to integrals further in add up, on the whole, for each of the batch.
-
-    added: (2, N) what they add up; owner: (N,) whose they are.
-    """
-    most = np.abs(inner.v).max(axis=0), np.abs(inner.t).max(axis=(0, 1), initial=0.0)
-    for row, (gross, size) in enumerate(zip(added, most, strict=True)):
-        fine = np.isfinite(gross) & np.isfinite(size)
-        up, down = (np.bincount(owner[fine], x[fine], minlength=work.batch) for x in (gross, size))
-        times = np.divide(up, down, out=np.ones(work.batch), where=down > 0)
-        work.cancels[row] = np.maximum(work.cancels[row], times)
-        if (nothing := (down == 0) & (up > 0)).any():
-            mean = up / np.maximum(np.bincount(owner, minlength=work.batch), 1)
-            work.hidden[row] = np.maximum(work.hidden[row], np.where(nothing, mean, 0.0))
-
-
-def sums(work: Work, found: Totals, ends: Ends | None) -> Sums:
+def sums(work: PanelBatch, found: Totals, ends: Ends | None) -> Sums:
     """The answer: per direction the better of the two forms, or the infinity that it is."""
     v, e = found.integral[:, 0], found.error[:, 0]
     moving, fixed = found.moving, found.fixed

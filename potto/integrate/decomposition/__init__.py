@@ -1,1 +1,1 @@
-"""Where integrals are cut: roots of surfaces, what coincides, what is empty, where what lies further in turns."""
+"""Where integrals are cut: roots of surfaces, by formulas and by certified searches, and critical places."""

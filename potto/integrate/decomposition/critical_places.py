@@ -20,7 +20,7 @@ from potto.core.terms import Term
 from potto.integrate.decomposition.cuts import SEARCHED, Row, as_array
 from potto.integrate.decomposition.root_isolation import between, flat
 from potto.integrate.events import Unsearched
-from potto.integrate.plan import LevelPlan
+from potto.integrate.levels import LevelPlan
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.intervals import Interval, enclosure
 from potto.kernels.cells import Array, Cell, Ints, Value

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from potto.integrate.plan import LevelPlan
+from potto.integrate.levels import LevelPlan
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.substitution import Segments, choose
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 
 from potto.calculus.solving.enclosable import slope_of
-from potto.core.terms import Lam, Term, lam
+from potto.core.terms import Lam, Term, function_of
 from potto.integrate.decomposition.cuts import SEARCHED, Row, as_array
 from potto.integrate.decomposition.root_isolation import Brackets, between, isolated
 from potto.integrate.events import ROOTS_NOT_SEPARATED, TOO_MANY_ROOTS
+from potto.integrate.levels import LevelPlan
 from potto.integrate.pieces import still
-from potto.integrate.plan import LevelPlan, function_of
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Cell, Value, map_arrays, pad
 
@@ -87,7 +87,7 @@ def _search(
     cut: int, surface: Term, variable: str, env: dict[str, Value], lo: Cell, hi: Cell, batch: int, machine: Any
 ) -> list[Row]:
     low, high = as_array(np.minimum(lo.v, hi.v), batch), as_array(np.maximum(lo.v, hi.v), batch)
-    function = lam(tuple(sorted(surface.free)), surface)
+    function = function_of(surface)
     slope = slope_of(surface, variable)
     if slope is None:
         a, b = _on_a_grid(function, variable, env, low, high, machine)

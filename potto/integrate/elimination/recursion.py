@@ -20,13 +20,13 @@ from potto.calculus.decomposition.sweep import MOST_CENTERS, Level, cut_along, p
 from potto.calculus.surfaces.case_split import cased
 from potto.calculus.surfaces.discontinuities import Finding, Kind, Resolve, TooDeep, findings, undecided
 from potto.core.simplify import simplify
-from potto.core.terms import Deriv, Integral, Lam, Term, Tuple, const, integral, substitute, tuple_
+from potto.core.terms import Deriv, Integral, Lam, Term, Tuple, const, function_of, integral, substitute, tuple_
 from potto.integrate.adaptive.iterated import Iteration
 from potto.integrate.decomposition.vanishing import vanishing_of
 from potto.integrate.elimination.interpolants import Table, finite, tabulated
 from potto.integrate.events import Fold, TwoSided
 from potto.integrate.pieces import Evaluator, Sums, still
-from potto.integrate.plan import Plan, function_of, group_levels, level_plan
+from potto.integrate.plan import Plan, group_levels, level_plan
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Cell, Mask, Value, pad
 

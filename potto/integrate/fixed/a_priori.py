@@ -14,7 +14,7 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -25,21 +25,20 @@ from potto.core.terms import (
     Lam,
     Term,
     children,
+    function_of,
     postorder,
     prim,
     rebuild,
     tuple_,
 )
-from potto.integrate.fixed.moving_sums import Totals, evaluated, function_of, summed
+from potto.integrate.fixed.moving_sums import Totals, evaluated, summed
+from potto.integrate.levels import LevelPlan
 from potto.integrate.pieces import Evaluator, Sums
 from potto.integrate.rules.complex_enclosures import enclosable
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.proved_orders import Cell as Stretch
 from potto.integrate.rules.proved_orders import Region, proved
 from potto.kernels.cells import Cell, Value
-
-if TYPE_CHECKING:
-    from potto.integrate.plan import LevelPlan
 
 MOST_VARIABLES, MOST_CUTS, MOST_CELLS, MOST_NODES, MOST_TERMS = 3, 8, 24, 60_000, 300
 # The truncation error that is proved for the value, as a part of the accuracy that is asked for; nobody gains by less

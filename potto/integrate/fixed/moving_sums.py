@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from potto.core.terms import Lam, Term, lam
+from potto.core.terms import Lam, function_of
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.gauss import EPS, gauss
 from potto.integrate.rules.proved_orders import Cell as Stretch
@@ -24,12 +24,6 @@ from potto.kernels.cells import Array, Cell, Ints, Value
 
 # The rounding of a sum of products, in units of the last place.
 SUMMED = 4 * EPS
-
-
-@lru_cache(maxsize=16384)
-def function_of(term: Term) -> Lam:
-    """A term as a function of its free variables, in sorted order."""
-    return lam(tuple(sorted(term.free)), term)
 
 
 def evaluated(function: Lam, machine: Evaluator, env: dict[str, Value]) -> tuple[Cell, ...]:

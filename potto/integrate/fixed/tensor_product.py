@@ -16,7 +16,7 @@ from functools import lru_cache
 import numpy as np
 
 from potto.calculus.surfaces.discontinuities import Finding
-from potto.core.terms import Integral, Lam, Prim, Term, lam, postorder, tuple_
+from potto.core.terms import Integral, Lam, Prim, Term, function_of, postorder, tuple_
 from potto.integrate.pieces import Evaluator, Sums, components, still
 from potto.integrate.rules.gauss import EPS, gauss, truncation
 from potto.kernels.cells import Array, Bools, Cell, Value, map_arrays
@@ -52,11 +52,7 @@ def box_of(term: Integral, found: Iterable[Finding], body: Lam) -> Box | None:
     if not all(affine_in_each(surface, names) for surface in surfaces):
         return None
     shown = tuple_(surfaces)
-    return Box(term.variables, _function(tuple_(bounds)), _function(shown), body)
-
-
-def _function(term: Term) -> Lam:
-    return lam(tuple(sorted(term.free)), term)
+    return Box(term.variables, function_of(tuple_(bounds)), function_of(shown), body)
 
 
 def affine_in_each(term: Term, names: frozenset[str]) -> bool:

@@ -18,8 +18,9 @@ from typing import Any
 import numpy as np
 
 from potto.integrate.decomposition.cuts import as_array, frame_rows
+from potto.integrate.levels import LevelPlan
 from potto.integrate.pieces import still
-from potto.integrate.plan import LevelPlan, Plan
+from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Cell, Number, Value, map_arrays, pad
 

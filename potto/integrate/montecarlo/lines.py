@@ -13,7 +13,8 @@ import numpy as np
 from potto.calculus.decomposition.sweep import Level, cut_along
 from potto.core.simplify import simplify
 from potto.core.terms import Integral, Term, add, mul, neg, sub, substitute, var
-from potto.integrate.plan import LevelPlan, level_plan
+from potto.integrate.levels import LevelPlan
+from potto.integrate.plan import level_plan
 from potto.kernels.cells import Array
 
 

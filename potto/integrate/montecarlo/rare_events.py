@@ -24,8 +24,8 @@ import numpy as np
 
 from potto.calculus.algebra.ranges import range_of
 from potto.core.terms import Integral, Term
-from potto.integrate.adaptive.undefined import fallen
 from potto.integrate.decomposition.cuts import as_array
+from potto.integrate.degenerate.undefined import fallen
 from potto.integrate.montecarlo.cube_map import Chart, Point, label_of
 from potto.integrate.montecarlo.surface_terms import Surface
 from potto.integrate.pieces import Evaluator, Sums, still

@@ -16,8 +16,9 @@ from typing import Any
 
 import numpy as np
 
+from potto.core.terms import function_of
 from potto.integrate.adaptive.iterated import Iteration
-from potto.integrate.adaptive.undefined import guarded_samples
+from potto.integrate.degenerate.undefined import guarded_samples
 from potto.integrate.events import BUDGET_SPENT, NO_SAMPLE
 from potto.integrate.montecarlo.cube_map import Chart, Point
 from potto.integrate.montecarlo.rare_events import (
@@ -33,7 +34,7 @@ from potto.integrate.montecarlo.rare_events import (
 from potto.integrate.montecarlo.replicates import Moments, Replicates, added
 from potto.integrate.montecarlo.surface_terms import Surface, factors
 from potto.integrate.pieces import Sums, components, still
-from potto.integrate.plan import Plan, function_of
+from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.sobol import MOST, Sobol
 from potto.kernels.cells import Array, Cell, Mask, Value, map_arrays

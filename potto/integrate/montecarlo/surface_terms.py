@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from potto.calculus.decomposition.sweep import Face, Product
-from potto.core.terms import App, Const, Prim, Term, const, mul, postorder, sub, var
+from potto.core.terms import App, Const, Prim, Term, const, function_of, mul, postorder, sub, var
 from potto.integrate.decomposition.cuts import Row, as_array, frame_rows
 from potto.integrate.decomposition.sections import searched_rows
 from potto.integrate.events import UNKNOWN_JUMP
@@ -35,7 +35,7 @@ from potto.integrate.montecarlo.cube_map import Chart, Point, label_of
 from potto.integrate.montecarlo.lines import End, Line, label_name, leaving, line, offset
 from potto.integrate.montecarlo.pivot_choice import pivots
 from potto.integrate.pieces import Sums, still
-from potto.integrate.plan import Plan, function_of
+from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Bools, Cell, Mask, Value, pad
 from potto.primitives import PRIMITIVES

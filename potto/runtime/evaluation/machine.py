@@ -18,7 +18,7 @@ from potto.calculus.differentiation.deltas import PRODUCT_OF_DELTAS
 from potto.calculus.differentiation.tangents import Shape
 from potto.calculus.inlining.currying import sizes_of, uncurry
 from potto.calculus.surfaces.branch_cuts import opened
-from potto.core.terms import Branch, Deriv, Global, Hole, If, Integral, Lam, Sum, Term, lam, postorder
+from potto.core.terms import Branch, Deriv, Global, Hole, If, Integral, Lam, Sum, Term, function_of, lam, postorder
 from potto.core.terms import Delta as DeltaTerm
 from potto.diagnostics import PottoError
 from potto.integrate.costs import Costs
@@ -224,7 +224,7 @@ class Machine:
         return found.run(self, trace, *args)
 
     def term(self, term: Term, env: dict[str, Value]) -> Value:
-        return self.evaluate(lam(tuple(sorted(term.free)), term), env, None)
+        return self.evaluate(function_of(term), env, None)
 
     def part(self, term: Term, env: dict[str, Value]) -> Value:
         return self.term(term, env)

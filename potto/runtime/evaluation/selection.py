@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from potto.calculus.surfaces.trace import part
-from potto.core.terms import Branch, If
+from potto.core.terms import Branch, If, function_of
 from potto.kernels.cells import Array, Cell, Number, Trace, Value, all_arrays, map_arrays, map_trace
 from potto.kernels.errors import wrong_call
 from potto.runtime.evaluation.machine import Machine
@@ -32,7 +31,7 @@ def lazy(machine: Machine, mask: Any, term: If | Branch, env: dict[str, Value], 
 
 
 def side(machine: Machine, term: If | Branch, env: dict[str, Value], which: int, trace: Trace | None) -> Value:
-    body = part(term.orelse if which else term.then)
+    body = function_of(term.orelse if which else term.then)
     return machine.run(body, [env[p] for p in body.params], trace)
 
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from potto.calculus.surfaces.discontinuities import TooDeep
-from potto.core.terms import Integral, lam
+from potto.core.terms import Integral, function_of
 from potto.diagnostics import PottoError
 from potto.integrate.events import BUDGET_SPENT
 from potto.integrate.pieces import Sums, still
@@ -49,7 +49,7 @@ def integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
         env = {**env, **{new: pad(still(env[old]), machine.directions) for old, new in stopped}}
     ready = prepared(term, linker.reach)
     if ready is not term:
-        return machine.evaluate(lam(tuple(sorted(ready.free)), ready), {n: env[n] for n in ready.free}, None)
+        return machine.evaluate(function_of(ready), {n: env[n] for n in ready.free}, None)
     return integrate(machine, term, env)
 
 

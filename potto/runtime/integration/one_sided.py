@@ -1,7 +1,7 @@
 """Derivatives that are not the same on the two sides of the parameters.
 
 Owns `from_both_sides`, `beside_folds`, `beside_axes`, `one_direction` and `moved`. What surfaces on bounds and on one
-another contribute is known on either side (`integrate/decomposition/coincidences`). Where sections of a surface appear
+another contribute is known on either side (`integrate/degenerate/coincidences`). Where sections of a surface appear
 or merge just at the parameters they move infinitely fast, and nothing at this place tells the derivative: of [x^2 < t]
 at t = 0 it is 0 on one side and infinite on the other, of [x^2 + y^2 < t] 0 and pi. It is then looked at beside the
 parameters, in three steps towards them; and so it is where surfaces run along every variable, and have sections along

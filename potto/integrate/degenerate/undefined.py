@@ -1,81 +1,29 @@
-"""Places at which the integrand is not defined: nodes that rounding puts there, and conditions that have no value.
+"""Places at which the integrand is not defined, since a condition has no value there.
 
-Owns `mend`, `sides_at`, `lost_members`, `fallen` and `guarded_samples`.
-
-Close to an end of a segment where roots merge an integrand like 1/sqrt(r^2 - x^2 - y^2) has a radicand of the size of
-its rounding, and may come out as nan. There, in the coordinate that the segment is run through by, it is smooth: its
-values a little further in stand for those.
-
-A condition is not defined where a builtin in it is not: [sqrt(1 + x) < 2] at x = -2. If nothing guards it there, the
-integral is not a number, and it is told where.
+Owns `sides_at`, `lost_members`, `fallen` and `guarded_samples`. A condition is not defined where a builtin in it is
+not: [sqrt(1 + x) < 2] at x = -2. If nothing guards it there, the integral is not a number, and it is told where.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Container, Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from potto.integrate.decomposition.coincidences import Scene, placed, surfaces_at
+from potto.core.terms import function_of
 from potto.integrate.decomposition.vanishing import vanishes
+from potto.integrate.degenerate.coincidences import Scene, placed, surfaces_at
 from potto.integrate.events import undefined
+from potto.integrate.levels import LevelPlan
 from potto.integrate.pieces import Evaluator, gather, still, take
-from potto.integrate.plan import LevelPlan, Plan, function_of
+from potto.integrate.plan import Plan
 from potto.integrate.rules import substitution
 from potto.integrate.rules.substitution import Segments
 from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value
 
-if TYPE_CHECKING:
-    from potto.integrate.adaptive.panel_batch import Work
-
 # Where a segment is looked at, as parts of it: in the middle, and where that is a pole (of sin(x)/x, say) elsewhere.
 LOOKED_AT = (0.5, 0.3, 0.8)
-
-# As close as this to an end, in the coordinate, values are taken for those at this distance: the closest that will do.
-CLOSE = (1e-6, 1e-4, 1e-2)
-# As close as this to an end an integral further in, that nothing comes of there, is taken for that at this distance.
-UNREACHED = 1e-12
-
-
-def mend(work: Work, seg: Segments, index: Ints, u: Array, du: Array, h: Array, bounds: Array | None) -> None:
-    """Put values, and bounds of their errors, from further in where channels (C, P, n) are no numbers.
-
-    u, du: (P, n) as for the map.
-    """
-    turning = np.isin(seg.kind, (substitution.LEFT, substitution.RIGHT, substitution.BOTH))[:, None]
-    for close in CLOSE if turning.any() else ():
-        bad = ~np.isfinite(h).all(axis=0) & turning & ((u < close) | (u > 1 - close))
-        rows = np.nonzero(bad.any(axis=1))[0]
-        if not rows.size:
-            break
-        part, inner = seg.pick(rows), np.clip(u[rows], close, 1 - close)
-        x, slope, label = substitution.points(part, inner)
-        found, errors = work.values(part, index[rows], x, label, slope * np.broadcast_to(du, u.shape)[rows])
-        h[:, rows] = np.where(bad[rows], found, h[:, rows])
-        if bounds is not None and errors is not None:
-            bounds[:, rows] = np.where(bad[rows], errors, bounds[:, rows])
-    if bounds is not None and not np.isfinite(h).all():
-        _unreached(work, seg, index, u, du, h, bounds)
-
-
-def _unreached(work: Work, seg: Segments, index: Ints, u: Array, du: Array, h: Array, bounds: Array) -> None:
-    """Values for nodes so close to an end that integrals further in give up: of 1/(x + y) along y at x = 1e-20.
-
-    Nothing is known of them but that they count little if values grow slowly; they may be off by all that they are.
-    """
-    plain = (seg.kind == substitution.LINEAR)[:, None]
-    bad = ~np.isfinite(h).all(axis=0) & plain & ((u < UNREACHED) | (u > 1 - UNREACHED))
-    rows = np.nonzero(bad.any(axis=1))[0]
-    if rows.size:
-        part, inner = seg.pick(rows), np.clip(u[rows], UNREACHED, 1 - UNREACHED)
-        x, slope, label = substitution.points(part, inner)
-        found, errors = work.values(part, index[rows], x, label, slope * np.broadcast_to(du, u.shape)[rows])
-        off = np.abs(found) if errors is None else np.abs(found) + errors
-        h[:, rows] = np.where(bad[rows], found, h[:, rows])
-        bounds[:, rows] = np.where(bad[rows], off, bounds[:, rows])
-
 
 def sides_at(level: LevelPlan, env: dict[str, Value], seg: Segments, machine: Evaluator) -> list[tuple[Array, Array]]:
     """The surfaces that a level decides the sides of, in the middle of segments, with their rounding, (S,) each.

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from potto.integrate.decomposition.coincidences import MOST_AT_ONE_PLACE, Scene, picked
 from potto.integrate.decomposition.cuts import SEARCHED, Row, as_array, tangents
+from potto.integrate.degenerate.coincidences import MOST_AT_ONE_PLACE, Scene, picked
 from potto.integrate.events import CROWDED, EMPTY_UNDEFINED, EMPTY_UNSEEN, Shortfall, TwoSided
+from potto.integrate.levels import LevelPlan
 from potto.integrate.pieces import Sums
-from potto.integrate.plan import LevelPlan
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Bools, Cell, Ints
 

@@ -17,20 +17,17 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from potto.core.terms import Term
 from potto.integrate.decomposition.cuts import Cuts, Edge, Meeting, as_array
 from potto.integrate.events import Fold, TwoSided, on_a_bound
+from potto.integrate.levels import LevelPlan
+from potto.integrate.panels.iterated import Iterated
 from potto.integrate.pieces import Evaluator, Sums, gather, mostly, still, take
-from potto.integrate.plan import LevelPlan
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value
-
-if TYPE_CHECKING:
-    from potto.integrate.adaptive.iterated import Iteration
 
 MOST_AT_ONE_PLACE = 4
 SURE = 1.001  # what rounding may add to a bound
@@ -44,7 +41,7 @@ MISPLACED = CLEAR * EPS / BESIDE
 class Scene:
     """One variable of an iteration as it is being integrated: everything that is needed to evaluate its integrand."""
 
-    parent: Iteration
+    parent: Iterated
     number: int
     level: LevelPlan
     env: dict[str, Value]

@@ -13,7 +13,7 @@ from contextlib import nullcontext
 
 import numpy as np
 
-from potto.integrate.decomposition.coincidences import Scene, placed
+from potto.integrate.degenerate.coincidences import Scene, placed
 from potto.integrate.pieces import Sums, take
 from potto.integrate.rules import substitution
 from potto.integrate.rules.substitution import Segments

@@ -7,18 +7,15 @@ it jumps, another variable must go innermost.
 from __future__ import annotations
 
 from contextlib import nullcontext
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from potto.integrate.decomposition.coincidences import Scene, around
 from potto.integrate.decomposition.cuts import Cuts, Edge
+from potto.integrate.degenerate.coincidences import Scene, around
 from potto.integrate.events import Degenerate
+from potto.integrate.panels.panel_batch import PanelBatch
 from potto.integrate.pieces import Evaluator, Pieces, gather, still, take
 from potto.kernels.cells import Array, Bools, Cell, Value
-
-if TYPE_CHECKING:
-    from potto.integrate.adaptive.panel_batch import Work
 
 # How far beside a place it is looked at (beside a bound twice), and what part may be lost across it.
 BESIDE, DISCONTINUITY = (1e-7, 1e-9), 1e-6
@@ -26,7 +23,7 @@ BESIDE, DISCONTINUITY = (1e-7, 1e-9), 1e-6
 SLOW = 1e-3
 
 
-def look_for_steps(work: Work, whole: Pieces) -> None:
+def look_for_steps(work: PanelBatch, whole: Pieces) -> None:
     """Whether the integral further in jumps where only its kinks were expected, which move in different ways.
 
     A surface that runs along the innermost variable leaves such a step. Looked at just beside the cut, since on

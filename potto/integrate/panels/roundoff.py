@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from potto.integrate.adaptive.reynolds import Ends
-from potto.integrate.pieces import Pieces
+from potto.integrate.pieces import Ends, Pieces
 from potto.integrate.rules import substitution
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.substitution import Segments

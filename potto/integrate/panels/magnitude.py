@@ -7,16 +7,11 @@ last place.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from potto.integrate.pieces import Pieces, Sums
+from potto.integrate.pieces import Sums
 from potto.integrate.rules.substitution import Segments
 from potto.kernels.cells import Array, Ints
-
-if TYPE_CHECKING:
-    from potto.integrate.adaptive.panel_batch import Work
 
 # One rounding, in units of the accuracy by which what is added up counts (`runtime/answers/convergence`).
 ROUNDING = 2.0**-12
@@ -34,10 +29,9 @@ class Extent:
         lengths += np.bincount(seg.owner, seg.b - seg.a, minlength=batch)
         _raise(self.reach[number], lengths, root if number else np.arange(batch))
 
-    def saw_values(self, work: Work, p: Pieces) -> None:
-        """Count the integrand on pieces that are whole segments."""
-        size = p.size.reshape(work.width, -1, p.segment.size)[:, 0].max(axis=0)
-        _raise(self.height, size / (work.seg.b - work.seg.a), work.below(work.seg.owner))
+    def saw_values(self, mean: Array, members: Ints | None) -> None:
+        """Count the mean size of the integrand on segments, (S,)."""
+        _raise(self.height, mean, members)
 
     def count(self, sums: Sums) -> None:
         """Of answers that are 0, as far as is known, one rounding of the most that there could be is added up."""

@@ -1,58 +1,37 @@
-"""The integrals of a batch over one variable: nodes, values, estimates, refinement.
+"""The panels of a batch of integrals over one variable: nodes, values, estimates.
 
-Owns `Work`. Segments are cut into pieces; each piece is integrated by a Gauss rule; what the next variable in gives
-at the nodes comes from the same procedure one level down. Pieces whose estimate is too large are halved, all of them
-in one go. For a derivative two forms are computed from the same values:
-
-    fixed:  D int F = int D_theta F  +  sum over ends of segments of F at the end times the end's speed
-    moving: D int F = int (D_theta F + v dF/dx + F dv/dx), v a velocity that agrees with the speed at every end
-
-(Reynolds' transport theorem.) Each has its own error estimate; the better one is the answer.
+Owns `PanelBatch`. Each panel is integrated by a Gauss rule; what the next variable in gives at the nodes
+comes from the same procedure one level down (`Iterated`). Refinement is not its business (`adaptive/refining`).
 """
 
 from __future__ import annotations
 
 from contextlib import nullcontext
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from potto.integrate.adaptive.divergence import endless, given_up
-from potto.integrate.adaptive.error_budget import Tally, filled, slack
-from potto.integrate.adaptive.refinement import doubtful, missed_peak, stragglers, too_coarse
-from potto.integrate.adaptive.reynolds import Ends, Totals, note_cancelling, sums, totals
-from potto.integrate.adaptive.roundoff import few_doubles, misplaced, noise, shake, together
-from potto.integrate.adaptive.undefined import mend
-from potto.integrate.decomposition.degeneracies import look_for_steps
-from potto.integrate.events import BUDGET_SPENT
-from potto.integrate.pieces import Evaluator, Pieces, Sums, column, gather, joined, spread, still
-from potto.integrate.plan import LevelPlan
+from potto.integrate.levels import LevelPlan
+from potto.integrate.panels.iterated import Iterated
+from potto.integrate.panels.mending import mend
+from potto.integrate.panels.roundoff import few_doubles, misplaced, noise, shake, together
+from potto.integrate.pieces import Ends, Evaluator, Pieces, Sums, column, gather, joined, spread, still
 from potto.integrate.rules import substitution
 from potto.integrate.rules.gauss import EPS, Rule, gauss, truncation
 from potto.integrate.rules.substitution import Segments
 from potto.kernels.cells import Array, Cell, Ints, Mask, Number, Value, pad
 
-if TYPE_CHECKING:
-    from potto.integrate.adaptive.iterated import Iteration
-
 CHUNK = 1 << 15  # points per kernel call: a few buffers of this length fit the second-level cache
-MOST_HALVINGS = 64
-# Nodes for pieces that were too coarse: first more of them on the same piece, then on halves.
-HIGH_ORDER = HALF_ORDER = 14
-MORE = 6  # for graded pieces, on which what is smooth is a polynomial, whose end looks like a fast decay
-# The relative error of a piece up to which more nodes promise more than halves do.
-PROMISING = 1e-2
-DOUBTFUL_ROUNDS = 8
-LONG = 8  # after how many halvings it is looked for members that take longer than the others
+MOST_SLACK = 1e6  # how many times the error of a node may be larger that hardly counts
 BESIDE = 1e-9  # how far from the ends of a segment, in parts of it, it is looked at just inside
 
 
 @dataclass
-class Work:
+class PanelBatch:
     """The integrals of one batch over one variable."""
 
-    parent: Iteration
+    parent: Iterated
     number: int
     level: LevelPlan
     env: dict[str, Value]
@@ -83,116 +62,11 @@ class Work:
 
     # Channels: per component the value, then per direction the moving form, then (if both) the fixed form
 
-    def integrate(self) -> Sums:
-        count = self.seg.a.size
-        if count == 0:
-            shape = (1, self.batch)
-            t, et = np.zeros((2, 1, self.k, self.batch))
-            return Sums(np.zeros(shape), np.zeros(shape), t, et, gross=np.zeros((2, self.batch)))
-        zero, one = np.zeros(count), np.ones(count)
-        ends = self.ends = self.end_values()
-        whole = Pieces(np.arange(count), zero, one, np.zeros(count, dtype=np.int64))
-        fresh = self.measure(whole, self.enough() or self.parent.order, True)
-        if self.last and self.parent.extent is not None:
-            self.parent.extent.saw_values(self, fresh)
-        if self.conflict and not self.last:
-            look_for_steps(self, fresh)
-        found = totals(self, fresh, ends)
-        if self.good_enough(fresh, found, ends):
-            return sums(self, found, ends)
-        self.endless = endless(self, found)
-        tally = Tally(self, fresh)
-        self.filled = filled(self, fresh)
-        done = self.refine(fresh, ends, tally)
-        for _ in range(DOUBTFUL_ROUNDS):
-            found = totals(self, done, ends)
-            bad = doubtful(self, done, found)
-            if bad is None or self.machine.exhausted():
-                break
-            halves = self.halve(done.pick(bad))
-            halves = self.replaced(done.pick(bad), halves, HALF_ORDER, tally)
-            done = done.pick(~bad).join(self.refine(halves, ends, tally))
-        else:
-            found = totals(self, done, ends)
-        return given_up(self, done, found, sums(self, found, ends))
-
     def enough(self) -> int | None:
         """How many nodes do for an integrand that is a polynomial between its cuts: so many that it is 0 where it is 0
         at all of them, since they also tell its size."""
         degree = self.parent.plan.degree if self.last and not self.seg.kind.any() else None
         return None if degree is None or degree >= self.parent.order else degree + 1
-
-    def good_enough(self, p: Pieces, found: Totals, ends: Ends | None) -> bool:
-        """Whether whole segments do as they are for every member, by the strictest reading of what is asked for."""
-        if self.number and self.root is not None:
-            return False  # what each may err is measured by members of the outermost batch: that takes a tally
-        scale = np.abs(found.size if self.number else found.integral)[:, : 1 + self.k]
-        if self.number:
-            scale = scale.max(axis=-1, keepdims=True)
-        error = found.error[:, : 1 + self.k]
-        if found.fixed is not None:
-            error = np.concatenate((error[:, :1], np.minimum(found.moving[1], found.fixed[1])), axis=1)
-        if not (error <= 0.5 * np.maximum(self.machine.atol, self.machine.rtol * scale)).all():
-            return False
-        if ends is not None and missed_peak(self, p, ends).any():
-            return False
-        return doubtful(self, p, found) is None
-
-    def refine(self, fresh: Pieces, ends: Any, tally: Tally) -> Pieces:
-        """More nodes, then halves, for what is too coarse until nothing is; what is accepted stays accepted."""
-        accepted: list[Pieces] = []
-        for turn in range(MOST_HALVINGS):
-            found = too_coarse(self, fresh, ends, tally)
-            if found is None:
-                break
-            if self.machine.exhausted():
-                owners = self.seg.owner[fresh.segment[found[0] | found[1]]]
-                self.machine.note(BUDGET_SPENT, self.below(np.unique(owners)))
-                if ends is not None:  # what is known to be missing
-                    fresh.error[:, missed_peak(self, fresh, ends)] = np.inf
-                break
-            bad, waiting = found
-            if turn >= LONG and (late := stragglers(self, fresh, bad)).any():
-                bad, waiting = bad & ~late, waiting & ~late
-                if not bad.any():
-                    break
-            accepted.append(fresh.pick(~bad & ~waiting))
-            coarse, later = fresh.pick(bad), fresh.pick(waiting)
-            later.excess[:] = 0.0
-            nearly = (coarse.error <= PROMISING * coarse.size).all(axis=0) if turn == 0 else np.zeros(0, dtype=bool)
-            if nearly.any():
-                near, far = coarse.pick(nearly), coarse.pick(~nearly)
-                fresh = self.replaced(near, near.places(slice(None)), HIGH_ORDER, tally)
-                if far.segment.size:
-                    fresh = fresh.join(self.replaced(far, self.halve(far), HALF_ORDER, tally))
-            else:
-                fresh = self.replaced(coarse, self.halve(coarse), HALF_ORDER, tally)
-            if later.segment.size:
-                fresh = fresh.join(later)
-        accepted.append(fresh)
-        return joined(accepted)
-
-    def replaced(self, old: Pieces, new: Pieces, order: int, tally: Tally) -> Pieces:
-        """The new pieces that stand for the old ones, measured; the books follow."""
-        copies = new.u0.size // old.u0.size
-        new = self.measure(new, order)
-        if (graded := np.nonzero((new.end != 0) & (new.error <= PROMISING * new.size).all(axis=0))[0]).size:
-            new.held_against(self.measure(new.places(graded), order + MORE), graded)
-        new.excess, new.stuck = np.tile(old.excess, copies), np.tile(old.stuck, copies)
-        tally.replace(self, old, new)
-        return new
-
-    def halve(self, p: Pieces) -> Pieces:
-        """Two pieces for each; the one at the end of its segment is graded towards that end."""
-        middle = 0.5 * (p.u0 + p.u1)
-        left = np.where((p.u0 == 0) & (p.end <= 0) & (p.lean < 0), p.lean, np.minimum(p.end, 0))
-        right = np.where((p.u1 == 1) & (p.end >= 0) & (p.lean > 0), p.lean, np.maximum(p.end, 0))
-        return Pieces(
-            np.concatenate((p.segment, p.segment)),
-            np.concatenate((p.u0, middle)),
-            np.concatenate((middle, p.u1)),
-            np.concatenate((left, right)),
-        )
 
     def measure(self, p: Pieces, order: int, whole: bool = False) -> Pieces:
         """Integrals, errors and rounding floors of pieces, chunk by chunk, by the rule with `order` nodes.
@@ -223,7 +97,7 @@ class Work:
             off, label = substitution.displaced(seg, x, label)
         h, inner = self.values(seg, p.segment, x, label, weight)
         if not whole:
-            mend(self, seg, p.segment, u, du, h, inner)
+            mend(self.values, seg, p.segment, u, du, h, inner)
         if off is not None:
             part = off * (seg.b - seg.a)[:, None] / weight
             slope = h @ rule.derivative
@@ -333,10 +207,10 @@ class Work:
         if weight is None or self.filled is None:
             less = self.inherited(owner, n)
         else:
-            less = slack(self, owner, np.broadcast_to(np.abs(weight), x.shape))
+            less = self.spared(owner, np.broadcast_to(np.abs(weight), x.shape))
         sums = self.parent.run(self.number + 1, env, x.size, masks, self.inner, root, less)
         if sums.gross is not None:
-            note_cancelling(self, sums, sums.gross, owner[flat])
+            self.count_cancelling(sums, sums.gross, owner[flat])
         shape = (sums.v.shape[0], *x.shape)
         t = sums.t.reshape(shape[0], -1, *x.shape)
         et = sums.et.reshape(t.shape)
@@ -346,6 +220,31 @@ class Work:
     def inherited(self, owner: Ints, n: int) -> Array | None:
         """How many times the error may be larger of the nodes of members that have less weight than others."""
         return None if self.slack is None else np.repeat(self.slack[owner], n)
+
+    def spared(self, owner: Ints, weight: Array) -> Array:
+        """How many times the error of integrals further in may be larger at nodes that count less than the mean."""
+        assert self.filled is not None
+        seg, nodes = self.seg, np.bincount(owner, minlength=self.batch) * weight.shape[1]
+        reach = self.filled * np.bincount(seg.owner, seg.b - seg.a, minlength=self.batch)
+        mean = (np.where(np.isfinite(reach), reach, 0.0) / np.maximum(nodes, 1))[owner]  # far out what counts is small
+        with np.errstate(divide="ignore", invalid="ignore"):
+            times: Array = np.fmax(1.0, np.fmin(mean[:, None] / weight, MOST_SLACK)).ravel()
+        return times if self.slack is None else times * np.repeat(self.slack[owner], weight.shape[1])
+
+    def count_cancelling(self, inner: Sums, added: Array, owner: Ints) -> None:
+        """Keep how many times what they come to integrals further in add up, on the whole, for each of the batch.
+
+        added: (2, N) what they add up; owner: (N,) whose they are.
+        """
+        most = np.abs(inner.v).max(axis=0), np.abs(inner.t).max(axis=(0, 1), initial=0.0)
+        for row, (gross, size) in enumerate(zip(added, most, strict=True)):
+            fine = np.isfinite(gross) & np.isfinite(size)
+            up, down = (np.bincount(owner[fine], x[fine], minlength=self.batch) for x in (gross, size))
+            times = np.divide(up, down, out=np.ones(self.batch), where=down > 0)
+            self.cancels[row] = np.maximum(self.cancels[row], times)
+            if (nothing := (down == 0) & (up > 0)).any():
+                mean = up / np.maximum(np.bincount(owner, minlength=self.batch), 1)
+                self.hidden[row] = np.maximum(self.hidden[row], np.where(nothing, mean, 0.0))
 
     def below(self, owner: Ints) -> Ints | None:
         """For members of the next batch, the members of the outermost one."""

@@ -1,0 +1,145 @@
+"""Panels refined until the integrals of a batch over one variable are as accurate as was asked for.
+
+Owns `integrated`. Each segment begins as one panel; what is too coarse gets more nodes, then is halved, all such panels
+of the batch in one go. For a derivative two forms are computed from the same values:
+
+    fixed:  D int F = int D_theta F  +  sum over ends of segments of F at the end times the end's speed
+    moving: D int F = int (D_theta F + v dF/dx + F dv/dx), v a velocity that agrees with the speed at every end
+
+(Reynolds' transport theorem.) Each has its own error estimate; the better one is the answer.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from potto.integrate.adaptive.divergence import endless, given_up
+from potto.integrate.adaptive.error_budget import Tally, filled
+from potto.integrate.adaptive.refinement import doubtful, missed_peak, stragglers, too_coarse
+from potto.integrate.adaptive.reynolds import Totals, sums, totals
+from potto.integrate.degenerate.degeneracies import look_for_steps
+from potto.integrate.events import BUDGET_SPENT
+from potto.integrate.panels.panel_batch import PanelBatch
+from potto.integrate.pieces import Ends, Pieces, Sums, joined
+
+MOST_HALVINGS = 64
+# Nodes for pieces that were too coarse: first more of them on the same piece, then on halves.
+HIGH_ORDER = HALF_ORDER = 14
+MORE = 6  # for graded pieces, on which what is smooth is a polynomial, whose end looks like a fast decay
+# The relative error of a piece up to which more nodes promise more than halves do.
+PROMISING = 1e-2
+DOUBTFUL_ROUNDS = 8
+LONG = 8  # after how many halvings it is looked for members that take longer than the others
+
+
+def integrated(work: PanelBatch) -> Sums:
+    count = work.seg.a.size
+    if count == 0:
+        shape = (1, work.batch)
+        t, et = np.zeros((2, 1, work.k, work.batch))
+        return Sums(np.zeros(shape), np.zeros(shape), t, et, gross=np.zeros((2, work.batch)))
+    zero, one = np.zeros(count), np.ones(count)
+    ends = work.ends = work.end_values()
+    whole = Pieces(np.arange(count), zero, one, np.zeros(count, dtype=np.int64))
+    fresh = work.measure(whole, work.enough() or work.parent.order, True)
+    if work.last and work.parent.extent is not None:
+        size = fresh.size.reshape(work.width, -1, fresh.segment.size)[:, 0].max(axis=0)
+        work.parent.extent.saw_values(size / (work.seg.b - work.seg.a), work.below(work.seg.owner))
+    if work.conflict and not work.last:
+        look_for_steps(work, fresh)
+    found = totals(work, fresh, ends)
+    if good_enough(work, fresh, found, ends):
+        return sums(work, found, ends)
+    work.endless = endless(work, found)
+    tally = Tally(work, fresh)
+    work.filled = filled(work, fresh)
+    done = refine(work, fresh, ends, tally)
+    for _ in range(DOUBTFUL_ROUNDS):
+        found = totals(work, done, ends)
+        bad = doubtful(work, done, found)
+        if bad is None or work.machine.exhausted():
+            break
+        halves = halved(done.pick(bad))
+        halves = replaced(work, done.pick(bad), halves, HALF_ORDER, tally)
+        done = done.pick(~bad).join(refine(work, halves, ends, tally))
+    else:
+        found = totals(work, done, ends)
+    return given_up(work, done, found, sums(work, found, ends))
+
+
+def good_enough(work: PanelBatch, p: Pieces, found: Totals, ends: Ends | None) -> bool:
+    """Whether whole segments do as they are for every member, by the strictest reading of what is asked for."""
+    if work.number and work.root is not None:
+        return False  # what each may err is measured by members of the outermost batch: that takes a tally
+    scale = np.abs(found.size if work.number else found.integral)[:, : 1 + work.k]
+    if work.number:
+        scale = scale.max(axis=-1, keepdims=True)
+    error = found.error[:, : 1 + work.k]
+    if found.fixed is not None:
+        error = np.concatenate((error[:, :1], np.minimum(found.moving[1], found.fixed[1])), axis=1)
+    if not (error <= 0.5 * np.maximum(work.machine.atol, work.machine.rtol * scale)).all():
+        return False
+    if ends is not None and missed_peak(work, p, ends).any():
+        return False
+    return doubtful(work, p, found) is None
+
+
+def refine(work: PanelBatch, fresh: Pieces, ends: Any, tally: Tally) -> Pieces:
+    """More nodes, then halves, for what is too coarse until nothing is; what is accepted stays accepted."""
+    accepted: list[Pieces] = []
+    for turn in range(MOST_HALVINGS):
+        found = too_coarse(work, fresh, ends, tally)
+        if found is None:
+            break
+        if work.machine.exhausted():
+            owners = work.seg.owner[fresh.segment[found[0] | found[1]]]
+            work.machine.note(BUDGET_SPENT, work.below(np.unique(owners)))
+            if ends is not None:  # what is known to be missing
+                fresh.error[:, missed_peak(work, fresh, ends)] = np.inf
+            break
+        bad, waiting = found
+        if turn >= LONG and (late := stragglers(work, fresh, bad)).any():
+            bad, waiting = bad & ~late, waiting & ~late
+            if not bad.any():
+                break
+        accepted.append(fresh.pick(~bad & ~waiting))
+        coarse, later = fresh.pick(bad), fresh.pick(waiting)
+        later.excess[:] = 0.0
+        nearly = (coarse.error <= PROMISING * coarse.size).all(axis=0) if turn == 0 else np.zeros(0, dtype=bool)
+        if nearly.any():
+            near, far = coarse.pick(nearly), coarse.pick(~nearly)
+            fresh = replaced(work, near, near.places(slice(None)), HIGH_ORDER, tally)
+            if far.segment.size:
+                fresh = fresh.join(replaced(work, far, halved(far), HALF_ORDER, tally))
+        else:
+            fresh = replaced(work, coarse, halved(coarse), HALF_ORDER, tally)
+        if later.segment.size:
+            fresh = fresh.join(later)
+    accepted.append(fresh)
+    return joined(accepted)
+
+
+def replaced(work: PanelBatch, old: Pieces, new: Pieces, order: int, tally: Tally) -> Pieces:
+    """The new pieces that stand for the old ones, measured; the books follow."""
+    copies = new.u0.size // old.u0.size
+    new = work.measure(new, order)
+    if (graded := np.nonzero((new.end != 0) & (new.error <= PROMISING * new.size).all(axis=0))[0]).size:
+        new.held_against(work.measure(new.places(graded), order + MORE), graded)
+    new.excess, new.stuck = np.tile(old.excess, copies), np.tile(old.stuck, copies)
+    tally.replace(work, old, new)
+    return new
+
+
+def halved(p: Pieces) -> Pieces:
+    """Two pieces for each; the one at the end of its segment is graded towards that end."""
+    middle = 0.5 * (p.u0 + p.u1)
+    left = np.where((p.u0 == 0) & (p.end <= 0) & (p.lean < 0), p.lean, np.minimum(p.end, 0))
+    right = np.where((p.u1 == 1) & (p.end >= 0) & (p.lean > 0), p.lean, np.maximum(p.end, 0))
+    return Pieces(
+        np.concatenate((p.segment, p.segment)),
+        np.concatenate((p.u0, middle)),
+        np.concatenate((middle, p.u1)),
+        np.concatenate((left, right)),
+    )

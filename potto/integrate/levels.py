@@ -1,0 +1,52 @@
+"""The variables of an integral before any number: for each its frame, and the surfaces that cut it.
+
+Owns `LevelPlan` and `Group`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from potto.calculus.decomposition.sweep import Cut, Level
+from potto.core.terms import Lam, function_of, tuple_
+
+
+@dataclass(frozen=True)
+class LevelPlan:
+    """One variable: its frame (bounds, then candidate cuts, as one tuple term) and what the cuts are."""
+
+    level: Level
+    frame: Lam
+    rows: tuple[tuple[int, bool], ...]
+    searched: tuple[Cut, ...]
+    families: tuple[tuple[int, Any], ...]
+    decided: tuple[int, ...]
+    surfaces: Lam
+    turned: tuple[tuple[int, ...], ...]
+
+    @property
+    def variable(self) -> str:
+        return self.level.variable
+
+    @cached_property
+    def bounds(self) -> Lam:
+        """The bounds alone, as a pair."""
+        return function_of(tuple_((self.level.lo, self.level.hi)))
+
+
+@dataclass(frozen=True)
+class Group:
+    """A surface with jumps: which branches it decides, and along which traces."""
+
+    number: int
+    cut: Cut
+
+    @property
+    def up_at_zero(self) -> bool:
+        """On which side a stretch lies along which the canonical surface is 0: that of max(x, 0) > 0 where x < 0."""
+        if not self.cut.jumps:
+            return True
+        jump = self.cut.jumps[0]
+        return jump.strict != (jump.orientation > 0)

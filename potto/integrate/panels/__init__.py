@@ -1,0 +1,1 @@
+"""Panels of a batch: nodes, values, estimates, and what rounding does to them."""
