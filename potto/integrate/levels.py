@@ -31,6 +31,17 @@ class LevelPlan:
         return self.level.variable
 
     @cached_property
+    def peaks(self) -> bool:
+        """Whether it is known of places at which the integrand may be concentrated."""
+        return bool(self.level.hints) or any(cut.center for cut in self.level.cuts)
+
+    @cached_property
+    def found(self) -> bool:
+        """Whether numbers have to find what decides, or bends, along the variable."""
+        families = any(not self.level.cuts[number].center for number, _ in self.families)
+        return families or any(not cut.center for cut in self.searched)
+
+    @cached_property
     def bounds(self) -> Lam:
         """The bounds alone, as a pair."""
         return function_of(tuple_((self.level.lo, self.level.hi)))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
+import mpmath as mp
 import pytest
 
 import potto
@@ -50,3 +52,27 @@ def test_a_hyperbola_close_to_its_asymptotes(t: float, box: str) -> None:
     quarters = {"[-1, 1], [-1, 1]": 2, "[-1, 0], [0, 1]": int(t < 0)}.get(box, int(t > 0))
     exact = -quarters * math.log(abs(t))
     assert abs(found.tangent - exact) <= found.tangent_error <= 1e-11 and found.converged
+
+
+# Peaks along the roots of what has no single formula for them: (program, what is 0 at a peak, where the domain ends).
+ALONG_ROOTS = [
+    ("integral [0, 1] exp(-(n*(sin(20*x) - 0.3))^2) d(x)", lambda x: mp.sin(20 * x) - mp.mpf("0.3"), 1),
+    ("integral [0, 1] exp(-(n*(x^3 + x - 0.3))^2) d(x)", lambda x: x**3 + x - mp.mpf("0.3"), 1),
+    ("integral [0, 3] exp(-(n*(cos(2*x + 0.3) - x/5))^2) d(x)", lambda x: mp.cos(2 * x + mp.mpf("0.3")) - x / 5, 3),
+]
+
+
+@pytest.mark.parametrize("n", [30, 100, 10_000, 1_000_000])
+@pytest.mark.parametrize("number", range(len(ALONG_ROOTS)))
+def test_peaks_are_found_along_roots_of_any_kind(number: int, n: int) -> None:
+    text, center, end = ALONG_ROOTS[number]
+    answer = potto.compile(f"def f(n) {text}").f(n)
+    with mp.workdps(30):
+        grid = [mp.mpf(i) * end / 500 for i in range(501)]
+        roots = [mp.findroot(center, (a, b), solver="anderson") for a, b in itertools.pairwise(grid)
+                 if center(a) * center(b) < 0]  # fmt: skip
+        places = sorted({mp.mpf(0), mp.mpf(end), *(r + k / mp.mpf(n) for r in roots for k in (-3, -1, 0, 1, 3))})
+        places = [p for p in places if 0 <= p <= end]
+        exact = float(mp.quad(lambda x: mp.exp(-((n * center(x)) ** 2)), places))
+    # a peak is placed to the rounding of x and of what is 0 there: up to 20n times 1e-16, in parts of its width
+    assert abs(answer.value - exact) <= answer.error <= (1e-10 + 3e-14 * n) * exact

@@ -9,8 +9,9 @@ decomposition in the manner of Collins, of the surfaces that a scene has, and of
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from itertools import islice
 
 from potto.calculus.algebra.radicals import minus
 from potto.calculus.algebra.ranges import positive
@@ -56,6 +57,7 @@ class Cut:
     steps: a branch that is decided further in jumps here all the same: of (x - t)*(y - s) >= 0 at x = t.
     turning: the integrand behaves like a square root there.
     roots: closed-form sections, or None where they are found by numbers.
+    center: nothing happens at it but that a smooth integrand may be concentrated there.
     """
 
     surface: Term
@@ -66,6 +68,7 @@ class Cut:
     families: tuple[Family, ...] = ()
     steps: bool = False
     product: Product | None = None
+    center: bool = False
 
     @property
     def decides(self) -> bool:
@@ -195,7 +198,8 @@ def sweep(
         centers = {c: None for c in centers if variable not in c.free}
         systems = tuple(c for c in critical if variable in c.free)
         critical = {c: None for c in critical if variable not in c.free}
-        levels.append(Level(variable, lo, hi, (*hints, *points_of(here, variable)[:MOST_CENTERS]), cuts, systems))
+        peaks = (*hints, *points_of(here, variable)[:MOST_CENTERS])
+        levels.append(Level(variable, lo, hi, peaks, (*cuts, *_around(here, variable)), systems))
         if not (outermost and variable == term.variables[0]):
             further = frozenset(term.variables[: term.variables.index(variable)])
             for shadow in _shadows(cuts, variable, lo, hi, further):
@@ -304,12 +308,16 @@ def _factored(surface: Term, orientation: int) -> tuple[tuple[Face, ...], int]:
 
 def points_of(centers: Iterable[Term], variable: str) -> tuple[Term, ...]:
     """Where the centers are, if that can be said in closed form."""
-    points: dict[Term, None] = {}
-    for center in centers:
-        found = _sections(center, variable)
-        if isinstance(found, Sections):
-            points.update(dict.fromkeys(found.roots))
-    return tuple(points)
+    found = (_sections(center, variable) for center in centers)
+    return tuple(dict.fromkeys(root for s in found if isinstance(s, Sections) and not s.families for root in s.roots))
+
+
+def _around(centers: Iterable[Term], variable: str) -> tuple[Cut, ...]:
+    """The centers that are more than points in closed form, and can be found."""
+    rest = (c for c in centers if not isinstance(found := _sections(c, variable), Sections) or found.families)
+    cuts = (replace(cut_along(c, variable), center=True) for c in rest)
+    known = (cut for cut in cuts if cut.roots is not None or slope_of(cut.surface, variable) is not None)
+    return tuple(islice(known, MOST_CENTERS))
 
 
 def along(cut: Cut) -> Term:

@@ -119,7 +119,7 @@ def straight(term: Integral, body: Term, levels: Sequence[LevelPlan]) -> Straigh
 
 
 def _not_plain(level: LevelPlan) -> bool:
-    return bool(level.searched or level.families or any(level.turned)) or len(level.rows) > MOST_CUTS
+    return bool(level.found or any(level.turned)) or len(level.rows) > MOST_CUTS
 
 
 def _all_sides(body: Term) -> Term:

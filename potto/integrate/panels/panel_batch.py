@@ -254,7 +254,7 @@ class PanelBatch:
 
     def end_values(self) -> Ends | None:
         """F at both ends of every segment, sides as on the segment; None where it is not needed."""
-        hinted = any(level.level.hints for level in self.parent.plan.levels[self.number :])
+        hinted = any(level.peaks for level in self.parent.plan.levels[self.number :])
         if not self.last and not hinted and not (self.moving and self.sweeps()):
             return None
         seg, frozen, plan = self.seg, self.machine.with_directions(0), self.parent.plan
