@@ -12,17 +12,17 @@ if TYPE_CHECKING:
     from potto.reports.pages import Page
 
 SUMMARY = "what a diagnostic means, with a wrong and a right program"
-EXAMPLE = "  potto explain P0301"
+EXAMPLE = "  potto explain P0301\n  potto explain limits"
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("codes", nargs="*", metavar="CODE", help="codes such as P0301; all are listed without one")
+    parser.add_argument("codes", nargs="*", metavar="CODE", help="codes such as P0301, or `limits`; without one, a list")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
     from potto.reports import pages
 
-    wanted = [code.upper() for code in options.codes]
+    wanted = [code.lower() if code.lower() in pages.TOPICS else code.upper() for code in options.codes]
     if not wanted:
         return _list(options, console)
     found = [page for page in map(pages.page, wanted) if page is not None]

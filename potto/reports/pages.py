@@ -13,6 +13,9 @@ HERE = Path(__file__).resolve().parent.parent
 FOLDERS = (HERE / "_docs" / "errors", HERE.parent / "docs" / "errors")  # installed; in a clone
 
 
+TOPICS = ("limits",)  # pages beside those of codes
+
+
 @dataclass(frozen=True, slots=True)
 class Example:
     """A program of a page. `heading` is what it stands under: `Wrong`, `Right`, `Wrong (run)`, …"""
@@ -68,11 +71,11 @@ def codes() -> tuple[str, ...]:
 
 
 def page(code: str) -> Page | None:
-    """The page of a code, or None."""
+    """The page of a code, or of a topic; None if there is none."""
     place = folder()
-    if place is None or not re.fullmatch(r"P\d{4}", code):
+    if place is None or not (re.fullmatch(r"P\d{4}", code) or code in TOPICS):
         return None
-    path = place / f"{code}.md"
+    path = (place.parent if code in TOPICS else place) / f"{code}.md"
     if not path.is_file():
         return None
     text = path.read_text(encoding="utf-8")

@@ -246,6 +246,7 @@ def test_explain(potto: Potto) -> None:
     ran = potto("explain", "P9999")
     assert ran.status == 2 and "no diagnostic P9999" in ran.err
     assert potto("explain", "--json", "P0520").json["pages"][0]["code"] == "P0520"
+    assert potto("explain", "Limits").out.startswith("Limits\n")
 
 
 def test_deriv(potto: Potto) -> None:

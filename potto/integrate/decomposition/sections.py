@@ -71,7 +71,7 @@ def _family(
     count = float(spans.max(initial=0.0))
     if np.isinf(stack).any() or count > MOST_IN_FAMILY:
         machine.note(TOO_MANY_ROOTS)
-        count = min(count, MOST_IN_FAMILY)
+        count = 0.0  # whatever was cut at some of them would be no better known
     function = function_of(family.root)
     turning = level.level.cuts[cut].turning
     rows = []
