@@ -16,7 +16,7 @@ EXAMPLE = "  potto explain P0301\n  potto explain limits"
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("codes", nargs="*", metavar="CODE", help="codes such as P0301, or `limits`; without one, a list")
+    parser.add_argument("codes", nargs="*", metavar="CODE", help="such as P0301, or `limits`; without one, a list")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
