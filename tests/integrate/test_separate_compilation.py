@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 import potto
 from potto.kernels import compile as kernels
 
@@ -61,3 +63,25 @@ def g(t) integral [0, 1] (step (t*x) + step (t*x)^2)*step (x + 1) d(x)
         r = potto.deriv(f)((0.8, 1.0))
         assert abs(r.value - factor * (1 - 0.625)) < 1e-15
         assert abs(r.tangent - factor / (2 * 0.64)) < 1e-14
+
+
+PIXELS = """
+def given(u, v, c, shader) integral ([u, u + 1/16], [v, v + 1/16]) shader (x, y) c*[x + y + c >= 0] d(x, y)
+def inlined(u, v, c) integral ([u, u + 1/16], [v, v + 1/16]) 1/(x + y + c + 2)*[x + y + c >= 0] d(x, y)
+def first(x, y)(c) 1/(x + y + c + 2)
+def second(x, y)(c) exp(-x*y)*(c + 2)
+"""
+
+
+def test_pixels_of_a_shader_given_take_the_short_way_as_those_of_one_written_out() -> None:
+    kernels.clear()
+    m, (u, v) = potto.compile(PIXELS), np.meshgrid(np.arange(16) / 16, np.arange(16) / 16)
+    whole = potto.deriv(m.inlined)((u, 0.0), (v, 0.0), (-0.7, 1.0))
+    apart = potto.deriv(m.given)((u, 0.0), (v, 0.0), (-0.7, 1.0), potto.deriv(m.first))
+    assert apart.evals == whole.evals
+    assert np.allclose(apart.value, whole.value, rtol=0, atol=1e-17)
+    assert np.allclose(apart.tangent, whole.tangent, rtol=0, atol=1e-16)
+    # Swapped: a kernel for uncut pixels and one for those that are cut, whose nodes move, and the name's own.
+    for shader, most in ((m.second, 3), (m.first, 0)):
+        found = potto.deriv(m.given)((u, 0.0), (v, 0.0), (-0.7, 1.0), potto.deriv(shader))
+        assert int(found.stats["kernels compiled"]) <= most

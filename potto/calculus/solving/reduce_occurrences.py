@@ -2,8 +2,8 @@
 
 Owns `split`: from such an equation to simpler ones. In this order: factors of a product, both sides under the same
 one-to-one builtin, a polynomial in something that contains every occurrence (so that (x - t)^2 + (x - t) is solved
-for x - t and keeps its digits), a polynomial in the variable, a sin u + b cos u, squaring a root away, and cases
-for abs, min, max and clamp.
+for x - t and keeps its digits), a polynomial in the variable, a sin u + b cos u, squaring a root away, the numerator
+of a fraction, and cases for abs, min, max and clamp.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 
+from potto.calculus.algebra.fractions import numerator
 from potto.calculus.algebra.polynomial_in import Collected, collect, dominators
 from potto.calculus.algebra.radicals import TWO, minus, quotient, signed, square_root
 from potto.calculus.algebra.rational_form import is_zero, shorter
@@ -55,7 +56,7 @@ def split(term: Prim, value: Term, name: str) -> Steps:
     same = _same_builtin(term, value)
     if same is not None:
         return same
-    for method in (_polynomial_in_something, _cases):
+    for method in (_polynomial_in_something, _fraction, _cases):
         steps = method(term, value, name)
         if steps is not None:
             return steps
@@ -194,6 +195,12 @@ def halved(term: Term) -> Term | None:
     if isinstance(term, Const) and term.name is None and (term.value / 2).is_integer():
         return const(term.value / 2)
     return None
+
+
+def _fraction(term: Prim, value: Term, name: str) -> Steps | None:
+    """The numerator over a common denominator: where that is 0, a pole is met or nothing at all."""
+    top = numerator(sub(term, value), name)
+    return None if top is None else (Step(top, ZERO),)
 
 
 # Two atoms

@@ -237,7 +237,7 @@ class Machine:
     def global_value(self, module: str, name: str) -> Value:
         term = self.linker.term(module, name)
         if isinstance(term, Lam):
-            return Closure(term, {}, self.rounding or self.linker.inexact(term), (module, name))
+            return Closure(term, {}, self.linker.inexact(term), (module, name))
         known = self.linker.held.get((module, name))
         if known is not None:
             self.record.used[module, name] = known
@@ -251,7 +251,7 @@ class Machine:
         return pad(self.linker.constants[key], self.directions)
 
     def closure(self, function: Lam, captured: dict[str, Value]) -> Value:
-        return Closure(function, captured, self.rounding or self.linker.inexact(function) or _any_inexact(captured))
+        return Closure(function, captured, self.linker.inexact(function) or _any_inexact(captured))
 
     def derived(self, function: Value) -> Value:
         if not isinstance(function, Closure):
