@@ -307,8 +307,11 @@ class Surface:
         """The same where phi has a pole, a kink, a jump or no slope: nothing if its sign does not change.
 
         Its root's formula, where there is one, tells how such a place moves; otherwise phi itself just beside it does,
-        unless it jumps there from one finite value to another. nan where that is not known.
+        unless it jumps there from one finite value to another. nan where that is not known. In labels the formula moves
+        with the bounds of variables that are held.
         """
+        if root is not None and self.held is not None and root.free & {label_name(x) for x in self.term.free}:
+            root = None
         wide = self.machine.directions + len(marked)
         below, above, slopes = self.around(labels, pivot, marked)
         change = (np.sign(above) - np.sign(below)) / 2
