@@ -8,19 +8,25 @@ do not.
 from __future__ import annotations
 
 from potto.core.kinds import Term
-from potto.core.walking import bound_names, children, fresh, postorder, postorder_by, rebuild, rename_bound
+from potto.core.walking import bound_names, children, fresh, postorder_by, rebuild, rename_bound
+
+# Of a term the names that binders in it bind, and whether one of them is bound by a binder around it too.
+Bound = dict[Term, tuple[frozenset[str], bool]]
 
 
-def apart(root: Term) -> Term:
-    """An equal term in which no binder binds a name that is free in the whole, or bound by a binder around it."""
-    inside: dict[Term, frozenset[str]] = {}
-    clash = False
-    for node in postorder(root):
-        own = frozenset(bound_names(node))
-        below = frozenset[str]().union(*(inside[c] for c in children(node)))
-        clash = clash or not own.isdisjoint(below) or not own.isdisjoint(root.free)
-        inside[node] = own | below
-    return _Apart(inside[root] | root.free).run(root, root.free) if clash else root
+def apart(root: Term, known: Bound | None = None) -> Term:
+    """An equal term in which no binder binds a name that is free in the whole, or bound by a binder around it.
+
+    known: what is known of terms already; it grows, and what is in it is not looked through again.
+    """
+    known = {} if known is None else known
+    for node in postorder_by(root, lambda node: () if node in known else children(node)):
+        if node not in known:
+            own, below = frozenset(bound_names(node)), [known[c] for c in children(node)]
+            inside = frozenset[str]().union(*(names for names, _ in below))
+            known[node] = own | inside, any(clash for _, clash in below) or not own.isdisjoint(inside)
+    names, clash = known[root]
+    return _Apart(names | root.free).run(root, root.free) if clash or not names.isdisjoint(root.free) else root
 
 
 class _Apart:

@@ -54,6 +54,7 @@ from potto.core.kinds import (
     var,
 )
 from potto.core.walking import (
+    Holding,
     bound_names,
     children,
     fresh,
@@ -76,6 +77,7 @@ __all__ = [
     "Delta",
     "Deriv",
     "Global",
+    "Holding",
     "Hole",
     "If",
     "Integral",

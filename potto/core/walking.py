@@ -142,6 +142,21 @@ def postorder(*roots: Term) -> list[Term]:
     return order
 
 
+class Holding:
+    """Whether terms have parts of some kinds. What was looked through once is not looked through again."""
+
+    def __init__(self, *kinds: type[Term]) -> None:
+        self.kinds = kinds
+        self.known: dict[Term, bool] = {}
+
+    def __call__(self, term: Term) -> bool:
+        known = self.known
+        for node in postorder_by(term, lambda node: () if node in known else children(node)):
+            if node not in known:
+                known[node] = isinstance(node, self.kinds) or any(known[c] for c in children(node))
+        return known[term]
+
+
 def outside(root: Term, binders: tuple[type[Term], ...]) -> Iterator[Term]:
     """The parts of a term that are not inside a binder of these kinds, each once; the outermost binders are parts."""
     waiting, seen = [root], set[Term]()

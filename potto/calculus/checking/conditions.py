@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 
 from potto.calculus.algebra.point_values import sample_value
 from potto.calculus.inlining.currying import arguments_of, groups_of, sizes_of, uncurry
-from potto.calculus.inlining.expand import DEEPEST, Resolve, expanded
+from potto.calculus.inlining.expand import DEEPEST, Expansion, Resolve, expanded
 from potto.calculus.surfaces.trace import spine
 from potto.core.terms import (
     ONE,
@@ -28,6 +28,7 @@ from potto.core.terms import (
     Delta,
     Deriv,
     Global,
+    Holding,
     Integral,
     Lam,
     Prim,
@@ -168,7 +169,8 @@ def conditions_of(term: Term, skeletons: Resolve, whole: Resolve) -> tuple[Condi
     while isinstance(body, Lam):
         body = body.body
     walk.term(body, _Place({}, {}, (), (), None))
-    return tuple({(c.coordinates, c.anchor): c for c in walk.found}.values())
+    found = [walk.condition(node, place) for node, place in reversed(walk.met)]  # what is called is expanded first
+    return tuple({(c.coordinates, c.anchor): c for c in reversed(found) if c is not None}.values())
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,7 +196,9 @@ class _Walk:
         self.box: dict[str, tuple[float, float]] = {}
         self.seen: set[tuple[object, ...]] = set()
         self.taken: set[str] = set()
-        self.found: list[Condition] = []
+        self.met: list[tuple[Branch | Delta, _Place]] = []
+        self.expansion = Expansion(whole)
+        self.calls = Holding(App)
 
     def term(self, term: Term, place: _Place) -> None:
         nodes = postorder(term)
@@ -209,33 +213,31 @@ class _Walk:
         heads = {node.function for node in nodes if isinstance(node, App)}
         for node in nodes:
             if isinstance(node, Branch | Delta):
-                self.condition(node, place)
+                self.met.append((node, place))
             elif isinstance(node, App) and node not in heads:
                 self.call(node, place)
 
-    def condition(self, node: Branch | Delta, place: _Place) -> None:
+    def condition(self, node: Branch | Delta, place: _Place) -> Condition | None:
         coordinates = node.coordinates
         mine = _decided_by(coordinates[0], place.functions)
         over = self.box.keys() if mine or place.caller is None else place.caller
         if over.isdisjoint(_reached(coordinates[:1], place)):
-            return
+            return None
         if isinstance(coordinates[0], Proj) and coordinates[0].index == 0 and len(coordinates) == 1:
             whole = self.seen_through(coordinates[0].term, place)
             coordinates = whole.items if isinstance(whole, Tuple) else (self.seen_through(coordinates[0], place),)
         else:
             coordinates = tuple(self.seen_through(c, place) for c in coordinates)
         surface = coordinates[0]
-        if over.isdisjoint(surface.free):
-            return
-        if any(isinstance(part, App) for part in postorder(surface)):
-            return  # a function parameter decides: the caller who passes it checks
+        if over.isdisjoint(surface.free) or self.calls(surface):  # a function parameter decides: its caller checks
+            return None
         box = {v: b for v, b in self.box.items() if any(v in c.free for c in coordinates)}
         strict, anchor = isinstance(node, Branch) and node.strict, place.anchor or node
-        self.found.append(Condition(coordinates, strict, anchor, isinstance(node, Delta), box, place.calls))
+        return Condition(coordinates, strict, anchor, isinstance(node, Delta), box, place.calls)
 
     def seen_through(self, term: Term, place: _Place) -> Term:
         known = {**place.mapping, **place.functions}
-        return expanded(substitute(term, known), self.whole)
+        return self.expansion.of(substitute(term, known))
 
     def call(self, node: App, place: _Place) -> None:
         head, groups = spine(node)

@@ -44,6 +44,7 @@ from potto.core.terms import (
     Branch,
     Deriv,
     Global,
+    Holding,
     Hole,
     Integral,
     Term,
@@ -167,8 +168,9 @@ def _judged(
 ) -> Iterable[Diagnostic]:
     """What is said of conditions; `maps` is where the text says `diffeo(...)`."""
     said: set[tuple[str, Span, str]] = set()
+    wrong = Holding(Hole)
     for condition in found:
-        if any(isinstance(n, Hole) for c in condition.coordinates for n in postorder(c)):
+        if any(map(wrong, condition.coordinates)):
             continue  # a diagnostic has said what is wrong there
         condition = _readable(condition)
         own = isinstance(condition.anchor, Branch) and condition.anchor.coordinates == condition.coordinates

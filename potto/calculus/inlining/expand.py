@@ -1,6 +1,6 @@
 """Calls carried out: a term in which known functions are replaced by what they do.
 
-Owns `expanded`, `Calls`, `known_function` and `named`.
+Owns `expanded`, `Expansion`, `Calls`, `known_function` and `named`.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 from potto.calculus.inlining.currying import arguments_of, sizes_of, uncurry
 from potto.calculus.surfaces.trace import spine
-from potto.core.binders import apart
+from potto.core.binders import Bound, apart
 from potto.core.terms import App, Deriv, Global, Lam, Proj, Term, children, postorder, proj, rebuild, substitute
 
 # The term of another definition: its skeleton, or all of it.
@@ -22,12 +22,8 @@ MOST_NAMES = 100  # that a definition may lead through
 
 
 def expanded(term: Term, resolve: Resolve, derive: Derive | None = None) -> Term:
-    """The term with calls of known functions carried out; of derivatives too, if it is said how.
-
-    A call of a definition inside itself stays a call: how deep it goes is decided by values. Binders that get inside of
-    each other have names of their own.
-    """
-    return apart(_Expansion(resolve, derive).run(term, ()))
+    """The term with calls of known functions carried out; of derivatives too, if it is said how."""
+    return Expansion(resolve, derive).of(term)
 
 
 class Calls:
@@ -50,13 +46,21 @@ class Calls:
         return self.known[key]
 
 
-class _Expansion:
-    """One expansion."""
+class Expansion:
+    """Calls carried out in one term or several, each call with the same arguments once.
 
-    def __init__(self, resolve: Resolve, derive: Derive | None) -> None:
+    A call of a definition inside itself stays a call: how deep it goes is decided by values. Binders that get inside of
+    each other have names of their own.
+    """
+
+    def __init__(self, resolve: Resolve, derive: Derive | None = None) -> None:
         self.resolve = resolve
         self.derive = derive
         self.calls = Calls()
+        self.bound: Bound = {}
+
+    def of(self, term: Term) -> Term:
+        return apart(self.run(term, ()), self.bound)
 
     def run(self, term: Term, path: tuple[Term, ...]) -> Term:
         memo: dict[Term, Term] = {}

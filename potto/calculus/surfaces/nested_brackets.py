@@ -6,7 +6,22 @@ only loaded for those that have some.
 
 from __future__ import annotations
 
-from potto.core.terms import Branch, Delta, If, Integral, Lam, Sum, Term, children, outside, postorder, rebuild
+from itertools import islice
+
+from potto.core.terms import (
+    Branch,
+    Delta,
+    If,
+    Integral,
+    Lam,
+    Sum,
+    Term,
+    children,
+    outside,
+    postorder,
+    postorder_by,
+    rebuild,
+)
 
 BINDERS = (Integral, Sum, Lam)
 _MOST_PIECES = 16
@@ -28,8 +43,14 @@ def coordinates_of(node: Term) -> tuple[Term, ...]:
 
 
 def pieces(surface: Term) -> tuple[Term, ...]:
-    """What a surface is on either side of the conditions inside of it: where it is 0, one of these is."""
+    """What a surface is on either side of the conditions inside of it: where it is 0, one of these is.
+
+    Of too many it has some, with conditions inside still; the surface itself, if none would be without.
+    """
     done: dict[Term, None] = {}
+    apart = (part for part in outside(surface, (*BINDERS, Branch, If)) if isinstance(part, Branch | If))
+    if len(tuple(islice(apart, _MOST_PIECES + 1))) > _MOST_PIECES:
+        return (surface,)
     waiting = [surface]
     while waiting:
         term = waiting.pop()
@@ -43,7 +64,7 @@ def pieces(surface: Term) -> tuple[Term, ...]:
 
 def _in_place(term: Term, old: Term, new: Term) -> Term:
     memo: dict[Term, Term] = {old: new}
-    for node in postorder(term):
+    for node in postorder_by(term, lambda node: () if node is old else children(node)):
         if node not in memo:
             memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
     return memo[term]

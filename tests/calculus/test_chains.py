@@ -1,0 +1,45 @@
+"""A chain of definitions is checked at a cost that grows with its text: what one call leads to is carried out once."""
+
+from __future__ import annotations
+
+import sys
+from types import FrameType
+
+import pytest
+
+import potto
+
+KINDS = {
+    "in the condition": "def f{0}(x, t) if [f{1}(x, t) > {0}/100] then x + t else x - t",
+    "as a bracket": "def f{0}(x, t) [f{1}(x, t) + x > {0}/100]",
+    "a state": "def f{0}(x, t) 0.8*f{1}(x, t) + 0.5*[f{1}(x, t) < t]",
+    "a product": "def f{0}(x, t) f{1}(x, t)*[f{1}(x, t) > t]",
+}
+
+
+def chain(kind: str, n: int) -> str:
+    lines = [f"def f0(x, t) x*t + {n}", *(KINDS[kind].format(i, i - 1) for i in range(1, n + 1))]
+    return "\n".join((*lines, f"def g(t) integral [0, 1] f{n}(x, t) d(x)"))
+
+
+def calls(source: str) -> int:
+    """How many functions are called while a program is checked: the same on any machine."""
+    count = 0
+
+    def one(frame: FrameType, event: str, argument: object) -> None:
+        nonlocal count
+        count += event == "call"
+
+    sys.setprofile(one)
+    try:
+        potto.compile(source)
+    finally:
+        sys.setprofile(None)
+    return count
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_twice_as_long_a_chain_takes_about_twice_as_long_to_check(kind: str) -> None:
+    calls(chain(kind, 3))
+    few, many = calls(chain(kind, 24)), calls(chain(kind, 48))
+    assert many <= 2.6 * few  # the text is 2.1 times as long
