@@ -1,7 +1,7 @@
 """Values of terms at points, in plain Python numbers: for checks that symbols cannot decide.
 
-Owns `sample_value` and the points. Nothing here integrates or runs a program: a term is evaluated as it stands, and
-whatever is not a number there is nan.
+Owns `sample_value`, `not_zero` and the points. Nothing here integrates or runs a program: a term is evaluated as it
+stands, and whatever is not a number there is nan.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import random
 from collections.abc import Iterator, Mapping, Sequence
 
 from potto.calculus.algebra.floats import FLOATS
-from potto.core.terms import Term, Var, children, postorder_by
+from potto.core.terms import Const, Prim, Term, Var, children, postorder_by
 
 
 def sample_value(term: Term, point: Mapping[str, float], known: dict[Term, float] | None = None) -> float:
@@ -24,6 +24,53 @@ def sample_value(term: Term, point: Mapping[str, float], known: dict[Term, float
         if node not in values:
             values[node] = point.get(node.name, math.nan) if isinstance(node, Var) else FLOATS.node(node, {}, values)
     return values[term]
+
+
+_UNIT = 2.0**-53
+# How much larger than its error a value is that is told from 0; how much a builtin enlarges relative errors, at most
+# (near a zero of its own, where a random point seldom is, it would be more).
+_CLEAR = 1e3
+_AMPLIFIED = 1e4
+_MOST_VALUES = 1 << 16
+_values: dict[Term, tuple[float, float]] = {}
+
+
+def not_zero(term: Term) -> bool:
+    """Whether a term's value at one point shows that it is not 0 everywhere, as a formula in what is no builtin in it.
+
+    False also where that is not known.
+    """
+    if len(_values) > _MOST_VALUES:
+        _values.clear()
+    for node in postorder_by(term, lambda node: () if node in _values else children(node)):
+        if node not in _values:
+            _values[node] = _value_and_error(node)
+    value, error = _values[term]
+    return math.isfinite(value) and abs(value) > _CLEAR * error
+
+
+def _value_and_error(node: Term) -> tuple[float, float]:
+    """A value at a point, and how far off it may be by rounding: a running error analysis."""
+    if isinstance(node, Const):
+        return node.value, 0.0
+    if not isinstance(node, Prim):
+        return 0.5 + random.Random(node.digest).random(), 0.0
+    values, errors = zip(*(_values[a] for a in node.args), strict=True)
+    value = FLOATS.apply(node.op, values)
+    match node.op:
+        case "add":
+            error = sum(errors)
+        case "neg":
+            return value, errors[0]
+        case "mul":
+            whole = math.prod(abs(v) + e for v, e in zip(values, errors, strict=True))
+            error = whole - math.prod(map(abs, values)) + len(values) * _UNIT * whole
+        case "div" if abs(values[1]) > errors[1]:
+            error = (errors[0] + abs(value) * errors[1]) / (abs(values[1]) - errors[1])
+        case _:
+            relative = max((e / abs(v) if v else math.inf for v, e in zip(values, errors, strict=True)), default=0.0)
+            error = abs(value) * _AMPLIFIED * (relative + _UNIT)
+    return value, error + _UNIT * abs(value)
 
 
 def points(

@@ -14,9 +14,26 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 
+from potto.calculus.algebra.point_values import not_zero
+from potto.core.kinds import union_of
 from potto.core.polynomials import ONE, Monomial, Polynomial, TooLarge, monomial_term, number, total
-from potto.core.terms import ZERO, Const, Prim, Term, add, div, mul, neg, postorder, prim
+from potto.core.terms import (
+    ZERO,
+    Const,
+    Prim,
+    Term,
+    add,
+    children,
+    div,
+    mul,
+    neg,
+    postorder,
+    postorder_by,
+    prim,
+    rebuild,
+)
 
 _LARGEST = 400
 
@@ -35,21 +52,78 @@ class Rational:
 
 
 
-def normal(term: Term) -> Rational | None:
-    """The normal form; None where it would be too large or a value is not a number."""
+def normal(term: Term, name: str | None = None) -> Rational | None:
+    """The normal form; None where it would be too large or a value is not a number.
+
+    name: sums that do not vary with this variable are atoms: few monomials, which tell less.
+    """
     memo: dict[Term, Rational] = {}
+
+    def whole(node: Term) -> bool:
+        return name is not None and name not in node.free and isinstance(node, Prim) and node.op == "add"
+
     try:
-        for node in postorder(term):
-            memo[node] = _node(node, memo)
+        for node in postorder_by(term, lambda node: () if whole(node) else children(node)):
+            memo[node] = _atom(node) if whole(node) else _node(node, memo)
     except TooLarge:
         return None
     return memo[term]
+
+
+@lru_cache(maxsize=8192)
+def settled(term: Term, names: frozenset[str]) -> Term:
+    """An equal term in which rational parts that vary with a variable by their form alone are without it.
+
+    Of a plane through the point p, dot(n, p) is one number wherever p is written as a fraction of coordinates.
+    """
+    below = [n.args[1] for n in postorder(term) if isinstance(n, Prim) and n.op == "div"]
+    for name in sorted(names.intersection(union_of(below))):
+        term = _settled(term, name)
+    return term
+
+
+def _settled(term: Term, name: str) -> Term:
+    memo: dict[Term, Term] = {}
+    rational: dict[Term, bool] = {}
+    for node in postorder_by(term, lambda node: children(node) if name in node.free else ()):
+        parts = children(node) if name in node.free else ()
+        rational[node] = not parts or (_is_rational(node) and all(rational[part] for part in parts))
+        new = rebuild(node, tuple(memo[part] for part in parts)) if parts else node
+        if isinstance(node, Prim) and node.op in ("add", "mul") and not rational[node]:
+            some = [memo[part] for part in parts if rational[part]]
+            others = [memo[part] for part in parts if not rational[part]]
+            join = add if node.op == "add" else mul
+            new = join(_without_it(join(*some), name), *others) if some else new
+        elif parts and not rational[node]:
+            fewer = (_without_it(memo[part], name) if rational[part] else memo[part] for part in parts)
+            new = rebuild(node, tuple(fewer))
+        memo[node] = new
+    return _without_it(memo[term], name) if rational[term] else memo[term]
+
+
+def _is_rational(node: Term) -> bool:
+    if not isinstance(node, Prim):
+        return False
+    power = node.args[-1] if node.op == "pow" else None
+    return node.op in ("add", "neg", "mul", "div") or (isinstance(power, Const) and power.value.is_integer())
+
+
+def _without_it(term: Term, name: str) -> Term:
+    for sums in (name, None) if name in term.free else ():
+        found = normal(term, sums)
+        atoms = {a for part in (found.top, found.below) for m in part for a, _ in m} if found else set[Term]()
+        if found is not None and not any(name in atom.free for atom in atoms):
+            top, below = as_term(found.top), as_term(found.below)
+            return term if top is None or below is None else div(top, below)
+    return term
 
 
 def is_zero(term: Term) -> bool:
     """Whether a term is 0 wherever it is defined. False also where that is not known."""
     if isinstance(term, Const):
         return term.value == 0
+    if not_zero(term):
+        return False
     found = normal(term)
     return found is not None and not found.top
 
@@ -274,6 +348,7 @@ def _sorted(counts: Mapping[Term, int]) -> Monomial:
     return tuple(sorted(counts.items(), key=lambda pair: pair[0].digest))
 
 
+@lru_cache(maxsize=1024)
 def _square(atom: Term) -> Polynomial | None:
     """What the square of an atom is, where an identity says so."""
     if isinstance(atom, Prim) and len(atom.args) == 1:

@@ -13,11 +13,13 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from potto.calculus.algebra.affine import determinant
-from potto.calculus.algebra.ranges import positive
+from potto.calculus.algebra.point_values import not_zero
+from potto.calculus.algebra.radicals import squared
+from potto.calculus.algebra.ranges import positive, range_of
 from potto.calculus.differentiation.derivative import NotSmooth, partial
 from potto.calculus.solving.enclosable import enclosable, slope_of
 from potto.core.simplify import simplify
-from potto.core.terms import Const, Prim, Term, substitute
+from potto.core.terms import Const, Prim, Term, mul, sub, substitute
 
 MOST_EQUATIONS = 3  # a search takes about 2^n times as long for n of them
 
@@ -81,6 +83,22 @@ def folds(surface: Term, variable: str, lo: Term, hi: Term) -> Iterator[Critical
         return
     for factor in _factors(slope):
         yield Critical((surface, factor), (Within(variable, lo, hi),), True)
+
+
+@lru_cache(maxsize=1024)
+def scattered(surface: Term, variable: str, further: frozenset[str]) -> bool:
+    """Whether a surface is 0 at single places only, by its form: a sum of squares that vary independently.
+
+    Of what else is integrated no section crosses it, but where parameters are such that it happens to.
+    """
+    if not (isinstance(surface, Prim) and surface.op == "add" and all(range_of(a).lo >= 0 for a in surface.args)):
+        return False
+    bases = [base for a in surface.args if (base := squared(a)) is not None and variable in base.free]
+    try:
+        slopes = [[(partial(base, variable), partial(base, other)) for base in bases] for other in further]
+    except NotSmooth:
+        return False
+    return any(not_zero(sub(mul(p, s), mul(q, r))) for rows in slopes for p, q in rows for r, s in rows)
 
 
 def shadows(

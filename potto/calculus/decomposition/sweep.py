@@ -15,7 +15,8 @@ from itertools import islice
 
 from potto.calculus.algebra.radicals import minus
 from potto.calculus.algebra.ranges import positive
-from potto.calculus.decomposition.critical import Critical, Within, folds, shadows
+from potto.calculus.algebra.rational_form import settled
+from potto.calculus.decomposition.critical import Critical, Within, folds, scattered, shadows
 from potto.calculus.solving.enclosable import slope_of
 from potto.calculus.solving.solve import Family, Sections, Unsolvable, sections
 from potto.calculus.surfaces.case_split import cased
@@ -183,7 +184,8 @@ def sweep(
         if f.critical is not None:
             critical[f.critical] = None
         elif f.kind != "center":
-            pool.put(f.surface, (f.path, f.strict) if f.kind == "jump" else None, f.kind == "edge")
+            surface = settled(f.surface, frozenset(term.variables))
+            pool.put(surface, (f.path, f.strict) if f.kind == "jump" else None, f.kind == "edge")
 
     for f in found:
         place(f)
@@ -362,6 +364,7 @@ def _shadows(
             for stop in dict.fromkeys(stop for family in found.families for stop in family.stops):
                 yield substitute(surface, {variable: stop}), True
     meeting = [c for c in cuts if c.roots or c.families or c.roots is None]
+    meeting = [c for c in meeting if not scattered(along(c), variable, further)]
     meeting = [c for n, c in enumerate(meeting) if n < (MOST_JUMPS if c.decides else MOST_PAIRS)]
     for first in meeting:
         for second in meeting:

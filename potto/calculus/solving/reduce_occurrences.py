@@ -120,7 +120,7 @@ def replaced(term: Term, old: Term, new: Term) -> Term:
 
 
 def _from_collected(found: Collected, name: str) -> tuple[Step, ...] | None:
-    found = Collected({m: shorter(c) for m, c in found.parts.items() if not is_zero(c)})
+    found = Collected({m: c for m, c in found.parts.items() if not is_zero(c)})
     atoms = found.atoms
     if not atoms:
         return ()  # constant along the variable: no root is isolated
@@ -138,16 +138,16 @@ def _polynomial(degrees: Degrees, atom: Term) -> tuple[Step, ...] | None:
     unit = _common(d - least for d in degrees)
     if unit is None:
         return None if least == 0 else ((Step(atom, ZERO),) if least > 0 else ())
-    coefficients = {int((d - least) / unit): c for d, c in degrees.items()}
+    if max(degrees) - least > 2 * unit:
+        return None
+    coefficients = {int((d - least) / unit): shorter(c) for d, c in degrees.items()}
     steps = [Step(atom, ZERO)] if least > 0 else []
     inner = atom if unit == 1 else (prim("sqrt", atom) if unit == Fraction(1, 2) else pow_(atom, const(float(unit))))
     highest = max(coefficients)
     if highest == 1:
         roots: tuple[Term, ...] = (quotient(minus(coefficients[0]), coefficients[1]),)
-    elif highest == 2:
-        roots = quadratic(coefficients[2], coefficients[1], coefficients[0])
     else:
-        return None
+        roots = quadratic(coefficients[2], coefficients[1], coefficients[0])
     return (*steps, *(Step(inner, r) for r in roots))
 
 
@@ -213,7 +213,7 @@ def _trigonometric(found: Collected) -> tuple[Step, ...] | None:
     if sin is None or cos is None or len(found.atoms) != 2 or sin.args != cos.args:
         return None
     nought, one = Fraction(0), Fraction(1)
-    table = {(dict(m).get(sin, nought), dict(m).get(cos, nought)): c for m, c in found.parts.items()}
+    table = {(dict(m).get(sin, nought), dict(m).get(cos, nought)): shorter(c) for m, c in found.parts.items()}
     if set(table) <= {(nought, nought), (one, nought), (nought, one)}:
         a, b, c = table[one, nought], table[nought, one], table.get((nought, nought), ZERO)
         turn, size = prim("atan2", a, b), prim("hypot", a, b)

@@ -15,7 +15,7 @@ from fractions import Fraction
 from potto.calculus.algebra.polynomial_in import collect
 from potto.calculus.algebra.radicals import NAN, guarded
 from potto.calculus.algebra.ranges import positive
-from potto.calculus.algebra.rational_form import shorter
+from potto.calculus.algebra.rational_form import settled, shorter
 from potto.calculus.solving.isolate import Guard, Step, Stuck, step
 from potto.calculus.solving.reduce_occurrences import split
 from potto.core.printer import format_term
@@ -107,7 +107,7 @@ def sections(surface: Term, name: str) -> Sections | Unsolvable:
     if name not in surface.free:
         return Unsolvable(f"the condition does not vary with `{name}`")
     search = _Search(name, surface)
-    search.run(Goal(surface, ZERO))
+    search.run(Goal(settled(surface, frozenset((name,))), ZERO))
     roots, families, reasons = search.roots, search.families, list(search.reasons)
     if reasons and not roots and not families:
         return Unsolvable(reasons[0])
