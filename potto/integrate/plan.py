@@ -167,7 +167,7 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve, numb
         tuple((t, v) for t, v in asked.decisions.items() if not isinstance(t, Const)),
         reaches,
         hides,
-        box_of(term, found, body) if reaches and not hides else None,
+        None if inlined is None else box_of(term, found, body, inlined),
         _doublings(term, found),
         None if inlined is None else straight(term, inlined, levels),
         _premise(premises),

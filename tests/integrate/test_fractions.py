@@ -130,3 +130,37 @@ def test_the_area_of_such_a_conic() -> None:
     assert abs(answer.value - value) <= answer.error + 1e-15 * value
     assert abs(answer.tangent - slope) <= answer.tangent_error + 1e-14 * abs(slope)
     assert answer.error <= 1e-10 * value
+
+
+# dot(n, l) is 2 - dot(n, lamp), however it is written; so |l|^2 is less than a number.
+SHADED = """
+def shade(x, y, s, th)
+    c = 2/(1 - 0.3*x - 0.1*y)
+    lx = s - c*x
+    ly = 0.4 - c*y
+    lz = 1.2 - c
+    d2 = lx^2 + ly^2 + lz^2
+    [(0.3*lx + 0.1*ly - lz)/(sqrt(0.3^2 + 0.1^2 + 1)*{}) > th]
+def lit(s, th) integral ([-4, 8], [-4, 4]) shade(x, y, s, th) d(x, y)
+"""
+SHADERS = {"sqrt(d2)": 0.5, "sqrt(d2)*d2": 1.5, "d2": 1.0}
+
+
+@pytest.mark.parametrize("below", SHADERS)
+def test_a_cosine_over_a_power_of_the_distance_lights_a_conic_too(below: str) -> None:
+    def area(s: mp.mpf, th: mp.mpf) -> mp.mpf:
+        normal = (-mp.mpf(0.3), -mp.mpf(0.1), mp.mpf(1))
+        lamp = (s, mp.mpf(0.4), mp.mpf(1.2))
+        cosine = (2 - mp.fdot(normal, lamp)) / mp.sqrt(mp.fdot(normal, normal))
+        return ellipse(s, 1 / (mp.pi * (cosine / th) ** (1 / mp.mpf(SHADERS[below]))))
+
+    at = 0.94389 / 1.2 ** SHADERS[below]  # |l|^2 is less than about 1.2
+    answer = potto.deriv(potto.compile(SHADED.format(below)).lit)((0.5, 1.0), (at, 0.0))
+    with mp.workdps(40):
+        s, th = mp.mpf(0.5), mp.mpf(at)
+        value, slope = float(area(s, th)), float(mp.diff(lambda p: area(p, th), s))
+    assert answer.converged
+    assert answer.evals <= 3_000  # closed roots: nothing is searched for
+    assert abs(answer.value - value) <= answer.error + 1e-14 * value
+    assert abs(answer.tangent - slope) <= answer.tangent_error + 1e-13 * abs(slope)
+    assert answer.error <= 1e-10 * value

@@ -26,6 +26,7 @@ from potto.core.terms import (
     Term,
     add,
     children,
+    const,
     div,
     mul,
     neg,
@@ -113,7 +114,7 @@ def _without_it(term: Term, name: str) -> Term:
         found = normal(term, sums)
         atoms = {a for part in (found.top, found.below) for m in part for a, _ in m} if found else set[Term]()
         if found is not None and not any(name in atom.free for atom in atoms):
-            top, below = as_term(found.top), as_term(found.below)
+            top, below = as_term(found.top, rounded=True), as_term(found.below, rounded=True)
             return term if top is None or below is None else div(top, below)
     return term
 
@@ -163,11 +164,11 @@ def _size(term: Term) -> int:
     return sizes[term]
 
 
-def as_term(polynomial: Polynomial) -> Term | None:
-    """A polynomial as a term; None if a coefficient is no double."""
+def as_term(polynomial: Polynomial, rounded: bool = False) -> Term | None:
+    """A polynomial as a term; None if a coefficient is no double, unless it may be `rounded` to one."""
     terms: list[Term] = []
     for monomial, coefficient in polynomial.items():
-        scale = number(abs(coefficient))
+        scale = const(float(abs(coefficient))) if rounded else number(abs(coefficient))
         if scale is None:
             return None
         term = monomial_term(scale, monomial)

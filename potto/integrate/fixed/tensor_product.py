@@ -2,8 +2,9 @@
 
 Owns `Box` and `uncut`. Of a picture's pixels all but a few lie on one side of every surface. Where a surface is affine
 in each variable of integration, its extremes over a box are at the corners, so that signs there tell whether it
-crosses. Such a box needs no cuts and has no boundary terms: a small product of Gauss rules does, whose coefficients
-tell in each variable whether it was enough. What is not shown to be smooth and accurate here is left to `levels`.
+crosses; of others an enclosure tells. Such a box needs no cuts and has no boundary terms: a small product of Gauss
+rules does, exact for a polynomial; else its coefficients tell in each variable whether it was enough. What is not shown
+to be smooth and accurate here is left to `adaptive`.
 """
 
 from __future__ import annotations
@@ -15,10 +16,14 @@ from functools import lru_cache
 
 import numpy as np
 
+from potto.calculus.algebra.degree import degree
+from potto.calculus.solving.enclosable import enclosable
 from potto.calculus.surfaces.discontinuities import Finding
+from potto.core.kinds import union_of
 from potto.core.terms import Integral, Lam, Prim, Term, function_of, postorder, tuple_
 from potto.integrate.pieces import Evaluator, Sums, components, still
 from potto.integrate.rules.gauss import EPS, gauss, truncation
+from potto.integrate.rules.intervals import Interval, enclosure
 from potto.kernels.cells import Array, Bools, Cell, Value, map_arrays
 
 MOST_VARIABLES = 3
@@ -32,16 +37,25 @@ NODE_ROUNDING = 0.5
 
 @dataclass(frozen=True)
 class Box:
-    """Bounds and surfaces of an integral over a box, as functions of parameters, and of parameters and variables."""
+    """Bounds and surfaces of an integral over a box, as functions of parameters, and of parameters and variables.
+
+    surfaces: those that are affine in each variable. curved: the others. exact: the nodes per variable that do for what
+    is a polynomial between its surfaces.
+    """
 
     variables: tuple[str, ...]
     bounds: Lam
     surfaces: Lam
+    curved: tuple[Term, ...]
     body: Lam
+    exact: int | None
 
 
-def box_of(term: Integral, found: Iterable[Finding], body: Lam) -> Box | None:
-    """The box of an integral, or None if its bounds depend on its variables or a surface may hide between corners."""
+def box_of(term: Integral, found: Iterable[Finding], body: Lam, inlined: Term) -> Box | None:
+    """The box of an integral, or None if its bounds depend on its variables or a surface can't be enclosed over it.
+
+    inlined: the integrand with calls carried out.
+    """
     names = frozenset(term.variables)
     bounds = tuple(bound for pair in term.bounds for bound in pair)
     if len(names) > MOST_VARIABLES or any(b.free & names for b in bounds) or any(term.hints):
@@ -49,10 +63,14 @@ def box_of(term: Integral, found: Iterable[Finding], body: Lam) -> Box | None:
     if any(isinstance(node, Integral) for node in postorder(term.body)):
         return None
     surfaces = tuple(dict.fromkeys(f.surface for f in found if f.surface.free & names))
-    if not all(affine_in_each(surface, names) for surface in surfaces):
+    curved = tuple(surface for surface in surfaces if not affine_in_each(surface, names))
+    if not all(map(enclosable, curved)):
         return None
-    shown = tuple_(surfaces)
-    return Box(term.variables, function_of(tuple_(bounds)), function_of(shown), body)
+    shown = tuple_(surface for surface in surfaces if surface not in curved)
+    degrees = [degree(inlined, variable) for variable in term.variables]
+    nodes = max(ORDERS[-1] + 1 if d is None else d // 2 + 1 for d in degrees)
+    exact = nodes if nodes <= ORDERS[-1] else None
+    return Box(term.variables, function_of(tuple_(bounds)), function_of(shown), curved, body, exact)
 
 
 def affine_in_each(term: Term, names: frozenset[str]) -> bool:
@@ -87,7 +105,7 @@ def uncut(box: Box, machine: Evaluator, env: dict[str, Value], batch: int) -> tu
         return None
     done: Bools = np.zeros(batch, dtype=bool)
     sums: Sums | None = None
-    for order in ORDERS:
+    for order in ORDERS if box.exact is None else (box.exact,):
         todo = np.nonzero(free & ~done)[0]
         size = max(1, POINTS // order ** len(box.variables))
         for index in (todo[i : i + size] for i in range(0, todo.size, size)):
@@ -126,6 +144,17 @@ def _free_of_surfaces(box: Box, machine: Evaluator, env: dict[str, Value], low: 
         at = np.broadcast_to(value.v, (len(corners), low.shape[1]))
         near = NEAR * np.abs(at).max(axis=0)
         free = np.asarray(free & ((at > near).all(axis=0) | (at < -near).all(axis=0)))
+    index = np.nonzero(free)[0] if box.curved else ()
+    if len(index):
+        ranges: dict[str, Interval] = {}
+        for name in union_of(box.curved) - set(box.variables):
+            cell = map_arrays(env[name], lambda a: a[index])
+            assert isinstance(cell, Cell)
+            off = 0.0 if cell.e is None else cell.e
+            ranges[name] = (cell.v - off, cell.v + off)
+        ranges |= {x: (low[n, index], high[n, index]) for n, x in enumerate(box.variables)}
+        for least, most in enclosure(box.curved, ranges):
+            free[index] &= (least > 0) | (most < 0)
     return free
 
 
@@ -159,7 +188,8 @@ def _product(
         for d, tangent in enumerate(cell.t or (None,) * k):
             h[c, 1 + d] = 0.0 if tangent is None else tangent
     channels = h.reshape(-1, *h.shape[2:])
-    integral, error, floor = _estimated(channels, order, np.maximum(np.abs(low), np.abs(high)) / size, weights)
+    far, exact = np.maximum(np.abs(low), np.abs(high)) / size, order == box.exact
+    integral, error, floor = _estimated(channels, order, far, weights, exact)
     volume = size.prod(axis=0)
     asked = np.maximum(0.5 * machine.rtol * np.abs(integral), 0.5 * machine.atol / volume)
     good: Bools = (error <= np.maximum(asked, 8 * floor)).all(axis=0)
@@ -170,10 +200,12 @@ def _product(
     return Sums(total[:, 0], bound[:, 0], total[:, 1:], bound[:, 1:], gross=gross), good
 
 
-def _estimated(h: Array, order: int, far: Array, weights: tuple[Array, ...]) -> tuple[Array, Array, Array]:
+def _estimated(
+    h: Array, order: int, far: Array, weights: tuple[Array, ...], exact: bool
+) -> tuple[Array, Array, Array]:
     """Mean values of channels over boxes, from values at nodes (C, n^d, B); truncation errors and rounding, (C, B).
 
-    far: how far from 0 a box lies in each variable, in its own lengths.
+    far: how far from 0 a box lies in each variable, in its own lengths. exact: whether the rule is.
     """
     rule, boxes = gauss(order), h.shape[-1]
     error = np.zeros((h.shape[0], boxes))
@@ -182,7 +214,7 @@ def _estimated(h: Array, order: int, far: Array, weights: tuple[Array, ...]) -> 
         coefficients = rule.transform.T @ h.reshape(h.shape[0], order, -1)
         sizes = np.abs(coefficients).reshape(h.shape[0], order, rest.size, boxes)
         mean = np.moveaxis(sizes[:, :, 0] if rest.size == 1 else np.einsum("r,cnrb->cnb", rest, sizes), 1, -1)
-        error += truncation(mean)
+        error += 0.0 if exact else truncation(mean)
         floor += (mean @ rule.slopes) * np.minimum(NODE_ROUNDING * EPS * distance, 1.0)
         h = coefficients[:, 0].reshape(h.shape[0], rest.size, boxes)
     return h[:, 0], error, floor
