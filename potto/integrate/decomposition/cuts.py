@@ -244,45 +244,64 @@ def _slivers(
     plan: LevelPlan, rows: list[Row], low: Array, high: Array, ends: tuple[Any, Any], directions: int, batch: int
 ) -> list[Sliver]:
     jumps = [row for row in rows if row.cut >= 0 and plan.level.cuts[row.cut].decides]
-    places = [as_array(row.x, batch) for row in jumps]
-    off = [SEARCHED * EPS * np.abs(x) if row.e is None else row.e for row, x in zip(jumps, places, strict=True)]
-    off = [np.where(np.isfinite(e), e, 0.0) for e in off]
-    fast = [np.abs(tangents(row.t, batch, directions)).max(axis=0, initial=0.0) / (high - low) for row in jumps]
+    if not jumps:
+        return []
+    x = np.stack([as_array(row.x, batch) for row in jumps])
+    off = np.stack([as_array(np.nan if row.e is None else row.e, batch) for row in jumps])
+    off = np.where(np.isnan(off), SEARCHED * EPS * np.abs(x), off)
+    off = np.where(np.isfinite(off), off, 0.0)
     out: list[Sliver] = []
 
-    def put(
-        cuts: tuple[int, ...], x: Array, gap: Any, width: Any, speed: Array, upper: bool, passes: Any = 0.0
-    ) -> None:
+    def put(of: tuple[int, ...], at: Array, gap: Array, width: Array, upper: bool, passes: Any = 0.0) -> None:
         owner = np.nonzero((gap <= width) & (width > 0) & (low < high))[0]
         if owner.size:
             every = np.broadcast_to(np.where(gap > 0, passes, 0.0), (directions, batch))[:, owner]
-            wide = np.broadcast_to(width, batch)[owner]
-            out.append(Sliver(cuts, owner, x[owner], wide, speed[owner], upper, every))
+            moves = np.abs([tangents(jumps[i].t, batch, directions) for i in of]).max(axis=(0, 1), initial=0.0)
+            fast = (moves / (high - low))[owner]
+            out.append(Sliver(tuple(jumps[i].cut for i in of), owner, at[owner], width[owner], fast, upper, every))
 
-    for i, x in enumerate(places):
-        t = tangents(jumps[i].t, batch, directions)
-        for bound, (moves, e), upper in ((low, ends[0], False), (high, ends[1], True)):
-            put((jumps[i].cut,), bound, np.abs(x - bound), off[i] + e, fast[i], upper, np.abs(t - moves))
-        for j in range(i):
-            if jumps[j].cut != jumps[i].cut:
-                gap = np.where((x > low) & (x < high), np.abs(x - places[j]), np.inf)
-                put((jumps[j].cut, jumps[i].cut), x, gap, off[i] + off[j], np.maximum(fast[i], fast[j]), True)
+    for bound, (moves, e), upper in ((low, ends[0], False), (high, ends[1], True)):
+        gap, width = np.abs(x - bound), off + e
+        for i in np.nonzero((gap <= width).any(axis=1))[0].tolist():
+            put((i,), bound, gap[i], width[i], upper, np.abs(tangents(jumps[i].t, batch, directions) - moves))
+    for j, i in _close(x, off):
+        if jumps[j].cut != jumps[i].cut:
+            gap = np.where((x[i] > low) & (x[i] < high), np.abs(x[i] - x[j]), np.inf)
+            put((j, i), x[i], gap, off[i] + off[j], True)
     return out
+
+
+def _close(x: Array, off: Array) -> list[tuple[int, int]]:
+    """The pairs of rows that are as close for some member as they may be off; by neighbours, next but one, and so on,
+    until none are close enough."""
+    order = np.argsort(x, axis=0, kind="stable")
+    x, off = np.take_along_axis(x, order, axis=0), np.take_along_axis(off, order, axis=0)
+    pairs: set[tuple[int, int]] = set()
+    for step in range(1, len(x)):
+        gap = x[step:] - x[:-step]
+        if not (gap <= 2 * off.max(axis=0)).any():
+            break
+        place, owner = np.nonzero(gap <= off[step:] + off[:-step])
+        both = np.sort((order[place, owner], order[place + step, owner]), axis=0)
+        pairs.update(zip(*both.tolist(), strict=True))
+    return sorted(pairs)
 
 
 def _folds(plan: LevelPlan, rows: list[Row], low: Array, high: Array, directions: int, batch: int) -> list[Fold]:
     """Where roots of one surface are at one place, or one on which the integrand jumps moves infinitely fast."""
     out: list[Fold] = []
-    for i, row in enumerate(rows):
+    before: dict[int, list[Any]] = {}
+    for row in rows:
+        others = before.setdefault(row.cut, [])
+        others.append(row.x)
         if row.cut < 0 or not (plan.level.cuts[row.cut].decides or row.turning or _any_turning(plan, row)):
             continue
         x = as_array(row.x, batch)
         folded: Any = np.zeros(batch, dtype=bool)
         if plan.level.cuts[row.cut].decides and any(not np.isfinite(t).all() for t in row.t if t is not None):
             folded = ~np.isfinite(tangents(row.t, batch, directions)).all(axis=0)
-        for other in rows[:i]:
-            if other.cut == row.cut:
-                folded = folded | (x == other.x)
+        for other in others[:-1]:
+            folded = folded | (x == other)
         owner = np.nonzero(folded & (x >= low) & (x <= high))[0]
         if owner.size:
             out.append(Fold(row.cut, owner, x[owner]))
