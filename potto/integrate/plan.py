@@ -163,7 +163,9 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve, numb
         levels,
         groups,
         body,
-        vanishing_of(term.body, {j.path: (g.number, j.orientation) for g in groups for j in g.cut.jumps}),
+        vanishing_of(
+            term.body, {j.path: (g.number, j.orientation) for g in groups for j in g.cut.jumps}, resolve=resolve
+        ),
         tuple((t, v) for t, v in asked.decisions.items() if not isinstance(t, Const)),
         reaches,
         hides,

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Protocol
 
-from potto.calculus.surfaces.trace import CallSite, Layout, is_lazy, layout
+from potto.calculus.surfaces.trace import CallSite, Layout, immediate, integrating, is_lazy, layout
 from potto.core.terms import (
     App,
     Branch,
@@ -37,6 +37,7 @@ from potto.core.terms import (
     Tuple,
     Var,
     postorder,
+    postorder_by,
 )  # fmt: skip
 from potto.kernels import support
 from potto.kernels.cells import Cell, Pattern, Trace, Value, scalar_parts
@@ -54,6 +55,7 @@ class Runtime(Protocol):
     def derived(self, function: Value) -> Value: ...
     def call(self, function: Value, groups: tuple[tuple[Value, ...], ...], trace: Trace | None) -> Value: ...
     def integral(self, term: Integral, env: dict[str, Value]) -> Value: ...
+    def added(self, terms: tuple[Term, ...], env: dict[str, Value]) -> Value: ...
     def sum(self, term: Sum, lo: Value, hi: Value, env: dict[str, Value], trace: Trace | None) -> Value: ...
     def lazy(self, mask: Any, term: If | Branch, env: dict[str, Value], traces: tuple[Any, Any]) -> Value: ...
     def falls(self, surface: Any, strict: bool) -> Any: ...
@@ -154,7 +156,7 @@ class _Compiler:
             self.env[param] = self.unpack(argument, pattern)
 
     def compile(self) -> Kernel:
-        for node in self.layout.order:
+        for node in postorder_by(self.lam.body, _at_once):
             self.values[node] = self.emit(node)
         result = self.pack(self.values[self.lam.body])
         body = [*self.out.lines, f"return {result}"]
@@ -249,7 +251,11 @@ class _Compiler:
             case Var():
                 return self.env[term.name]
             case Prim():
-                return self.out.apply(term.op, [self.number(a) for a in term.args])
+                together = integrating(term)
+                args = [self.number(a) for a in term.args if a not in together]
+                if together:
+                    args.append(self.scalar(self.added(tuple(a for a in term.args if a in together))))
+                return self.out.apply(term.op, args)
             case If() | Branch():
                 return self.conditional(term)
             case Tuple() | ListOf():
@@ -373,12 +379,22 @@ class _Compiler:
         env, known = self.environment(term.free)
         return self.dynamic(f"rt.integral({self.keep(term)}, {env})", True, known)
 
+    def added(self, terms: tuple[Term, ...]) -> Known:
+        env, known = self.environment(frozenset().union(*(term.free for term in terms)))
+        return self.dynamic(f"rt.added({self.keep(terms)}, {env})", True, known)
+
     def sum(self, term: Sum) -> Known:
         env, known = self.environment(term.body.free - {term.variable})
         lo, hi = self.pack(self.known(term.lo)), self.pack(self.known(term.hi))
         inexact = self.out.rounding or self.rt.inexact(term.body) or any(map(_inexact, known))
         text = f"rt.sum({self.keep(term)}, {lo}, {hi}, {env}, {self.trace(term, 0)})"
         return self.dynamic(text, inexact, known)
+
+
+def _at_once(term: Term) -> tuple[Term, ...]:
+    """The children that come before a term itself; summands that integrate are evaluated together."""
+    together = integrating(term) if isinstance(term, Prim) else ()
+    return tuple(part for part in immediate(term) if part not in together)
 
 
 def _inexact(known: Known) -> bool:

@@ -40,7 +40,13 @@ def _integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
     return integral(machine, term, env)
 
 
-SEMANTICS = Semantics(call_derivative, call_paired, lazy, total, _integral)
+def _added(machine: Machine, terms: tuple[Term, ...], env: dict[str, Value]) -> Value:
+    from potto.runtime.integration.summands import added
+
+    return added(machine, terms, env)
+
+
+SEMANTICS = Semantics(call_derivative, call_paired, lazy, _added, total, _integral)
 
 
 class Program:

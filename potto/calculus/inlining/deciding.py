@@ -10,11 +10,12 @@ from collections.abc import Iterable
 
 from potto.calculus.inlining.currying import fitted, sizes_of, uncurry
 from potto.calculus.surfaces.discontinuities import Resolve, underlying
-from potto.core.terms import App, Global, If, Lam, Sum, Term, postorder
+from potto.core.terms import App, Global, If, Lam, Prim, Sum, Term, postorder
 
 
-def deciding(terms: Iterable[Term], resolve: Resolve) -> frozenset[str]:
-    """The free names of terms that reach a condition of a recursion or a bound of a sum, through calls.
+def deciding(terms: Iterable[Term], resolve: Resolve, exponents: bool = False) -> frozenset[str]:
+    """The free names of terms that reach a condition of a recursion or a bound of a sum, through calls; or an exponent,
+    if these count.
 
     Where it is not known which function is called, everything that it is given counts.
     """
@@ -26,11 +27,11 @@ def deciding(terms: Iterable[Term], resolve: Resolve) -> frozenset[str]:
     while changed:
         changed = False
         for function in functions:
-            names = _names(function.body, function in recursive, known, resolve)
+            names = _names(function.body, function in recursive, exponents, known, resolve)
             if names != known[function]:
                 known[function] = names
                 changed = True
-    return frozenset().union(*(_names(term, False, known, resolve) & term.free for term in whole))
+    return frozenset().union(*(_names(term, False, exponents, known, resolve) & term.free for term in whole))
 
 
 def _reached(terms: list[Term], resolve: Resolve) -> dict[Lam, None]:
@@ -48,7 +49,9 @@ def _reached(terms: list[Term], resolve: Resolve) -> dict[Lam, None]:
     return found
 
 
-def _names(term: Term, recursive: bool, known: dict[Lam, frozenset[str]], resolve: Resolve) -> frozenset[str]:
+def _names(
+    term: Term, recursive: bool, exponents: bool, known: dict[Lam, frozenset[str]], resolve: Resolve
+) -> frozenset[str]:
     names: set[str] = set()
     for node in postorder(term):
         match node:
@@ -56,6 +59,8 @@ def _names(term: Term, recursive: bool, known: dict[Lam, frozenset[str]], resolv
                 names |= node.condition.free
             case Sum():
                 names |= node.lo.free | node.hi.free
+            case Prim(op="pow") if exponents:
+                names |= node.args[1].free
             case App():
                 names |= _given(node, known, resolve)
             case _:

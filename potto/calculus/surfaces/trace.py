@@ -17,11 +17,13 @@ from potto.core.terms import (
     If,
     Integral,
     Lam,
+    Prim,
     Sum,
     Term,
     children,
     function_of,
     lam,
+    outside,
     postorder,
     postorder_by,
 )  # fmt: skip
@@ -107,6 +109,20 @@ def immediate(term: Term) -> tuple[Term, ...]:
             return (head, *(a for group in groups for a in group))
         case _:
             return children(term)
+
+
+@lru_cache(maxsize=16384)
+def integrating(term: Prim) -> frozenset[Term]:
+    """The summands, if they are several, that are made of integrals and arithmetic, so that none has a site."""
+    if term.op != "add":
+        return frozenset()
+    found = frozenset(arg for arg in term.args if _integrates(arg))
+    return found if len(found) > 1 else frozenset()
+
+
+def _integrates(term: Term) -> bool:
+    kinds = {type(node) for node in outside(term, (Integral, Lam, Deriv))}
+    return Integral in kinds and kinds.isdisjoint((App, Branch, If, Sum))
 
 
 @lru_cache(maxsize=16384)

@@ -10,22 +10,50 @@ from typing import Any
 
 import numpy as np
 
-from potto.calculus.surfaces.trace import layout
-from potto.core.terms import Branch, Const, If, ListOf, Prim, Proj, Term, Tuple, postorder
+from potto.calculus.inlining.currying import arguments_of, sizes_of, uncurry
+from potto.calculus.surfaces.discontinuities import Resolve
+from potto.calculus.surfaces.trace import layout, spine
+from potto.core.terms import App, Branch, Const, If, Lam, ListOf, Prim, Proj, Term, Tuple, postorder, var
 from potto.kernels.cells import Mask
 from potto.primitives import EXACT
 
+Numbers = Mapping[tuple[int, ...], tuple[int, int]]
 
-def vanishing_of(body: Term, numbers: Mapping[tuple[int, ...], tuple[int, int]], part: Term | None = None) -> Any:
+
+def vanishing_of(body: Term, numbers: Numbers, part: Term | None = None, resolve: Resolve = lambda head: None) -> Any:
     """A test on sides: True, False, or ("and" | "or", tests), or (group, orientation, then, orelse).
 
-    part: what is tested, a part of the body that the paths of `numbers` are those of; all of it if None.
+    part: what is tested, a part of the body that the paths of `numbers` are those of; all of it if None. resolve: gives
+    the functions that are looked into where they are called.
     """
+    return _tests(body, numbers, {}, resolve)[body if part is None else part]
+
+
+def _tests(body: Term, numbers: Numbers, given: Mapping[Term, Any], resolve: Resolve) -> dict[Term, Any]:
+    """The tests of all parts of a body. given: those of its parameters."""
     index = layout(body).index
-    memo: dict[Term, Any] = {}
+    memo = dict(given)
     for node in postorder(body):
-        memo[node] = _zero(node, memo, index, numbers)
-    return memo[body if part is None else part]
+        if node not in given:
+            site = index.get((node, 0)) if isinstance(node, App) else None
+            memo[node] = (_zero(node, memo, index, numbers) if site is None or not isinstance(node, App)
+                          else _called(node, memo, site, numbers, resolve))  # fmt: skip
+    return memo
+
+
+def _called(call: App, memo: dict[Term, Any], site: int, numbers: Numbers, resolve: Resolve) -> Any:
+    """The test of what a function gives, in which some of its branches are told from sides."""
+    inner = {path[1:]: place for path, place in numbers.items() if path[:1] == (site,) and path[1:]}
+    head, groups = spine(call)
+    function = resolve(head) if inner else None
+    if not isinstance(function, Lam):
+        return False
+    params, body = uncurry(function, sizes_of(groups))
+    args = arguments_of(function, groups)
+    if len(args) != len(params):
+        return False
+    given: dict[Term, Any] = {var(name): memo.get(arg, False) for name, arg in zip(params, args, strict=True)}
+    return _tests(body, inner, given, resolve)[body]
 
 
 def _zero(node: Term, memo: dict[Term, Any], index: Mapping[tuple[Term, int], int], numbers: Any) -> Any:

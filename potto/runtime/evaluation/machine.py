@@ -44,12 +44,14 @@ Groups = tuple[tuple[Value, ...], ...]
 class Semantics:
     """What is done by more than kernels: derivatives called, conditionals with one side taken, sums, integrals.
 
-    derivative: of a function, called with duals; paired: a function on duals that was written by hand.
+    derivative: of a function, called with duals; paired: a function on duals that was written by hand. added: summands
+    that integrate.
     """
 
     derivative: Callable[[Machine, Derivative, Groups, Trace | None], Value]
     paired: Callable[[Machine, Paired, Groups, Trace | None], Value]
     conditional: Callable[[Machine, Any, If | Branch, dict[str, Value], tuple[Any, Any]], Value]
+    added: Callable[[Machine, tuple[Term, ...], dict[str, Value]], Value]
     sum: Callable[[Machine, Sum, Value, Value, dict[str, Value], Trace | None], Value]
     integral: Callable[[Machine, Integral, dict[str, Value]], Value]
 
@@ -71,6 +73,7 @@ class Linker:
         self.terms: dict[tuple[str, str], Term] = {}
         self.exactness: dict[Term, bool] = {}
         self.reach = Reach(lambda name: self.term(name.module, name.name))
+        self.alike: dict[Any, Any] = {}
         self.placed: dict[tuple[Integral, tuple[Shape, ...], bool], Term] = {}
         self.constants: dict[tuple[str, str, Settings], Value] = {}
         self.duals: dict[tuple[Lam, bool], Lam] = {}
@@ -168,6 +171,10 @@ class Machine:
         if self.rounding:
             return self
         return replace(self, rounding=True)
+
+    def standing(self) -> Machine:
+        """The machine for which surfaces, bounds and deltas stand still."""
+        return replace(self, frozen=True)
 
     # Record
 
@@ -337,6 +344,9 @@ class Machine:
 
     def lazy(self, mask: Any, term: If | Branch, env: dict[str, Value], traces: tuple[Any, Any]) -> Value:
         return self.linker.semantics.conditional(self, mask, term, env, traces)
+
+    def added(self, terms: tuple[Term, ...], env: dict[str, Value]) -> Value:
+        return self.linker.semantics.added(self, terms, env)
 
     def sum(self, term: Sum, lo: Value, hi: Value, env: dict[str, Value], trace: Trace | None) -> Value:
         return self.linker.semantics.sum(self, term, lo, hi, env, trace)

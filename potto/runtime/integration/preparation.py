@@ -35,7 +35,6 @@ from potto.core.terms import (
     children,
     deriv,
     integral,
-    neg,
     postorder,
     rebuild,
     substitute,
@@ -69,10 +68,13 @@ def prepared(term: Integral, reach: Reach) -> Term:
     body = term.body
     if isinstance(body, Sum) and not (body.lo.free | body.hi.free) & set(term.variables):
         return sum_(body.variable, body.lo, body.hi, _over(term, body.body))
-    if isinstance(body, Prim) and body.op == "neg":
-        inner = _over(term, body.args[0])
+    if isinstance(body, Prim) and body.op in ("neg", "mul", "div"):
+        varying = [arg for arg in body.args if arg.free.intersection(term.variables)]
+        if len(varying) != 1 or (body.op == "div" and varying[0] is not body.args[0]):
+            return term
+        inner = _over(term, varying[0])
         ready = prepared(inner, reach)
-        return neg(ready) if ready is not inner else term
+        return term if ready is inner else rebuild(body, tuple(ready if a in varying else a for a in body.args))
     if isinstance(body, Prim) and body.op == "add":
         return _apart(term, body, reach)
     return term
@@ -240,7 +242,7 @@ def _apart(term: Integral, body: Prim, reach: Reach) -> Term:
     if sum(counts) <= FEW and not any(isinstance(arg, Sum) for arg in body.args):
         return term
     smooth = [arg for arg, count in zip(body.args, counts, strict=True) if not count and not isinstance(arg, Sum)]
-    rest = [arg for arg in body.args if arg not in smooth]
+    rest = [arg for arg, count in zip(body.args, counts, strict=True) if count or isinstance(arg, Sum)]
     if len(rest) + bool(smooth) < 2:
         return term
     parts: list[Term] = [_over(term, add(*smooth))] if smooth else []

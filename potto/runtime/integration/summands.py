@@ -1,0 +1,277 @@
+"""Summands that integrate: those alike but for their numbers share one plan and are evaluated as one batch.
+
+Owns `added`. A member of a batch carries only the directions in which it moves, whichever these are, so that n summands
+with parameters of their own cost n times one of them, gradient and all. Members that have something to say (why they
+are not accurate, that they have two derivatives) are evaluated as they are written, so that they say it of that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from potto.calculus.differentiation.tangents import FUNCTION
+from potto.calculus.inlining.alike import Alike, Leaf, alike
+from potto.core.terms import Const, Integral, Lam, Term, Var
+from potto.diagnostics import PottoError
+from potto.kernels import errors
+from potto.kernels.cells import Array, Bools, Cell, Number, Value, all_arrays, map_arrays, pad
+from potto.kernels.whole import ROUNDING, UNIT_ROUNDOFF
+from potto.runtime.answers.convergence import widest
+from potto.runtime.evaluation.machine import Machine
+from potto.runtime.evaluation.sums import CHUNK
+from potto.runtime.integration.preparation import shape_of
+
+Slots = tuple[int, ...]  # the directions in which a member moves
+SAMPLED = ("mc", "qmc")  # methods whose errors are no less for one summand than for many
+SUM = 8 * UNIT_ROUNDOFF  # what numpy's pairwise sums round off, as a part of all magnitudes, as in `sums`
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Summands of one shape, as `Alike` has them, with columns of nothing but numbers as arrays."""
+
+    function: Lam
+    columns: tuple[Array | tuple[Leaf, ...] | str, ...]
+    places: tuple[int, ...]
+
+    def part(self, index: slice) -> Batch:
+        columns = tuple(c if isinstance(c, str) else c[index] for c in self.columns)
+        return Batch(self.function, columns, self.places[index])
+
+
+@dataclass(frozen=True)
+class Grouped:
+    """Summands that are alike, with the names that each group needs, and the places of those that are not."""
+
+    batches: tuple[tuple[Batch, frozenset[str]], ...]
+    alone: tuple[int, ...]
+
+
+def added(machine: Machine, terms: tuple[Term, ...], env: dict[str, Value]) -> Value:
+    """The sum of terms that are made of integrals and arithmetic."""
+    parts: list[Value] = []
+    alone: Sequence[int] = range(len(terms))
+    if machine.root and machine.costs is None:  # costs are told of each condition as it is written
+        grouped = _grouped(machine, terms, env)
+        left = list(grouped.alone)
+        for batch, names in grouped.batches:
+            _together(machine, batch, {name: env[name] for name in names}, parts, left)
+        alone = sorted(left)
+    return _sum([*parts, *(_single(machine, terms[place], env) for place in alone)], machine.directions)
+
+
+def _single(machine: Machine, term: Term, env: dict[str, Value]) -> Value:
+    here = {name: env[name] for name in term.free}
+    return machine.integral(term, here) if isinstance(term, Integral) else machine.term(term, here)
+
+
+def _grouped(machine: Machine, terms: tuple[Term, ...], env: dict[str, Value]) -> Grouped:
+    """The summands by what is alike of them, for values built as these are; found once."""
+    kinds = tuple((name, shape_of(value)) for name, value in env.items())
+    known = machine.linker.alike.get((terms, kinds))
+    if known is None:
+        numbers = {name: shape for name, shape in kinds if FUNCTION not in _flat(shape)}
+        groups, alone = alike(terms, numbers, machine.linker.function)
+        batches = tuple((_batch(group), frozenset().union(*(terms[p].free for p in group.places))) for group in groups)
+        known = machine.linker.alike[terms, kinds] = Grouped(batches, tuple(alone))
+    return known
+
+
+def _flat(shape: object) -> tuple[object, ...]:
+    return tuple(part for item in shape for part in _flat(item)) if isinstance(shape, tuple) else (shape,)
+
+
+def _batch(group: Alike) -> Batch:
+    def column(leaves: tuple[Leaf, ...] | str) -> Array | tuple[Leaf, ...] | str:
+        if isinstance(leaves, str) or any(isinstance(leaf, Var) for leaf in leaves):
+            return leaves
+        return np.array([leaf.value for leaf in leaves if isinstance(leaf, Const)])
+
+    return Batch(group.function, tuple(map(column, group.columns)), group.places)
+
+
+def _together(machine: Machine, batch: Batch, env: dict[str, Value], parts: list[Value], left: list[int]) -> None:
+    """Put sums over the members, so many at a time, and the places of those that are to be evaluated as written."""
+    shape = np.broadcast_shapes(*(a.shape for value in env.values() for a in all_arrays(value)))
+    step = max(1, CHUNK // max(1, int(np.prod(shape))))
+    for start in range(0, len(batch.places), step):
+        chunk = batch.part(slice(start, start + step))
+        found, bad = _evaluated(machine, chunk, env, shape)
+        left += [chunk.places[i] for i in np.nonzero(bad)[0]]
+        if found is not None:
+            parts.append(found)
+
+
+def _evaluated(
+    machine: Machine, batch: Batch, env: dict[str, Value], shape: tuple[int, ...]
+) -> tuple[Cell | None, Bools]:
+    """The sum over the members that have nothing to say, and which have."""
+    size, record = len(batch.places), machine.record
+    bad = np.zeros(size, dtype=bool)
+    slots = _slots(batch, env, machine.directions)
+    width = max(map(len, slots))
+    args = [_column(column, env, slots, width) for column in batch.columns]
+    kept = record.shortfalls, record.edges, record.within
+    record.shortfalls, record.edges, record.within = {}, [], 0.0
+    try:
+        with machine.among(np.arange(size)) as together:
+            value = pad(together.with_directions(width).run(batch.function, args, None), width)
+        within, told = record.within, [*record.shortfalls.values(), *(np.isfinite(e.backward) for e in record.edges)]
+    except PottoError:  # as it is written, it says what is wrong, and where
+        return None, ~bad
+    finally:
+        record.shortfalls, record.edges, record.within = kept
+    if not isinstance(value, Cell):
+        raise errors.not_a_number(value)
+    told += [np.isnan(value.v), np.isinf(value.v), *([] if value.e is None else [~np.isfinite(value.e)])]
+    for where in (*told, bool(together.events)):
+        bad |= np.broadcast_to(where, (*np.shape(where)[:-1], size)).reshape(-1, size).any(axis=0)
+    if bad.all():
+        return None, bad
+    parts = _Parts(value, (*shape, size), slots, machine.directions)
+    whole = parts.total(~bad)
+    if record.methods.isdisjoint(SAMPLED) and (lacking := parts.lacking(whole, machine.rtol, within) & ~bad).any():
+        bad |= lacking
+        if bad.all():
+            return None, bad
+        whole = parts.total(~bad)
+    if np.shape(within) == (*shape, size):
+        within = within[..., ~bad].max(axis=-1)
+    record.within = widest(record.within, within if shape else float(np.min(within)))
+    return whole, bad
+
+
+# Members with directions of their own
+
+
+def _slots(batch: Batch, env: dict[str, Value], directions: int) -> list[Slots]:
+    """Per member, in which directions it moves."""
+    moving = {name: frozenset(_moving(value, directions)) for name, value in env.items()}
+    shared = frozenset[int]().union(*(moving[c] for c in batch.columns if isinstance(c, str)))
+    own = [c for c in batch.columns if isinstance(c, tuple)]
+    if not own or len(shared) == directions:
+        return [tuple(sorted(shared))] * len(batch.places)
+    return [
+        tuple(sorted(shared.union(*(moving[leaf.name] for leaf in leaves if isinstance(leaf, Var)))))
+        for leaves in zip(*own, strict=True)
+    ]
+
+
+def _moving(value: Value, directions: int) -> list[int]:
+    """The directions in which a value moves; a function may move in any."""
+    if isinstance(value, Cell):
+        return [d for d, t in enumerate(value.t) if t is not None]
+    if isinstance(value, tuple):
+        return [d for item in value for d in _moving(item, directions)]
+    return list(range(directions))
+
+
+def _column(
+    column: Array | tuple[Leaf, ...] | str, env: dict[str, Value], slots: Sequence[Slots], width: int
+) -> Value:
+    """What stands in the place of one parameter: members along the last axis."""
+    if isinstance(column, np.ndarray):
+        return Cell(column, None, (None,) * width)
+    if isinstance(column, str) and slots.count(slots[0]) == len(slots):
+        return map_arrays(_narrowed(env[column], slots[0], width), lambda a: a[..., None])
+    leaves = (column,) * len(slots) if isinstance(column, str) else column
+    values = [Cell(x.value) if isinstance(x, Const) else env[x if isinstance(x, str) else x.name] for x in leaves]
+    return _stacked([_narrowed(value, own, width) for value, own in zip(values, slots, strict=True)])
+
+
+def _narrowed(value: Value, slots: Slots, width: int) -> Value:
+    """A value with its tangents in some directions alone."""
+    if isinstance(value, tuple):
+        return tuple(_narrowed(item, slots, width) for item in value)
+    if not isinstance(value, Cell):
+        return value
+    more = (None,) * (width - len(slots))
+    t, et = ((tuple([x[d] for d in slots]) if x else (None,) * len(slots)) + more for x in (value.t, value.et))
+    return Cell(value.v, value.e, t, et)
+
+
+def _stacked(values: Sequence[Value]) -> Value:
+    """Values that are built alike as one, along one more axis."""
+    if isinstance(values[0], tuple):
+        return tuple(map(_stacked, zip(*values, strict=True)))
+    cells = [value for value in values if isinstance(value, Cell)]
+    t, et = (tuple(map(_along, zip(*(getattr(cell, name) for cell in cells)))) for name in ("t", "et"))
+    v = _along([cell.v for cell in cells])
+    assert v is not None
+    return Cell(v, _along([cell.e for cell in cells]), t, et)
+
+
+def _along(parts: Sequence[Number | None]) -> Number | None:
+    if all(x is None for x in parts):
+        return None
+    given = [0.0 if x is None else x for x in parts]
+    batches = any(isinstance(x, np.ndarray) for x in given)
+    return np.stack(np.broadcast_arrays(*given), axis=-1) if batches else np.array(given)
+
+
+# Sums
+
+
+class _Parts:
+    """The numbers of members and how far off they are, (..., m) each, by what they are added up to: in `into` 0 for the
+    value, 1 and on for the tangents, and a number beyond those for nothing."""
+
+    def __init__(self, value: Cell, shape: tuple[int, ...], slots: Sequence[Slots], directions: int) -> None:
+        numbers, off = (value.v, *value.t), (value.e, *value.et)
+        self.numbers, self.off = (
+            np.stack([np.broadcast_to(0.0 if x is None else x, shape) for x in parts], axis=-2)
+            for parts in (numbers, off)
+        )
+        self.batch, self.directions = shape[:-1], directions
+        width = len(value.t)
+        members = slots[:1] if slots.count(slots[0]) == len(slots) else slots
+        into = np.array([(0, *(d + 1 for d in own), *(directions + 1,) * (width - len(own))) for own in members]).T
+        self.into = np.broadcast_to(into, (1 + width, len(slots)))
+
+    def total(self, keep: Bools) -> Cell:
+        """The sums over some members, and what adding them up rounds off."""
+        into = self.into[:, keep].reshape(-1)
+        order = np.argsort(into, kind="stable")
+        ends = np.searchsorted(into[order], np.arange(self.directions + 2))
+        numbers, off = (x[..., keep].reshape(*self.batch, -1)[..., order] for x in (self.numbers, self.off))
+        found: list[tuple[Number | None, Number | None]] = [(None, None)] * (self.directions + 1)
+        for place in np.unique(into[into <= self.directions]).tolist():
+            here = slice(ends[place], ends[place + 1])
+            size = np.abs(numbers[..., here])
+            sums = numbers[..., here].sum(axis=-1), (off[..., here] + SUM * size).sum(axis=-1)
+            found[place] = sums if self.batch else (float(sums[0]), float(sums[1]))
+        (v, e), *tangents = found
+        assert v is not None
+        return Cell(v, e, tuple(t for t, _ in tangents), tuple(et for _, et in tangents))
+
+    def lacking(self, whole: Cell, rtol: float, within: Any) -> Bools:
+        """The members that are not accurate enough for a sum that is less than they are, where it is."""
+        share = np.zeros((*self.batch, self.directions + 2))
+        share[..., -1] = np.inf
+        for place, (x, off) in enumerate(zip((whole.v, *whole.t), (whole.e, *whole.et), strict=True)):
+            if x is not None and off is not None:
+                asked = rtol * np.abs(x)
+                share[..., place] = np.where(off > asked, asked / self.numbers.shape[-1], np.inf)
+        enough = np.maximum(share[..., self.into], np.expand_dims(within, -2) if np.ndim(within) else within)
+        return (self.off > enough).reshape(-1, self.numbers.shape[-1]).any(axis=0)  # type: ignore[no-any-return]
+
+
+def _sum(parts: Sequence[Value], directions: int) -> Value:
+    """The sum of a few numbers, and what it rounds off."""
+    cells = [cell for part in parts if isinstance(cell := pad(part, directions), Cell)]
+    if len(cells) != len(parts):
+        raise errors.not_a_number(next(part for part in parts if not isinstance(part, Cell)))
+
+    def total(numbers: Sequence[Number | None], off: Sequence[Number | None]) -> tuple[Number | None, Number | None]:
+        given = [x for x in numbers if x is not None]
+        whole = sum(given) if given else None
+        return whole, None if whole is None else ROUNDING["add"](whole, *given) + sum(x for x in off if x is not None)
+
+    v, e = total([cell.v for cell in cells], [cell.e for cell in cells])
+    assert v is not None
+    tangents = [total([cell.t[d] for cell in cells], [cell.et[d] for cell in cells]) for d in range(directions)]
+    return Cell(v, e, tuple(t for t, _ in tangents), tuple(et for _, et in tangents))

@@ -1,0 +1,101 @@
+"""Summands that differ in their numbers alone are one batch, however written, with the answers of each alone."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import potto
+
+N = 60
+# What may differ between two ways of adding up N numbers, as a part of their sum.
+ROUNDING = N * 2.0**-52
+
+
+def test_written_out_as_a_sum_and_through_calls() -> None:
+    """`k*[x < k*t/(N + 1)]` for k to N: t * the sum of k^2/(N + 1)."""
+    ways = {
+        "written": " + ".join(f"{k}*[x < {k}*t/{N + 1}]" for k in range(1, N + 1)),
+        "called": " + ".join(f"step(x, {k}, t)" for k in range(1, N + 1)),
+        "mean": f"(sum k in 1..{N} (step(x, k, t)))*2/2",
+        "looped": f"sum k in 1..{N} (k*[x < k*t/{N + 1}])",
+    }
+    definitions = "\n".join(f"def {name}(t) integral [0, 1] ({body}) d(x)" for name, body in ways.items())
+    m = potto.compile(f"def step(x, k, t) k*[x < k*t/{N + 1}]\n{definitions}")
+    exact = math.fsum(k * k / (N + 1) for k in range(1, N + 1))
+    found = {name: potto.deriv(getattr(m, name))((0.9, 1.0)) for name in ways}
+    for answer in found.values():
+        assert abs(answer.value - 0.9 * exact) <= answer.error + ROUNDING * exact and answer.error <= 1e-12 * exact
+        assert abs(answer.tangent - exact) <= answer.tangent_error and answer.tangent_error <= 1e-11 * exact
+        assert answer.converged and answer.evals <= 1.5 * found["looped"].evals
+
+
+def test_parameters_of_their_own() -> None:
+    """A gradient in N parameters, each of one summand, and one of all of them: t*(1 - exp(-a))."""
+    names = [f"a{k}" for k in range(N)]
+    body = " + ".join(f"t*exp(-x)*[x < {name}]" for name in names)
+    f = potto.compile(f"def f(t, {', '.join(names)}) integral [0, 1] ({body}) d(x)").f
+    at = {name: 0.9 * (k + 1) / N for k, name in enumerate(names)}
+    answer = potto.grad(f, ["t", *names])(t=1.5, **at)
+    whole = math.fsum(1 - math.exp(-a) for a in at.values())
+    exact = np.array([whole, *(1.5 * math.exp(-a) for a in at.values())])
+    assert np.all(np.abs(np.array(answer.tangent) - exact) <= np.array(answer.tangent_error) + 4e-16 * exact)
+    assert np.max(answer.tangent_error) <= 1e-9 and answer.converged
+
+
+def test_arrays_of_sums() -> None:
+    """A sum at an array of parameters is what it is at each of them."""
+    body = " + ".join(f"exp({k / N}*x)*[x < {k / N}*t]" for k in range(1, N + 1))
+    f = potto.deriv(potto.compile(f"def f(t) integral [0, 1] ({body}) d(x)").f)
+    t = np.array([[0.2, 0.5], [0.7, 0.95], [0.01, 0.3]])
+    together = f((t, np.ones_like(t)))
+    assert together.value.shape == t.shape
+    for index in np.ndindex(*t.shape):
+        exact = math.fsum(math.expm1(c * c * t[index]) / c for c in (k / N for k in range(1, N + 1)))
+        slope = math.fsum(c * math.exp(c * c * t[index]) for c in (k / N for k in range(1, N + 1)))
+        assert abs(together.value[index] - exact) <= together.error[index] + ROUNDING * exact
+        assert abs(together.tangent[index] - slope) <= together.tangent_error[index] + ROUNDING * slope
+
+
+def test_what_decides_formulas_stays() -> None:
+    """Exponents that differ, here and through a call, are not parameters: the roots keep their closed forms."""
+    parts = [f"power(x, {n})*[x^{n} < {c}*t]" for n in (1, 2, 3) for c in (0.2, 0.4, 0.6)]
+    m = potto.compile(f"def power(x, n) x^n\ndef f(t) integral [0, 1] ({' + '.join(parts)}) d(x)")
+    answer = potto.deriv(m.f)((0.8, 1.0))
+    cuts = [((c * 0.8) ** (1 / n), n, c) for n in (1, 2, 3) for c in (0.2, 0.4, 0.6)]
+    exact = math.fsum(r ** (n + 1) / (n + 1) for r, n, _ in cuts)
+    slope = math.fsum(r**n * r / (n * 0.8) for r, n, _ in cuts)
+    assert abs(answer.value - exact) <= answer.error + 1e-15 and answer.error <= 1e-11
+    assert abs(answer.tangent - slope) <= answer.tangent_error + 1e-15 and answer.evals <= 200
+
+
+@pytest.mark.parametrize("t", [0.0, 0.5])
+def test_members_say_of_themselves_what_they_have_to(t: float) -> None:
+    """Summands with two derivatives, or none, name their own conditions, and the rest has its answer."""
+    parts = [f"[x < {k}*t]" for k in range(1, 7)]
+    m = potto.compile("\n".join(
+        [f"def f(t) integral [0, 1] ({' + '.join(parts)}) d(x)"]
+        + [f"def p{k}(t) integral [0, 1] {part} d(x)" for k, part in enumerate(parts)]
+    ))  # fmt: skip
+    whole = potto.deriv(m.f)((t, 1.0))
+    single = [potto.deriv(getattr(m, f"p{k}"))((t, 1.0)) for k in range(6)]
+    assert whole.value == math.fsum(one.value for one in single)
+    assert {note.surface for note in whole.notes} == {note.surface for one in single for note in one.notes}
+    assert whole.converged == all(one.converged for one in single)
+
+
+def test_a_sum_that_cancels_is_as_accurate_as_its_value() -> None:
+    """Two hundred waves that leave a hundredth of what they are: each is to be known better than relative to itself."""
+    ks = np.arange(1, 201)
+    signs = (-1.0) ** ks
+    body = " + ".join(f"{s}*cos({k / 200}*x)*exp(x*t)" for k, s in zip(ks, signs)) + " + [x < t]"
+    answer = potto.deriv(potto.compile(f"def f(t) integral [0, 1] ({body}) d(x)").f)((0.7, 1.0))
+
+    def wave(w: float, t: float) -> complex:
+        z = complex(t, w)
+        return (np.exp(z) - 1) / z
+
+    exact = 0.7 + math.fsum(s * wave(k / 200, 0.7).real for k, s in zip(ks, signs))
+    assert abs(answer.value - exact) <= answer.error + 1e-13 and answer.converged
