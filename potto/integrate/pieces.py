@@ -41,6 +41,7 @@ class Evaluator(Protocol):
     def costs(self) -> Costs | None: ...
     def with_directions(self, directions: int) -> Evaluator: ...
     def tracking(self) -> Evaluator: ...
+    def standing(self) -> Evaluator: ...
     def evaluate(self, lam: Lam, env: dict[str, Value], trace: Trace | None) -> Value: ...
     def count(self, evaluations: int) -> None: ...
     def exhausted(self) -> bool: ...
@@ -67,6 +68,22 @@ class Sums:
     et: Array
     gross: Array | None = field(default=None, kw_only=True)
     common: Array | None = field(default=None, kw_only=True)
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """What crosses faces, (m, k, B): the tangents and their errors. counted: what of it ends of segments and nodes that
+    move with the cuts tell already, with errors."""
+
+    t: Array
+    et: Array
+    counted: Array
+    uncertain: Array
+
+    def added(self, tangents: tuple[Array, Array], moving: bool) -> tuple[Array, Array]:
+        """Tangents and their errors with what crosses, by nodes that move, or not."""
+        value, bound = tangents[0] + self.t, tangents[1] + self.et
+        return (value - self.counted, bound + self.uncertain) if moving else (value, bound)
 
 
 @dataclass

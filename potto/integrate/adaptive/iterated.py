@@ -6,7 +6,7 @@ leaves out the segments on which the integrand vanishes, and hands the rest to `
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from potto.integrate.decomposition.vanishing import vanishes
 from potto.integrate.degenerate.coincidences import Scene, count_places, count_slivers, note_folds
 from potto.integrate.degenerate.degeneracies import brush
 from potto.integrate.degenerate.empty_ranges import Collapsed, collapsed_ranges, count_collapsed
+from potto.integrate.degenerate.faces import Face
 from potto.integrate.degenerate.narrow_panels import count_narrow
 from potto.integrate.degenerate.undefined import lost_members, sides_at
 from potto.integrate.events import UNSEEN_MEETING, sides_hidden
@@ -51,7 +52,7 @@ class Iteration:
     """One plan being evaluated by one machine. `order` is the number of nodes per piece to start with.
 
     still: surfaces that don't move here, since someone else counts what their motion does. tracked: whether the
-    integrand brings its rounding along at every node.
+    integrand brings its rounding along at every node. face: what is integrated instead of the integrand, if anything.
     """
 
     plan: Plan
@@ -60,6 +61,7 @@ class Iteration:
     still: frozenset[Term] = frozenset()
     tracked: bool = False
     extent: Extent | None = None
+    face: Face | None = None
 
     def whole(self, env: dict[str, Value], batch: int) -> Sums:
         """The integrals of a batch over all variables, with what they could come to at most counted as added up."""
@@ -148,6 +150,8 @@ class Iteration:
         lo, hi, rows = frame_rows(level, values)
         found, lost = self.searched(level, env, lo, hi, batch, machine)
         rows += found
+        if self.face is not None:  # its sections are nowhere, or anywhere
+            rows = [row for row in rows if row.cut < 0 or level.level.cuts[row.cut].surface is not self.face.surface]
         if machine.costs is not None:
             asked = self.machine.directions > 0 and not machine.frozen  # others are by variables further out
             for number, cut in enumerate(level.level.cuts):
@@ -200,8 +204,8 @@ class Iteration:
         undefined: dict[int, Bools] = {}
         values = sides_at(level, scene.env, seg, scene.machine)
         for group, (at_middle, off), turned in zip(level.decided, values, level.turned, strict=True):
-            if any(outer not in sides for outer in turned):
-                continue  # one that is not defined
+            if any(outer not in sides for outer in turned) or (self.face is not None and group == self.face.group):
+                continue  # one that is not defined, or has both
             side = at_middle >= 0 if self.plan.groups[group].up_at_zero else at_middle > 0
             for outer in turned:
                 side = side ^ np.logical_not(sides[outer])
@@ -228,8 +232,14 @@ class Iteration:
             mask = np.where(np.any(list(undefined.values()), axis=0), either, mask)
         return np.nonzero(~mask)[0] if mask.any() else None
 
+    def across(self, face: Face) -> Iteration:
+        """The same for what crosses a face."""
+        return replace(self, face=face, extent=None)
+
     def body(self, env: dict[str, Value], sides: dict[int, Mask], machine: Evaluator) -> Value:
-        """The integrand itself, on the sides given."""
+        """The integrand itself, on the sides given; or what crosses a face of it."""
+        if self.face is not None:
+            return self.face.crossed(self.plan, env, sides, machine)
         body = self.plan.body
         return machine.evaluate(body, {n: env[n] for n in body.params}, self.plan.trace(sides))
 

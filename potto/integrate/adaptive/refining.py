@@ -19,7 +19,7 @@ from potto.integrate.adaptive.divergence import endless, given_up
 from potto.integrate.adaptive.error_budget import Tally, filled
 from potto.integrate.adaptive.refinement import doubtful, missed_peak, stragglers, too_coarse
 from potto.integrate.adaptive.reynolds import Totals, sums, totals
-from potto.integrate.degenerate.degeneracies import look_for_steps
+from potto.integrate.degenerate.degeneracies import steps_at_cuts
 from potto.integrate.events import BUDGET_SPENT
 from potto.integrate.panels.panel_batch import PanelBatch
 from potto.integrate.pieces import Ends, Pieces, Sums, joined
@@ -48,7 +48,7 @@ def integrated(work: PanelBatch) -> Sums:
         size = fresh.size.reshape(work.width, -1, fresh.segment.size)[:, 0].max(axis=0)
         work.parent.extent.saw_values(size / (work.seg.b - work.seg.a), work.below(work.seg.owner))
     if work.conflict and not work.last:
-        look_for_steps(work, fresh)
+        work.steps = steps_at_cuts(work, fresh)
     found = totals(work, fresh, ends)
     if good_enough(work, fresh, found, ends):
         return sums(work, found, ends)

@@ -36,13 +36,17 @@ def totals(work: PanelBatch, p: Pieces, ends: Ends | None) -> Totals:
     k = work.k
     integral, error, size = added(work, np.concatenate((p.integral, p.error + p.floor, p.size)), p, 3)
     error = np.where(np.isnan(integral) | np.isnan(error), np.inf, error)
-    moving = integral[:, 1 : 1 + k], error[:, 1 : 1 + k]
+    moving, steps = (integral[:, 1 : 1 + k], error[:, 1 : 1 + k]), work.steps
+    if steps is not None:
+        moving = steps.added(moving, True)
     if not work.both:
         return Totals(integral, error, size, moving, None, None)
     value, bound = integral[:, 1 + k :], error[:, 1 + k :]
     if ends is not None:
         swept, rounding = boundary(work, ends)
         value, bound = value + swept, bound + rounding
+    if steps is not None:
+        value, bound = steps.added((value, bound), ends is not None)
     if work.misplaced is not None:
         rows = work.misplaced.reshape(-1, work.seg.a.size)
         bound = bound + np.stack([np.bincount(work.seg.owner, row, work.batch) for row in rows]).reshape(bound.shape)

@@ -23,6 +23,8 @@ SEARCHED = 4
 # The part of a range up to which cuts that rounding does not tell apart are taken for one: what is further off, however
 # little is known of where it is, is not to be lost.
 ONE_PLACE = 1e-6
+# The part of its size up to which a place is all but that of another cut: no rule has its nodes in so few doubles.
+NARROW = 16 * EPS
 # How far beside cuts that are taken for one a place is clear of all of them, in terms of how far off they may be.
 BLUR = 8
 
@@ -112,7 +114,7 @@ class Cuts:
 
     brushes: edges at which only something further in changes. folds: where roots of one surface are at one place.
     slivers: what may lie between cuts that are taken for one. lost: the most that cuts left out may matter.
-    conflict: cuts that coincide move differently, which is harmless only where the integrand does not jump there.
+    conflict: cuts all but at one place move differently: harmless only where the integrand does not jump there.
     """
 
     sign: Array
@@ -182,17 +184,19 @@ def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, d
         inner = (root > low) & (root < high)
         if nested:  # roots that merge just here move infinitely fast; a single node of the variables further out
             for speed in row.t:
-                if isinstance(speed, np.ndarray):
+                if speed is not None and isinstance(speed, np.ndarray):
                     inner &= np.isfinite(speed)
         inside[i] = inner
         x[i] = np.where(inner, root, high)
         off = SEARCHED * EPS * np.abs(root) if row.e is None else row.e
         e[i] = np.where(inner, off, eh)
-        for d in range(directions):
-            speed = row.t[d] if d < len(row.t) and row.t[d] is not None else 0.0
-            t[d, i] = np.where(inner, speed, th[d])
-            if d < len(row.et) and row.et[d] is not None:
-                t[directions + d, i] = np.where(inner, row.et[d], 0.0)
+        t[:directions, i] = np.where(inner, 0.0, th)
+        for d, speed in enumerate(row.t[:directions]):
+            if speed is not None:
+                t[d, i] = np.where(inner, speed, th[d])
+        for d, slip in enumerate(row.et[:directions]):
+            if slip is not None:
+                t[directions + d, i] = np.where(inner, slip, 0.0)
         if row.turning or (row.cut >= 0 and _any_turning(plan, row)):
             beyond.append((root, True))
         if directions and row.cut >= 0:
@@ -340,7 +344,7 @@ def _edges(row: Row, root: Array, off: Any, lower: _End, upper: _End, directions
         on = root == bound
         if off is not None:
             with np.errstate(invalid="ignore"):
-                on = on | (np.abs(root - bound) <= off + e)
+                on = on | (np.abs(root - bound) <= np.minimum(off + e, ONE_PLACE * (upper[0] - lower[0])))
         if not on.any():
             continue
         on = on & np.isfinite(bound) & (lower[0] < upper[0])
@@ -369,12 +373,12 @@ def _sorted(
     rank: Ints = np.where(inside, np.array([0, *(_rank(plan, r) for r in rows), 0])[order], 0)
     if t.shape[0]:
         t = t[:, order, member]
-        same = (x[1:] == x[:-1]) & inside[1:] & inside[:-1]
-        if same.any():
+        near = (x[1:] - x[:-1] <= NARROW * np.abs(x[1:])) & inside[1:] & inside[:-1]
+        if near.any():
             speeds = t[: t.shape[0] // 2]
             apart = np.abs(speeds[:, 1:] - speeds[:, :-1]) > 1e-9 * (np.abs(speeds[:, 1:]) + np.abs(speeds[:, :-1]))
-            conflict = bool((same & apart.any(axis=0)).any())
-            _agree(t, same, rank)
+            conflict = bool((near & apart.any(axis=0)).any())
+            _agree(t, near & (x[1:] == x[:-1]), rank)
     return x, e, t, rank, conflict, blur
 
 

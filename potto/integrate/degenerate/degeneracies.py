@@ -1,7 +1,8 @@
 """Steps where only bends are expected: a surface that runs along a variable further in has no section there.
 
-Owns `look_for_steps` (at cuts) and `brush` (at bounds). What is further in is integrated on both sides of the place; if
-it jumps, another variable must go innermost.
+Owns `steps_at_cuts` and `brush` (at bounds). What is further in is integrated on both sides of the place. If it jumps,
+and it is one surface that makes it jump, what crosses that face is known (`faces`); else another variable must go
+innermost.
 """
 
 from __future__ import annotations
@@ -10,12 +11,14 @@ from contextlib import nullcontext
 
 import numpy as np
 
-from potto.integrate.decomposition.cuts import Cuts, Edge
+from potto.integrate.decomposition.cuts import NARROW, Cuts
 from potto.integrate.degenerate.coincidences import Scene, around
+from potto.integrate.degenerate.faces import THIN, Place, crossing
 from potto.integrate.events import Degenerate
 from potto.integrate.panels.panel_batch import PanelBatch
-from potto.integrate.pieces import Evaluator, Pieces, gather, still, take
-from potto.kernels.cells import Array, Bools, Cell, Value
+from potto.integrate.pieces import Crossing, Pieces, gather, still, take
+from potto.integrate.rules.substitution import Segments
+from potto.kernels.cells import Array, Bools, Cell, Ints, Mask
 
 # How far beside a place it is looked at (beside a bound twice), and what part may be lost across it.
 BESIDE, DISCONTINUITY = (1e-7, 1e-9), 1e-6
@@ -23,33 +26,56 @@ BESIDE, DISCONTINUITY = (1e-7, 1e-9), 1e-6
 SLOW = 1e-3
 
 
-def look_for_steps(work: PanelBatch, whole: Pieces) -> None:
-    """Whether the integral further in jumps where only its kinks were expected, which move in different ways.
+def steps_at_cuts(work: PanelBatch, whole: Pieces) -> Crossing | None:
+    """What crosses the cuts at which the integral further in jumps where only its kinks were expected, which move in
+    different ways.
 
-    A surface that runs along the innermost variable leaves such a step. Looked at just beside the cut, since on
-    the cut itself the sides are a matter of rounding.
+    A surface that runs along the variables further in leaves such a step. Looked at just beside the cut, since on
+    the cut itself the sides are a matter of rounding; so they are between cuts that are all but at one place.
     """
-    seg, frozen = work.seg, work.machine.with_directions(0)
-    follows = np.nonzero((seg.owner[1:] == seg.owner[:-1]) & (seg.a[1:] == seg.b[:-1]) & (seg.rank[1:] == 1))[0] + 1
-    if not follows.size:
-        return
-    width = np.minimum(np.abs(seg.b - seg.a)[follows], np.abs(seg.b - seg.a)[follows - 1])
-    steps = []
-    for part in BESIDE:
-        aside, values = part * np.minimum(width, 1e300), []
-        for side, index in ((1.0, follows), (-1.0, follows - 1)):
-            here = gather({n: still(v) for n, v in work.env.items()}, seg.owner[index])
-            here[work.level.variable] = Cell(seg.a[follows] + side * aside)
-            sides = {g: take(m, index) for g, m in work.sides.items()}
-            with nullcontext() if work.machine.costs is None else work.machine.costs.apart():
-                root = work.below(seg.owner[index])
-                values.append(work.parent.inside(work.number, here, index.size, sides, frozen, root)[0])
-        steps.append(np.abs(values[0] - values[1]))
+    seg, parts = work.seg, len(BESIDE)
+    left, right = _neighbours(seg)
+    if not left.size:
+        return None
+    owner, x = seg.owner[right], seg.a[right]
+    width = np.minimum((seg.b - seg.a)[right], (seg.b - seg.a)[left])
+    scene = Scene(work.parent, work.number, work.level, work.env, {}, work.machine, work.batch, work.root)
+    beside = [end + sign * part * np.minimum(width, 1e300)
+              for part in BESIDE for end, sign in ((x, 1.0), (seg.b[left], -1.0))]  # fmt: skip
+    index = np.concatenate([right, left] * parts)
+    sides: dict[int, Mask] = {g: np.broadcast_to(take(m, index), index.shape) for g, m in work.sides.items()}
+    values = _inside(scene, owner, np.concatenate(beside), sides)
+    after, before = values[:, 0::2], values[:, 1::2]
     mean = whole.size.reshape(work.width, -1, seg.a.size)[:, 0] / (seg.b - seg.a)
-    size = np.abs(values[0]) + np.abs(values[1]) + mean[:, follows] + mean[:, follows - 1]
-    jumps = _jumps(steps, size)
-    if jumps.any():
-        work.machine.note(Degenerate(work.level.variable), work.below(np.unique(seg.owner[follows[jumps]])))
+    size = np.abs(after[:, 1]) + np.abs(before[:, 1]) + mean[:, right] + mean[:, left]
+    jumps = np.nonzero(_jumps(np.abs(after - before), size))[0]
+    if not jumps.size:
+        return None
+    left, right = left[jumps], right[jumps]
+    off = np.maximum(np.minimum(seg.ea[right], THIN * width[jumps]), x[jumps] - seg.b[left])
+    sides = {g: take(m, left) for g, m in work.sides.items()}
+    place = Place(owner[jumps], x[jumps], off, seg.ta[:, right], sides, (before - after)[:, 1, jumps])
+    as_one = all((seg.tb[:, i:j] == seg.ta[:, j, None]).all() and (seg.ta[:, i + 1 : j] == seg.ta[:, j, None]).all()
+                 for i, j in zip(left, right, strict=True))  # fmt: skip
+    found = crossing(scene, place, DISCONTINUITY * size[:, jumps]) if as_one else None
+    if found is None:
+        work.machine.note(Degenerate(work.level.variable), scene.below(np.unique(owner[jumps])))
+        return None
+    for i, j in zip(left, right, strict=True):  # what moves there is what crosses
+        for part in (whole.integral, whole.error, whole.floor):
+            part.reshape(work.width, -1, seg.a.size)[:, 1:, i + 1 : j] = 0.0
+    return found
+
+
+def _neighbours(seg: Segments) -> tuple[Ints, Ints]:
+    """The segments between which nothing lies but kinks, and what is too narrow to tell them apart."""
+    width = seg.b - seg.a
+    wide = np.nonzero(width > NARROW * np.abs(seg.b))[0]
+    expected = np.ones(width.size, dtype=bool)
+    expected[1:] = (seg.owner[1:] != seg.owner[:-1]) | (seg.a[1:] != seg.b[:-1]) | (seg.rank[1:] != 1)
+    stretch = np.cumsum(expected)
+    together = np.nonzero(stretch[wide[1:]] == stretch[wide[:-1]])[0]
+    return wide[together], wide[together + 1]
 
 
 def brush(scene: Scene, cuts: Cuts) -> None:
@@ -57,42 +83,54 @@ def brush(scene: Scene, cuts: Cuts) -> None:
 
     Looked at on both sides of the bound, with the surfaces of this variable as they are inside.
     """
-    parent, number, level, machine = scene.parent, scene.number, scene.level, scene.machine
-    for found in cuts.brushes:
-        edge = found.pick(scene.counted(found.owner))
-        if not edge.owner.size:
+    for upper in (False, True):
+        found = [edge for edge in cuts.brushes if edge.upper == upper]
+        if not found:
             continue
-        here, inner = around(level, edge.owner, edge.x, not edge.upper, scene.env, scene.sides, machine)
-        frozen, size = machine.with_directions(0), edge.owner.size
-        if _bends(scene, here, edge, frozen):
+        owner, first = np.unique(np.concatenate([edge.owner for edge in found]), return_index=True)
+        x = np.concatenate([edge.x for edge in found])[first]
+        counts = scene.counted(owner)
+        owner, x = owner[counts], x[counts]
+        if not owner.size or _bends(scene, owner, x, upper):
             continue
-        steps, root = [], scene.below(edge.owner)
-        with nullcontext() if machine.costs is None else machine.costs.apart():
-            for part in BESIDE:
-                aside = part * (1 + np.abs(edge.x))
-                inside, beyond = (
-                    parent.inside(number, {**here, level.variable: Cell(x)}, size, inner, frozen, root)[0]
-                    for x in (edge.x + aside, edge.x - aside)
-                )
-                steps.append(np.abs(inside - beyond))
-        jumps = _jumps(steps, np.abs(inside) + np.abs(beyond))
+        _, inner = around(scene.level, owner, x, not upper, scene.env, scene.sides, scene.machine)
+        aside = np.array(BESIDE)[:, None] * (1 + np.abs(x))
+        places = np.concatenate([x + sign * a for a in aside for sign in (1.0, -1.0)])
+        many = 2 * len(BESIDE)
+        sides: dict[int, Mask] = {g: np.tile(np.broadcast_to(m, owner.shape), many) for g, m in inner.items()}
+        values = _inside(scene, owner, places, sides)
+        above, below = values[:, 0::2], values[:, 1::2]
+        jumps = _jumps(np.abs(above - below), np.abs(above[:, 1]) + np.abs(below[:, 1]))
         if jumps.any():
-            machine.note(Degenerate(level.variable), scene.below(edge.owner[jumps]))
+            scene.machine.note(Degenerate(scene.level.variable), scene.below(owner[jumps]))
 
 
-def _jumps(steps: list[Array], size: Array) -> Bools:
+def _inside(scene: Scene, owner: Ints, x: Array, sides: dict[int, Mask]) -> Array:
+    """What is further in at several places for each of some members, (m, places, members)."""
+    many = np.tile(owner, x.size // owner.size)
+    here = gather({n: still(v) for n, v in scene.env.items()}, many)
+    here[scene.level.variable] = Cell(x)
+    costs = scene.machine.costs
+    with nullcontext() if costs is None else costs.apart():
+        frozen = scene.machine.with_directions(0)
+        values = scene.parent.inside(scene.number, here, many.size, sides, frozen, scene.below(many))[0]
+    return values.reshape(values.shape[0], -1, owner.size)
+
+
+def _jumps(steps: Array, size: Array) -> Bools:
     """Where values on the two sides of a place differ, and no less so nearer to it: what bends would shrink."""
-    return np.asarray(((steps[1] > 0.5 * steps[0]) & (steps[1] > DISCONTINUITY * size)).any(axis=0))
+    far, near = steps[:, 0], steps[:, 1]
+    return np.asarray(((near > 0.5 * far) & (near > DISCONTINUITY * size)).any(axis=0))
 
-
-def _bends(scene: Scene, here: dict[str, Value], edge: Edge, frozen: Evaluator) -> bool:
+def _bends(scene: Scene, owner: Ints, x: Array, upper: bool) -> bool:
     """Whether it is plain that no surface runs along the bound: all sections in the innermost variable are slow."""
-    levels, name = scene.parent.plan.levels, scene.level.variable
+    levels, frozen = scene.parent.plan.levels, scene.machine.with_directions(0)
     further = levels[scene.number + 1]
     if scene.number + 2 < len(levels) or further.searched:
         return False
-    aside = BESIDE[1] * (1 + np.abs(edge.x)) * (-1 if edge.upper else 1)
-    places = ({**here, name: Cell(x)} for x in (edge.x, edge.x + aside))
+    here = gather({n: still(v) for n, v in scene.env.items()}, owner)
+    aside = BESIDE[1] * (1 + np.abs(x)) * (-1 if upper else 1)
+    places = ({**here, scene.level.variable: Cell(place)} for place in (x, x + aside))
     on, inside = (frozen.evaluate(further.frame, {n: at[n] for n in further.frame.params}, None) for at in places)
     assert isinstance(on, tuple) and isinstance(inside, tuple)
     for row, beside in zip(on, inside, strict=True):

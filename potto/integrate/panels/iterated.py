@@ -5,7 +5,7 @@ Owns `Iterated`, and `siblings`.
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -31,6 +31,7 @@ class Iterated(Protocol):
     def tracked(self) -> bool: ...
     @property
     def extent(self) -> Extent | None: ...
+    def across(self, face: Any) -> Iterated: ...
     def body(self, env: dict[str, Value], sides: dict[int, Mask], machine: Evaluator) -> Value: ...
     def run(
         self, number: int, env: dict[str, Value], batch: int, sides: dict[int, Mask], machine: Evaluator,

@@ -16,7 +16,7 @@ from potto.integrate.levels import LevelPlan
 from potto.integrate.panels.iterated import Iterated
 from potto.integrate.panels.mending import mend
 from potto.integrate.panels.roundoff import few_doubles, misplaced, noise, shake, together
-from potto.integrate.pieces import Ends, Evaluator, Pieces, Sums, column, gather, joined, spread, still
+from potto.integrate.pieces import Crossing, Ends, Evaluator, Pieces, Sums, column, gather, joined, spread, still
 from potto.integrate.rules import substitution
 from potto.integrate.rules.gauss import EPS, Rule, gauss, truncation
 from potto.integrate.rules.substitution import Segments
@@ -50,6 +50,7 @@ class PanelBatch:
     hidden: Array = field(init=False)  # what is added up further in, on the average, where it comes to nothing
     endless: Array | None = None  # (k, B) the tangents that are infinite, with their signs; 0 for others
     filled: Array | None = None  # (B,) which part of the range integrands take up, where that is known
+    steps: Crossing | None = None  # what crosses faces at which cuts only bends were expected
     misplaced: Array | None = None  # (m, k, S) what the rounding of the ends of segments means for the fixed form
 
     def __post_init__(self) -> None:

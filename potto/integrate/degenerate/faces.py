@@ -1,0 +1,149 @@
+"""Faces of surfaces that run along all variables further in: what crosses them, integrated over these variables.
+
+Owns `crossing` and `Face`. Where a surface psi = 0 is a place of one variable x, whatever the variables y
+further in are, it has no section in y. Its boundary term is then an integral over y, in which F stands with the surface
+on either side and everything else as it falls at the place:
+
+    int (F before - F after) dx/dtheta dy,  dx/dtheta = - psi_theta / psi_x  on psi(x, y) = 0
+
+It is integrated as the tangents of a vector that stands still, by the same rules as everything else.
+"""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from potto.core.terms import Lam, Term, children, function_of
+from potto.integrate.degenerate.coincidences import CLEAR, Scene
+from potto.integrate.pieces import Crossing, Evaluator, components, gather, still, take
+from potto.integrate.plan import Plan
+from potto.integrate.rules.gauss import EPS
+from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Number, Value, pad
+
+# The part of the stretches beside it up to which a face may be off its place: a tenth of what is allowed for a sum that
+# cancels (`convergence.CANCELS`).
+THIN = 1e-13
+# Where between their bounds the variables further in are looked at: no fractions that programs are likely to have.
+FRACTIONS = (0.137, 0.483, 0.829)
+
+
+@dataclass(frozen=True)
+class Place:
+    """Places of one variable at which what is further in jumps: whose they are, where, how far off that may be, with
+    what speeds (k, P) they were integrated; the sides of the surfaces so far, and the jumps (m, P)."""
+
+    owner: Ints
+    x: Array
+    off: Array
+    speed: Array
+    sides: dict[int, Mask]
+    jump: Array
+
+
+@dataclass(frozen=True)
+class Face:
+    """A face as an integrand: the group of its surface, that surface, the variable it is a place of."""
+
+    group: int
+    surface: Term
+    variable: str
+
+    @cached_property
+    def psi(self) -> Lam:
+        return function_of(self.surface)
+
+    def crossed(self, plan: Plan, env: dict[str, Value], sides: dict[int, Mask], machine: Evaluator) -> Value:
+        """F before it less F after it; as tangents that times the speeds of the face."""
+        k, plain = machine.directions, machine.with_directions(0)
+        here = {n: still(env[n]) for n in plan.body.params}
+        up, down = (components(plain.evaluate(plan.body, here, plan.trace({**sides, self.group: on})))
+                    for on in (True, False))  # fmt: skip
+        moving: dict[str, Value] = {n: pad(env[n], k + 1) for n in self.psi.params}
+        x = env[self.variable]
+        assert isinstance(x, Cell)
+        moving[self.variable] = Cell(x.v, x.e, (None,) * k + (1.0,))
+        psi = machine.with_directions(k + 1).tracking().evaluate(self.psi, moving, None)
+        assert isinstance(psi, Cell)
+        slope = np.asarray(psi.t[k])
+        rise, blur = np.sign(slope), _size(psi.et[k]) / np.abs(slope)
+        speeds = [(0.0 if t is None else -t / slope, _size(et) / np.abs(slope)) for t, et in zip(psi.t[:k], psi.et)]
+        cells = []
+        for on, off in zip(up, down, strict=True):
+            jump, e = rise * (off.v - on.v), _size(on.e) + _size(off.e)
+            t = tuple(jump * speed for speed, _ in speeds)
+            et = tuple(e * np.abs(s) + np.abs(jump) * (es + blur * np.abs(s)) for s, es in speeds)
+            cells.append(Cell(jump, e, t, et))
+        return tuple(cells)
+
+
+def _size(x: Number | None) -> Number:
+    return 0.0 if x is None else np.abs(x)
+
+
+def crossing(scene: Scene, place: Place, tolerance: Array) -> Crossing | None:
+    """What crosses surfaces that run along the variables further in; None where it is not one surface that makes what
+    is further in jump."""
+    if scene.parent.plan.hides or scene.machine.frozen:
+        return None
+    which = _running_along(scene, place)
+    if which is None or (which < 0).any() or not np.isfinite(place.speed).all():
+        return None
+    found = Crossing(*np.zeros((4, place.jump.shape[0], scene.machine.directions, scene.batch)))
+    for group in np.unique(which).tolist():
+        here = which == group
+        jump, e, t, et = _crossed(scene, place, group, here)
+        if not (np.abs(jump - place.jump[:, here]) <= tolerance[:, here] + e).all():
+            return None
+        speed = place.speed[:, here]
+        counted = speed * jump[:, None], np.abs(speed) * e[:, None]
+        et = et + THIN * (np.abs(t) + np.abs(counted[0]))
+        for into, part in zip((found.t, found.et, found.counted, found.uncertain), (t, et, *counted), strict=True):
+            for number, owner in enumerate(place.owner[here]):
+                into[:, :, owner] += part[:, :, number]
+    return found
+
+
+def _crossed(scene: Scene, place: Place, group: int, here: Bools) -> tuple[Array, Array, Array, Array]:
+    """What jumps across a face, and that times its speeds, with their errors: (m, P) and (m, k, P)."""
+    level = next(level for level in scene.parent.plan.levels if group in level.decided)
+    surface = children(level.surfaces.body)[level.decided.index(group)]
+    face = Face(group, surface, scene.level.variable)
+    owner, machine = place.owner[here], scene.machine
+    env = gather(scene.env, owner)
+    env[scene.level.variable] = Cell(place.x[here], None, (None,) * machine.directions)
+    sides = {g: take(m, np.nonzero(here)[0]) for g, m in place.sides.items()}
+    iteration = scene.parent.across(face)
+    with nullcontext() if machine.costs is None else machine.costs.apart():
+        sums = iteration.run(scene.number + 1, env, owner.size, sides, machine.standing(), scene.below(owner))
+    return sums.v, sums.e, sums.t, sums.et
+
+
+def _running_along(scene: Scene, place: Place) -> Ints | None:
+    """Per place the group of the one surface that is 0 there all along the variables further in, -1 if there is none,
+    or several; None where that cannot be looked at."""
+    further = scene.parent.plan.levels[scene.number + 1 :]
+    if not any(level.decided for level in further):
+        return None
+    quiet = scene.machine.with_directions(1).tracking()
+    many = np.tile(place.owner, len(FRACTIONS))
+    here = gather({n: pad(still(v), 1) for n, v in scene.env.items()}, many)
+    here[scene.level.variable] = Cell(np.tile(place.x, len(FRACTIONS)), None, (1.0,))
+    fraction, off = np.repeat(FRACTIONS, place.x.size), np.tile(place.off + EPS * np.abs(place.x), len(FRACTIONS))
+    along = []
+    for level in further:
+        ends = quiet.evaluate(level.bounds, {n: here[n] for n in level.bounds.params}, None)
+        lo, hi = (np.broadcast_to(cell.v, off.shape) for cell in components(ends))
+        here[level.variable] = Cell(lo + fraction * (hi - lo), None, (None,))
+        if any(level.turned) or not np.isfinite(lo + hi).all():
+            return None
+        for psi in components(quiet.evaluate(level.surfaces, {n: here[n] for n in level.surfaces.params}, None)):
+            slope = _size(psi.t[0])
+            near = (np.abs(psi.v) <= CLEAR * (_size(psi.e) + slope * off)) & (slope > 0)
+            along.append(np.broadcast_to(near, off.shape).reshape(len(FRACTIONS), -1).all(axis=0))
+    groups = np.array([group for level in further for group in level.decided])
+    found: Ints = np.where(np.sum(along, axis=0) == 1, groups[np.argmax(along, axis=0)], -1)
+    return found

@@ -1,0 +1,71 @@
+"""Surfaces that run along the variables further in, exactly or up to rounding: what crosses them is integrated.
+
+Turned by a, a rectangle's sides x = 0.5 and y = 0.6 move by -y and x: the derivative of the integral of exp(x*y) over
+it, within the unit square, is the integral of x*exp(0.6*x) over [0, 0.5] less that of y*exp(0.5*y) over [0, 0.6].
+"""
+
+from __future__ import annotations
+
+import math
+
+import mpmath as mp
+import pytest
+
+import potto
+
+TURNED = "[x*cos(a) + y*sin(a) < 0.5]*[y*cos(a) - x*sin(a) < 0.6]"
+NEARLY = (0.0, 6e-17, -1.3e-16, 3e-16)  # cos(pi/2) is 6e-17
+
+
+def first_moment(c: float, b: float) -> mp.mpf:
+    """The integral of u*exp(c*u) over [0, b]."""
+    return (mp.exp(c * mp.mpf(b)) * (c * mp.mpf(b) - 1) + 1) / mp.mpf(c) ** 2
+
+
+SLOPE = float(first_moment(0.6, 0.5) - first_moment(0.5, 0.6))
+
+
+def close(program: str, a: float, slope: float, evals: int) -> None:
+    answer = potto.deriv(potto.compile(program).f)((a, 1.0))
+    assert abs(answer.tangent - slope) <= answer.tangent_error + 10 * abs(a)  # the second derivative is at most 10
+    assert answer.tangent_error <= 1e-11 and answer.converged and answer.evals <= evals
+
+
+@pytest.mark.parametrize("a", NEARLY)
+def test_a_rectangle(a: float) -> None:
+    close(f"def f(a) integral ([0, 1], [0, 1]) {TURNED}*exp(x*y) d(x, y)", a, SLOPE, 1_000)
+
+
+@pytest.mark.parametrize("a", NEARLY)
+@pytest.mark.parametrize("order", ["x, y, z", "z, x, y", "x, z, y"])
+def test_a_box(a: float, order: str) -> None:
+    """A lid that tilts by x takes in the integral of x*exp(x*y) over the rectangle more."""
+    lid = float(mp.quad(lambda x: mp.exp(mp.mpf(6) / 10 * x) - 1, [0, 0.5]))  # y from 0 to 0.6
+    program = f"def f(a) integral ([0, 1], [0, 1], [0, 1]) {TURNED}*[z < 0.7 + a*x]*exp(x*y) d({order})"
+    close(program, a, 0.7 * SLOPE + lid, 20_000)
+
+
+@pytest.mark.parametrize("a", NEARLY)
+def test_no_product(a: float) -> None:
+    """1/(1 + how many of two conditions hold): on either side of each edge it depends on the other one."""
+    program = f"def f(a) integral ([0, 1], [0, 1]) 1/(1 + {TURNED.replace('*[', ' + [')}) d(x, y)"
+    in_both, in_one = 1 / 3 - 1 / 2, 1 / 2 - 1.0
+    slope = in_both * (0.5**2 - 0.6**2) / 2 + in_one * ((1 - 0.5**2) - (1 - 0.6**2)) / 2
+    close(program, a, slope, 1_000)
+
+
+@pytest.mark.parametrize("a", [s * 10.0**k for k in (-16.4, -15.5, -14.5, -13.2, -12.0, -9.0, -6.0) for s in (1, -1)])
+def test_bars_hold_all_the_way(a: float) -> None:
+    """Between what is parallel up to rounding and what is not, the bars may be wide, but they cover."""
+    answer = potto.deriv(potto.compile(f"def f(a) integral ([0, 1], [0, 1]) {TURNED}*exp(x*y) d(x, y)").f)((a, 1.0))
+    assert abs(answer.tangent - SLOPE) <= answer.tangent_error + 10 * abs(a)
+
+
+@pytest.mark.parametrize("a", [0.0, 1e-16, -2e-16])
+def test_an_octagon_costs_what_a_turned_one_does(a: float) -> None:
+    edges = "*".join(f"[x*cos(a + {k}*pi/4) + y*sin(a + {k}*pi/4) < 0.7]" for k in range(8))
+    f = potto.deriv(potto.compile(f"def f(a) integral ([-1, 1], [-1, 1]) {edges} d(x, y)").f)
+    along, turned = f((a, 1.0)), f((0.3, 1.0))
+    assert along.evals <= 1.5 * turned.evals
+    assert abs(along.value - 8 * 0.49 * math.tan(math.pi / 8)) <= along.error + 1e-15
+    assert abs(along.tangent) <= along.tangent_error <= 1e-10 and along.converged
