@@ -56,14 +56,12 @@ class Cell:
     def map(self, change: Any) -> Cell:
         """The cell with `change` done to every part that is an array."""
 
-        def part(x: Number | None) -> Number | None:
-            return change(x) if isinstance(x, np.ndarray) else x
-
-        return Cell(change(self.v) if isinstance(self.v, np.ndarray) else self.v, part(self.e),
-                    tuple(map(part, self.t)), tuple(map(part, self.et)))  # fmt: skip
+        e, *rest = [x if x is None or not isinstance(x, np.ndarray) else change(x) for x in (self.e, *self.t, *self.et)]
+        v, k = change(self.v) if isinstance(self.v, np.ndarray) else self.v, len(self.t)
+        return Cell(v, e, tuple(rest[:k]), tuple(rest[k:]))
 
     def arrays(self) -> list[Array]:
-        return [x for x in (self.v, self.e, *self.t, *self.et) if isinstance(x, np.ndarray)]
+        return [x for x in (self.v, self.e, *self.t, *self.et) if x is not None and isinstance(x, np.ndarray)]
 
 
 class FunctionLike(Protocol):
@@ -85,7 +83,7 @@ def pattern(value: Value, directions: int) -> Pattern:
     """
     if isinstance(value, Cell):
         tangents = [0 if x is None else 1 if x.__class__ is float and x == 1.0 else 2 for x in value.t]
-        inexact = value.e is not None or (bool(value.et) and any(x is not None for x in value.et))
+        inexact = value.e is not None or bool([True for x in value.et if x is not None])
         return (inexact, tuple(tangents) or (0,) * directions)
     if isinstance(value, tuple):
         return ("tuple", *(pattern(item, directions) for item in value))

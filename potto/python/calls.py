@@ -147,7 +147,7 @@ def _seeded(value: Value, numbers: Any, directions: int) -> Value:
         return tuple(_seeded(item, numbers, directions) for item in value)
     assert isinstance(value, Cell)
     own = next(numbers)
-    return Cell(value.v, value.e, tuple(1.0 if d == own else None for d in range(directions)))
+    return Cell(value.v, value.e, (None,) * own + (1.0,) + (None,) * (directions - own - 1))
 
 
 def _pick(value: Value, direction: int) -> Value:

@@ -1,0 +1,88 @@
+"""Twice as much of a program costs at most STEP times as much: conditions, summands, calls, builtins; also gradients.
+
+Evaluations of integrands are counted, and calls of functions, Python's and numpy's; nothing is timed.
+"""
+
+from __future__ import annotations
+
+import itertools
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+import potto
+
+STEP = 2.3
+Made = Callable[[int], tuple[str, dict[str, float]]]
+SHOWN = "[({2} - {0})*(y - {1}) - ({3} - {1})*(x - {0}) > 0]*[({4} - {2})*(y - {3}) - ({5} - {3})*(x - {2}) > 0]"
+TRIANGLE = f"{SHOWN}*[({{0}} - {{4}})*(y - {{5}}) - ({{1}} - {{5}})*(x - {{4}}) > 0]*{{6}}"
+CORNERS = ("ax", "ay", "bx", "by", "cx", "cy", "s")
+
+
+def conditions(n: int) -> tuple[str, dict[str, float]]:
+    """A function of all conditions, so that no sum splits it."""
+    at = {f"a{k}": 0.9 * k / (n + 1) for k in range(1, n + 1)}
+    return f"def f({', '.join(at)}) integral [0, 1] 1/(1 + {' + '.join(f'[x < {a}]' for a in at)}) d(x)", at
+
+
+def one_parameter(n: int) -> tuple[str, dict[str, float]]:
+    terms = " + ".join(f"{k}*[x < {k}*t/{n + 1}]" for k in range(1, n + 1))
+    return f"def f(t) integral [0, 1] ({terms}) d(x)", {"t": 0.9}
+
+
+def own_parameters(n: int) -> tuple[str, dict[str, float]]:
+    at = {f"a{k}": 0.9 * k / (n + 1) for k in range(1, n + 1)}
+    terms = " + ".join(f"exp(x*{a})*[x < {a}]" for a in at)
+    return f"def f({', '.join(at)}) integral [0, 1] ({terms}) d(x)", at
+
+
+def triangles(n: int) -> tuple[str, dict[str, float]]:
+    at: dict[str, float] = {}
+    for i in range(n):
+        corners = (0.1 + 0.3 * i / n, 0.2, 0.9 - 0.2 * i / n, 0.15, 0.4, 0.7 + 0.2 * i / n, 1.0 + i)
+        at |= dict(zip((f"{c}{i}" for c in CORNERS), corners, strict=True))
+    calls = " + ".join(f"tri(x, y, {', '.join(f'{c}{i}' for c in CORNERS)})" for i in range(n))
+    tri = f"def tri(x, y, {', '.join(CORNERS)}) {TRIANGLE.format(*CORNERS)}"
+    return f"{tri}\ndef f({', '.join(at)}) integral ([0, 1], [0, 1]) ({calls}) d(x, y)", at
+
+
+def builtins(n: int) -> tuple[str, dict[str, float]]:
+    terms = " + ".join(f"sin({k}/{n}*x*t)*exp(-{k}/{n}*x)" for k in range(1, n + 1))
+    return f"def f(t) integral [0, 1] ({terms})*[x < t] d(x)", {"t": 0.7}
+
+
+def counted(call: Callable[[], Any]) -> tuple[int, int]:
+    """Evaluations, and calls of functions, once everything is made."""
+    call()
+    calls = 0
+
+    def seen(frame: Any, event: str, argument: Any) -> None:
+        nonlocal calls
+        calls += event in ("call", "c_call")
+
+    before = sys.getprofile()
+    sys.setprofile(seen)
+    try:
+        answer = call()
+    finally:
+        sys.setprofile(before)
+    return answer.evals, calls
+
+
+@pytest.mark.parametrize("made, sizes", [
+    (conditions, (20, 40, 80)), (one_parameter, (160, 320, 640)), (own_parameters, (40, 80, 160)),
+    (triangles, (12, 24, 48)), (builtins, (20, 40, 80)),
+])  # fmt: skip
+@pytest.mark.parametrize("gradient", [False, True])
+def test_twice_as_much(made: Made, sizes: tuple[int, ...], gradient: bool) -> None:
+    costs = []
+    for n in sizes:
+        program, at = made(n)
+        f = potto.compile(program).f
+        call = potto.grad(f, list(at)) if gradient else f
+        costs.append(counted(lambda call=call, at=at: call(**at)))  # type: ignore[misc]
+    for small, large in itertools.pairwise(costs):
+        assert large[0] <= STEP * small[0]
+        assert large[1] <= STEP * small[1]
