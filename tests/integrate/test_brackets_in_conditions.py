@@ -435,3 +435,23 @@ def f(t) integral [0, 1] sim(12, x, t) d(x)
         answer = potto.compile(text).f(0.5)
     assert not answer.converged and math.isinf(answer.error)
     assert any("conditions inside of conditions" in reason for reason in answer.reasons)
+
+
+# Behind another condition, and such as are decided by the bounds alone; the expected values are lengths by hand
+
+
+@pytest.mark.parametrize(
+    ("condition", "low", "length", "slope"),
+    [
+        ("x > 0.2 and [x > t] > 0.5", 0.1, 1.5 - 0.7, -1.0),
+        ("x < 0.2 or x + [x > t] > 1.8", 0.1, 0.1 + 1.5 - 0.8, 0.0),
+        ("x > t and x + [x > t] > 1.5", 0.1, 1.5 - 0.7, -1.0),
+        ("[min(x, 0.175) > 0.25] > 0.5", 1.0, 0.0, 0.0),
+        ("[min(x, 0.175) < 0.25] > 0.5", 1.0, 0.5, 0.0),
+    ],
+)
+def test_behind_others_or_decided(condition: str, low: float, length: float, slope: float) -> None:
+    f = potto.compile(f"def f(t) integral [{low}, 1.5] [{condition}] d(x)").f
+    answer = potto.deriv(f)((0.7, 1.0))
+    covered(answer, length, rtol=2 * EPS)  # the lengths themselves are differences of rounded numbers
+    covered(answer, slope, tangent=True)

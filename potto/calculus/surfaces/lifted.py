@@ -11,7 +11,7 @@ ones are one object, and a side that no point of the domain reaches is left out 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from potto.calculus.algebra.point_values import sample_value
@@ -130,7 +130,7 @@ class _Trees:
 
     def apart(self, body: Term) -> Term:
         """The body with each part that has nested conditions written as decisions."""
-        roots = [node for node in _outermost(body) if self.nests(node)]
+        roots = [node for node in postorder_by(body, self.until_it_nests) if self.nests(node)]
         met = [self.inner.intersection(outside(root, BINDERS)) for root in roots]
         if sum(map(len, met)) > len(set().union(*met)) or any(isinstance(root, Delta) for root in roots):
             return self.write(self.tree(body))  # they are decided together
@@ -145,6 +145,9 @@ class _Trees:
 
     def nests(self, node: Term) -> bool:
         return any(nested(c) for c in coordinates_of(node))
+
+    def until_it_nests(self, node: Term) -> Sequence[Term]:
+        return () if isinstance(node, BINDERS) or self.nests(node) else children(node)
 
     def tree(self, root: Term) -> Tree:
         for node in postorder_by(root, self.below):
@@ -168,7 +171,7 @@ class _Trees:
             return self.walk([self.memo[c] for c in node.coordinates], self.region, decided)
 
         parts = [self.memo[c] for c in children(node)]
-        if all(isinstance(part, Leaf) for part in parts):
+        if all(isinstance(part, Leaf) and part.term is child for part, child in zip(parts, children(node), strict=True)):
             return self.leaf(node)
 
         def built(parts: tuple[Term, ...], region: Region) -> Tree:
@@ -291,11 +294,6 @@ class _Trees:
                     then, orelse = self.written[top.then], self.written[top.orelse]
                     self.written[top] = branch(top.coordinates, top.strict, then, orelse)
         return self.written[tree]
-
-
-def _outermost(body: Term) -> Iterable[Term]:
-    """The conditions and deltas of a body that stand in no other one, and the parts that are none."""
-    return outside(body, (Branch, Delta, *BINDERS))
 
 
 def _restricted(tree: Tree, key: tuple[Term, bool], up: bool) -> Tree:
