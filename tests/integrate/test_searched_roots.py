@@ -158,3 +158,35 @@ def test_roots_without_end_leave_nothing_to_vouch_for(integrand: str, at: float)
     found = potto.deriv(potto.compile(f"def f(t) integral [0, inf] {integrand} d(x)").f)((at, 1.0))
     assert not found.converged and found.error == found.tangent_error == math.inf
     assert any("too many roots" in reason for reason in found.reasons)
+
+
+# Surfaces that are 0 to rounding over a stretch: what they may do there is part of the error. Values by antisymmetry.
+
+
+@pytest.mark.parametrize(
+    ("program", "value", "slope"),
+    [
+        # x - sin(x) has a triple root at 0: within 1e-8 of it nothing is known. int_0^2 (x + t), t = 1/2
+        ("integral [-2, 2] [x > sin(x)]*(x + t) d(x)", 3.0, 2.0),
+        # it touches 0 there, and is nowhere below
+        ("integral [-2, 2] [exp(x) - 1 - x < 0]*(x + t) d(x)", 0.0, 0.0),
+        ("integral [-2, 2] [exp(x) - 1 - x >= 0]*(x + t) d(x)", 2.0, 4.0),
+    ],
+)
+def test_where_rounding_hides_a_root(program: str, value: float, slope: float) -> None:
+    answer = potto.deriv(potto.compile(f"def f(t) {program}").f)((0.5, 1.0))
+    assert abs(answer.value - value) <= answer.error < 1e-6
+    assert abs(answer.tangent - slope) <= answer.tangent_error < 1e-6
+
+
+def test_a_kink_where_rounding_hides_it_is_none() -> None:
+    answer = potto.compile("def f(t) integral [0, 2] max(sin(x), x)*t d(x)").f(0.5)
+    assert answer.converged and abs(answer.value - 1.0) <= answer.error < 1e-12
+
+
+def test_powers_of_negative_numbers_have_no_roots() -> None:
+    """Kinks of the clamp would be at powers of -0.4, which are none: int_0^1 3^cos(y) d(y) by mpmath."""
+    answer = potto.compile("def f(t) integral [0, 1] clamp((2 + t)^cos(y), -0.4, 9) d(y)").f(1.0)
+    exact = mp.quad(lambda y: 3 ** mp.cos(y), [0, 1])
+    assert answer.converged and abs(answer.value - exact) <= answer.error
+    assert answer.evals < 200

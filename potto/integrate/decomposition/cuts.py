@@ -34,6 +34,7 @@ class Row:
     """One candidate cut for the whole batch: where it is, how it moves, which cut of the level it belongs to.
 
     e, et: how far off the place, and its speeds, may be by rounding; None where that is not known.
+    hides: how long the stretch around it is on all of which the surface is 0 to rounding, if there is one.
     """
 
     x: Array
@@ -42,6 +43,7 @@ class Row:
     turning: bool
     e: Any = None
     et: tuple[Any, ...] = ()
+    hides: Any = None
 
 
 @dataclass
@@ -212,7 +214,7 @@ def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, d
         merged = bool(blur.any())
     cuts = _pieces(x, e, t, rank, blur, sign, beyond, edges)
     cuts.conflict, cuts.brushes = conflict, brushes
-    if merged or edges or not nested:
+    if merged or edges or not nested or any(row.hides is not None for row in rows):
         cuts.slivers = _slivers(plan, rows, low, high, ((tl, el), (th, eh)), directions, batch)
     if directions:
         cuts.folds = _folds(plan, rows, low, high, directions, batch)
@@ -272,6 +274,9 @@ def _slivers(
         if jumps[j].cut != jumps[i].cut:
             gap = np.where((x[i] > low) & (x[i] < high), np.abs(x[i] - x[j]), np.inf)
             put((j, i), x[i], gap, off[i] + off[j], True)
+    for i, row in enumerate(jumps):
+        if row.hides is not None:
+            put((i, i), x[i], np.where((x[i] > low) & (x[i] < high), 0.0, np.inf), row.hides, True)
     return out
 
 

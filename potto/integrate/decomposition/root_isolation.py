@@ -19,16 +19,25 @@ FINEST = 48  # halvings of the whole
 FAR = (2.0**100, 2.0**30, 2.0**9)  # where signs are looked at that infinity does not tell
 OUTSIDE = 64  # how many of the smallest cells away from one a sign is asked for
 CELLS, CELLS_EACH = 1 << 16, 1 << 9  # at most so many open at once, or so many for each member
+# Up to how many widths of its enclosure at a point a surface may vary over a cell that is not looked at more closely:
+# halves of it would say no more. Of x - sin(x) that is settled after 40 cells, and never without.
+SHALLOW = 2.0
+
+_Stretches = tuple[Ints, Array, Array]  # whose, from where, to where
 
 
 @dataclass
 class Brackets:
-    """owner: (r,) whose; a, b: (r,) ends of cells with a sign change each. complete: whether these are all."""
+    """owner: (r,) whose; a, b: (r,) ends of cells with a sign change each. complete: whether these are all.
+
+    hidden: whose, and from where to where, the surface is 0 to rounding, so that there may be any number of them.
+    """
 
     owner: Ints
     a: Array
     b: Array
     complete: bool
+    hidden: _Stretches
 
 
 def isolated(surface: Term, slope: Term, variable: str, env: dict[str, Value], low: Array, high: Array) -> Brackets:
@@ -42,7 +51,8 @@ def isolated(surface: Term, slope: Term, variable: str, env: dict[str, Value], l
     cells = _Cells(surface, slope, variable, fixed, low, high)
     there = np.nonzero(low < high)[0]
     owner, s0, s1 = there, np.zeros(there.size), np.ones(there.size)
-    found: list[tuple[Ints, Array, Array]] = []
+    found: list[_Stretches] = []
+    hidden: list[_Stretches] = [(there[:0], s0[:0], s1[:0])]
     most = max(CELLS, CELLS_EACH * there.size)
     complete = True
     for _ in range(FINEST):
@@ -51,7 +61,8 @@ def isolated(surface: Term, slope: Term, variable: str, env: dict[str, Value], l
         if owner.size > most:
             complete = False
             break
-        settled, crossed, open_ = cells.judged(owner, s0, s1)
+        settled, crossed, open_, shallow = cells.judged(owner, s0, s1)
+        hidden.append((owner[shallow], s0[shallow], s1[shallow]))
         found.append((owner[settled][crossed], s0[settled][crossed], s1[settled][crossed]))
         owner, s0, s1 = owner[open_], s0[open_], s1[open_]
         middle = 0.5 * (s0 + s1)
@@ -60,32 +71,38 @@ def isolated(surface: Term, slope: Term, variable: str, env: dict[str, Value], l
     found.append((owner[crossed], s0[crossed], s1[crossed]))
     if complete and owner.size:
         found.append(_around_poles(cells, owner[~crossed], s0[~crossed], s1[~crossed], found))
-    owners, s0, s1 = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    return Brackets(owners, cells.x(owners, s0), cells.x(owners, s1), complete)
+    sure, unsure = cells.places(*_together(found)), cells.places(*adjoining(*_together(hidden)))
+    return Brackets(*sure, complete, unsure)
 
 
-def _around_poles(
-    cells: _Cells, owner: Ints, s0: Array, s1: Array, found: list[tuple[Ints, Array, Array]]
-) -> tuple[Ints, Array, Array]:
+def _together(parts: list[_Stretches]) -> _Stretches:
+    owner, s0, s1 = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return owner, s0, s1
+
+
+def _around_poles(cells: _Cells, owner: Ints, s0: Array, s1: Array, found: list[_Stretches]) -> _Stretches:
     """Places with a sign change among the smallest cells, next to each other, that say nothing by themselves.
 
     So close to a pole no enclosure has a sign: it is asked for a little outside. What was found there already is left.
     """
-    order = np.lexsort((s0, owner))
-    owner, s0, s1 = owner[order], s0[order], s1[order]
+    owner, s0, s1 = adjoining(owner, s0, s1)
     width = 2.0**-FINEST
-    first = np.ones(owner.size, dtype=bool)
-    first[1:] = (owner[1:] != owner[:-1]) | (s0[1:] > s1[:-1] + width)
-    starts = np.nonzero(first)[0]
-    if not starts.size:
-        return owner, s0, s1
-    owner, s0, s1 = owner[starts], s0[starts], np.maximum.reduceat(s1, starts)
     s0, s1 = np.maximum(s0 - OUTSIDE * width, 0.0), np.minimum(s1 + OUTSIDE * width, 1.0)
     crossed = cells.crossed(owner, s0, s1)
     for o, a, b in found:
         for i in np.nonzero(crossed)[0]:
             crossed[i] = not ((o == owner[i]) & (b >= s0[i]) & (a <= s1[i])).any()
     return owner[crossed], s0[crossed], s1[crossed]
+
+
+def adjoining(owner: Ints, s0: Array, s1: Array) -> _Stretches:
+    """Cells put together with those next to them."""
+    order = np.lexsort((s0, owner))
+    owner, s0, s1 = owner[order], s0[order], s1[order]
+    first = np.ones(owner.size, dtype=bool)
+    first[1:] = (owner[1:] != owner[:-1]) | (s0[1:] > s1[:-1] + 2.0**-FINEST)
+    starts = np.nonzero(first)[0]
+    return owner[starts], s0[starts], np.maximum.reduceat(s1, starts) if starts.size else s1
 
 
 def flat(terms: tuple[Term, ...], env: dict[str, Value]) -> tuple[list[Term], dict[str, Value]]:
@@ -141,11 +158,15 @@ class _Cells:
         """The places of labels in [0, 1], also where a bound is infinite."""
         return at_label(self.low[owner], self.high[owner], s)
 
+    def places(self, owner: Ints, s0: Array, s1: Array) -> _Stretches:
+        return owner, self.x(owner, s0), self.x(owner, s1)
+
     def at(self, owner: Ints) -> dict[str, Interval]:
         return {n: (v[0][owner], v[1][owner]) if isinstance(v[0], np.ndarray) else v for n, v in self.fixed.items()}
 
-    def judged(self, owner: Ints, s0: Array, s1: Array) -> tuple[Ints, Bools, Ints]:
-        """The cells with at most one root, whether they have one, and the cells that are to be halved."""
+    def judged(self, owner: Ints, s0: Array, s1: Array) -> tuple[Ints, Bools, Ints, Ints]:
+        """The cells with at most one root, whether they have one, the cells that are to be halved, and those on all of
+        which the surface is 0 to rounding."""
         a, b = self.x(owner, s0), self.x(owner, s1)
         box = {**self.at(owner), self.variable: (a, b)}
         (lo, hi), (least, most) = (
@@ -158,6 +179,7 @@ class _Cells:
             far = np.maximum(np.abs(least), np.abs(most)) * reach
             apart = (here[0] - far > 0) | (here[1] + far < 0)
             steady = (least >= 0) | (most <= 0)
+            shallow = ~steady & (here[0] <= 0) & (here[1] >= 0) & (far <= SHALLOW * (here[1] - here[0]))
         if not self.total:  # a slope says nothing across the edge of where the surface has a value
             whole = ~(self.nowhere(owner, a) | self.nowhere(owner, b))
             apart, steady = apart & whole, steady & whole
@@ -165,9 +187,10 @@ class _Cells:
             one = (low > 0) | (high < 0)
             apart, steady = apart & one, steady & one
         free = (lo > 0) | (hi < 0) | np.isnan(lo) | apart
-        settled = ~free & steady
+        settled, shallow = ~free & steady, ~free & shallow
         index = np.nonzero(settled)[0]
-        return index, self.crossed(owner[index], s0[index], s1[index]), np.nonzero(~free & ~settled)[0]
+        crossed = self.crossed(owner[index], s0[index], s1[index])
+        return index, crossed, np.nonzero(~free & ~settled & ~shallow)[0], np.nonzero(shallow)[0]
 
     def nowhere(self, owner: Ints, x: Array) -> Bools:
         lo, _ = enclosure((self.surface,), {**self.at(owner), self.variable: (x, x)})[0]

@@ -8,6 +8,7 @@ crossing it. Each is polished; how a root moves follows from the surface's own d
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,12 +16,12 @@ import numpy as np
 from potto.calculus.solving.enclosable import slope_of
 from potto.core.terms import Lam, Term, function_of
 from potto.integrate.decomposition.cuts import SEARCHED, Row, as_array
-from potto.integrate.decomposition.root_isolation import Brackets, between, isolated
+from potto.integrate.decomposition.root_isolation import between, isolated
 from potto.integrate.events import ROOTS_NOT_SEPARATED, TOO_MANY_ROOTS
 from potto.integrate.levels import LevelPlan
 from potto.integrate.pieces import still
 from potto.integrate.rules.gauss import EPS
-from potto.kernels.cells import Array, Cell, Value, map_arrays, pad
+from potto.kernels.cells import Array, Cell, Ints, Value, map_arrays, pad
 
 GRID = 64
 MOST_IN_FAMILY = 100_000
@@ -89,27 +90,31 @@ def _search(
     low, high = as_array(np.minimum(lo.v, hi.v), batch), as_array(np.maximum(lo.v, hi.v), batch)
     function = function_of(surface)
     slope = slope_of(surface, variable)
+    hidden: list[Row] = []
     if slope is None:
         a, b = _on_a_grid(function, variable, env, low, high, machine)
     else:
         brackets = isolated(surface, slope, variable, env, low, high)
         if not brackets.complete:
             machine.note(ROOTS_NOT_SEPARATED)
-        a, b = _padded(brackets, batch)
+        a, b = _padded(brackets.owner, brackets.a, brackets.b, batch)
+        for start, end in zip(*(x.T for x in _padded(*brackets.hidden, batch)), strict=True):
+            row = _moving(cut, function, variable, env, 0.5 * (start + end), end - start, machine)
+            hidden.append(replace(row, e=row.e + (end - start), hides=end - start))
     roots, within = _polished(function, variable, env, a, b, machine)
     columns = zip(roots.T, within.T, strict=True)
-    return [_moving(cut, function, variable, env, root, wide, machine) for root, wide in columns]
+    return [*(_moving(cut, function, variable, env, root, wide, machine) for root, wide in columns), *hidden]
 
 
-def _padded(found: Brackets, batch: int) -> tuple[Array, Array]:
-    """Brackets as rows, one for each member, in order and padded with nan."""
-    order = np.lexsort((found.a, found.owner))
-    owner = found.owner[order]
+def _padded(owner: Ints, a: Array, b: Array, batch: int) -> tuple[Array, Array]:
+    """Stretches as rows, one for each member, in order and padded with nan."""
+    order = np.lexsort((a, owner))
+    owner = owner[order]
     count = np.bincount(owner, minlength=batch)
     slot = np.arange(owner.size) - (np.cumsum(count) - count)[owner]
-    a, b = np.full((2, batch, int(count.max(initial=0))), np.nan)
-    a[owner, slot], b[owner, slot] = found.a[order], found.b[order]
-    return a, b
+    first, last = np.full((2, batch, int(count.max(initial=0))), np.nan)
+    first[owner, slot], last[owner, slot] = a[order], b[order]
+    return first, last
 
 
 def _on_a_grid(

@@ -142,6 +142,8 @@ def count_slivers(scene: Scene, cuts: Cuts, sums: Sums) -> None:
         swept = lost * np.where(np.isfinite(sliver.speed), sliver.speed, 0.0)
         either = apart[:, None] * np.where(np.isfinite(sliver.passes), sliver.passes, 0.0)
         sums.et[:, :, sliver.owner] += swept[:, None] + np.where(np.isfinite(either), either, 0.0)
+        if len(set(sliver.cuts)) < len(sliver.cuts):  # nothing is known of how a surface moves where it folds
+            sums.et[:, :, sliver.owner] += np.where((lost > 0) & ~np.isfinite(sliver.speed), np.inf, 0.0)[:, None]
         sums.e[at] += lost
         if len(sliver.cuts) == 1 and sums.gross is not None:
             # What lies between two roundings of a bound is rounding of the bound, if there is nothing else, and what

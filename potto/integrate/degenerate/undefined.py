@@ -22,7 +22,8 @@ from potto.integrate.rules import substitution
 from potto.integrate.rules.substitution import Segments
 from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value
 
-# Where a segment is looked at, as parts of it: in the middle, and where that is a pole (of sin(x)/x, say) elsewhere.
+# Where a segment is looked at, as parts of it: in the middle, and where that is a pole (of sin(x)/x, say), or the very
+# place where a surface touches 0, elsewhere.
 LOOKED_AT = (0.5, 0.3, 0.8)
 
 def sides_at(level: LevelPlan, env: dict[str, Value], seg: Segments, machine: Evaluator) -> list[tuple[Array, Array]]:
@@ -38,13 +39,17 @@ def sides_at(level: LevelPlan, env: dict[str, Value], seg: Segments, machine: Ev
         if not found:
             found = now
         else:
-            found = [
-                (np.where(np.isnan(v), w, v), np.where(np.isnan(v), off, e))
-                for (v, e), (w, off) in zip(found, now, strict=True)
-            ]
-        if not any(np.isnan(v).any() for v, _ in found):
+            found = [_clearer(*both) for both in zip(found, now, strict=True)]
+        if not any((np.isnan(v) | (v == 0)).any() for v, _ in found):
             break
     return found
+
+
+def _clearer(first: tuple[Array, Array], second: tuple[Array, Array]) -> tuple[Array, Array]:
+    """The second of two values with their rounding where the first says nothing."""
+    (v, e), (w, off) = first, second
+    other = np.isnan(v) | ((v == 0) & ~np.isnan(w))
+    return np.where(other, w, v), np.where(other, off, e)
 
 
 def lost_members(scene: Scene, seg: Segments, undefined: dict[int, Bools], alive: Ints | None) -> Ints:

@@ -186,8 +186,10 @@ def _pow(node: Prim, args: list[Interval]) -> tuple[Any, Any] | tuple[Any, Any, 
         least, most = (np.power(np.maximum(end, 0.0), exponent.value) for end in base)
         return least, most, base[1] < 0
     corners = np.stack(np.broadcast_arrays(*(np.power(b, e) for b in base for e in (low, high))))
-    fine = base[0] > 0
-    return np.where(fine, corners.min(axis=0), -np.inf), np.where(fine, corners.max(axis=0), np.inf)
+    whole = (low == high) & (low == np.rint(low))
+    fine = (base[0] > 0) | ((base[1] < 0) & whole)
+    least, most = np.where(fine, corners.min(axis=0), -np.inf), np.where(fine, corners.max(axis=0), np.inf)
+    return least, most, (base[1] < 0) & ~whole  # of what is negative it is one at whole exponents only
 
 
 _ARITHMETIC: dict[str, Callable[[Prim, list[Interval]], tuple[Any, ...]]] = {
