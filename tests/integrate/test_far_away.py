@@ -69,3 +69,25 @@ def test_a_stretch_that_is_written_multiplied_out_has_lost_its_length(far: float
     assert abs(answer.value - 2 * mp.mpf(0.3)) <= answer.error
     assert abs(answer.tangent - 2) <= answer.tangent_error
     assert not answer.converged and "rounding" in answer.reasons[0]
+
+
+@pytest.mark.parametrize("order", ["x, y", "y, x"])
+@pytest.mark.parametrize("first", ["normal(0, 1)", "uniform(0, 1)"])
+def test_a_wave_over_infinite_ranges(first: str, order: str) -> None:
+    """sin(u) <= s between pi - asin(s) and 2 pi + asin(s), and a period further: so often as u = x + y falls there."""
+    other = "normal(0, 1)"
+    measures = {"x": first, "y": other}
+    drawn = ", ".join(f"{v} ~ {measures[v]}" for v in order.split(", "))
+    f = potto.compile(f"def f(s) integral ({drawn}) [sin(x + y) <= s] d({order})").f
+    answer = potto.deriv(f)((0.25, 1.0))
+
+    def cdf(u: Any) -> Any:
+        if first == other:
+            return mp.ncdf(u / mp.sqrt(2))
+        return (u * mp.ncdf(u) + mp.npdf(u)) - ((u - 1) * mp.ncdf(u - 1) + mp.npdf(u - 1))
+
+    def share(s: Any) -> Any:
+        a = mp.asin(s)
+        return mp.fsum(cdf(2 * mp.pi * (k + 1) + a) - cdf(2 * mp.pi * k + mp.pi - a) for k in range(-8, 8))
+
+    covered(answer, share(mp.mpf(0.25)), mp.diff(share, mp.mpf(0.25)))

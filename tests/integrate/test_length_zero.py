@@ -113,3 +113,12 @@ def test_bounds_that_differ_by_rounding_alone_are_not_taken_for_equal_in_silence
     answer = potto.compile("def f(a) integral [a + 0.2, 0.3] exp(x) d(x)").f(0.1)
     assert abs(answer.value - (0.3 - (0.1 + 0.2)) * math.exp(0.3)) <= answer.error
     assert answer.error <= 1e-15
+
+
+def test_a_searched_surface_at_the_place() -> None:
+    """2b < exp(x) + x - 1 is x > b, to first order: of [b, -b/2] that is all for b < 0 and nothing for b > 0."""
+    answer = rate("def f(b) integral [b, -b/2] (if [2*b - exp(x) - x + 1 <= 0] then 2 else 3) d(x)", 0.0)
+    (note,) = answer.notes
+    assert (float(note.backward), float(note.forward)) == pytest.approx((-3.0, -4.5), rel=1e-14, abs=0)
+    away = rate("def f(b) integral [b, -b/2] (if [2*b - exp(x) - x + 1.5 <= 0] then 2 else 3) d(x)", 0.0)
+    assert not away.notes and abs(away.tangent + 4.5) <= away.tangent_error < 1e-14

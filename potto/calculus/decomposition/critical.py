@@ -8,12 +8,13 @@ the projection of a cylindrical decomposition (Collins 1975), done by numbers ra
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 from potto.calculus.algebra.affine import determinant
-from potto.calculus.algebra.point_values import not_zero
+from potto.calculus.algebra.point_values import not_zero, sample_value
 from potto.calculus.algebra.radicals import squared
 from potto.calculus.algebra.ranges import positive, range_of
 from potto.calculus.differentiation.derivative import NotSmooth, partial
@@ -112,7 +113,7 @@ def shadows(
     here = Within(variable, lo, hi)
     known = dict.fromkeys(found)
     for system in found:
-        for place in (*(bound for bound in (lo, hi) if not _infinite(bound)), *roots):
+        for place in (*(bound for bound in (lo, hi) if not infinite(bound)), *roots):
             at = system.at(variable, place)
             if all(e.free for e in at.equations):
                 yield at
@@ -141,8 +142,8 @@ def _slopes(system: Critical) -> Iterator[Term]:
             yield from _factors(slope)
 
 
-def _infinite(bound: Term) -> bool:
-    return isinstance(bound, Const) and bound.value in (float("inf"), float("-inf"))
+def infinite(bound: Term) -> bool:
+    return not bound.free and math.isinf(sample_value(bound, {}))
 
 
 def _turns(system: Critical, variable: str) -> Iterator[Term]:

@@ -16,7 +16,7 @@ from itertools import islice
 from potto.calculus.algebra.radicals import minus
 from potto.calculus.algebra.ranges import positive
 from potto.calculus.algebra.rational_form import settled
-from potto.calculus.decomposition.critical import Critical, Within, folds, scattered, shadows
+from potto.calculus.decomposition.critical import Critical, Within, folds, infinite, scattered, shadows
 from potto.calculus.solving.enclosable import slope_of
 from potto.calculus.solving.solve import Family, Sections, Unsolvable, sections
 from potto.calculus.surfaces.case_split import cased
@@ -349,7 +349,7 @@ def _shadows(
     for cut in cuts:
         surface = along(cut)
         for bound in (lo, hi):
-            if not (isinstance(bound, Const) and bound.value in (float("inf"), float("-inf"))):
+            if not infinite(bound):
                 yield substitute(surface, {variable: bound}), False
         if cut.roots is None or (cut.families and _by_numbers(surface, variable, further)):
             yield from folds(surface, variable, lo, hi)

@@ -171,7 +171,7 @@ class _Trees:
             return self.walk([self.memo[c] for c in node.coordinates], self.region, decided)
 
         parts = [self.memo[c] for c in children(node)]
-        if all(isinstance(part, Leaf) and part.term is child for part, child in zip(parts, children(node), strict=True)):
+        if all(isinstance(tree, Leaf) and tree.term is c for tree, c in zip(parts, children(node), strict=True)):
             return self.leaf(node)
 
         def built(parts: tuple[Term, ...], region: Region) -> Tree:

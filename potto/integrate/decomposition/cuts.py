@@ -199,7 +199,7 @@ def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, d
         for d, slip in enumerate(row.et[:directions]):
             if slip is not None:
                 t[directions + d, i] = np.where(inner, slip, 0.0)
-        if row.turning or (row.cut >= 0 and _any_turning(plan, row)):
+        if row.turning or (row.cut >= 0 and plan.level.cuts[row.cut].turning):
             beyond.append((root, True))
         if directions and row.cut >= 0:
             found, beside = (edges, None) if plan.level.cuts[row.cut].decides else (brushes, off)
@@ -303,7 +303,7 @@ def _folds(plan: LevelPlan, rows: list[Row], low: Array, high: Array, directions
     for row in rows:
         others = before.setdefault(row.cut, [])
         others.append(row.x)
-        if row.cut < 0 or not (plan.level.cuts[row.cut].decides or row.turning or _any_turning(plan, row)):
+        if row.cut < 0 or not (plan.level.cuts[row.cut].decides or row.turning or plan.level.cuts[row.cut].turning):
             continue
         x = as_array(row.x, batch)
         folded: Any = np.zeros(batch, dtype=bool)
@@ -327,10 +327,6 @@ def at_rest(cuts: Cuts) -> Cuts:
     seg = cuts.segments
     seg.ta, seg.tb, seg.da, seg.db = (np.zeros_like(speed) for speed in (seg.ta, seg.tb, seg.da, seg.db))
     return replace(cuts, moving=False)
-
-
-def _any_turning(plan: LevelPlan, row: Row) -> bool:
-    return plan.level.cuts[row.cut].turning
 
 
 def tangents(t: tuple[Any, ...], batch: int, directions: int) -> Array:

@@ -17,7 +17,7 @@ from potto.calculus.solving.enclosable import slope_of
 from potto.core.terms import Lam, Term, function_of
 from potto.integrate.decomposition.cuts import SEARCHED, Row, as_array
 from potto.integrate.decomposition.root_isolation import between, isolated
-from potto.integrate.events import ROOTS_NOT_SEPARATED, TOO_MANY_ROOTS
+from potto.integrate.events import ROOTS_NOT_SEPARATED, TOO_MANY_ROOTS, Unsearched
 from potto.integrate.levels import LevelPlan
 from potto.integrate.pieces import still
 from potto.integrate.rules.gauss import EPS
@@ -26,6 +26,9 @@ from potto.kernels.cells import Array, Cell, Ints, Value, map_arrays, pad
 GRID = 64
 MOST_IN_FAMILY = 100_000
 BISECTIONS = 64
+# Kinks that are cut at, for each member: next to x = 0 those of sin(1/x) < y beside y < x are without number, and what
+# lies there is refined like all else that is not smooth. 256 of them take as long as 0.3 s.
+MOST_KINKS = 256
 JUMP = 8.0  # a surface that is so many times its rounding, and that of the place, where its sign changes jumps there
 BESIDE = 2.0**-27  # how far from a pole, as a part of where it is, it is asked how it moves
 
@@ -37,7 +40,7 @@ def searched_rows(level: LevelPlan, env: dict[str, Value], lo: Cell, hi: Cell, b
         rows += _family(level, number, family, env, lo, hi, batch, machine)
     for cut in level.searched:
         number = level.level.cuts.index(cut)
-        rows += _search(number, cut.surface, level.variable, env, lo, hi, batch, machine)
+        rows += _search(level, number, cut.surface, env, lo, hi, batch, machine)
     return rows
 
 
@@ -70,7 +73,10 @@ def _family(
     last = np.floor(np.where(known, stack, -np.inf).max(axis=0) + 1e-6)
     spans = np.where(np.isfinite(first) & np.isfinite(last), last - first + 1, 0.0)
     count = float(spans.max(initial=0.0))
-    if np.isinf(stack).any() or count > MOST_IN_FAMILY:
+    # At a node at infinity of a variable further out nothing counts.
+    outer = [env[name] for name in family.inner.free - {level.variable}]
+    far = np.any([np.isinf(as_array(cell.v, batch)) for cell in outer if isinstance(cell, Cell)], axis=0)
+    if (np.isinf(stack).any(axis=0) & ~far).any() or count > MOST_IN_FAMILY:
         machine.note(TOO_MANY_ROOTS)
         count = 0.0  # whatever was cut at some of them would be no better known
     function = function_of(family.root)
@@ -85,8 +91,9 @@ def _family(
 
 
 def _search(
-    cut: int, surface: Term, variable: str, env: dict[str, Value], lo: Cell, hi: Cell, batch: int, machine: Any
+    level: LevelPlan, cut: int, surface: Term, env: dict[str, Value], lo: Cell, hi: Cell, batch: int, machine: Any
 ) -> list[Row]:
+    variable = level.variable
     low, high = as_array(np.minimum(lo.v, hi.v), batch), as_array(np.maximum(lo.v, hi.v), batch)
     function = function_of(surface)
     slope = slope_of(surface, variable)
@@ -95,15 +102,34 @@ def _search(
         a, b = _on_a_grid(function, variable, env, low, high, machine)
     else:
         brackets = isolated(surface, slope, variable, env, low, high)
-        if not brackets.complete:
+        most = brackets.owner.size if level.level.cuts[cut].decides else MOST_KINKS * batch
+        if level.level.cuts[cut].decides and not brackets.complete:
             machine.note(ROOTS_NOT_SEPARATED)
-        a, b = _padded(brackets.owner, brackets.a, brackets.b, batch)
+        elif not brackets.complete or brackets.owner.size > most:
+            machine.note(Unsearched(variable))
+        few = slice(most)  # those that are farthest apart are found first
+        a, b = _padded(brackets.owner[few], brackets.a[few], brackets.b[few], batch)
         for start, end in zip(*(x.T for x in _padded(*brackets.hidden, batch)), strict=True):
             row = _moving(cut, function, variable, env, 0.5 * (start + end), end - start, machine)
             hidden.append(replace(row, e=row.e + (end - start), hides=end - start))
     roots, within = _polished(function, variable, env, a, b, machine)
     columns = zip(roots.T, within.T, strict=True)
-    return [*(_moving(cut, function, variable, env, root, wide, machine) for root, wide in columns), *hidden]
+    rows = [*(_moving(cut, function, variable, env, root, wide, machine) for root, wide in columns), *hidden]
+    return rows + _at_places(cut, function, variable, env, low, low == high, machine)
+
+
+def _at_places(
+    cut: int, function: Lam, variable: str, env: dict[str, Value], x: Array, empty: Array, machine: Any
+) -> list[Row]:
+    """The places that empty ranges are, where the surface is 0 there: nothing else can be searched for in them."""
+    if not empty.any():
+        return []
+    here = {**{n: still(v) for n, v in env.items()}, variable: Cell(x)}
+    at = _call(function, here, machine.tracking().with_directions(0))
+    zero: Any = np.abs(at.v) <= (0.0 if at.e is None else at.e)
+    on = empty & zero
+    there = np.where(on, x, np.nan)
+    return [_moving(cut, function, variable, env, there, np.zeros(x.size), machine)] if on.any() else []
 
 
 def _padded(owner: Ints, a: Array, b: Array, batch: int) -> tuple[Array, Array]:

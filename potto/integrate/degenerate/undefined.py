@@ -26,6 +26,7 @@ from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value
 # place where a surface touches 0, elsewhere.
 LOOKED_AT = (0.5, 0.3, 0.8)
 
+
 def sides_at(level: LevelPlan, env: dict[str, Value], seg: Segments, machine: Evaluator) -> list[tuple[Array, Array]]:
     """The surfaces that a level decides the sides of, in the middle of segments, with their rounding, (S,) each.
 
