@@ -20,7 +20,7 @@ Record = list[tuple[str, Array]]
 Program = Callable[[Environment, "Record | None", int], Array]
 
 GRID = 129
-MOST_POINTS = 30_000_000
+MOST_POINTS = 10_000_000
 GOLDEN = (5**0.5 - 1) / 2
 
 

@@ -1,204 +1,48 @@
 """Random well-typed programs of Potto, each with its meaning as a program for `plain_quadrature`.
 
-Owns `random_program`. Parameters t and s, integrals over one and two variables, one inside another, and everything
-that a condition, a bound and a call may look like.
+Owns `random_program`. Parameters t and s, integrals over one to three variables, one inside another, over ranges and
+measures, and everything that a condition, a bound and a call may look like. A program has many
+spellings: written out, behind calls and `let`, in another order of variables, mirrored, scaled, nested.
 """
 
 from __future__ import annotations
 
-import random
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
-from plain_quadrature import Array, Environment, Program, Record, integral
+from plain_quadrature import Array, Environment, Program, Record
+from program_measures import measures
+from program_nodes import (
+    Binder,
+    Node,
+    apply,
+    bent,
+    between,
+    call,
+    chosen,
+    compare,
+    diffeo,
+    integrals,
+    logic,
+    minus,
+    name,
+    number,
+    over,
+    plus,
+    power,
+    ranged,
+    spike,
+    times,
+)
+from program_terms import PARAMETERS, Terms
 
-PARAMETERS = ["t", "s"]
-
-
-@dataclass(frozen=True)
-class Node:
-    """A piece of source and what it means."""
-
-    text: str
-    run: Program
-
-    def __call__(self, env: Environment, record: Record | None, n: int) -> Array:
-        return self.run(env, record, n)
-
-
-def number(value: float) -> Node:
-    return Node(repr(value) if value >= 0 else f"({value!r})", lambda env, record, n: np.full(n, float(value)))
-
-
-def name(text: str) -> Node:
-    return Node(text, lambda env, record, n: env[text])
-
-
-OPERATORS: dict[str, Any] = {"+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide}
-
-
-def apply(op: str, a: Node, b: Node) -> Node:
-    f = OPERATORS[op]
-    return Node(f"({a.text} {op} {b.text})", lambda env, record, n: f(a(env, record, n), b(env, record, n)))
-
-
-def power(a: Node, exponent: int) -> Node:
-    return Node(f"({a.text})^{exponent}", lambda env, record, n: a(env, record, n) ** exponent)
+# How a variable may be written: in another one of which it is this multiple, shifted by that.
+WRITTEN = ((-1.0, 0.0), (-1.0, 0.0), (2.0, 0.0), (0.5, 1.0), (1.0, -3.0), (1e-8, 0.0), (1e6, 0.0), (-3.0, 0.25))
+SCALES = (2.0, 0.5, 3.0, 1e8, 1e-8, 0.1)
 
 
-def call(function: Any, a: Node, text: str = "") -> Node:
-    shape = text or {np.arctan: "atan(%s)"}.get(function, f"{function.__name__}(%s)")
-    return Node(shape % a.text, lambda env, record, n: function(a(env, record, n)))
-
-
-def note(record: Record | None, *margins: Array) -> None:
-    if record is not None:
-        record.extend(("sign", margin) for margin in margins)
-
-
-def bent(op: str, *args: Node) -> Node:
-    """abs, min, max or clamp."""
-
-    def run(env: Environment, record: Record | None, n: int) -> Array:
-        values = [a(env, record, n) for a in args]
-        if op == "abs":
-            note(record, 0 + values[0])
-            return np.abs(values[0])
-        if op == "clamp":
-            note(record, values[0] - values[1], values[2] - values[0])
-            return np.clip(*values)
-        note(record, values[0] - values[1])
-        return np.minimum(*values) if op == "min" else np.maximum(*values)
-
-    return Node(f"{op}({', '.join(a.text for a in args)})", run)
-
-
-def compare(op: str, a: Node, b: Node) -> Node:
-    def run(env: Environment, record: Record | None, n: int) -> Array:
-        x, y = a(env, record, n), b(env, record, n)
-        note(record, x - y)
-        return {"<": x < y, "<=": x <= y, ">": x > y, ">=": x >= y}[op]
-
-    return Node(f"{a.text} {op} {b.text}", run)
-
-
-def between(a: Node, x: Node, b: Node) -> Node:
-    both = logic("and", compare("<=", a, x), compare("<", x, b))
-    return Node(f"{a.text} <= {x.text} < {b.text}", both.run)
-
-
-def logic(op: str, *args: Node) -> Node:
-    def run(env: Environment, record: Record | None, n: int) -> Array:
-        values = [a(env, record, n) for a in args]
-        return ~values[0] if op == "not" else (values[0] & values[1] if op == "and" else values[0] | values[1])
-
-    texts = [f"({a.text})" for a in args]
-    return Node(f"not {texts[0]}" if op == "not" else f" {op} ".join(texts), run)
-
-
-def chosen(shape: str, condition: Node, then: Node, orelse: Node) -> Node:
-    def run(env: Environment, record: Record | None, n: int) -> Array:
-        return np.where(condition(env, record, n), then(env, record, n), orelse(env, record, n))
-
-    return Node(shape % (condition.text, then.text, orelse.text), run)
-
-
-def bracket(condition: Node) -> Node:
-    return Node(f"[{condition.text}]", chosen("%s%s%s", condition, number(1.0), number(0.0)).run)
-
-
-def diffeo(surface: Node, then: Node, orelse: Node) -> Node:
-    inner = chosen("%s%s%s", compare(">=", surface, number(0.0)), then, orelse)
-    return Node(f"(if diffeo({surface.text}) then {then.text} else {orelse.text})", inner.run)
-
-
-Bounds = tuple[str, Node, Node]
-
-
-def integrals(bounds: Sequence[Bounds], body: Node) -> Node:
-    run: Program = body
-    for variable, lo, hi in reversed(bounds):
-        run = integral(variable, lo, hi, run)
-    if len(bounds) == 1:
-        variable, lo, hi = bounds[0]
-        return Node(f"(integral [{lo.text}, {hi.text}] ({body.text}) d({variable}))", run)
-    box = ", ".join(f"[{lo.text}, {hi.text}]" for _, lo, hi in bounds)
-    return Node(f"(integral ({box}) ({body.text}) d({', '.join(v for v, _, _ in bounds)}))", run)
-
-
-def expectation(bounds: Sequence[Bounds], body: Node) -> Node:
-    """Over uniform measures."""
-    volume: Node = number(1.0)
-    for _, lo, hi in bounds:
-        volume = apply("*", volume, apply("-", hi, lo))
-    box = ", ".join(f"{v} ~ uniform({lo.text}, {hi.text})" for v, lo, hi in bounds)
-    names = ", ".join(v for v, _, _ in bounds)
-    return Node(f"(integral ({box}) ({body.text}) d({names}))", apply("/", integrals(bounds, body), volume).run)
-
-
-class Source:
+class Source(Terms):
     """One random program in the making."""
-
-    def __init__(self, seed: int) -> None:
-        self.random = random.Random(seed)
-        self.definitions: list[str] = []
-        self.met: list[tuple[set[str], Node, Node]] = []
-
-    def pick(self, *choices: Any) -> Any:
-        return self.random.choice(choices)
-
-    def likely(self, probability: float) -> bool:
-        return self.random.random() < probability
-
-    # Terms
-
-    def constant(self) -> Node:
-        return number(self.pick(0.5, 2.0, 0.3, 1.0, 0.25, 1.5, 3.0, 0.7, round(self.random.uniform(0.1, 2), 2)))
-
-    def smooth(self, names: list[str], depth: int) -> Node:
-        """Smooth and defined everywhere."""
-        if not depth:
-            return name(self.pick(*names)) if self.likely(0.7) else self.constant()
-        a, square = self.smooth(names, depth - 1), lambda: power(self.smooth(names, depth - 1), 2)
-        makers: tuple[tuple[float, Callable[[], Node]], ...] = (
-            (0.45, lambda: apply(self.pick("+", "-", "*"), a, self.smooth(names, depth - 1))),
-            (0.55, lambda: power(a, self.pick(2, 2, 3))),
-            (0.63, lambda: call(np.sin, a)),
-            (0.68, lambda: call(np.cos, a)),
-            (0.74, lambda: call(np.exp, apply("*", number(0.5), call(np.sin, a)))),
-            (0.80, lambda: apply("/", a, apply("+", number(1.0), square()))),
-            (0.85, lambda: call(np.sqrt, apply("+", number(1.0), power(a, 2)))),
-            (0.90, lambda: call(np.tanh, a)),
-            (0.93, lambda: call(np.arctan, a)),
-            (0.96, lambda: call(np.negative, a, "(-%s)")),
-            (1.01, lambda: call(np.log, apply("+", number(1.0), power(a, 2)))),
-        )
-        return self.one_of(makers)
-
-    def one_of(self, makers: tuple[tuple[float, Callable[[], Node]], ...]) -> Node:
-        at = self.random.random()
-        return next(make for bound, make in makers if at < bound)()
-
-    def rough(self, names: list[str], depth: int) -> Node:
-        a = self.smooth(names, depth)
-        if self.likely(0.7):
-            return a
-        op = self.pick("abs", "min", "max", "clamp")
-        others = {"abs": [], "clamp": [number(-0.4), number(0.6)]}.get(op)
-        return bent(op, a, *([self.smooth(names, max(depth - 1, 0))] if others is None else others))
-
-    def parameter(self) -> Node:
-        """A term over the parameters."""
-        a = name(self.pick(*PARAMETERS))
-        return self.one_of((
-            (0.50, lambda: a),
-            (0.65, lambda: apply(self.pick("+", "-", "*"), a, self.constant())),
-            (0.80, lambda: apply(self.pick("+", "-", "*"), a, name(self.pick(*PARAMETERS)))),
-            (0.87, self.constant),
-            (1.01, lambda: self.smooth(PARAMETERS, 2)),
-        ))  # fmt: skip
 
     # Conditions
 
@@ -206,70 +50,93 @@ class Source:
         total: Node | None = None
         for v in names:
             factor = self.pick(1.0, 1.0, 2.0, 0.5, 3.0, 0.7, -1.0, -2.0)
-            part = name(v) if factor == 1.0 else apply("*", number(factor), name(v))
-            total = part if total is None else apply("+", total, part)
+            part = self.name(v) if factor == 1.0 else times(number(factor), self.name(v))
+            total = part if total is None else self.swapped("+", total, part)
         assert total is not None
         return total
 
-    def squares(self, names: list[str], p: Node) -> Node:
-        total = power(name(names[0]), 2)
+    def conic(self, names: list[str], p: Node) -> Node:
+        total = power(self.name(names[0]), 2)
         for v in names[1:]:
-            total = apply("+", total, power(name(v), 2))
-        return apply("+", total, apply("*", p, name(names[0]))) if self.likely(0.3) else total
+            square = power(self.name(v), 2)
+            op = self.pick("+", "+", "-")
+            total = apply(op, total, times(self.constant(), square) if self.likely(0.5) else square)
+        if len(names) > 1 and self.likely(0.3):
+            total = plus(total, times(number(self.pick(0.5, -1.0, 1.5)), times(*map(self.name, names[:2]))))
+        return plus(total, times(p, self.name(names[0]))) if self.likely(0.3) else total
+
+    def last(self, names: list[str]) -> Node:
+        return self.name(names[-1]) if len(names) > 1 else self.parameter()
+
+    def searched(self, names: list[str]) -> Node:
+        """Has no roots in closed form along a variable, or several."""
+        x, y = self.name(names[0]), self.name(names[-1])
+        a = number(self.pick(0.5, 1.0, 1.5, 2.5))
+        cube = power(x, 3)
+        return self.one_of((
+            (0.20, lambda: minus(cube, times(a, y))),
+            (0.35, lambda: plus(cube, power(y, 3)) if y != x else minus(cube, times(a, x))),
+            (0.50, lambda: call(lambda u, v: u * np.exp(-v * v), "%s*exp(-(%s)^2)", x, y)),
+            (0.65, lambda: plus(call(lambda u: np.cos(2 * u), "cos(2*%s)", x), call(np.cos, "cos(%s)", times(a, y)))),
+            (0.80, lambda: plus(call(lambda u: np.exp(0.5 * u), "exp(0.5*%s)", x), times(a, power(y, 2)))),
+            (1.01, lambda: plus(self.smooth(names, 2), times(a, x))),
+        ))  # fmt: skip
 
     def surface(self, names: list[str]) -> tuple[Node, Node]:
         """Two sides of a comparison; now and then ones that were met before."""
         known = [(a, b) for free, a, b in self.met if free <= set(names)]
         if known and self.likely(0.25):
-            pair: tuple[Node, Node] = self.pick(*known)
-            return pair
+            a, b = self.pick(*known)
+            # the same, or nearly: parallel to it, or turned a little
+            return (a, b) if self.likely(0.7) else (a, plus(b, number(self.pick(1e-8, 1e-15, 1e-3, 0.1))))
         p, some = self.parameter(), names if self.likely(0.7) else [self.pick(*names)]
-        second = name(some[-1]) if len(some) > 1 else p
+        if self.likely(0.3):
+            some = some[::-1]
+        second = self.name(some[-1]) if len(some) > 1 else p
+        makers: tuple[tuple[float, Callable[[], tuple[Node, Node]]], ...] = (
+            (0.34, lambda: (self.affine(some), p)),
+            (0.47, lambda: (self.conic(some, p), times(p, p) if self.likely(0.3) else p)),
+            (0.55, lambda: (times(self.name(names[0]), self.last(names)), p)),
+            (0.60, lambda: (times(p, self.name(some[0])), plus(number(0.3), times(number(0.5), second)))),
+            (0.65, lambda: (call(lambda u: np.exp(0.8 * u), "exp(0.8*%s)", self.affine(some)), plus(number(1.0), p))),
+            (0.71, lambda: (call(np.sin, "sin(%s)", times(number(self.pick(2.0, 5.0)), self.affine(some))),
+                            times(number(0.7), p))),
+            (0.81, lambda: (self.searched(some), p)),
+            (0.84, lambda: (call(lambda x, y: x / (1 + y * y), "%s/(1 + (%s)^2)", self.name(some[0]), second), p)),
+            (0.87, lambda: (call(np.hypot, "hypot(%s, %s)", self.name(some[0]), minus(second, p)), self.constant())),
+            (0.91, lambda: (bent("abs", minus(self.affine(some), p)), number(0.4))),
+            (0.94, lambda: (bent(self.pick("min", "max"), self.name(some[0]), times(number(0.7), second)), p)),
+            (0.97, lambda: (plus(self.name(some[0]), times(self.constant(), self.bracket(self.comparison(names)))), p)),
+            (1.01, lambda: (self.smooth(names + PARAMETERS, 2), self.smooth(names, 1))),
+        )  # fmt: skip
         at = self.random.random()
-        if at < 0.40:
-            return self.affine(some), p
-        if at < 0.55:
-            return self.squares(some, p), apply("*", p, p) if self.likely(0.3) else p
-        if at < 0.68:
-            return apply("*", name(names[0]), name(names[-1]) if len(names) > 1 else self.parameter()), p
-        if at < 0.76:
-            return apply("*", p, name(some[0])), apply("+", number(0.3), apply("*", number(0.5), second))
-        if at < 0.84:
-            return call(np.exp, apply("*", number(0.8), self.affine(some))), apply("+", number(1.0), p)
-        if at < 0.90:
-            return call(np.sin, apply("*", number(2.0), self.affine(some))), apply("*", number(0.7), p)
-        if at < 0.94:
-            return bent("abs", apply("-", self.affine(some), p)), number(0.4)
-        if at < 0.97:
-            return bent(self.pick("min", "max"), name(some[0]), apply("*", number(0.7), second)), p
-        return self.smooth(names + PARAMETERS, 2), self.smooth(names, 1)
+        return next(make for bound, make in makers if at < bound)()
 
     def comparison(self, names: list[str]) -> Node:
         a, b = self.surface(names)
-        at = self.random.random()
-        if at < 0.15:
-            factor = number(self.pick(2.0, 0.5, 3.0))
-            a, b = apply("*", factor, a), apply("*", factor, b)
-        elif at < 0.25:
-            a, b = b, a
-        elif at < 0.32:
-            a, b = apply("-", a, b), number(0.0)
-        elif at < 0.38:
-            a, b = apply("*", number(-2.0), a), apply("*", number(-2.0), b)
         if self.likely(0.4):
             self.met.append((set(names), a, b))
         if self.likely(0.08):
-            return between(a, b, apply("+", a, number(0.3)))
-        return compare(self.pick("<", "<=", ">", ">="), a, b)
+            return between(a, b, plus(a, number(0.3)))
+        op = self.pick("<", "<=", ">", ">=")
+        plain = compare(op, self.behind(a, names), b)
+        turned = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}[op]
+        if not self.styled(0.5):
+            return plain
+        c = self.chosen_style(*SCALES)
+        return Node(self.chosen_style(
+            f"{b.text} {turned} {a.text}", f"{c!r}*{a.text} {op} {c!r}*{b.text}", f"{a.text} - {b.text} {op} 0",
+            f"-{c!r}*{a.text} {turned} -{c!r}*{b.text}", f"({b.text} - {a.text})/{c!r} {turned} 0",
+        ), plain.run)  # fmt: skip
 
-    def condition(self, names: list[str], depth: int = 1) -> Node:
+    def condition(self, names: list[str], depth: int = 2) -> Node:
         at = self.random.random()
-        if not depth or at < 0.55:
+        if not depth or at < 0.6:
             return self.comparison(names)
         first = self.condition(names, depth - 1)
-        if at > 0.85:
+        if at > 0.9:
             return logic("not", first)
-        return logic("and" if at < 0.7 else "or", first, self.condition(names, depth - 1))
+        return self.joined("and" if at < 0.77 else "or", first, self.condition(names, depth - 1))
 
     # What jumps
 
@@ -277,32 +144,29 @@ class Source:
         every = names + PARAMETERS
         at = self.random.random()
         if at < 0.55:
-            return bracket(self.condition(names))
+            return self.behind(self.bracket(self.condition(names)), names, "bracket")
         if at < 0.75:
             shape = self.pick("(if [%s] then %s else %s)", "([%s] ? %s : %s)")
             return chosen(shape, self.condition(names), self.smooth(every, 1), self.smooth(every, 1))
         if at < 0.85:
             return self.step(names)
         if at < 0.95:
-            return diffeo(apply("-", *self.surface(names)), self.smooth(every, 1), self.smooth(every, 1))
+            return diffeo(minus(self.affine(names), self.parameter()), self.smooth(every, 1), self.smooth(every, 1))
         return self.passed(every)
-
-    def define(self, stem: str) -> str:
-        return f"{stem}{len(self.definitions) + 1}"
 
     def step(self, names: list[str]) -> Node:
         """A function that branches on its parameters."""
-        u = apply("-", *self.surface(names))
+        u = minus(*self.surface(names))
         if self.likely(0.4):
-            body = bracket(compare(self.pick("<", ">"), name("u"), number(self.pick(0.0, 0.2))))
+            body = self.bracket(compare(self.pick("<", ">"), name("u"), number(self.pick(0.0, 0.2))))
             if self.likely(0.5):
-                body = apply("*", body, apply("+", number(1.0), name("u")))
+                body = times(body, plus(number(1.0), name("u")))
             f = self.define("step")
             self.definitions.append(f"def {f}(u) {body.text}")
             return Node(f"{f}({u.text})", lambda env, record, n: body({"u": u(env, record, n)}, record, n))
         w = self.smooth(names + PARAMETERS, 1)
-        left = power(name("u"), 2) if self.likely(0.3) else apply("*", number(2.0), name("u"))
-        body = bracket(compare("<", left, name("w")))
+        left = power(name("u"), 2) if self.likely(0.3) else times(number(2.0), name("u"))
+        body = self.bracket(compare("<", left, name("w")))
         f = self.define("step")
 
         def run(env: Environment, record: Record | None, n: int) -> Array:
@@ -317,7 +181,7 @@ class Source:
     def passed(self, every: list[str]) -> Node:
         """A function that is passed to another: with some of its arguments, or inside a lambda."""
         x, p = self.smooth(every, 1), name(self.pick(*PARAMETERS))
-        body = apply("*", bracket(compare("<", name("a"), name("b"))), apply("+", name("a"), number(2.0)))
+        body = times(self.bracket(compare("<", name("a"), name("b"))), plus(name("a"), number(2.0)))
         f, g = self.define("apply"), self.define("curried")
         self.definitions.append(f"def {f}(h, v) h(v)*h(v) + 1")
         self.definitions.append(f"{g} = \\a . \\b . {body.text}")
@@ -332,90 +196,125 @@ class Source:
         return Node(f"{f}({function}, {x.text})", run)
 
     def total(self, names: list[str]) -> Node:
-        last, at = self.pick(2, 3), self.affine(names)
-        body = bracket(compare("<", at, apply("*", name(self.pick(*PARAMETERS)), name("k"))))
+        last, at = self.pick(2, 3, 6), self.affine(names)
+        body = self.bracket(compare("<", at, times(name(self.pick(*PARAMETERS)), name("k"))))
 
         def run(env: Environment, record: Record | None, n: int) -> Array:
             return sum(body({**env, "k": np.full(n, float(k))}, record, n) for k in range(1, last + 1))
 
+        if self.styled(0.3):  # written out
+            return Node(f"({' + '.join(f'(let k = {k} in {body.text})' for k in range(1, last + 1))})", run)
         return Node(f"(sum k in 1..{last} ({body.text}))", run)
 
     def body(self, names: list[str]) -> Node:
         every, jump = names + PARAMETERS, self.jump(names)
-        return self.one_of((
-            (0.35, lambda: apply("*", jump, self.rough(every, self.pick(1, 2)))),
-            (0.50, lambda: apply("+", apply("*", jump, self.smooth(every, 1)), self.jump(names))),
-            (0.60, lambda: apply("*", jump, self.jump(names))),
-            (0.68, lambda: call(np.sin, apply("+", apply("*", number(3.0), jump), self.smooth(every, 1)))),
-            (0.74, lambda: apply("/", number(1.0), apply("+", number(1.0), power(jump, 2)))),
-            (0.80, lambda: power(jump, self.pick(2, 3))),
-            (0.86, lambda: bent(self.pick("min", "max"), jump, self.smooth(every, 1))),
-            (0.90, lambda: call(np.exp, call(np.sin, jump))),
-            (0.95, lambda: self.total(names)),
+        return self.behind(self.one_of((
+            (0.35, lambda: self.swapped("*", jump, self.rough(every, self.pick(1, 2)))),
+            (0.50, lambda: self.swapped("+", times(jump, self.smooth(every, 1)), self.jump(names))),
+            (0.60, lambda: self.swapped("*", jump, self.jump(names))),
+            (0.65, lambda: call(np.sin, "sin(%s)", plus(times(number(3.0), jump), self.smooth(every, 1)))),
+            (0.70, lambda: over(number(1.0), plus(number(1.0), power(jump, 2)))),
+            (0.75, lambda: power(jump, self.pick(2, 3))),
+            (0.80, lambda: bent(self.pick("min", "max"), jump, self.smooth(every, 1))),
+            (0.84, lambda: call(np.exp, "exp(%s)", call(np.sin, "sin(%s)", jump))),
+            (0.89, lambda: self.total(names)),
             (1.01, lambda: self.rough(every, 2)),
-        ))  # fmt: skip
+        )), names, "body")  # fmt: skip
 
     # Integrals
 
-    def bounds(self, outer: list[str]) -> tuple[Node, Node]:
-        at = self.random.random()
+    def bounds(self, outer: list[str]) -> tuple[Node, Node, bool]:
+        """Both, and whether they follow no other variable."""
+        at, fixed = self.random.random(), True
         if at < 0.40:
             low, high = self.pick((0.0, 1.0), (-1.0, 1.0), (0.0, 2.0), (-0.5, 1.5))
             lo, hi = number(low), number(high)
         elif at < 0.75:
             lo, hi = number(0.0) if at < 0.6 else self.parameter(), self.parameter()
         elif outer and at < 0.95:
-            v = name(self.pick(*outer))
+            v, fixed = self.name(self.pick(*outer)), False
             lo, hi = number(0.0), self.one_of((
                 (0.25, lambda: v),
-                (0.50, lambda: apply("+", v, name(self.pick(*PARAMETERS)))),
-                (0.75, lambda: apply("-", number(1.0), v)),
-                (1.01, lambda: call(np.sqrt, apply("+", number(0.1), power(v, 2)))),
+                (0.50, lambda: plus(v, name(self.pick(*PARAMETERS)))),
+                (0.75, lambda: minus(number(1.0), v)),
+                (1.01, lambda: call(lambda x: np.sqrt(0.1 + x * x), "sqrt(0.1 + %s^2)", v)),
             ))  # fmt: skip
         else:
             lo, hi = self.smooth(PARAMETERS, 1), number(1.0)
-        return (hi, lo) if self.likely(0.15) else (lo, hi)
+        return (hi, lo, fixed) if self.likely(0.15) else (lo, hi, fixed)
+
+    def range(self, v: str, outer: list[str]) -> Binder:
+        """A range; the variable is perhaps written in another one."""
+        lo, hi, fixed = self.bounds(outer)
+        if not self.styled(0.3):
+            return ranged(v, f"[{lo.text}, {hi.text}]", lo, hi, fixed)
+        slope, shift = self.chosen_style(*WRITTEN)
+        self.written[v] = f"({slope!r}*{v} + {shift!r})" if shift else f"({slope!r}*{v})"
+        text = ", ".join(f"({end.text} - {shift!r})/{number(slope).text}" for end in (lo, hi))
+        return ranged(v, f"[{text}]", lo, hi, fixed, f"*{number(slope).text}")
+
+    def binder(self, v: str, outer: list[str], drawn: bool) -> Binder:
+        if drawn:
+            return measures(self.random, v, [name(p) for p in PARAMETERS], [self.name(x) for x in outer])
+        return self.range(v, outer)
 
     def integral(self, outer: list[str], new: list[str]) -> Node:
-        box, names = [], list(outer)
+        binders, names, drawn = [], list(outer), self.likely(0.2)
         for v in new:
-            box.append((v, *self.bounds(names)))
+            binders.append(self.binder(v, names, drawn or self.likely(0.05)))
             names.append(v)
         body = self.body(names)
-        if self.likely(0.1):
-            top = apply("+", number(1.0), power(name(self.pick(*PARAMETERS)), 2))
-            return expectation([(v, number(0.0), top) for v in new], body)
-        return integrals(box, body)
+        whole = integrals(binders, body)
+        if self.styled(0.3) and all(binder.fixed for binder in binders):
+            assert self.style is not None
+            order = self.style.sample(binders, len(binders))
+            return Node(integrals(order, body, nested=self.styled(0.3)).text, whole.run)
+        return integrals(binders, body, nested=self.styled(0.2))
+
+    def spiked(self) -> Node:
+        """An integral with a delta, of the innermost variable or of several."""
+        names = self.pick(["x"], ["x", "y"])
+        outer = [self.range(v, []) for v in names[:-1]]
+        lo, hi, _ = self.bounds(names[:-1])
+        slope, v = self.pick(1.0, -1.0, 2.0, 0.5), names[-1]
+        place = plus(self.parameter(), self.affine(names[:-1])) if outer else self.parameter()
+        body = self.smooth(names + PARAMETERS, 1) if self.likely(0.5) else self.jump(names)
+        text = f"({body.text})*delta({number(slope).text}*{v} - {place.text})"
+        inner = Binder(v, f"[{lo.text}, {hi.text}]", lambda _: spike(lo, hi, slope, place, v, body), True)
+        return integrals([*outer, inner], Node(text, body.run), nested=self.styled(0.3))
 
     def nested(self) -> Node:
         """An integral whose integrand is a function of another one."""
-        lo, hi = self.bounds([])
+        over = self.range("x", [])
         inner = self.integral(["x"], ["y"])
         outer = self.one_of((
             (0.20, lambda: power(inner, 2)),
-            (0.40, lambda: call(np.sin, inner)),
-            (0.60, lambda: call(np.exp, call(np.sin, inner))),
+            (0.40, lambda: call(np.sin, "sin(%s)", inner)),
+            (0.60, lambda: call(lambda u: np.exp(np.sin(u)), "exp(sin(%s))", inner)),
             (0.73, lambda: bent("max", inner, number(0.3))),
             (0.86, lambda: bent("abs", inner)),
-            (1.01, lambda: apply("*", inner, self.jump(["x"]))),
+            (1.01, lambda: times(inner, self.jump(["x"]))),
         ))  # fmt: skip
-        return integrals([("x", lo, hi)], apply("*", outer, self.smooth(["x", *PARAMETERS], 1)))
+        return integrals([over], times(self.behind(outer, ["x"]), self.smooth(["x", *PARAMETERS], 1)))
 
     def program(self, flat: bool) -> Node:
         whole = self.one_of((
             (0.40, lambda: self.integral([], ["x"])),
-            (0.48, lambda: apply("*", self.integral([], ["x"]), self.integral([], ["z"]))),
-            (0.80, lambda: self.integral([], ["x"] if flat else ["x", "y"])),
+            (0.46, lambda: times(self.integral([], ["x"]), self.integral([], ["z"]))),
+            (0.50, self.spiked),
+            (0.76, lambda: self.integral([], ["x"] if flat else ["x", "y"])),
+            (0.80, lambda: self.integral([], ["x"] if flat else ["x", "y", "z"])),
             (1.01, lambda: self.integral([], ["x"]) if flat else self.nested()),
         ))  # fmt: skip
         if self.likely(0.15):
-            plain = chosen("(if %s then %s else %s)", compare("<", name("t"), name("s")), name("t"), name("s"))
-            whole = apply("+", whole, plain)
-        return call(np.sin, whole) if self.likely(0.15) else whole
+            plain = chosen("(if %s then %s else %s)", compare("<", name("t"), number(0.6)), name("t"), name("s"))
+            whole = plus(whole, plain)
+        whole = self.behind(whole, [], "whole")
+        return call(np.sin, "sin(%s)", whole) if self.likely(0.15) else whole
 
 
-def random_program(seed: int, flat: bool = False) -> tuple[str, Program]:
+def random_program(seed: int, flat: bool = False, spelling: int = 0) -> tuple[str, Program]:
     """The source of a function f(t, s), and its meaning. `flat`: integrals over one variable only."""
-    source = Source(seed)
+    source = Source(seed, spelling)
     whole = source.program(flat)
     return "\n".join([*source.definitions, f"def f(t, s)\n    {whole.text}\n"]), whole.run

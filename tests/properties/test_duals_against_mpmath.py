@@ -2,7 +2,7 @@
 
 No allowance is made: the reported error alone must cover what is wrong. Programs over one variable of integration, with
 surfaces, calls, functions that are passed, and bounds that move; of two the oracle takes minutes (brute force in
-doubles does for those, see test_random_programs).
+doubles does for those, see program_checks).
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 from mpmath import mp
+from program_checks import where
 from program_source import random_program
-from test_random_programs import where
 
 import potto
 from potto.core.reference import NotAccurate, evaluate

@@ -10,8 +10,8 @@ import math
 
 import pytest
 from plain_quadrature import Program, TooHard, estimate
+from program_checks import Point, where
 from program_source import random_program
-from test_random_programs import Point, where
 
 import potto
 from potto.diagnostics import PottoError
