@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from itertools import groupby, product
 
+from potto.core.simplify import simplify
 from potto.core.terms import (
     ONE,
     App,
@@ -26,6 +27,7 @@ from potto.core.terms import (
     if_,
     mul,
     proj,
+    sub,
     sum_,
     tuple_,
     var,
@@ -107,14 +109,16 @@ def _summed(elaboration: Elaboration, terms: list[Term]) -> Term:
 
 
 def _holds(condition: Term) -> bool:
-    """Whether a condition is seen to hold at once: it compares numbers that are written down."""
+    """Whether a condition is seen to hold at once: it compares what differs by a number that is written down.
+
+    As of x + 1 > x, which no longer holds in doubles far out in the range of x.
+    """
     match condition:
         case Prim(op="and", args=args):
             return all(map(_holds, args))
-        case Prim(op="lt", args=(Const(value=a), Const(value=b))):
-            return a < b
-        case Prim(op="le", args=(Const(value=a), Const(value=b))):
-            return a <= b
+        case Prim(op="lt" | "le" as op, args=(a, b)):
+            gap = simplify(sub(b, a))
+            return isinstance(gap, Const) and (gap.value > 0 or (op == "le" and gap.value == 0))
         case _:
             return False
 

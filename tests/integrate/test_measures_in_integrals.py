@@ -96,3 +96,11 @@ def test_by_samples(measure: str, names: tuple[str, ...], cdf: Cdf, values: tupl
             order = tuple(int(i == place) for i in range(len(values)))
             moved = getattr(module, f"d_{name}")(*values)
             assert abs(mp.mpf(float(moved)) - mp.diff(cdf, tuple(exact), order)) <= 5 * moved.error + 1e-9
+
+
+def test_a_range_around_a_variable_far_out() -> None:
+    """At nodes where x + 1 is x to rounding there is a range all the same: E(x + 1/2) = t + 1/2."""
+    f = potto.compile("def f(t) integral (x ~ normal(t, 0.1)) (integral (y ~ uniform(x, x + 1)) y d(y)) d(x)").f
+    answer = potto.deriv(f)((0.5, 1.0))
+    assert answer.converged and abs(answer.value - 1.0) <= answer.error < 1e-12
+    assert abs(answer.tangent - 1.0) <= answer.tangent_error < 1e-11
