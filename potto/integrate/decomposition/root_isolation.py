@@ -40,8 +40,13 @@ class Brackets:
     hidden: _Stretches
 
 
-def isolated(surface: Term, slope: Term, variable: str, env: dict[str, Value], low: Array, high: Array) -> Brackets:
-    """The sign changes of a surface between bounds (B,), which may be infinite."""
+def isolated(
+    surface: Term, slope: Term, variable: str, env: dict[str, Value], low: Array, high: Array, jumps: bool = True
+) -> Brackets:
+    """The sign changes of a surface between bounds (B,), which may be infinite.
+
+    jumps: whether something jumps there, so that what hides roots is left as it is; a kink is wanted to the last digit.
+    """
     (surface, slope), env = flat((surface, slope), env)
     fixed: dict[str, Interval] = {}
     for name in surface.free - {variable}:
@@ -62,6 +67,8 @@ def isolated(surface: Term, slope: Term, variable: str, env: dict[str, Value], l
             complete = False
             break
         settled, crossed, open_, shallow = cells.judged(owner, s0, s1)
+        if not jumps:
+            open_, shallow = np.union1d(open_, shallow), shallow[:0]
         hidden.append((owner[shallow], s0[shallow], s1[shallow]))
         found.append((owner[settled][crossed], s0[settled][crossed], s1[settled][crossed]))
         owner, s0, s1 = owner[open_], s0[open_], s1[open_]

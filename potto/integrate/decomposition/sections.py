@@ -101,7 +101,7 @@ def _search(
     if slope is None:
         a, b = _on_a_grid(function, variable, env, low, high, machine)
     else:
-        brackets = isolated(surface, slope, variable, env, low, high)
+        brackets = isolated(surface, slope, variable, env, low, high, level.level.cuts[cut].decides)
         most = brackets.owner.size if level.level.cuts[cut].decides else MOST_KINKS * batch
         if level.level.cuts[cut].decides and not brackets.complete:
             machine.note(ROOTS_NOT_SEPARATED)
