@@ -36,6 +36,11 @@ class Range:
     def negative(self) -> bool:
         return self.hi < 0 or (self.hi <= 0 and not self.zero)
 
+    @property
+    def infinite(self) -> bool:
+        """Whether no number is in it."""
+        return self.lo == math.inf or self.hi == -math.inf
+
 
 ANYTHING = Range(-math.inf, math.inf)
 _POSITIVE = Range(0.0, math.inf, False)

@@ -15,7 +15,7 @@ from potto.integrate.pieces import Sums
 from potto.integrate.rules import substitution
 from potto.integrate.rules.gauss import EPS, Rule, gauss
 from potto.integrate.rules.substitution import Segments
-from potto.kernels.cells import Array, Bools, Cell, Ints
+from potto.kernels.cells import Array, Cell, Ints
 
 ORDER = 16
 ROUNDS, MOST = 40, 2000  # of halvings; pieces
@@ -71,7 +71,7 @@ class Table:
         self.met[0] = max(self.met[0], np.abs(v).max(initial=0.0))
         if not wide:
             return Cell(v, e)
-        label = ((x - seg.a) / (seg.b - seg.a))[:, None]
+        label = substitution.label(seg, x[:, None])
         t, et = [], []
         for d in range(wide):
             rate = s.t[d] if d < len(s.t) else None
@@ -121,9 +121,10 @@ def tabulated(segments: Segments, k: int, function: Function, rtol: float) -> Ta
 
 
 def _lengths(segments: Segments) -> Array:
-    """The lengths of segments, as parts of the whole."""
+    """The lengths of segments, as parts of the whole; of infinite ones 1."""
     length = segments.b - segments.a
-    return length / length.sum()  # type: ignore[no-any-return]
+    with np.errstate(invalid="ignore"):
+        return np.where(np.isinf(length), 1.0, length / length.sum())
 
 
 def _joined(
@@ -201,10 +202,11 @@ def _continuous(table: Table, inside: Array, rule: Rule, largest: float) -> bool
 
 
 def _inverse(seg: Segments, x: Array) -> tuple[Array, Array]:
-    """Which u the maps of finite segments take to x, one in each, and dx/du there."""
+    """Which u the maps of segments take to x, one in each, and dx/du there."""
     a, b = seg.a, seg.b
-    q, slope = (x - a) / (b - a), b - a
-    for kind, inverse in ((substitution.LEFT, _left), (substitution.RIGHT, _right), (substitution.BOTH, _both)):
+    with np.errstate(invalid="ignore"):
+        q, slope = (x - a) / (b - a), b - a
+    for kind, inverse in _INVERSES.items():
         rows = seg.kind == kind
         if rows.any():
             q, slope = q.copy(), slope.copy()
@@ -230,6 +232,21 @@ def _both(seg: Segments, x: Array) -> tuple[Array, Array]:
     return (half - low) / (high - low), 2 * (d - c) * np.sin(half) * np.cos(half) * (high - low)
 
 
-def finite(segments: Segments) -> Bools:
-    """Which segments a table can be made of."""
-    return segments.kind < substitution.UP
+def _up(seg: Segments, x: Array) -> tuple[Array, Array]:
+    far = x - seg.a
+    return far / (1 + far), (1 + far) ** 2
+
+
+def _down(seg: Segments, x: Array) -> tuple[Array, Array]:
+    far = seg.b - x
+    return 1 / (1 + far), (1 + far) ** 2
+
+
+def _whole(seg: Segments, x: Array) -> tuple[Array, Array]:
+    far = np.abs(x)
+    w = 2 * far / (1 + np.sqrt(1 + 4 * far * far))
+    return 0.5 * (1 + np.copysign(w, x)), 2 * (1 + w * w) / (1 - w * w) ** 2
+
+
+_INVERSES = {substitution.LEFT: _left, substitution.RIGHT: _right, substitution.BOTH: _both, substitution.UP: _up,
+             substitution.DOWN: _down, substitution.WHOLE: _whole}  # fmt: skip

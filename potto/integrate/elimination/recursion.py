@@ -23,7 +23,7 @@ from potto.core.simplify import simplify
 from potto.core.terms import Deriv, Integral, Lam, Term, Tuple, const, function_of, integral, substitute, tuple_
 from potto.integrate.adaptive.iterated import Iteration
 from potto.integrate.decomposition.vanishing import vanishing_of
-from potto.integrate.elimination.interpolants import Table, finite, tabulated
+from potto.integrate.elimination.interpolants import Table, tabulated
 from potto.integrate.events import Fold, TwoSided
 from potto.integrate.pieces import Evaluator, Sums, still
 from potto.integrate.plan import Plan, group_levels, level_plan
@@ -35,6 +35,7 @@ START_ORDER = 16
 SHARE = 0.02
 FINEST = 1e-14
 AFFORDABLE = 1_000_000  # evaluations: more than that is no good use of one number
+FARTHEST = np.finfo(float).max
 SLIVER = 16  # roundings of its ends, that a piece of a table is longer than
 MOST_PLACES = 64  # where the integral over one variable is not smooth in the number that it depends on
 
@@ -159,8 +160,6 @@ def one_by_one(known: Eliminated, machine: Any, env: dict[str, Value]) -> Sums |
             if isinstance(below, Table) and not below.seen:
                 return None
             continue
-        if not np.isfinite(span).all():
-            return None
         # As one inside another: how much each may err is measured by the largest of all.
         inside = replace(plan, levels=(*plan.levels, *plan.levels))
         iteration = _Tabled(inside, fine, START_ORDER, tracked=True, further=further)
@@ -180,7 +179,7 @@ def _table(
     level = level_plan(Level(state, const(span[0]), const(span[1]), hints, cuts), (), ())
     found, _ = iteration.cut(level, env, 1, machine)
     segments = found.segments
-    size = np.maximum(np.abs(segments.a), np.abs(segments.b))
+    size = np.fmin(np.maximum(np.abs(segments.a), np.abs(segments.b)), FARTHEST)
     segments = segments.pick(segments.b - segments.a > SLIVER * EPS * size)  # a span is rounded outwards
 
     def function(x: Array, speeds: Array) -> Sums:
@@ -195,7 +194,7 @@ def _table(
         machine.events.take(apart.events, None)
         return sums
 
-    if found.conflict or not segments.a.size or not finite(segments).all():
+    if found.conflict or not segments.a.size:
         return None
     return tabulated(segments, machine.directions, function, machine.rtol)
 

@@ -125,9 +125,11 @@ def displaced(seg: Segments, x: Array, label: Array) -> tuple[Array, Array]:
     return off, actual
 
 
-def _label(seg: Segments, x: Array) -> Array:
+def label(seg: Segments, x: Array) -> Array:
+    """By which share points move with the right end of their segment; all of an infinite one moves alike."""
     a, b = seg.a[:, None], seg.b[:, None]
-    return (x - a) / (b - a)
+    with np.errstate(invalid="ignore"):
+        return np.where(seg.kind[:, None] < UP, (x - a) / (b - a), 0.0)
 
 
 def _linear(seg: Segments, u: Array, rest: Array) -> tuple[Array, Array, Array]:
@@ -141,7 +143,7 @@ def _left(seg: Segments, u: Array, rest: Array) -> tuple[Array, Array, Array]:
     q0, q1 = np.sqrt(seg.a[:, None] - c), np.sqrt(seg.b[:, None] - c)
     q = q0 + (q1 - q0) * u
     x = c + q * q
-    return x, 2 * q * (q1 - q0), _label(seg, x)
+    return x, 2 * q * (q1 - q0), label(seg, x)
 
 
 def _right(seg: Segments, u: Array, rest: Array) -> tuple[Array, Array, Array]:
@@ -150,7 +152,7 @@ def _right(seg: Segments, u: Array, rest: Array) -> tuple[Array, Array, Array]:
     q0, q1 = np.sqrt(c - seg.a[:, None]), np.sqrt(c - seg.b[:, None])
     q = q1 + (q0 - q1) * rest
     x = c - q * q
-    return x, -2 * q * (q1 - q0), _label(seg, x)
+    return x, -2 * q * (q1 - q0), label(seg, x)
 
 
 def _both(seg: Segments, u: Array, rest: Array) -> tuple[Array, Array, Array]:
@@ -162,7 +164,7 @@ def _both(seg: Segments, u: Array, rest: Array) -> tuple[Array, Array, Array]:
     half, other = half0 + (half1 - half0) * u, rest1 + (rest0 - rest1) * rest  # each from the end that it is 0 at
     sine, cosine = np.sin(half), np.sin(other)
     x = np.where(half < np.pi / 4, c + (d - c) * sine**2, d - (d - c) * cosine**2)
-    return x, 2 * (d - c) * sine * cosine * (half1 - half0), _label(seg, x)
+    return x, 2 * (d - c) * sine * cosine * (half1 - half0), label(seg, x)
 
 
 def _up(seg: Segments, u: Array, rest: Array) -> tuple[Array, Array, Array]:
