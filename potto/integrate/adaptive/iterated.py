@@ -162,7 +162,7 @@ class Iteration:
             if row.cut >= 0 and level.level.cuts[row.cut].surface in self.still:
                 row.t = ()
         cuts = segments(level, lo, hi, rows, batch, machine.directions, level is not self.plan.levels[0])
-        if self.resting(level, lo, hi):
+        if self.resting(level, lo, hi, cuts.segments):
             cuts = at_rest(cuts)
         cuts.lost = lost
         collapsed = collapsed_ranges(level, lo, hi, rows, batch, machine.directions)
@@ -170,15 +170,18 @@ class Iteration:
             return standing(cuts), [ranges.at_rest() for ranges in collapsed]
         return cuts, collapsed
 
-    def resting(self, level: LevelPlan, lo: Cell, hi: Cell) -> bool:
+    def resting(self, level: LevelPlan, lo: Cell, hi: Cell, seg: Segments) -> bool:
         """Whether nothing needs to move with the cuts of a variable: what is integrated is continuous there.
 
         Then the derivative along it, which nodes that move would need, is best left alone: near critical places it is
-        the hardest of all. Where there is but one variable further in it costs little, and serves as a check.
+        the hardest of all. Where there is but one variable further in it costs little, and serves as a check, unless
+        roots merge just here, and so move infinitely fast.
         """
         levels = self.plan.levels
-        if len(levels) < 3 or any(own is level for own in levels[-2:]) or any(c.decides for c in level.level.cuts):
+        if any(c.decides for c in level.level.cuts):
             return False
+        if len(levels) < 3 or any(own is level for own in levels[-2:]):
+            return not np.isfinite(seg.ta).all()
         return not any(np.any(t) for bound in (lo, hi) for t in bound.t if t is not None)
 
     def searched(

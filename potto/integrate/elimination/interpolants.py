@@ -215,21 +215,27 @@ def _inverse(seg: Segments, x: Array) -> tuple[Array, Array]:
 
 
 def _left(seg: Segments, x: Array) -> tuple[Array, Array]:
-    root, low, high = (np.sqrt(np.maximum(y - seg.left, 0.0)) for y in (x, seg.a, seg.b))
+    low, high = np.sqrt(seg.a - seg.left), np.sqrt(seg.b - seg.left)
+    root = np.sqrt(_distance(x - seg.left, seg.left))
     return (root - low) / (high - low), 2 * root * (high - low)
 
 
 def _right(seg: Segments, x: Array) -> tuple[Array, Array]:
-    root, low, high = (np.sqrt(np.maximum(seg.right - y, 0.0)) for y in (x, seg.a, seg.b))
+    low, high = np.sqrt(seg.right - seg.a), np.sqrt(seg.right - seg.b)
+    root = np.sqrt(_distance(seg.right - x, seg.right))
     return (low - root) / (low - high), 2 * root * (low - high)
 
 
 def _both(seg: Segments, x: Array) -> tuple[Array, Array]:
     c, d = seg.left, seg.right
-    half, low, high = (
-        np.arctan2(np.sqrt(np.maximum(y - c, 0.0)), np.sqrt(np.maximum(d - y, 0.0))) for y in (x, seg.a, seg.b)
-    )
+    low, high = (np.arctan2(np.sqrt(y - c), np.sqrt(d - y)) for y in (seg.a, seg.b))
+    half = np.arctan2(np.sqrt(_distance(x - c, c)), np.sqrt(_distance(d - x, d)))
     return (half - low) / (high - low), 2 * (d - c) * np.sin(half) * np.cos(half) * (high - low)
+
+
+def _distance(found: Array, turn: Array) -> Array:
+    """A distance from a turning point, as large as it may be by rounding: at the point the slope of the map is 0."""
+    return np.maximum(found, EPS * np.abs(turn))
 
 
 def _up(seg: Segments, x: Array) -> tuple[Array, Array]:

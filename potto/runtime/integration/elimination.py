@@ -5,11 +5,16 @@ Owns `step_by_step`.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from potto.integrate.elimination.recursion import one_by_one
+from potto.integrate.elimination.recursion import Eliminated, one_by_one
+from potto.integrate.events import Fold
 from potto.integrate.pieces import Sums
+from potto.kernels.cells import Value
 from potto.runtime.evaluation.machine import Machine
+from potto.runtime.integration.one_sided import beside_folds
 from potto.runtime.integration.plans import eliminated_for
 from potto.runtime.integration.problem import Problem
 
@@ -24,13 +29,38 @@ def step_by_step(problem: Problem, limit: float) -> Sums | None:
         return None
     rows = []
     for i in range(problem.batch):
-        machine = problem.machine.apart()
-        row = one_by_one(known, machine, problem.picked(np.array([i])).env)
-        if row is None or machine.events or not accurate(row, limit, machine):
+        alone = replace(problem.apart(), linked=problem.picked(np.array([i])), batch=1)
+        row = _member(known, alone)
+        if row is None or alone.events or not accurate(row, limit, alone.machine):
             return None
         rows.append(row)
     problem.machine.record.methods.add("quadrature")
     return Sums(*(np.concatenate([getattr(r, name) for r in rows], axis=-1) for name in ("v", "e", "t", "et")))
+
+
+def _member(known: Eliminated, problem: Problem) -> Sums | None:
+    """One integral, looked at from both sides where a surface folds in the outermost variable."""
+
+    def evaluated(env: dict[str, Value]) -> Sums:
+        there = problem.moved(env)
+        found = one_by_one(known, there.machine, there.env)
+        if found is None:
+            raise _NotEvaluated
+        return found
+
+    row = one_by_one(known, problem.machine, problem.env)
+    folds = problem.events.every(Fold)
+    if row is None or not folds or any(fold.number for fold, _ in folds):
+        return row
+    try:
+        beside_folds(problem, known.plans[0], row, evaluated)
+    except _NotEvaluated:
+        return None
+    return row
+
+
+class _NotEvaluated(Exception):
+    """A step has no table."""
 
 
 def accurate(sums: Sums, limit: float, machine: Machine) -> bool:
