@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from potto.calculus.algebra.degree import degree
+from potto.calculus.algebra.degree import degree, plane
 from potto.calculus.algebra.polytopes import Number
 from potto.calculus.checking.solvability import monotone
 from potto.calculus.decomposition.critical import MOST_EQUATIONS, slopes_of
@@ -67,7 +67,7 @@ class Plan:
     premise: what has to be positive for the plan to hold: for these parameters some cases are never met.
     confused: whether there are conditions inside of conditions that were not told apart.
     folds: whether a surface that is searched for may have folds where the variables further out can't be cut.
-    degree: of the integrand between its cuts, where it is a polynomial in the innermost variable.
+    degrees: of what is integrated over each variable between its cuts, where it is a polynomial in it.
     """
 
     term: Integral
@@ -84,7 +84,7 @@ class Plan:
     premise: Lam | None = None
     confused: bool = False
     folds: bool = False
-    degree: int | None = None
+    degrees: tuple[int | None, ...] = ()
 
     def trace(self, sides: Mapping[int, Mask]) -> Trace | None:
         """The trace that forces the groups to the sides given: a mask, true where the canonical surface is >= 0."""
@@ -175,8 +175,22 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve, numb
         _premise(premises),
         confused,
         _may_fold(term, levels),
-        None if inlined is None else degree(inlined, term.variables[-1]),
+        () if inlined is None else _degrees(inlined, levels),
     )
+
+
+def _degrees(body: Term, levels: Sequence[LevelPlan]) -> tuple[int | None, ...]:
+    """The degree of what is integrated over each variable: of a polynomial between planes it is one, of a degree that
+    each variable raises by one."""
+    found: list[int | None] = []
+    variables = [level.variable for level in levels]
+    for number in range(len(levels)):
+        inner = levels[number + 1 :]
+        own = degree(body, variables[number:])
+        surfaces = (t for level in inner for t in (level.level.lo, level.level.hi, *map(along, level.level.cuts)))
+        flat = all(level.level.complete for level in inner) and all(plane(t, variables[number:]) for t in surfaces)
+        found.append(own + len(inner) if own is not None and flat else None)
+    return tuple(found)
 
 
 def _doublings(term: Integral, found: Sequence[Finding]) -> int:

@@ -28,14 +28,9 @@ UNMET = {
     "delta, damped": "refused, P0402: a delta wants an inverse",
     "density of states, 1-D": "refused, P0402: a delta wants an inverse",
     "density of states": "refused, P0508: no derivative of a delta whose roots come and go",
-    "touching ball, 5-D": "the value has 9 digits, the derivative is sampled",
-    "touching ball, 6-D": "the value has 9 digits, the derivative is sampled",
     "torus, quartic": "too slow",
     "three cosines": "too slow",
     "ridge in space": "the budget is spent: 5 digits, as many as rtol=1e-3 has at a thirtieth of the cost",
-    "five normals": "sampled, 3 digits",
-    "two half spaces, 4-D": "sampled, 3 digits",
-    "chain": "sampled, 2 digits",
 }
 UNMET_SECOND = {
     "cubic": "refused, P0508: a root that is searched for has no second derivative",
@@ -47,7 +42,8 @@ UNMET_SECOND = {
 }
 SLOW = {name for name in UNMET if "refused" not in UNMET[name]} | {
     "ball of normals", "depth test", "flower", "folium", "folium and wings", "gyroid corner", "quartic", "quartic ball",
-    "gyroid slab", "near a fold", "three metaballs", "torus", "touching ball, 4-D", "two metaballs", "weighted cubic",
+    "gyroid slab", "near a fold", "three metaballs", "torus", "touching ball, 4-D", "touching ball, 5-D",
+    "touching ball, 6-D", "two metaballs", "weighted cubic",
 }  # fmt: skip
 
 

@@ -1,24 +1,35 @@
-"""How high the degree of an integrand is in one variable, between the surfaces that cut it.
+"""How high the degree of an integrand is in its variables, between the surfaces that cut it.
 
-Owns `degree`. A Gauss rule with n nodes is exact up to degree 2n - 1: of a length, an area or a volume one node along
+Owns `degree` and `plane`. A Gauss rule with n nodes is exact up to degree 2n - 1: of a length, an area or a volume one node along
 the innermost variable says everything.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
-from potto.core.terms import Branch, Const, If, Prim, Proj, Term, Tuple, Var, children, postorder_by
+from potto.core.terms import Branch, Const, If, Prim, Proj, Term, Tuple, Var, children, postorder, postorder_by
 
+_ARITHMETIC = frozenset(("add", "neg", "mul", "div"))
 MOST = 40  # more nodes than these ask for are no saving
 
 
-def degree(term: Term, variable: str) -> int | None:
-    """The largest degree that a term has in a variable on any side of its surfaces; None if it is no polynomial."""
+def degree(term: Term, variables: Iterable[str]) -> int | None:
+    """The largest degree that a term has in some variables together on any side of its surfaces; None if it is no
+    polynomial."""
     found: dict[Term, int | None] = {}
+    names = frozenset(variables)
     for node in postorder_by(term, _values):
-        found[node] = 0 if variable not in node.free else _node(node, [found[part] for part in _values(node)])
+        found[node] = 0 if names.isdisjoint(node.free) else _node(node, [found[part] for part in _values(node)])
     return found[term]
+
+
+def plane(term: Term, variables: Iterable[str]) -> bool:
+    """Whether a term is affine in some variables together, without sides, by its form."""
+    names = frozenset(variables)
+    steady = all(names.isdisjoint(n.free) or isinstance(n, Var) or (isinstance(n, Prim) and n.op in _ARITHMETIC)
+                 for n in postorder(term))  # fmt: skip
+    return steady and degree(term, names) in (0, 1)
 
 
 def _values(node: Term) -> Sequence[Term]:

@@ -8,7 +8,7 @@ decomposition in the manner of Collins, of the surfaces that a scene has, and of
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import islice
@@ -93,7 +93,8 @@ class Product:
 class Level:
     """One variable of the iteration, with everything that cuts it.
 
-    critical: where what lies further in meets, appears or turns, if that has no closed form there.
+    critical: where what lies further in meets, appears or turns, if that has no closed form there. complete: whether
+    what the cuts leave in the variables further out was worked out for all of them.
     """
 
     variable: str
@@ -102,6 +103,7 @@ class Level:
     hints: tuple[Term, ...]
     cuts: tuple[Cut, ...]
     critical: tuple[Critical, ...] = ()
+    complete: bool = True
 
 
 @dataclass(slots=True)
@@ -195,15 +197,17 @@ def sweep(
     rows = list(zip(term.variables, term.bounds, term.hints, strict=True))
     for variable, (lo, hi), hints in reversed(rows):
         cuts = tuple(_cut(placed, variable) for placed in pool.take(variable))
-        cuts = (*(c for c in cuts if c.decides), *[c for c in cuts if not c.decides][:MOST_CUTS])
+        decisive, others = [c for c in cuts if c.decides], [c for c in cuts if not c.decides]
+        further = frozenset(term.variables[: term.variables.index(variable)])
+        complete = len(others) <= MOST_CUTS and _meeting(cuts, variable, further)[1]
+        cuts = (*decisive, *others[:MOST_CUTS])
         here = [c for c in centers if variable in c.free]
         centers = {c: None for c in centers if variable not in c.free}
         systems = tuple(c for c in critical if variable in c.free)
         critical = {c: None for c in critical if variable not in c.free}
         peaks = (*hints, *points_of(here, variable)[:MOST_CENTERS])
-        levels.append(Level(variable, lo, hi, peaks, (*cuts, *_around(here, variable)), systems))
+        levels.append(Level(variable, lo, hi, peaks, (*cuts, *_around(here, variable)), systems, complete))
         if not (outermost and variable == term.variables[0]):
-            further = frozenset(term.variables[: term.variables.index(variable)])
             for shadow in _shadows(cuts, variable, lo, hi, further):
                 if isinstance(shadow, Critical):
                     critical[shadow] = None
@@ -363,13 +367,19 @@ def _shadows(
                 yield turn, True
             for stop in dict.fromkeys(stop for family in found.families for stop in family.stops):
                 yield substitute(surface, {variable: stop}), True
-    meeting = [c for c in cuts if c.roots or c.families or c.roots is None]
-    meeting = [c for c in meeting if not scattered(along(c), variable, further)]
-    meeting = [c for n, c in enumerate(meeting) if n < (MOST_JUMPS if c.decides else MOST_PAIRS)]
+    meeting, _ = _meeting(cuts, variable, further)
     for first in meeting:
         for second in meeting:
             if first is not second and first.key.digest < second.key.digest:
                 yield from _crossings(first, second, Within(variable, lo, hi), further)
+
+
+def _meeting(cuts: Sequence[Cut], variable: str, further: frozenset[str]) -> tuple[list[Cut], bool]:
+    """The cuts whose crossings are worked out, and whether those are all that may cross."""
+    meeting = [c for c in cuts if c.roots or c.families or c.roots is None]
+    meeting = [c for c in meeting if not scattered(along(c), variable, further)]
+    chosen = [c for n, c in enumerate(meeting) if n < (MOST_JUMPS if c.decides else MOST_PAIRS)]
+    return chosen, len(chosen) == len(meeting)
 
 
 def _by_numbers(surface: Term, variable: str, further: frozenset[str]) -> bool:

@@ -121,10 +121,10 @@ def tabulated(segments: Segments, k: int, function: Function, rtol: float) -> Ta
 
 
 def _lengths(segments: Segments) -> Array:
-    """The lengths of segments, as parts of the whole; of infinite ones 1."""
+    """The lengths of segments, as parts of the whole; of an infinite one each is all."""
     length = segments.b - segments.a
-    with np.errstate(invalid="ignore"):
-        return np.where(np.isinf(length), 1.0, length / length.sum())
+    whole = length.sum()
+    return length / whole if np.isfinite(whole) else np.ones(length.size)
 
 
 def _joined(

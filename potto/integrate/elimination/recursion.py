@@ -34,7 +34,7 @@ START_ORDER = 16
 # The accuracy of each step as a part of what is asked for.
 SHARE = 0.02
 FINEST = 1e-14
-AFFORDABLE = 1_000_000  # evaluations: more than that is no good use of one number
+AFFORDABLE = 3_000_000  # evaluations, a few seconds: more than that is no good use of one number
 FARTHEST = np.finfo(float).max
 SLIVER = 16  # roundings of its ends, that a piece of a table is longer than
 MOST_PLACES = 64  # where the integral over one variable is not smooth in the number that it depends on

@@ -66,7 +66,8 @@ class PanelBatch:
     def enough(self) -> int | None:
         """How many nodes do for an integrand that is a polynomial between its cuts: so many that it is 0 where it is 0
         at all of them, since they also tell its size."""
-        degree = self.parent.plan.degree if self.last and not self.seg.kind.any() else None
+        degrees = self.parent.plan.degrees
+        degree = degrees[self.number] if degrees and not self.seg.kind.any() else None
         return None if degree is None or degree >= self.parent.order else degree + 1
 
     def measure(self, p: Pieces, order: int, whole: bool = False) -> Pieces:

@@ -5,6 +5,7 @@ Owns `too_many`, `many`, `orders`, `preferred` and `trials`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 
 from potto.core.terms import Integral, integral
@@ -16,6 +17,7 @@ from potto.runtime.integration.plans import Linked, plan_for
 MOST_LEVELS = 3
 PER_LEVEL, AFFORDABLE = 12, 1_000_000
 LOOSE = 1e-3
+MET = 4  # one in so many planes that may cut a variable does: half of what it takes to twice that, of polytopes
 FEW_NODES = 30_000  # up to which iterated quadrature is no slower
 # Evaluations that are spent on one order of two variables before another one is tried; how many times those of one
 # variable more.
@@ -36,7 +38,11 @@ def many(machine: Machine, term: Integral, linked: Linked) -> bool:
 
 def expected(machine: Machine, term: Integral, linked: Linked) -> int:
     """About how many evaluations iterated quadrature takes."""
-    return PER_LEVEL ** len(term.variables) * 2 ** plan_for(machine, term, linked).doublings  # type: ignore[no-any-return]
+    plan = plan_for(machine, term, linked)
+    if plan.degrees and None not in plan.degrees[1:]:
+        nodes = (PER_LEVEL if degree is None else degree + 1 for degree in plan.degrees)
+        return math.prod(n * (1 + len(own.level.cuts) // MET) for n, own in zip(nodes, plan.levels, strict=True))
+    return PER_LEVEL ** len(term.variables) * 2**plan.doublings  # type: ignore[no-any-return]
 
 
 def orders(term: Integral) -> Iterator[Integral]:
