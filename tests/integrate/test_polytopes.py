@@ -6,6 +6,7 @@ which is the number of alternating permutations, and of simplices.
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import pytest
@@ -31,7 +32,7 @@ def over(n: int, body: str) -> str:
 
 @pytest.mark.parametrize("n", ALTERNATING)
 def test_zigzags(n: int) -> None:
-    body = "*".join(f"[{a} + {b} < t]" for a, b in zip(NAMES, NAMES[1:n], strict=False))
+    body = "*".join(f"[{a} + {b} < t]" for a, b in itertools.pairwise(NAMES[:n]))
     share = ALTERNATING[n] / math.factorial(n)
     check(over(n, body), 0.9, share * 0.9**n, n * share * 0.9 ** (n - 1), 100_000)
 
@@ -39,7 +40,7 @@ def test_zigzags(n: int) -> None:
 @pytest.mark.parametrize("n", [3, 4, 5])
 def test_a_polynomial_over_ordered_variables(n: int) -> None:
     """a*z over a < b < ... < z < t: the integrals of a are b^2/2, c^3/6, ...; so t^(n+2)/(n! (n+2))."""
-    inside = " and ".join([*(f"{a} < {b}" for a, b in zip(NAMES, NAMES[1:n], strict=False)), f"{NAMES[n - 1]} < t"])
+    inside = " and ".join([*(f"{a} < {b}" for a, b in itertools.pairwise(NAMES[:n])), f"{NAMES[n - 1]} < t"])
     size = math.factorial(n) * (n + 2)
     check(over(n, f"[{inside}]*a*{NAMES[n - 1]}"), 0.8, 0.8 ** (n + 2) / size, (n + 2) * 0.8 ** (n + 1) / size, 100_000)
 

@@ -1,7 +1,7 @@
 """How high the degree of an integrand is in its variables, between the surfaces that cut it.
 
-Owns `degree` and `plane`. A Gauss rule with n nodes is exact up to degree 2n - 1: of a length, an area or a volume one node along
-the innermost variable says everything.
+Owns `degree` and `plane`. A Gauss rule with n nodes is exact up to degree 2n - 1: of a length, an area or a volume one
+node along the innermost variable says everything.
 """
 
 from __future__ import annotations

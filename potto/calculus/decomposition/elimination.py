@@ -12,9 +12,10 @@ a function of one number that can be tabulated, so that n variables take n times
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 
 from potto.core.collecting import split
 from potto.core.polynomials import number
@@ -43,6 +44,7 @@ from potto.core.terms import (
 )
 
 Names = frozenset[str]
+Scaled = Callable[[Term], Term]
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +68,7 @@ class _MoreThanOne(Exception):
     """What is further in depends on more than one number."""
 
 
+@lru_cache(maxsize=1024)
 def eliminate(term: Integral) -> tuple[Step, ...] | None:
     """The steps, outermost first; None where more than one number would have to be handed on."""
     everything = (term.body, *(bound for pair in term.bounds for bound in pair))
@@ -80,16 +83,15 @@ def eliminate(term: Integral) -> tuple[Step, ...] | None:
         if not inner:
             return (*steps, Step(variable, lo, hi, state, rest, None))
         here = frozenset((variable,)) if state is None else frozenset((variable, state))
-        weight, rest = _split(rest, inner)
+        weight, rest = _split(rest, here, inner)
         handed = _Handed(here, inner, f"{variable}@known")
         try:
             rest = handed.put(rest)
             bounds[i + 1 :] = [(handed.put(a), handed.put(b)) for a, b in bounds[i + 1 :]]
-            passed = handed.passed()
         except _MoreThanOne:
             return None
-        steps.append(Step(variable, lo, hi, state, weight, passed))
-        state = None if passed is None else handed.name
+        steps.append(Step(variable, lo, hi, state, weight, handed.written))
+        state = None if handed.written is None else handed.name
     return None
 
 
@@ -102,7 +104,7 @@ def _bare(body: Term) -> Term:
     return memo[body]
 
 
-def _split(term: Term, inner: Names) -> tuple[Term, Term]:
+def _split(term: Term, here: Names, inner: Names) -> tuple[Term, Term]:
     """A term as a product of what the inner variables don't occur in, and the rest."""
     weight: list[Term] = []
     rest: list[Term] = []
@@ -112,7 +114,7 @@ def _split(term: Term, inner: Names) -> tuple[Term, Term]:
             continue
         match factor:
             case Prim(op="exp", args=(inside,)):
-                terms = _summands(inside)
+                terms = _summands(inside, here | inner)
                 known = [t for t in terms if not t.free & inner]
                 if known:
                     weight.append(prim("exp", add(*known)))
@@ -157,18 +159,25 @@ def _every(surface: Term) -> list[Term]:
     return [surface]
 
 
-def _summands(term: Term) -> list[Term]:
+def _summands(term: Term, names: Names) -> list[Term]:
+    """What a term is a sum of, that what has none of some variables is multiplied into."""
     found: list[Term] = []
-    waiting = [(term, False)]
+    waiting: list[tuple[Term, Scaled]] = [(term, lambda part: part)]
     while waiting:
-        item, turned = waiting.pop()
+        item, scaled = waiting.pop()
         match item:
             case Prim(op="add", args=args):
-                waiting.extend((a, turned) for a in reversed(args))
+                waiting.extend((a, scaled) for a in reversed(args))
             case Prim(op="neg", args=(inside,)):
-                waiting.append((inside, not turned))
+                waiting.append((inside, lambda part, scaled=scaled: neg(scaled(part))))
+            case Prim(op="mul", args=args) if sum(not a.free.isdisjoint(names) for a in args) == 1:
+                inside = next(a for a in args if not a.free.isdisjoint(names))
+                rest = mul(*(a for a in args if a is not inside))
+                waiting.append((inside, lambda part, scaled=scaled, rest=rest: scaled(mul(rest, part))))
+            case Prim(op="div", args=(inside, below)) if below.free.isdisjoint(names):
+                waiting.append((inside, lambda part, scaled=scaled, below=below: scaled(div(part, below))))
             case _:
-                found.append(neg(item) if turned else item)
+                found.append(scaled(item))
     return found
 
 
@@ -176,14 +185,15 @@ def _summands(term: Term) -> list[Term]:
 class _Handed:
     """The one number that terms depend on variables `here` through, as far as they have been put.
 
-    core: that number as a sum, by what it is a sum of, with a coefficient of 1 somewhere; name: what it is called then.
-    What is multiplied or raised to powers stays as it was written: multiplied out it might lose digits.
+    written: that number as a sum, as it comes first; core: the same by what it is a sum of; name: what it is called
+    then. What is multiplied or raised to powers stays as it was written: multiplied out it might lose digits.
     """
 
     here: Names
     inner: Names
     name: str
     core: dict[Term, Fraction] | None = None
+    written: Term | None = None
 
     def put(self, term: Term) -> Term:
         """The term with the number in place of what it is made of. Raises _MoreThanOne."""
@@ -199,7 +209,7 @@ class _Handed:
     def _rebuilt(self, node: Term, memo: dict[Term, Term]) -> Term:
         if isinstance(node, Prim) and node.op in ("add", "mul"):
             together = add if node.op == "add" else mul
-            parts = _summands(node) if node.op == "add" else list(_factors(node))
+            parts = _summands(node, self.here | self.inner) if node.op == "add" else list(_factors(node))
             known = [p for p in parts if not p.free & self.inner and p.free & self.here]
             others = [self._again(p, memo) for p in parts if p.free & self.inner or not p.free & self.here]
             return together(*others, self._single(together(*known))) if known else together(*others)
@@ -219,29 +229,21 @@ class _Handed:
             return term
         varying: dict[Term, Fraction] = {}
         constant: list[Term] = []
-        for summand in _summands(term):
+        moving: list[Term] = []
+        for summand in _summands(term, self.here):
             coefficient, atom = split(summand)
             if atom.free & self.here:
                 varying[atom] = varying.get(atom, Fraction(0)) + coefficient
+                moving.append(summand)
             else:
                 constant.append(summand)
-        first = varying[min(varying, key=lambda atom: atom.digest)]
-        scale = number(first)
-        if scale is None or not all(varying.values()):
+        if not all(varying.values()):
             raise _MoreThanOne
-        core = {atom: coefficient / first for atom, coefficient in varying.items()}
         if self.core is None:
-            self.core = core
-        if self.core != core:
+            self.core, self.written = varying, add(*moving)
+        first = next(iter(varying))
+        ratio = varying[first] / self.core.get(first, varying[first])
+        scale = number(ratio)
+        if scale is None or varying != {atom: ratio * coefficient for atom, coefficient in self.core.items()}:
             raise _MoreThanOne
         return add(*constant, mul(scale, var(self.name)))
-
-    def passed(self) -> Term | None:
-        """The number in terms of what it is made of; None if there is none. Raises _MoreThanOne."""
-        if self.core is None:
-            return None
-        scales = {atom: number(coefficient) for atom, coefficient in self.core.items()}
-        terms = [mul(scale, atom) for atom, scale in scales.items() if scale is not None]
-        if len(terms) < len(scales):
-            raise _MoreThanOne  # a third has no decimals
-        return add(*terms)

@@ -124,9 +124,7 @@ class _Pool:
 
     surfaces: dict[Term, _Placed] = field(default_factory=dict)
 
-    def put(
-        self, surface: Term, jump: tuple[tuple[int, ...], bool] | None, turning: bool, steps: bool = False
-    ) -> None:
+    def put(self, surface: Term, jump: tuple[tuple[int, ...], bool] | None, turning: bool, steps: bool = False) -> None:
         face, orientation = _face(surface)
         if not face.key.free:
             return
@@ -174,9 +172,7 @@ class Sweep:
     outer: tuple[Finding, ...]
 
 
-def sweep(
-    term: Integral, found: Iterable[Finding], resolve: Resolve, decide: Decide, outermost: bool = False
-) -> Sweep:
+def sweep(term: Integral, found: Iterable[Finding], resolve: Resolve, decide: Decide, outermost: bool = False) -> Sweep:
     """Place every surface of an integral's body at the variable that it cuts. outermost: nobody asks for the rest."""
     pool = _Pool()
     centers: dict[Term, None] = {}

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 
+from potto.calculus.decomposition.elimination import eliminate
 from potto.core.terms import Integral, integral
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.integration.plans import Linked, plan_for
@@ -69,10 +70,17 @@ def trials(machine: Machine, term: Integral, linked: Linked, outermost: bool) ->
     """Orders, and how many evaluations may go into trying them: where a jump is searched for, roots that merge further
     out at places that are not known may make one order a hundred times as expensive as another."""
     found = preferred(machine, term, linked)
+    most = TRIAL * TRIAL_FACTOR ** max(len(term.variables) - 2, 0)
     if isinstance(found, list) and outermost and len(found) > 1 and searches(machine, found[0], linked):
-        most = TRIAL * TRIAL_FACTOR ** max(len(term.variables) - 2, 0)
         yield from ((order, most) for order in found)
+    elif outermost and passes_on(machine, term):
+        yield term, most
     yield from ((order, None) for order in found)
+
+
+def passes_on(machine: Machine, term: Integral) -> bool:
+    """Whether variables may be eliminated where iterated quadrature, which suits so few, turns out to take long."""
+    return len(term.variables) == MOST_LEVELS and not machine.frozen and eliminate(term) is not None
 
 
 def preferred(machine: Machine, term: Integral, linked: Linked) -> Iterable[Integral]:

@@ -31,7 +31,7 @@ def step_by_step(problem: Problem, limit: float) -> Sums | None:
     for i in range(problem.batch):
         alone = replace(problem.apart(), linked=problem.picked(np.array([i])), batch=1)
         row = _member(known, alone)
-        if row is None or alone.events or not accurate(row, limit, alone.machine):
+        if row is None or alone.events or not accurate(row, max(limit, alone.machine.rtol), alone.machine):
             return None
         rows.append(row)
     problem.machine.record.methods.add("quadrature")

@@ -30,7 +30,7 @@ from potto.integrate.pieces import Sums, still
 from potto.integrate.plan import Plan
 from potto.kernels.cells import Ints, Value
 from potto.runtime.answers.convergence import missing
-from potto.runtime.integration.choices import many, orders, preferred, too_many, trials
+from potto.runtime.integration.choices import many, orders, passes_on, preferred, too_many, trials
 from potto.runtime.integration.coarser import by_less
 from potto.runtime.integration.differences import by_differences
 from potto.runtime.integration.elimination import ACCURATE, WORTH, step_by_step
@@ -103,8 +103,14 @@ def along_cuts(problem: Problem) -> Sums:
     """Iterated quadrature, in the first order of the variables in which no surface runs along the one that it cuts."""
     machine, env, batch, events = problem.machine, problem.env, problem.batch, problem.events
     machine.record.methods.add("quadrature")
+    tried = False
     for order, most in trials(machine, problem.term, problem.linked, problem.outermost):
         events.forget(Degenerate)
+        if most is None and tried and batch == 1 and passes_on(machine, problem.term):
+            eliminated = step_by_step(problem, ACCURATE)
+            if eliminated is not None:
+                return eliminated
+        tried = most is not None
         plan = problem.plan(order)
         if batch == 1 and plan.straight is not None:
             plain = certain(plan.straight, machine, env)
