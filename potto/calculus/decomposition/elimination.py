@@ -239,9 +239,11 @@ class _Handed:
                 constant.append(summand)
         if not all(varying.values()):
             raise _MoreThanOne
-        if self.core is None:
-            self.core, self.written = varying, add(*moving)
         first = next(iter(varying))
+        if self.core is None:  # with the sign that it starts with: a square counts upwards
+            positive = varying[first] > 0
+            self.core = varying if positive else {atom: -coefficient for atom, coefficient in varying.items()}
+            self.written = add(*moving) if positive else add(*map(neg, moving))
         ratio = varying[first] / self.core.get(first, varying[first])
         scale = number(ratio)
         if scale is None or varying != {atom: ratio * coefficient for atom, coefficient in self.core.items()}:
