@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import lru_cache
+from functools import lru_cache, partial, reduce
 
 from potto.core.collecting import split
 from potto.core.polynomials import number
@@ -162,23 +162,27 @@ def _every(surface: Term) -> list[Term]:
 def _summands(term: Term, names: Names) -> list[Term]:
     """What a term is a sum of, that what has none of some variables is multiplied into."""
     found: list[Term] = []
-    waiting: list[tuple[Term, Scaled]] = [(term, lambda part: part)]
+    waiting: list[tuple[Term, tuple[Scaled, ...]]] = [(term, ())]
     while waiting:
         item, scaled = waiting.pop()
         match item:
             case Prim(op="add", args=args):
                 waiting.extend((a, scaled) for a in reversed(args))
             case Prim(op="neg", args=(inside,)):
-                waiting.append((inside, lambda part, scaled=scaled: neg(scaled(part))))
+                waiting.append((inside, (neg, *scaled)))
             case Prim(op="mul", args=args) if sum(not a.free.isdisjoint(names) for a in args) == 1:
                 inside = next(a for a in args if not a.free.isdisjoint(names))
                 rest = mul(*(a for a in args if a is not inside))
-                waiting.append((inside, lambda part, scaled=scaled, rest=rest: scaled(mul(rest, part))))
+                waiting.append((inside, (partial(mul, rest), *scaled)))
             case Prim(op="div", args=(inside, below)) if below.free.isdisjoint(names):
-                waiting.append((inside, lambda part, scaled=scaled, below=below: scaled(div(part, below))))
+                waiting.append((inside, (partial(_over, below), *scaled)))
             case _:
-                found.append(scaled(item))
+                found.append(reduce(lambda part, wrap: wrap(part), scaled, item))
     return found
+
+
+def _over(below: Term, above: Term) -> Term:
+    return div(above, below)
 
 
 @dataclass

@@ -94,8 +94,7 @@ class Level:
     """One variable of the iteration, with everything that cuts it.
 
     critical: where what lies further in meets, appears or turns, if that has no closed form there. complete: whether
-    what the cuts leave in the variables further out was worked out for all of them.
-    """
+    all that the cuts leave further out was worked out."""
 
     variable: str
     lo: Term
@@ -342,8 +341,7 @@ def _shadows(
     cuts: tuple[Cut, ...], variable: str, lo: Term, hi: Term, further: frozenset[str]
 ) -> Iterator[tuple[Term, bool] | Critical]:
     """What the cuts of one variable leave in those further out: (surface, whether like a square root), or systems.
-
-    further: those variables. Formulas of formulas grow from one to the next; where there are two or more, systems in
+    Formulas of formulas grow from one to the next; where there are two or more, systems in
     the surfaces as they are take the place of what is more than a radical.
     """
     for cut in cuts:
@@ -375,7 +373,7 @@ def _meeting(cuts: Sequence[Cut], variable: str, further: frozenset[str]) -> tup
     meeting = [c for c in cuts if c.roots or c.families or c.roots is None]
     meeting = [c for c in meeting if not scattered(along(c), variable, further)]
     chosen = [c for n, c in enumerate(meeting) if n < (MOST_JUMPS if c.decides else MOST_PAIRS)]
-    return chosen, len(chosen) == len(meeting)
+    return chosen, chosen == meeting
 
 
 def _by_numbers(surface: Term, variable: str, further: frozenset[str]) -> bool:

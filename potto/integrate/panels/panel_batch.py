@@ -65,7 +65,9 @@ class PanelBatch:
 
     def enough(self) -> int | None:
         """How many nodes do for an integrand that is a polynomial between its cuts: so many that it is 0 where it is 0
-        at all of them, since they also tell its size."""
+        at all of them, since they also tell its size. Where nodes round to others than the rule's, more average out."""
+        if not self.last and few_doubles(self.seg, (self.seg.b - self.seg.a)[:, None]):
+            return None
         degrees = self.parent.plan.degrees
         degree = degrees[self.number] if degrees and not self.seg.kind.any() else None
         return None if degree is None or degree >= self.parent.order else degree + 1
