@@ -212,6 +212,22 @@ def on_a_bound(cause: TwoSided) -> Shortfall:
     return Shortfall(f"{both}, and what lies between them is not known", BESIDE)
 
 
+def at_a_fold(surface: Term, variable: str) -> Shortfall:
+    """Roots merge over which is summed."""
+    return Shortfall(
+        f"{format_term(surface)} = 0 folds just here: roots in `{variable}` merge, and their sum is infinite",
+        BESIDE,
+    )
+
+
+def root_on_a_bound(surface: Term, variable: str) -> Shortfall:
+    """A root counts on one side of the parameters, and on the other it does not."""
+    return Shortfall(
+        f"{format_term(surface)} = 0 meets a bound of `{variable}` just here: on one side of the parameters it counts",
+        BESIDE,
+    )
+
+
 UNDEFINED = "a condition has no value"
 
 

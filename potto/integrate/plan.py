@@ -18,6 +18,7 @@ from potto.calculus.algebra.polytopes import Number
 from potto.calculus.checking.solvability import monotone
 from potto.calculus.decomposition.critical import MOST_EQUATIONS, slopes_of
 from potto.calculus.decomposition.sweep import Cut, Level, along, sweep
+from potto.calculus.differentiation.level_sets import LevelSet, placed_along
 from potto.calculus.inlining.expand import expanded
 from potto.calculus.inlining.unrolled import unrolled
 from potto.calculus.solving.enclosable import slope_of
@@ -68,6 +69,7 @@ class Plan:
     confused: whether there are conditions inside of conditions that were not told apart.
     folds: whether a surface that is searched for may have folds where the variables further out can't be cut.
     degrees: of what is integrated over each variable between its cuts, where it is a polynomial in it.
+    over: a level set, over whose roots the innermost variable is summed.
     """
 
     term: Integral
@@ -85,6 +87,12 @@ class Plan:
     confused: bool = False
     folds: bool = False
     degrees: tuple[int | None, ...] = ()
+    over: LevelSet | None = None
+
+    @property
+    def mass(self) -> Term:
+        """What tells how much of an infinite range matters."""
+        return self.term.body if self.over is None else self.over.factor
 
     def trace(self, sides: Mapping[int, Mask]) -> Trace | None:
         """The trace that forces the groups to the sides given: a mask, true where the canonical surface is >= 0."""
@@ -139,7 +147,8 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve, numb
     for some of the parameters, or nan.
     """
     asked = _Asked(resolve, decide)
-    term = cased(term)
+    over = placed_along(term)
+    term = cased(term if over is None else integral(term.variables, term.bounds, over.weight, term.hints))
     found = asked.findings(term)
     premises: tuple[Term, ...] = ()
     confused = False
@@ -155,9 +164,9 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve, numb
         found = asked.findings(term)
         hides = hidden(term, found, resolve)
     reaches = not asked.unknown
-    levels, groups = group_levels(sweep(term, found, resolve, asked.remember, outermost=True).levels)
+    levels, groups = group_levels(sweep(term, found, resolve, asked.remember, True, over).levels)
     body = function_of(term.body)
-    inlined = _inlined(term, inline) if reaches and not hides else None
+    inlined = _inlined(term, inline) if reaches and not hides and over is None else None
     return Plan(
         term,
         levels,
@@ -168,7 +177,7 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve, numb
         ),
         tuple((t, v) for t, v in asked.decisions.items() if not isinstance(t, Const)),
         reaches,
-        hides,
+        hides or over is not None,
         None if inlined is None else box_of(term, found, body, inlined),
         _doublings(term, found),
         None if inlined is None else straight(term, inlined, levels),
@@ -176,6 +185,7 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve, numb
         confused,
         _may_fold(term, levels),
         () if inlined is None else _degrees(inlined, levels),
+        over,
     )
 
 

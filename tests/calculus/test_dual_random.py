@@ -12,7 +12,6 @@ import random
 import pytest
 from calculus_terms import value
 
-from potto.calculus.differentiation.boundary_terms import NoClosedForm
 from potto.calculus.differentiation.dual import dual
 from potto.core import terms as t
 from potto.core.printer import format_term
@@ -73,10 +72,9 @@ def compare(seed: int) -> None:
     programs = Programs(seed)
     whole = programs.integral()
     at, h = programs.random.uniform(0.2, 1.5), 1e-5
-    try:
-        tangent = dual(whole, {"t": ONE})[1]
-    except NoClosedForm:
-        return
+    tangent = dual(whole, {"t": ONE})[1]
+    if any(isinstance(node, t.Delta) for node in t.postorder(tangent)):
+        return  # over a level set, which has no closed form: only numbers integrate it
     here, up, down = (float(value(whole, {"t": s})) for s in (at, at + h, at - h))
     derived = float(value(tangent, {"t": at}))
     if any(v != v for v in (up, down, derived)):

@@ -24,21 +24,10 @@ PATIENCE = 20.0  # seconds of processor time that a region may take
 SECOND_WITHIN = 1e-6  # what is asked of second derivatives
 
 UNMET = {
-    "delta of a cubic": "refused, P0402: a delta wants an inverse",
-    "delta, damped": "refused, P0402: a delta wants an inverse",
-    "density of states, 1-D": "refused, P0402: a delta wants an inverse",
-    "density of states": "refused, P0508: no derivative of a delta whose roots come and go",
     "three cosines": "too slow",
 }
-UNMET_SECOND = {
-    "cubic": "refused, P0508: a root that is searched for has no second derivative",
-    "damped": "refused, P0508: a root that is searched for has no second derivative",
-    "waves": "refused, P0508: a root that is searched for has no second derivative",
-    "folium": "refused, P0508: a root that is searched for has no second derivative",
-    "normal waves": "refused, P0507: a sum over the roots that starts at -inf",
-    "lens": "7 digits, but a bound of 1e-5",
-}
-SLOW = {name for name in UNMET if "refused" not in UNMET[name]} | {
+UNMET_SECOND: dict[str, str] = {}
+SLOW = set(UNMET) | {
     "ball of normals", "depth test", "flower", "folium", "folium and wings", "gyroid corner", "quartic", "quartic ball",
     "gyroid slab", "near a fold", "three metaballs", "torus", "torus, quartic", "touching ball, 4-D",
     "touching ball, 5-D", "touching ball, 6-D", "two metaballs", "weighted cubic",

@@ -3,7 +3,8 @@
 Owns `judge`, a pure function of a condition's coordinates, and the kinds of diagnostics that say no. For a condition
 under an integral it is enough that its first coordinate can be solved for one variable of integration with all roots,
 or that it is strictly monotone in one; a map with as many coordinates as variables must also not be singular. A bracket
-needs no inverse: it is enough that its zeros can be searched for. What is declared a diffeomorphism must be one.
+or a delta needs no inverse: it is enough that its zeros can be searched for. What is declared a diffeomorphism must be
+one.
 """
 
 from __future__ import annotations
@@ -72,7 +73,7 @@ def judge(
     coordinates: Sequence[Term], variables: Sequence[str], box: Box, whole: bool = False, role: Role = "bracket"
 ) -> Verdict | Problem:
     """The verdict on a condition; `whole`: its author wrote all coordinates, as many as variables. What is a map or has
-    several coordinates is declared a diffeomorphism; that and what a delta is of must have an inverse."""
+    several coordinates is declared a diffeomorphism, which must have an inverse."""
     if len(coordinates) > 1:
         role = "map"
     if any(map(nested, coordinates)):
@@ -144,7 +145,7 @@ def _judged(
         if isinstance(inverse, Inverse):
             return Verdict(mine[-1], (), inverse.determinant, None, inverse)
     found_by_search = next((name for name in reversed(mine) if searchable(surface, name)), None)
-    if role == "bracket" and found_by_search is not None:
+    if role != "map" and found_by_search is not None:
         return Verdict(found_by_search, (), None, None, searched=(surface,))
     return no_inverse(surface, mine, reasons, role, found_by_search is not None)
 
@@ -231,7 +232,7 @@ def _empty(surface: Term, box: Box) -> Problem | None:
 
 _ADVICE: dict[Role, str] = {
     "bracket": "write the condition so that one variable can be isolated",
-    "delta": "differentiate an integral over the bracket `[{0} >= 0]`, which needs no inverse",
+    "delta": "write the condition so that one variable can be isolated",
     "map": "write the bracket `[{0} >= 0]`, which needs no inverse",
 }
 

@@ -38,12 +38,14 @@ class Within:
 class Critical:
     """Where all equations are 0 for some values of the variables of `within`, innermost first: one fewer than those.
 
-    turning: what is integrated further in changes there like a square root, or worse.
+    turning: what is integrated further in changes there like a square root, or worse. steps: it jumps there, or is
+        infinite, so that nodes move with the place.
     """
 
     equations: tuple[Term, ...]
     within: tuple[Within, ...]
     turning: bool = False
+    steps: bool = False
 
     @property
     def free(self) -> frozenset[str]:
@@ -53,7 +55,7 @@ class Critical:
 
     def mapped(self, change: Callable[[Term], Term]) -> Critical:
         """The system with its equations changed."""
-        return Critical(tuple(map(change, self.equations)), self.within, self.turning)
+        return Critical(tuple(map(change, self.equations)), self.within, self.turning, self.steps)
 
     def at(self, variable: str, value: Term) -> Critical:
         """The system with a variable further out replaced."""
@@ -77,13 +79,13 @@ def slopes_of(system: Critical, variable: str) -> tuple[Term, ...] | None:
     return slopes if all(enclosable(t, jumps=True) for t in slopes) else None
 
 
-def folds(surface: Term, variable: str, lo: Term, hi: Term) -> Iterator[Critical]:
+def folds(surface: Term, variable: str, lo: Term, hi: Term, steps: bool = False) -> Iterator[Critical]:
     """Where sections of a surface along a variable appear or merge; nothing where that can't be searched for."""
     slope = slope_of(surface, variable)
     if slope is None:
         return
     for factor in _factors(slope):
-        yield Critical((surface, factor), (Within(variable, lo, hi),), True)
+        yield Critical((surface, factor), (Within(variable, lo, hi),), True, steps)
 
 
 @lru_cache(maxsize=1024)

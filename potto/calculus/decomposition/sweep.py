@@ -17,6 +17,7 @@ from potto.calculus.algebra.radicals import minus
 from potto.calculus.algebra.ranges import positive
 from potto.calculus.algebra.rational_form import settled
 from potto.calculus.decomposition.critical import Critical, Within, folds, infinite, scattered, shadows
+from potto.calculus.differentiation.level_sets import LevelSet
 from potto.calculus.solving.enclosable import slope_of
 from potto.calculus.solving.solve import Family, Sections, Unsolvable, sections
 from potto.calculus.surfaces.case_split import cased
@@ -171,8 +172,14 @@ class Sweep:
     outer: tuple[Finding, ...]
 
 
-def sweep(term: Integral, found: Iterable[Finding], resolve: Resolve, decide: Decide, outermost: bool = False) -> Sweep:
-    """Place every surface of an integral's body at the variable that it cuts. outermost: nobody asks for the rest."""
+def sweep(
+    term: Integral, found: Iterable[Finding], resolve: Resolve, decide: Decide, outermost: bool = False,
+    over: LevelSet | None = None,
+) -> Sweep:  # fmt: skip
+    """Place every surface of an integral's body at the variable that it cuts. outermost: nobody asks for the rest.
+
+    over: the level set over which the innermost variable is not integrated but summed.
+    """
     pool = _Pool()
     centers: dict[Term, None] = {}
     critical: dict[Critical, None] = {}
@@ -201,13 +208,20 @@ def sweep(term: Integral, found: Iterable[Finding], resolve: Resolve, decide: De
         systems = tuple(c for c in critical if variable in c.free)
         critical = {c: None for c in critical if variable not in c.free}
         peaks = (*hints, *points_of(here, variable)[:MOST_CENTERS])
-        levels.append(Level(variable, lo, hi, peaks, (*cuts, *_around(here, variable)), systems, complete))
+        own = cut_along(over.surface, variable) if over is not None and variable == term.variables[-1] else None
+        placed = (*cuts, *_around(here, variable)) if own is None else (own,)
+        levels.append(Level(variable, lo, hi, peaks, placed, systems, complete))
         if not (outermost and variable == term.variables[0]):
-            for shadow in _shadows(cuts, variable, lo, hi, further):
+            within = Within(variable, lo, hi)
+            if over is None or own is None:
+                found_here = _shadows(cuts, within, further)
+            else:
+                found_here = _root_shadows(own, cuts, within, further, len(over.shares) == 1)
+            for shadow in found_here:
                 if isinstance(shadow, Critical):
                     critical[shadow] = None
                 else:
-                    pool.put(shadow[0], None, shadow[1])
+                    pool.put(shadow[0], None, *shadow[1:])
             critical.update(dict.fromkeys(_further(systems, cuts, variable, lo, hi)))
         for bound in (lo, hi):
             for f in findings(bound, resolve, decide):
@@ -337,35 +351,61 @@ def _further(
     yield from shadows(systems[:MOST_PAIRS], variable, lo, hi, roots, searched)
 
 
-def _shadows(
-    cuts: tuple[Cut, ...], variable: str, lo: Term, hi: Term, further: frozenset[str]
-) -> Iterator[tuple[Term, bool] | Critical]:
-    """What the cuts of one variable leave in those further out: (surface, whether like a square root), or systems.
-    Formulas of formulas grow from one to the next; where there are two or more, systems in
-    the surfaces as they are take the place of what is more than a radical.
-    """
+# A surface, whether what is left is like a square root there, and whether it jumps; or a system.
+_Shadow = tuple[Term, bool, bool] | Critical
+
+
+def _shadows(cuts: tuple[Cut, ...], within: Within, further: frozenset[str]) -> Iterator[_Shadow]:
+    """What the cuts of one variable leave in those further out."""
     for cut in cuts:
-        surface = along(cut)
-        for bound in (lo, hi):
-            if not infinite(bound):
-                yield substitute(surface, {variable: bound}), False
-        if cut.roots is None or (cut.families and _by_numbers(surface, variable, further)):
-            yield from folds(surface, variable, lo, hi)
-            if cut.roots is not None:
-                continue
-        found = _sections(surface, variable)
-        if cut.product is None and not (isinstance(found, Sections) and found.complete):
-            found = _sections(cut.key, variable)
-        if isinstance(found, Sections):
-            for turn in found.turning:
-                yield turn, True
-            for stop in dict.fromkeys(stop for family in found.families for stop in family.stops):
-                yield substitute(surface, {variable: stop}), True
-    meeting, _ = _meeting(cuts, variable, further)
+        yield from _at_bounds(cut, within, False)
+        yield from _turning(cut, within, further)
+    meeting, _ = _meeting(cuts, within.variable, further)
     for first in meeting:
         for second in meeting:
             if first is not second and first.key.digest < second.key.digest:
-                yield from _crossings(first, second, Within(variable, lo, hi), further)
+                yield from _crossings(first, second, within, further)
+
+
+def _root_shadows(
+    own: Cut, cuts: tuple[Cut, ...], within: Within, further: frozenset[str], alone: bool
+) -> Iterator[_Shadow]:
+    """What a sum over the roots of one surface leaves: it jumps where they meet a bound, or a jump of what is summed.
+
+    alone: no other variable has a share, so that the sum is infinite where roots merge.
+    """
+    yield from _at_bounds(own, within, True)
+    yield from _turning(own, within, further, alone)
+    for cut in cuts:
+        if cut.decides:
+            yield from _crossings(own, cut, within, further, True)
+
+
+def _at_bounds(cut: Cut, within: Within, steps: bool) -> Iterator[_Shadow]:
+    for bound in (within.lo, within.hi):
+        if not infinite(bound):
+            yield substitute(along(cut), {within.variable: bound}), False, steps
+
+
+def _turning(cut: Cut, within: Within, further: frozenset[str], steps: bool = False) -> Iterator[_Shadow]:
+    """Where the roots of a cut appear, merge or turn.
+
+    further: the variables further out. Formulas of formulas grow from one to the next; where there are two or more,
+    systems in the surfaces as they are take the place of what is more than a radical.
+    """
+    surface, variable = along(cut), within.variable
+    if cut.roots is None or (cut.families and _by_numbers(surface, variable, further)):
+        yield from folds(surface, variable, within.lo, within.hi, steps)
+        if cut.roots is not None:
+            return
+    found = _sections(surface, variable)
+    if cut.product is None and not (isinstance(found, Sections) and found.complete):
+        found = _sections(cut.key, variable)
+    if isinstance(found, Sections):
+        for turn in found.turning:
+            yield turn, True, False
+        for stop in dict.fromkeys(stop for family in found.families for stop in family.stops):
+            yield substitute(surface, {variable: stop}), True, False
 
 
 def _meeting(cuts: Sequence[Cut], variable: str, further: frozenset[str]) -> tuple[list[Cut], bool]:
@@ -382,8 +422,8 @@ def _by_numbers(surface: Term, variable: str, further: frozenset[str]) -> bool:
 
 
 def _crossings(
-    first: Cut, second: Cut, within: Within, further: frozenset[str]
-) -> Iterator[tuple[Term, bool] | Critical]:
+    first: Cut, second: Cut, within: Within, further: frozenset[str], steps: bool = False
+) -> Iterator[_Shadow]:
     """Where two sections meet: the simpler one's roots put into the other's surface, where they are all known."""
     solved = [c for c in (first, second) if c.roots is not None and not c.families]
     a = min(solved, key=lambda c: (len(c.roots or ()), sum(_size(r) for r in c.roots or ())), default=None)
@@ -392,13 +432,13 @@ def _crossings(
         and all(_by_numbers(along(c), within.variable, further) for c in (first, second))
     )
     if a is None or searched:
-        yield Critical((along(first), along(second)), (within,))
+        yield Critical((along(first), along(second)), (within,), False, steps)
         return
     b = second if a is first else first
     for root in a.roots or ():
         meeting = simplify(substitute(b.surface, {within.variable: root}))
         if meeting.free:
-            yield meeting, False
+            yield meeting, False, steps
 
 
 def _radical(root: Term) -> bool:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from potto.calculus.algebra.radicals import NAN
 from potto.calculus.algebra.ranges import range_of
-from potto.calculus.differentiation.derivative import zero_like
+from potto.calculus.differentiation.derivative import partial, zero_like
 from potto.calculus.solving.pivots import NoClosedForm as NoClosedForm
 from potto.calculus.solving.pivots import Root, chosen, conjunction, pivots
 from potto.calculus.solving.solve import factors
@@ -39,6 +39,7 @@ from potto.core.terms import (
     Const,
     If,
     Integral,
+    Prim,
     Sum,
     Term,
     Tuple,
@@ -66,8 +67,9 @@ from potto.core.terms import (
 Rate = Callable[[Term], Term]
 
 
-def at_surfaces(node: Integral, moving: frozenset[str], rate: Rate) -> list[Term]:
-    """The boundary terms of an integral, one for each root of each surface that moves."""
+def at_surfaces(node: Integral, moving: frozenset[str], rate: Rate, folding: bool = False) -> list[Term]:
+    """The boundary terms of an integral, one for each root of each surface that moves; over a level set, as an integral
+    of a delta, where roots have no closed form, or one in which they merge, unless `folding` ones are wanted."""
     branches = branches_of(node.body, node.variables)
     surfaces: dict[Term, list[Branch]] = {}
     for item in branches:
@@ -80,15 +82,33 @@ def at_surfaces(node: Integral, moving: frozenset[str], rate: Rate) -> list[Term
     for surface, members in surfaces.items():
         sums = summed_over(node.body, members[0])
         alternatives: list[tuple[Term | None, Term]] = []
-        for pivot in pivots(node, surface):
-            new = [r for r in pivot.roots if not any(_same(r, other) for other in met)]
-            met += new
-            gains: list[Term] = []
-            for root in new:
-                gains += _at_root(node, flipping(branches, root.variable, root.at, members), root, rate, sums)
-            alternatives.append((pivot.condition, total(gains, zero)))
-        terms.append(chosen(alternatives))
+        try:
+            for pivot in pivots(node, surface, folding):
+                new = [r for r in pivot.roots if not any(_same(r, other) for other in met)]
+                gains: list[Term] = []
+                for root in new:
+                    gains += _at_root(node, flipping(branches, root.variable, root.at, members), root, rate, sums)
+                met += new
+                alternatives.append((pivot.condition, total(gains, zero)))
+            terms.append(chosen(alternatives))
+        except NoClosedForm:
+            terms += _over_level_set(node, surface, members, rate)
     return [term for term in terms if not vanishes(term)]
+
+
+def _over_level_set(node: Integral, surface: Term, members: Sequence[Branch], rate: Rate) -> Iterator[Term]:
+    """The jump at a surface, integrated over it."""
+    item = _jump_at(node.body, surface, [(b, _side(b.surface, surface, node.variables)) for b in members], rate)
+    if item is not None:
+        yield integral(node.variables, node.bounds, item.contribution, node.hints)
+
+
+def _side(product: Term, factor: Term, variables: Iterable[str]) -> Term:
+    """A term with the sign of a product just where one of its factors turns positive: that of how both rise."""
+    whole, key = normalized_surface(product), normalized_surface(factor)
+    if whole[0] is key[0]:
+        return const(whole[1] * key[1])
+    return add(*(mul(partial(product, name), partial(factor, name)) for name in variables if name in factor.free))
 
 
 def _same(root: Root, other: Root) -> bool:
@@ -101,19 +121,18 @@ def _at_root(node: Integral, flips: Flips, root: Root, rate: Rate, sums: list[Su
     speed = rate(root.at)
     if speed is ZERO:
         return
-    body, instances = _instances(node.body, flips, sums, box_of(node))
+    body, instances = _instances(node.body, flips, sums, box_of(node), root.at.free)
     left, right = (substitute(f, {root.variable: root.at}) for f in (body(False), body(True)))
     if left is right:
         return
     gain = scaled(difference(left, right), speed)
     lo, hi = node.bounds[node.variables.index(root.variable)]
-    gain = substitute(between(root.at, lo, hi, gain), instances)
-    for old in sums:
-        new = instances[old.variable]
-        gain = sum_(_name(new), old.lo, old.hi, gain)
+    gain = between(root.at, lo, hi, gain)
     if root.index is not None and root.counts is not None:
-        lowest, highest = root.counts
-        gain = sum_(root.index, lowest, highest, gain)
+        gain = sum_(root.index, *root.counts, gain)
+    gain = substitute(gain, instances)
+    for old in sums:
+        gain = sum_(_name(instances[old.variable]), old.lo, old.hi, gain)
     yield remaining(node, root.variable, root.at, gain)
 
 
@@ -122,11 +141,13 @@ def _name(term: Term) -> str:
     return name
 
 
-def _instances(body: Term, flips: Flips, sums: list[Sum], box: Box) -> tuple[Callable[[bool], Term], dict[str, Term]]:
+def _instances(
+    body: Term, flips: Flips, sums: list[Sum], box: Box, used: Iterable[str] = ()
+) -> tuple[Callable[[bool], Term], dict[str, Term]]:
     """The forced integrand; under sums only the instance of a branch that flips is forced, the others fall."""
     if not sums:
         return (lambda right: forced(body, flips, right, box)), {}
-    taken = {n for t in postorder(body) for n in t.free} | {s.variable for s in sums}
+    taken = {n for t in postorder(body) for n in t.free} | {s.variable for s in sums} | set(used)
     names: dict[str, Term] = {}
     for item in sums:
         name = fresh(item.variable, taken)
@@ -182,12 +203,13 @@ def between(at: Term, lo: Term, hi: Term, value: Term) -> Term:
 
 
 def exists(at: Term, value: Term) -> Term:
-    """`value` where `at` is a number, else 0: these conditions come first, since a comparison with nan is nan."""
+    """`value` where `at` is a number, else 0: these conditions come first, and of roots of roots the inner ones, as a
+    comparison with nan is nan.
+    """
     guards = [n.surface for n in postorder(at) if isinstance(n, Branch) and n.orelse is NAN]
     for surface in guards:
         value = branch((surface,), False, value, zero_like(value))
-    radicands = [n.args[0] for n in postorder(at) if getattr(n, "op", "") in ("sqrt", "log")]  # type: ignore[union-attr]
-    for radicand in radicands:
+    for radicand in [n.args[0] for n in reversed(postorder(at)) if isinstance(n, Prim) and n.op in ("sqrt", "log")]:
         if not range_of(radicand).positive:
             value = branch((radicand,), False, value, zero_like(value))
     return value
@@ -229,7 +251,14 @@ def remaining(node: Integral, name: str, at: Term, body: Term) -> Term:
 
 
 def vanishes(term: Term) -> bool:
-    return all(map(vanishes, term.items)) if isinstance(term, Tuple) else term is ZERO
+    """Whether a number, or each of a tuple, is 0 on all sides of what it depends on."""
+    match term:
+        case Tuple(items=parts):
+            return all(map(vanishes, parts))
+        case Branch(then=then, orelse=orelse) | If(then=then, orelse=orelse):
+            return vanishes(then) and vanishes(orelse)
+        case _:
+            return term is ZERO
 
 
 def total(parts: Sequence[Term], zero: Term) -> Term:
@@ -286,22 +315,27 @@ class JumpTerm:
 
 def jumps(body: Term, variables: Iterable[str], rate: Rate) -> list[JumpTerm]:
     """The distribution part of the derivative of an integrand, surface by surface; coincident ones as one."""
-    groups: dict[Term, list[tuple[Branch, int]]] = {}
+    groups: dict[Term, list[Branch]] = {}
     for item in branches_of(body, variables):
-        canonical, orientation = normalized_surface(item.surface)
-        groups.setdefault(canonical, []).append((item, orientation))
+        groups.setdefault(normalized_surface(item.surface)[0], []).append(item)
     found: list[JumpTerm] = []
     for members in groups.values():
-        first, side = members[0]
-        speed = rate(first.surface)
-        if speed is ZERO:
-            continue
-        flips = [Flip(b, const(-o * side), const(o * side)) for b, o in members]
-        sums = summed_over(body, first)
-        sided, instances = _instances(body, flips, sums, NOWHERE)
-        positive, negative = sided(True), sided(False)
-        if positive is not negative:
-            surface, speed = substitute(first.surface, instances), substitute(speed, instances)
-            over = tuple((_name(instances[s.variable]), s.lo, s.hi) for s in sums)
-            found.append(JumpTerm(surface, difference(positive, negative), speed, over))
+        surface = members[0].surface
+        jump = _jump_at(body, surface, [(b, _side(b.surface, surface, ())) for b in members], rate)
+        found += [] if jump is None else [jump]
     return found
+
+
+def _jump_at(body: Term, surface: Term, members: Sequence[tuple[Branch, Term]], rate: Rate) -> JumpTerm | None:
+    """What a surface contributes: branches, with the signs of their surfaces where this one turns positive."""
+    speed = rate(surface)
+    if speed is ZERO:
+        return None
+    sums = summed_over(body, members[0][0])
+    sided, instances = _instances(body, [Flip(b, neg(side), side) for b, side in members], sums, NOWHERE)
+    positive, negative = sided(True), sided(False)
+    if positive is negative:
+        return None
+    over = tuple((_name(instances[s.variable]), s.lo, s.hi) for s in sums)
+    jump = difference(positive, negative)
+    return JumpTerm(substitute(surface, instances), jump, substitute(speed, instances), over)

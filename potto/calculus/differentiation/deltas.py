@@ -1,163 +1,146 @@
 """Dirac deltas, integrated out.
 
 Owns `without_deltas`: the integral of f delta(psi) over v is the sum of f/|dpsi/dv| over the roots of psi in v that
-lie between the bounds. Where the roots have no closed form, that of a monotone psi is the length on which psi has not
-changed its sign yet, an integral like others; and if psi is not known to be monotone, the delta is the tangent of
-[psi + s >= 0] by s. A delta met twice on one surface has no meaning: that is an error, not a number.
+lie between the bounds. Where the roots have no closed form the integral is one over a level set, and stays
+(`level_sets`). A delta met twice on one surface has no meaning: that is an error, not a number.
 """
 
 from __future__ import annotations
 
 from potto.calculus.algebra.radicals import quotient
 from potto.calculus.algebra.ranges import range_of
-from potto.calculus.differentiation.boundary_terms import above, between, finite, remaining, scaled, total, vanishes
-from potto.calculus.differentiation.derivative import NotSmooth, partial, zero_like
+from potto.calculus.differentiation import level_sets
+from potto.calculus.differentiation.boundary_terms import between, remaining, scaled, total, vanishes
+from potto.calculus.differentiation.derivative import partial, zero_like
 from potto.calculus.solving.pivots import NoClosedForm, Root, chosen, pivots
-from potto.calculus.surfaces.branch_assignment import box_of, branches_of, flipping, forced, unguarded
+from potto.calculus.surfaces.branch_assignment import branches_of, flipping, forced, unguarded
 from potto.core.printer import format_term
 from potto.core.simplify import is_zero, normalized_surface
 from potto.core.terms import (
     ONE,
-    ZERO,
     Branch,
     Delta,
     Integral,
+    Sum,
     Term,
-    add,
-    app,
-    branch,
+    Tuple,
     children,
-    deriv,
-    fresh,
+    delta,
     integral,
-    lam,
     neg,
     postorder,
     prim,
-    proj,
     rebuild,
-    sub,
     substitute,
     sum_,
     tuple_,
-    var,
 )
 from potto.diagnostics import PottoError, declare
 from potto.source import Span
 
 PRODUCT_OF_DELTAS = declare("P0505", "a product of deltas on the same surface")
 
-STEP = "step@"  # what the names of steps begin with, as no other does
 _MOST = 64  # deltas integrated out of one integral
 
 
-def without_deltas(node: Integral) -> Term:
-    """The integral with every delta over its variables integrated out. Raises PottoError (P0505)."""
+def without_deltas(node: Integral, folding: bool = False) -> Term:
+    """The integral with every delta over its variables integrated out that can be, those of level sets left. Raises
+    PottoError (P0505). folding: also where roots merge as the other variables vary."""
     if not any(isinstance(n, Delta) for n in postorder(node.body)):
         return node
-    body = _inner_first(node.body)
-    node = integral(node.variables, node.bounds, body, node.hints)
+    body = _inner_first(node.body, folding)
+    if body is not node.body:
+        node = integral(node.variables, node.bounds, body, node.hints)
     parts: list[Term] = []
     waiting: list[Term] = [node]
     for _ in range(_MOST):
         if not waiting:
             break
         term = waiting.pop()
-        found = _first(term) if isinstance(term, Integral) else None
+        found = _next(term, folding) if isinstance(term, Integral) else None
         if found is None:
             parts.append(term)
         else:
-            assert isinstance(term, Integral)
-            waiting.extend(_eliminated(term, found))
+            waiting.extend(found)
     return total(parts + waiting, zero_like(node.body))
 
 
-def _inner_first(body: Term) -> Term:
+def _inner_first(body: Term, folding: bool) -> Term:
     memo: dict[Term, Term] = {}
     for node in postorder(body):
         new = rebuild(node, tuple(memo[c] for c in children(node)))
-        memo[node] = without_deltas(new) if isinstance(new, Integral) else new
+        memo[node] = without_deltas(new, folding) if isinstance(new, Integral) else new
     return memo[body]
 
 
-def _first(node: Integral) -> Delta | None:
-    for part in postorder(node.body):
-        if isinstance(part, Delta) and part.coordinates[0].free & frozenset(node.variables):
-            return part
-    return None
+def _next(node: Integral, folding: bool) -> list[Term] | None:
+    """What an integral comes to with one delta integrated out, or in a summand of its own; None if nothing is left."""
+    if level_sets.placed_along(node) is not None:
+        return None
+    reason: NoClosedForm | None = None
+    deltas = level_sets.deltas_over(node)
+    for item in postorder(node.body):
+        if isinstance(item, Sum) and any(item.variable in what.coordinates[0].free for what in deltas):
+            return _summed(node, item, folding)
+    for what in deltas:
+        parts = level_sets.coefficient(node.body, what)
+        if parts is None:
+            raise _product(what)
+        factor, rest = parts
+        alone = [] if vanishes(rest) else [integral(node.variables, node.bounds, rest, node.hints)]
+        try:
+            return [*alone, *_eliminated(node, what, factor, folding)]
+        except NoClosedForm as problem:
+            reason = problem
+            _check_apart(factor, what)
+        if alone:
+            body = scaled(factor, delta(what.coordinates[:1]))
+            return [*alone, integral(node.variables, node.bounds, body, node.hints)]
+    if reason is None or level_sets.level_set(node) is not None:
+        return None
+    raise NoClosedForm(f"two surfaces meet, neither of which can be solved for a variable: {reason}")
 
 
-def _eliminated(node: Integral, what: Delta) -> list[Term]:
-    """f delta(psi) + rest: the rest as it was, and f at the roots of psi."""
-    hidden = fresh("delta", {n for t in postorder(node.body) for n in t.free})
-    opened = _replaced(node.body, what, var(hidden))
-    try:
-        factor = partial(opened, hidden)
-    except NotSmooth as problem:
-        raise NoClosedForm("a delta is given to a function that is not known") from problem
-    if hidden in factor.free:
-        raise _product(what)
-    rest = substitute(opened, {hidden: ZERO})
-    terms: list[Term] = []
-    if not vanishes(rest):
-        terms.append(integral(node.variables, node.bounds, rest, node.hints))
-    try:
-        found = [
-            (pivot.condition, [_at_root(node, what, factor, root) for root in pivot.roots])
-            for pivot in pivots(node, what.coordinates[0])
-        ]
-    except NoClosedForm:
-        return [*terms, _by_numbers(node, what, factor)]
+def _summed(node: Integral, item: Sum, folding: bool) -> list[Term]:
+    """A sum of deltas as a sum of integrals. Raises NoClosedForm, PottoError (P0505)."""
+    parts = level_sets.coefficient(node.body, item)
+    if parts is None:
+        raise _product(next(n for n in postorder(item.body) if isinstance(n, Delta)))
+    if (item.lo.free | item.hi.free) & frozenset(node.variables):
+        raise NoClosedForm("how many deltas there are varies with a variable of integration")
+    factor, rest = parts
+    each = integral(node.variables, node.bounds, _times(factor, item.body), node.hints)
+    whole = sum_(item.variable, item.lo, item.hi, without_deltas(each, folding))
+    return [whole] if vanishes(rest) else [whole, integral(node.variables, node.bounds, rest, node.hints)]
+
+
+def _times(factor: Term, value: Term) -> Term:
+    """The product of a number and a number, or a tuple."""
+    if isinstance(factor, Tuple) and isinstance(value, Tuple):
+        return tuple_(_times(a, b) for a, b in zip(factor.items, value.items, strict=True))
+    return scaled(factor, value) if isinstance(factor, Tuple) else scaled(value, factor)
+
+
+def _eliminated(node: Integral, what: Delta, factor: Term, folding: bool) -> list[Term]:
+    """f delta(psi): f at the roots of psi. Raises NoClosedForm."""
+    found = [
+        (pivot.condition, [_at_root(node, what, factor, root) for root in pivot.roots])
+        for pivot in pivots(node, what.coordinates[0], folding)
+    ]
     if len(found) == 1:
-        return [*terms, *found[0][1]]  # each of them may hold the next delta, so they stay apart
+        return found[0][1]  # each of them may hold the next delta, so they stay apart
     zero = zero_like(node.body)
-    return [*terms, chosen([(condition, total(gains, zero)) for condition, gains in found])]
+    return [chosen([(condition, total(gains, zero)) for condition, gains in found])]
 
 
-def _by_numbers(node: Integral, what: Delta, factor: Term) -> Term:
-    """f delta(psi) without a formula for the roots of psi."""
-    surface = what.coordinates[0]
-    key = normalized_surface(surface)[0]
+def _check_apart(factor: Term, what: Delta) -> None:
+    """No other delta, and no jump, on the same surface, which is not known along any variable."""
+    key = normalized_surface(what.coordinates[0])[0]
     for part in postorder(factor):
         if isinstance(part, Delta) and normalized_surface(part.coordinates[0])[0] is key:
             raise _product(what)
         if isinstance(part, Branch) and normalized_surface(part.surface)[0] is key:
             raise _jump(what)
-    for name in reversed(node.variables):
-        if name in surface.free:
-            slope = range_of(partial(surface, name), box_of(node))
-            if slope.positive or slope.negative:
-                return _at_searched_root(node, what, factor, name, surface if slope.positive else neg(surface))
-    step = fresh(STEP, {n for t in postorder(node) for n in t.free})
-    jump = branch((add(surface, var(step)),), False, ONE, ZERO)
-    moved = integral(node.variables, node.bounds, scaled(factor, jump), node.hints)
-    return proj(app(deriv(lam((step,), moved)), (tuple_((ZERO, ONE)),)), 1)
-
-
-def _at_searched_root(node: Integral, what: Delta, factor: Term, name: str, rising: Term) -> Term:
-    """Where the rising surface has different signs at the ends the root lies between them."""
-    lo, hi = node.bounds[node.variables.index(name)]
-    ordered = range_of(sub(hi, lo)).lo >= 0
-    low, high = (lo, hi) if ordered else (prim("min", lo, hi), prim("max", lo, hi))
-    place = _turn(name, low, high, rising)
-    weight = quotient(ONE, _magnitude(partial(what.coordinates[0], name)))
-    value = substitute(scaled(factor, weight), {name: place})
-    first, last = (substitute(rising, {name: end}) for end in (low, high))
-    value = above(last, above(neg(first), value))
-    if not ordered:
-        value = branch((sub(hi, lo),), False, value, scaled(value, neg(ONE)))
-    return remaining(node, name, place, value)
-
-
-def _turn(name: str, low: Term, high: Term, rising: Term) -> Term:
-    """Where a rising surface turns positive, by the lengths on which it is, or is not yet, from a finite place on."""
-    start = low if finite(low) else high if finite(high) else ZERO
-    place = start
-    if start is not high:
-        place = add(place, integral((name,), ((start, high),), branch((rising,), False, ZERO, ONE), ((),)))
-    if start is not low:
-        place = sub(place, integral((name,), ((low, start),), branch((rising,), False, ONE, ZERO), ((),)))
-    return place
 
 
 def _check_single(factor: Term, what: Delta, root: Root) -> None:
@@ -204,14 +187,6 @@ def _magnitude(slope: Term) -> Term:
     if bounds.lo >= 0:
         return slope
     return neg(slope) if bounds.hi <= 0 else prim("abs", slope)
-
-
-def _replaced(term: Term, old: Term, new: Term) -> Term:
-    memo: dict[Term, Term] = {old: new}
-    for node in postorder(term):
-        if node not in memo:
-            memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
-    return memo[term]
 
 
 def _at_root(node: Integral, what: Delta, factor: Term, root: Root) -> Term:

@@ -12,7 +12,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from potto.calculus.differentiation.boundary_terms import total, vanishes
-from potto.calculus.differentiation.deltas import STEP
 from potto.calculus.differentiation.derivative import zero_like
 from potto.calculus.differentiation.tangents import NotShifted, Shapes, Site, Sites
 from potto.calculus.inlining.expand import Resolve, expanded, named
@@ -47,6 +46,7 @@ from potto.core.terms import (
     var,
 )
 
+STEP = "step@"  # what the names of steps begin with, as no other does
 LINEAR, BEYOND = 1, 2  # how a term depends on tangents; 0: not at all
 
 

@@ -13,10 +13,12 @@ from collections.abc import Callable, Mapping
 from potto.calculus.differentiation.boundary_terms import at_bounds, at_surfaces, jumps, scaled, total, vanishes
 from potto.calculus.differentiation.deltas import without_deltas
 from potto.calculus.differentiation.derivative import NotSmooth, partial, zero_like
+from potto.calculus.differentiation.level_sets import level_set, transported
 from potto.calculus.inlining.expand import Resolve, expanded, known_function
 from potto.calculus.surfaces.case_split import resolved
 from potto.calculus.surfaces.trace import spine
 from potto.core.terms import (
+    ONE,
     ZERO,
     App,
     Branch,
@@ -72,7 +74,7 @@ def dual(term: Term, tangents: Mapping[str, Term], resolve: Resolve = nothing_kn
     resolve: the terms of other definitions; those that are not known stay calls of `Deriv(definition)`.
     Raises PottoError (P0502, P0505) where the derivative has no meaning or no closed form.
     """
-    return Differentiator(resolve).dual(term, tangents)
+    return Differentiator(resolve, folding=True).dual(term, tangents)
 
 
 def dual_function(function: Lam, resolve: Resolve = nothing_known, frozen: bool = False) -> Lam:
@@ -88,15 +90,20 @@ def split_pairs(value: Term, tangent: Term) -> Term:
 
 
 class Differentiator:
-    """One derivation. singular: a jump becomes a delta, for an integral is around it; frozen: it stands still."""
+    """One derivation. singular: a jump becomes a delta, for an integral is around it; frozen: it stands still.
+
+    folding: closed forms are wanted, also of roots that merge.
+    """
+
 
     def __init__(
         self, resolve: Resolve, singular: bool = False, pairs: Callable[[Term, Term], Term] | None = None,
-        frozen: bool = False,
+        frozen: bool = False, folding: bool = False,
     ) -> None:  # fmt: skip
         self.resolve = resolve
         self.singular = singular
         self.frozen = frozen
+        self.folding = folding
         self.pair = pairs or split_pairs
 
     def dual(self, term: Term, tangents: Mapping[str, Term]) -> Dual:
@@ -147,7 +154,7 @@ class Differentiator:
 
     def carried_out(self, term: Term) -> Term:
         """Calls of known functions carried out, derivatives of known functions too, with deltas for jumps."""
-        inside = Differentiator(self.resolve, not self.frozen, frozen=self.frozen)
+        inside = Differentiator(self.resolve, not self.frozen, frozen=self.frozen, folding=self.folding)
         return expanded(term, self.resolve, inside.function)
 
 
@@ -364,7 +371,7 @@ class _Pass:
         whole = resolved(self.owner.carried_out(node))
         if not isinstance(whole, Integral):
             return _Pass(self.owner, self.tangents).run(whole)
-        plain = _without(without_deltas(whole), Delta)
+        plain = _without(without_deltas(whole, self.owner.folding))
         if not isinstance(plain, Integral):
             return _Pass(self.owner, self.tangents).run(plain)
         moving = {n: t for n, t in self.tangents.items() if n not in plain.variables}
@@ -375,17 +382,28 @@ class _Pass:
             """The tangent of a term as the parameters move; the variables of integration stand still."""
             return _Pass(self.owner, moving).run(term)[1]
 
+        def slope(term: Term, name: str) -> Term:
+            return _Pass(self.owner, {name: ONE}).run(term)[1]
+
+        over = level_set(plain)
+        if over is not None:
+            found = over.standing(plain, rate) if self.owner.frozen else transported(plain, over, rate, slope)
+            return plain, total(found, zero_like(plain.body))
         parts = [_over(plain, rate(plain.body))]
         if not self.owner.frozen:
-            parts += [*at_bounds(plain, rate), *at_surfaces(plain, frozenset(moving), rate)]
+            parts += [*at_bounds(plain, rate), *at_surfaces(plain, frozenset(moving), rate, self.owner.folding)]
         return plain, total([p for p in parts if p is not ZERO], zero_like(plain.body))
 
 
-def _without(term: Term, kind: type[Delta]) -> Term:
-    """Deltas that are left vary with no variable of integration: they stand for a jump that nothing sweeps."""
+def _without(term: Term) -> Term:
+    """Deltas that are left outside of level sets vary with no variable of integration: they stand for a jump that
+    nothing sweeps."""
     memo: dict[Term, Term] = {}
     for node in postorder(term):
-        memo[node] = ZERO if isinstance(node, kind) else rebuild(node, tuple(memo[c] for c in children(node)))
+        if isinstance(node, Integral) and level_set(node) is not None:
+            memo[node] = node
+        else:
+            memo[node] = ZERO if isinstance(node, Delta) else rebuild(node, tuple(memo[c] for c in children(node)))
     return memo[term]
 
 

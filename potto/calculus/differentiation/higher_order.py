@@ -53,7 +53,7 @@ def first_derivative(term: Term, resolve: Resolve) -> Term:
     tangents = {p: var(f"d{p}") for p in params}
     names = tuple(dict.fromkeys((*params, *(f"d{p}" for p in params))))
     try:
-        return lam(names, Differentiator(resolve).dual(body, tangents)[1])
+        return lam(names, Differentiator(resolve, folding=True).dual(body, tangents)[1])
     except (NoClosedForm, NotSmooth) as problem:
         raise NoText(f"the first derivative has no closed form: {problem}") from None
     except PottoError as problem:

@@ -17,6 +17,7 @@ from potto.calculus.differentiation.deltas import without_deltas
 from potto.calculus.differentiation.derivative import NotSmooth
 from potto.calculus.differentiation.dual import Differentiator, heads_of
 from potto.calculus.differentiation.higher_order import moving_deltas
+from potto.calculus.differentiation.level_sets import level_set
 from potto.calculus.explanation.layout import DerivativeText, IntegralText, SurfaceText
 from potto.calculus.inlining.expand import Resolve
 from potto.calculus.solving.pivots import NoClosedForm, pivots
@@ -116,7 +117,7 @@ def describe(term: Term, name: str, type_text: str, resolve: Resolve) -> Derivat
     body, conditions = unguarded(body)
     functions = {p: f"d{p}" for p in params if p in heads_of(term)}
     tangents: dict[str, Term] = {p: var(f"d{p}") for p in params}
-    work = Differentiator(resolve)
+    work = Differentiator(resolve, folding=True)
     problems: list[str] = []
     tangent = ""
     try:
@@ -186,10 +187,13 @@ def _integral(
         deltas += [_text(t, functions) for t in moving_deltas(node, rate)]
         whole = opened(node)
         assert isinstance(whole, Integral)
-        plain = without_deltas(whole)
+        plain = without_deltas(whole, True)
         if isinstance(plain, Integral):
+            reason = _why_searched(plain)
+        if isinstance(plain, Integral) and level_set(plain) is None:
             bounds = [_text(t, functions) for t in at_bounds(plain, rate)]
-            boundary = [_text(t, functions) for t in at_surfaces(plain, frozenset(inside), rate)]
+            swept = at_surfaces(plain, frozenset(inside), rate, True)
+            boundary = [_text(t, functions) for t in swept if not (isinstance(t, Integral) and level_set(t))]
     except (NoClosedForm, NotSmooth) as problem:
         reason = str(problem)
     except PottoError as problem:
@@ -206,6 +210,19 @@ def _integral(
         _surfaces(node, inside),
         reason,
     )
+
+
+def _why_searched(node: Integral) -> str:
+    """Why the boundary of an integral is found by numbers; nothing where it is not."""
+    known = level_set(node)
+    found = branches_of(node.body, node.variables)
+    for surface in (known.surface,) if known else (f for item in found for f in factors(item.surface)):
+        try:
+            if surface.free & frozenset(node.variables):
+                pivots(node, surface)
+        except NoClosedForm as problem:
+            return str(problem)
+    return ""
 
 
 def _surfaces(node: Integral, tangents: Mapping[str, Term]) -> tuple[SurfaceText, ...]:

@@ -6,10 +6,12 @@ variable of the largest slope, chosen at run time where slopes are known only th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from potto.calculus.algebra.affine import affine
+from potto.calculus.algebra.ranges import range_of
 from potto.calculus.solving.solve import Family, Sections, sections
 from potto.core.terms import Const, Integral, Term, const, if_, prim, substitute
 
@@ -36,11 +38,12 @@ class Pivot:
     condition: Term | None = None
 
 
-def pivots(node: Integral, surface: Term) -> list[Pivot]:
+def pivots(node: Integral, surface: Term, folding: bool = True) -> list[Pivot]:
     """Where a surface cuts the integral, solved for the innermost variable that it can be solved for.
 
     An affine surface whose slopes are known only at run time is solved for the variable of the largest slope then:
     the others may be 0. The pivots are tried in order, the last one has no condition.
+    folding: also for one along which the surface turns back as the others vary, where what is added up is infinite.
     """
     slopes: dict[str, Term] = {}
     for name in reversed(node.variables):
@@ -49,7 +52,7 @@ def pivots(node: Integral, surface: Term) -> list[Pivot]:
             slopes[name] = found.coefficients[0]
     order = [n for n in reversed(node.variables) if n in surface.free]
     if len(slopes) < 2 or order[0] not in slopes:
-        return [Pivot(_solved(node, surface, order))]
+        return [Pivot(_solved(node, surface, order, folding))]
     if all(isinstance(c, Const) for c in slopes.values()):
         sizes = {n: abs(c.value) for n, c in slopes.items() if isinstance(c, Const)}
         largest = max(sizes.values())
@@ -65,15 +68,19 @@ def pivots(node: Integral, surface: Term) -> list[Pivot]:
 _STEEP = 8.0  # a slope this much smaller than the largest one is still fine to divide by
 
 
-def _solved(node: Integral, surface: Term, order: Sequence[str]) -> list[Root]:
+def _solved(node: Integral, surface: Term, order: Sequence[str], folding: bool = True) -> list[Root]:
     reasons: list[str] = []
     for name in order:
         found = sections(surface, name)
-        if isinstance(found, Sections) and found.complete:
+        turning = () if folding or not isinstance(found, Sections) else found.turning
+        if any(turn.free & frozenset(node.variables) for turn in turning):
+            reasons.append(f"it turns back along `{name}`")
+        elif isinstance(found, Sections) and found.complete:
             roots = [Root(name, r) for r in (*found.roots, *found.poles)]
             position = node.variables.index(name)
             return roots + [_family(node, position, f) for f in (*found.families, *found.pole_families)]
-        reasons.append(found.reason)
+        else:
+            reasons.append(found.reason)
     raise NoClosedForm(reasons[0] if reasons else "the surface varies with no variable of integration")
 
 
@@ -90,6 +97,8 @@ def _family(node: Integral, position: int, family: Family) -> Root:
     ends = [substitute(family.inner, {name: end}) for end in (lo, hi)]
     if family.stops:
         ends += [substitute(family.inner, {name: _within(stop, lo, hi)}) for stop in family.stops]
+    if any(abs(range_of(end).lo) == math.inf and range_of(end).lo == range_of(end).hi for end in ends):
+        raise NoClosedForm(f"there are infinitely many roots in `{name}`")
     ends = _corners(node, position, ends)
     lowest, highest = _extreme("min", ends), _extreme("max", ends)
     counts = (_whole("ceil", lowest, 1.0), _whole("floor", highest, 0.0))

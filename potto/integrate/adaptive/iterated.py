@@ -12,6 +12,7 @@ import numpy as np
 
 from potto.core.terms import Term
 from potto.integrate.adaptive.refining import integrated
+from potto.integrate.adaptive.root_sums import Rows, over_roots
 from potto.integrate.decomposition.critical_places import critical_rows
 from potto.integrate.decomposition.cuts import Cuts, Row, at_rest, frame_rows, segments, standing
 from potto.integrate.decomposition.effective_range import concentrated
@@ -80,6 +81,8 @@ class Iteration:
         `slack` says how many times the error may be larger of nodes that have less weight than others.
         """
         level = self.plan.levels[number]
+        if self.plan.over is not None and number + 1 == len(self.plan.levels):
+            return over_roots(self.plan, self.rows(level, env, batch, machine), env, batch, sides, machine)
         cuts, collapsed = self.cut(level, env, batch, machine)
         seg = cuts.segments
         if self.extent is not None:
@@ -145,11 +148,7 @@ class Iteration:
         self, level: LevelPlan, env: dict[str, Value], batch: int, machine: Evaluator
     ) -> tuple[Cuts, list[Collapsed]]:
         """Where the members are cut, and which of them have a range of length zero."""
-        values = machine.tracking().evaluate(level.frame, env, None)
-        assert isinstance(values, tuple)
-        lo, hi, rows = frame_rows(level, values)
-        found, lost = self.searched(level, env, lo, hi, batch, machine)
-        rows += found
+        lo, hi, rows, lost = self.rows(level, env, batch, machine)
         if self.face is not None:  # its sections are nowhere, or anywhere
             rows = [row for row in rows if row.cut < 0 or level.level.cuts[row.cut].surface is not self.face.surface]
         if machine.costs is not None:
@@ -169,6 +168,14 @@ class Iteration:
         if machine.frozen:
             return standing(cuts), [ranges.at_rest() for ranges in collapsed]
         return cuts, collapsed
+
+    def rows(self, level: LevelPlan, env: dict[str, Value], batch: int, machine: Evaluator) -> Rows:
+        """The bounds of a variable, all candidate cuts, and the most that those matter which were not looked for."""
+        values = machine.tracking().evaluate(level.frame, env, None)
+        assert isinstance(values, tuple)
+        lo, hi, rows = frame_rows(level, values)
+        found, lost = self.searched(level, env, lo, hi, batch, machine)
+        return lo, hi, rows + found, lost
 
     def resting(self, level: LevelPlan, lo: Cell, hi: Cell, seg: Segments) -> bool:
         """Whether nothing needs to move with the cuts of a variable: what is integrated is continuous there.

@@ -3,8 +3,8 @@
 Owns `critical_rows`. Boxes over which the enclosure of an equation leaves out 0 hold no solution. On the others one
 step of Krawczyk's operator either leaves nothing, or shows that there is just one solution and closes in on it, or
 leaves a smaller box, which is halved (Krawczyk 1969; Neumaier, Interval Methods for Systems of Equations, 1990). Where
-that never settles, since surfaces touch, both ends of what is left are cuts. Such cuts need not move: what is
-integrated is continuous there.
+that never settles, since surfaces touch, both ends of what is left are cuts. Such cuts need not move where what is
+integrated is continuous there; where it is not, they do as the implicit function theorem says.
 """
 
 from __future__ import annotations
@@ -16,14 +16,15 @@ from typing import Any
 import numpy as np
 
 from potto.calculus.decomposition.critical import Critical, slopes_of
-from potto.core.terms import Term
-from potto.integrate.decomposition.cuts import SEARCHED, Row, as_array
+from potto.core.terms import Term, function_of, tuple_
+from potto.integrate.decomposition.cuts import SEARCHED, Row, as_array, tangents
 from potto.integrate.decomposition.root_isolation import between, flat
 from potto.integrate.events import Unsearched
 from potto.integrate.levels import LevelPlan
+from potto.integrate.pieces import gather
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.intervals import Interval, enclosure
-from potto.kernels.cells import Array, Cell, Ints, Value
+from potto.kernels.cells import Array, Cell, Ints, Value, pad
 
 ROUNDS = 120  # halvings of one side or all of them
 BOXES, BOXES_EACH = 1 << 14, 1 << 8  # at most so many open at once, or so many for each member
@@ -34,8 +35,6 @@ SAME = 2.0**-44  # of the range: solutions no farther apart are one
 SHRUNK = 0.7  # of a side: what a step leaves no larger is not halved
 POLISH = 6
 BEYOND = 0.125  # how far beyond its range a turning place is looked for, which the map of nodes takes care of
-
-Places = list[tuple[Array, Array]]
 
 
 def critical_rows(level: LevelPlan, env: dict[str, Value], lo: Cell, hi: Cell, batch: int, machine: Any) -> list[Row]:
@@ -49,12 +48,42 @@ def critical_rows(level: LevelPlan, env: dict[str, Value], lo: Cell, hi: Cell, b
         if found is None:
             machine.note(Unsearched(level.variable))
             continue
-        rows += [Row(x, (), -1, system.turning, off) for x, off in found]
+        owner, places, width = found
+        t, et = np.zeros((2, machine.directions if system.steps else 0, owner.size))
+        if t.size:
+            t, et = _speeds(system, level.variable, env, owner, places, width, machine)
+        same = SAME * np.where(np.isfinite(high - low), high - low, 1.0)
+        rows += _as_rows(system, owner, places[0], width, same, batch, (t, et))
     return rows
 
 
-def _places(system: Critical, variable: str, env: dict[str, Value], low: Array, high: Array) -> Places | None:
-    """The solutions, in rows, and how far off each may be; None if not all are known."""
+def _speeds(
+    system: Critical, variable: str, env: dict[str, Value], owner: Ints, places: Array, width: Array, machine: Any
+) -> tuple[Array, Array]:
+    """How solutions move along the variable that is cut, (k, P), and by how much that may be off."""
+    names = (variable, *(w.variable for w in system.within))
+    k, n = machine.directions, len(names)
+    here = {name: pad(value, k + n) for name, value in gather(env, owner).items()}
+    for i, name in enumerate(names):
+        unit = tuple(1.0 if i == j else None for j in range(n))
+        here[name] = Cell(places[i], None, (None,) * k + unit)
+    function = function_of(tuple_(system.equations))
+    found = machine.with_directions(k + n).evaluate(function, {name: here[name] for name in function.params}, None)
+    slopes = np.stack([tangents(cell.t, owner.size, k + n) for cell in found])  # (n, k + n, P)
+    slopes = np.moveaxis(slopes, -1, 0)
+    rates, matrices = slopes[:, :, :k], slopes[:, :, k:]
+    inverse = _inverse(matrices)
+    moves = -inverse @ rates
+    sizes = np.abs(inverse) @ (np.abs(rates) + np.abs(matrices) @ np.abs(moves))
+    doubt = 8 * EPS + width / np.maximum(1.0, np.abs(places[0]))
+    return moves[:, 0].T, sizes[:, 0].T * doubt
+
+
+def _places(
+    system: Critical, variable: str, env: dict[str, Value], low: Array, high: Array
+) -> tuple[Ints, Array, Array] | None:
+    """Whose the solutions are, where (n, P), and how far off along the variable that is cut; None if not all are known.
+    """
     slopes = slopes_of(system, variable)
     if slopes is None:
         return None
@@ -63,7 +92,7 @@ def _places(system: Critical, variable: str, env: dict[str, Value], low: Array, 
     terms, env = flat((*system.equations, *slopes, *ends), env)
     n = len(names)
     if not all(equation.free.intersection(names) for equation in terms[:n]):
-        return []  # what the parameters alone decide is 0 everywhere, or nowhere
+        return _none(n)  # what the parameters alone decide is 0 everywhere, or nowhere
     fixed: dict[str, Array] = {}
     for name in frozenset().union(*(t.free for t in terms)).difference(names):
         value = env[name]
@@ -71,11 +100,11 @@ def _places(system: Critical, variable: str, env: dict[str, Value], low: Array, 
             return None
         fixed[name] = as_array(value.v, low.size)
     search = _Search(names, fixed, terms[:n], terms[n : n + n * n], terms[n + n * n :])
-    found = search.solved(low, high)
-    if found is None:
-        return None
-    owner, place, width = found
-    return _as_rows(owner, place, width, SAME * np.where(np.isfinite(high - low), high - low, 1.0), low.size)
+    return search.solved(low, high)
+
+
+def _none(n: int) -> tuple[Ints, Array, Array]:
+    return np.zeros(0, dtype=np.int64), np.zeros((n, 0)), np.zeros(0)
 
 
 @dataclass
@@ -90,7 +119,7 @@ class _Search:
     found: list[tuple[Ints, Array, Array]] = field(default_factory=list)
 
     def solved(self, low: Array, high: Array) -> tuple[Ints, Array, Array] | None:
-        """Whose the solutions are, where they are along the variable that is cut, and how far off they may be.
+        """Whose the solutions are, where they are, and how far off along the variable that is cut.
 
         None where there are too many boxes.
         """
@@ -108,12 +137,12 @@ class _Search:
             owner, box = self.halved(owner[~narrow], box[:, :, ~narrow])
         self.leave(owner, box)
         if not self.found:
-            return np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0)
-        return tuple(np.concatenate(parts) for parts in zip(*self.found, strict=True))  # type: ignore[return-value]
+            return _none(len(self.names))
+        return tuple(np.concatenate(parts, axis=-1) for parts in zip(*self.found, strict=True))  # type: ignore[return-value]
 
     def leave(self, owner: Ints, box: Array) -> None:
         """Both ends of boxes that may hold solutions, as such."""
-        for end in box[0]:
+        for end in (box[:, 0], box[:, 1]):
             self.found.append((owner, end, np.zeros(owner.size)))
 
     def whole(self, low: Array, high: Array) -> tuple[Ints, Array]:
@@ -187,7 +216,7 @@ class _Search:
                 box = better
                 if done:
                     break
-        self.found.append((owner, 0.5 * (box[0, 0] + box[0, 1]), 0.5 * (box[0, 1] - box[0, 0])))
+        self.found.append((owner, 0.5 * (box[:, 0] + box[:, 1]), 0.5 * (box[0, 1] - box[0, 0])))
 
     @staticmethod
     def halved(owner: Ints, box: Array) -> tuple[Ints, Array]:
@@ -219,7 +248,9 @@ def _inverse(matrices: Array) -> Array:
     return found
 
 
-def _as_rows(owner: Ints, places: Array, width: Array, same: Array, batch: int) -> Places:
+def _as_rows(
+    system: Critical, owner: Ints, places: Array, width: Array, same: Array, batch: int, speeds: tuple[Array, Array]
+) -> list[Row]:
     """Places in order, one of those at one place for each member, as rows padded with nan."""
     order = np.lexsort((places, owner))
     owner, places, width = owner[order], places[order], width[order]
@@ -228,7 +259,17 @@ def _as_rows(owner: Ints, places: Array, width: Array, same: Array, batch: int) 
     new[1:] = (owner[1:] != owner[:-1]) | apart
     owner, places, width = owner[new], places[new], width[new]
     count = np.bincount(owner, minlength=batch)
-    rows, off = np.full((2, int(count.max(initial=0)), batch), np.nan)
+    slots = int(count.max(initial=0))
     at = np.arange(owner.size) - (np.cumsum(count) - count)[owner], owner
-    rows[at], off[at] = places, width + SEARCHED * EPS * np.abs(places)
-    return list(zip(rows, off, strict=True))
+
+    def padded(values: Array, gap: float) -> Array:
+        rows = np.full((slots, batch), gap)
+        rows[at] = values
+        return rows
+
+    x, off = padded(places, np.nan), padded(width + SEARCHED * EPS * np.abs(places), np.nan)
+    t, et = ([padded(speed[order][new], 0.0) for speed in of] for of in speeds)
+    return [
+        Row(x[i], tuple(speed[i] for speed in t), -1, system.turning, off[i], tuple(doubt[i] for doubt in et))
+        for i in range(slots)
+    ]

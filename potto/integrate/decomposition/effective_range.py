@@ -32,7 +32,7 @@ def concentrated(
     low, high = as_array(np.minimum(lo.v, hi.v), batch), as_array(np.maximum(lo.v, hi.v), batch)
     if np.isfinite(low).all() and np.isfinite(high).all():
         return None
-    box: dict[str, Interval] = {node.name: ANYTHING for node in postorder(plan.term.body) if isinstance(node, Var)}
+    box: dict[str, Interval] = {node.name: ANYTHING for node in postorder(plan.mass) if isinstance(node, Var)}
     for name, value in env.items():
         if isinstance(value, Cell):
             column = as_array(value.v, batch)[:, None]
@@ -65,7 +65,7 @@ class _Range:
     """The range of one variable, others in a box."""
 
     def __init__(self, plan: Plan, number: int, box: dict[str, Interval], low: Array, high: Array) -> None:
-        self.body, self.box = plan.term.body, dict(box)
+        self.body, self.box = plan.mass, dict(box)
         self.level, self.low, self.high = plan.levels[number].level, low, high
 
     def found(self, volume: Array) -> tuple[Cell, Cell, Array] | None:

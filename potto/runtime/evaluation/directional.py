@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from potto.calculus.differentiation.deltas import PRODUCT_OF_DELTAS, STEP
+from potto.calculus.differentiation.deltas import PRODUCT_OF_DELTAS
+from potto.calculus.differentiation.directional import STEP
 from potto.core.printer import format_term
 from potto.core.terms import ZERO, Term, substitute
 from potto.diagnostics import PottoError

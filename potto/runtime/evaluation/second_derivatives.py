@@ -14,6 +14,7 @@ from potto.diagnostics import PottoError
 from potto.kernels import errors
 from potto.runtime.evaluation.functions import Closure, Derivative, Paired
 from potto.runtime.evaluation.machine import Machine
+from potto.runtime.integration.preparation import NOT_COUNTED
 
 
 def dual_function(machine: Machine, function: Closure) -> Closure:
@@ -36,7 +37,7 @@ def _dual(machine: Machine, function: Lam) -> Lam:
         try:
             known = symbolic(function, resolve, machine.frozen)
         except (NoClosedForm, NotSmooth) as reason:
-            raise PottoError([errors.NO_MEANING(
+            raise PottoError([NOT_COUNTED(
                 errors.NOWHERE, f"no second derivative was found: {reason}", help="differentiate only once",
             )]) from None  # fmt: skip
         machine.linker.duals[function, machine.frozen] = known

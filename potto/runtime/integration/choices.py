@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterable, Iterator
 
 from potto.calculus.decomposition.elimination import eliminate
+from potto.calculus.differentiation.level_sets import placed_along
 from potto.core.terms import Integral, integral
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.integration.plans import Linked, plan_for
@@ -27,14 +28,15 @@ TRIAL, TRIAL_FACTOR = 12_000, 25
 
 def too_many(machine: Machine, term: Integral, linked: Linked) -> bool:
     """Whether an integral has too many variables and surfaces for quadrature, or too few digits are asked for."""
-    if len(term.variables) <= MOST_LEVELS:
+    if len(term.variables) <= MOST_LEVELS or placed_along(term) is not None:
         return False
     return machine.settings.rtol >= LOOSE or expected(machine, term, linked) > AFFORDABLE
 
 
 def many(machine: Machine, term: Integral, linked: Linked) -> bool:
     """Whether it pays to look whether the variables can be eliminated."""
-    return len(term.variables) > MOST_LEVELS and not machine.frozen and expected(machine, term, linked) > FEW_NODES
+    fits = len(term.variables) > MOST_LEVELS and not machine.frozen and placed_along(term) is None
+    return fits and expected(machine, term, linked) > FEW_NODES
 
 
 def expected(machine: Machine, term: Integral, linked: Linked) -> int:
@@ -53,7 +55,7 @@ def orders(term: Integral) -> Iterator[Integral]:
     """
     yield term
     names = set(term.variables)
-    if any((lo.free | hi.free) & names for lo, hi in term.bounds):
+    if placed_along(term) is not None or any((lo.free | hi.free) & names for lo, hi in term.bounds):
         return
     count = len(term.variables)
     for last in range(count - 1):

@@ -10,10 +10,12 @@ from __future__ import annotations
 from functools import lru_cache
 
 from potto.calculus.decomposition.joined import joined
+from potto.calculus.differentiation.boundary_terms import total
 from potto.calculus.differentiation.deltas import without_deltas
-from potto.calculus.differentiation.derivative import NotSmooth
+from potto.calculus.differentiation.derivative import NotSmooth, zero_like
 from potto.calculus.differentiation.directional import shifted
 from potto.calculus.differentiation.dual import Differentiator
+from potto.calculus.differentiation.level_sets import level_set, placed_along, spread
 from potto.calculus.differentiation.tangents import FUNCTION, NotShifted, Shape, Shapes
 from potto.calculus.inlining.expand import expanded
 from potto.calculus.solving.pivots import NoClosedForm
@@ -56,15 +58,17 @@ FEW = 4  # branches that one integrand may have before its summands are integrat
 def prepared(term: Integral, reach: Reach) -> Term:
     """An equal term, or the same one where there is nothing to be done. Raises PottoError (a product of deltas)."""
     deltas = [node for node in postorder(term.body) if isinstance(node, Delta)]
-    if deltas:
+    if deltas and placed_along(term) is None:
         apart = lifted(term, closed_value) if any(map(nested, (d.coordinates[0] for d in deltas))) else None
         try:
-            return without_deltas(term if apart is None else apart.term)
+            return _spread(without_deltas(term if apart is None else apart.term))
         except (NoClosedForm, NotSmooth) as problem:
             raise PottoError([NOT_COUNTED(
                 errors.NOWHERE, f"a delta under this integral was not integrated out: {problem}",
                 help="let its argument be smooth, and solvable for one of the variables of integration",
             )]) from None  # fmt: skip
+    if deltas:
+        return term
     body = term.body
     if isinstance(body, Sum) and not (body.lo.free | body.hi.free) & set(term.variables):
         return sum_(body.variable, body.lo, body.hi, _over(term, body.body))
@@ -78,6 +82,15 @@ def prepared(term: Integral, reach: Reach) -> Term:
     if isinstance(body, Prim) and body.op == "add":
         return _apart(term, body, reach)
     return term
+
+
+def _spread(term: Term) -> Term:
+    """An integral over a level set as what numbers integrate."""
+    known = level_set(term) if isinstance(term, Integral) else None
+    if known is None or known.shares:
+        return term
+    assert isinstance(term, Integral)
+    return total(spread(term, known), zero_like(term.body))
 
 
 def placed(term: Integral, reach: Reach, shapes: Shapes, again: bool) -> Term:

@@ -13,6 +13,7 @@ from functools import partial
 
 import numpy as np
 
+from potto.calculus.differentiation.level_sets import placed_along
 from potto.core.terms import Integral
 from potto.integrate.events import (
     ALONG_AXES,
@@ -75,7 +76,7 @@ def by_samples(problem: Problem) -> Sums | None:
     from potto.integrate.montecarlo.sampling import sample
 
     method = problem.machine.settings.method
-    if method not in ("mc", "qmc") and not _too_many(problem):
+    if placed_along(problem.term) is not None or (method not in ("mc", "qmc") and not _too_many(problem)):
         return None
     plan = problem.plan()
     sums = counted(problem, plan, sample(plan, problem.machine, problem.env, problem.batch, method), drawn=True)

@@ -150,6 +150,12 @@ def delta_cubic(t: Any) -> Any:
     return mp.fsum(mp.exp(r) / abs(3 * r * r - 1) for r in roots(lambda x: cubic(x) - t, -1.5, 1.5))
 
 
+def sum_of_deltas(t: Any) -> Any:
+    """exp(r)/(3 r^2 + i) over the root of each."""
+    found = ((i, r) for i in (1, 2, 3) for r in roots(lambda x, i=i: x**3 + i * x - t, 0, 1))
+    return mp.fsum(mp.exp(r) / (3 * r * r + i) for i, r in found)
+
+
 def delta_damped(t: Any) -> Any:
     found = (-mp.lambertw(-t, k).real for k in (-1, 0))
     return mp.fsum(1 / abs((1 - r) * mp.exp(-r)) for r in found)
@@ -202,7 +208,7 @@ VALUES: dict[str, tuple[Value, float]] = {
     "thermostat, 4 steps": (thermostat(4), 1e-6), "thermostat, 8 steps": (thermostat(8), 1e-6),
     "delta of a cubic": (delta_cubic, 1e-6), "delta, damped": (delta_damped, 1e-6), "band, 1-D": (band, 1e-6),
     "density of states, 1-D": (lambda t: differenced(band)(t)[1], 1e-6), "frequency": (frequency, 1e-6),
-    "length zero": (lambda t: mp.exp(t) - 1, 1e-6),
+    "sum of deltas": (sum_of_deltas, 1e-6), "length zero": (lambda t: mp.exp(t) - 1, 1e-6),
 }  # fmt: skip
 
 
@@ -216,5 +222,9 @@ TRUTHS: dict[str, Callable[[Any], Truth]] = {
     "squared difference": squared_difference,
 }
 SECONDS: dict[str, Value] = {
-    name: second(VALUES[name][0], 1e-5) for name in ("cubic", "damped", "waves", "normal waves")
+    name: second(VALUES[name][0], 1e-5)
+    for name in (
+        "cubic", "quintic", "damped", "waves", "normal waves", "moving bound", "delta of a cubic", "delta, damped",
+        "sum of deltas",
+    )
 }

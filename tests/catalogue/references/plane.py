@@ -304,6 +304,7 @@ VALUES: dict[str, tuple[Value, float]] = {
     "saddles": (saddles, 1e-3), "gyroid slice": (gyroid_slice, 1e-3), "ridge": (ridge, 1e-6), "arm": (arm, 1e-3),
     "wavy half plane": (wavy_half_plane, 1e-3), "bracket within, 2-D": (bracket_within, 1e-3), "lens": (lens, 1e-3),
     "union of discs": (lambda d: 2 * mp.pi - lens(d), 1e-3), "superellipse": (superellipse, 1e-3),
+    "fourth powers, by a delta": (lambda t: superellipse(t) / (2 * t), 1e-3),
     "lemniscate": (lambda t: t, 1e-3), "cardioid": (lambda t: 3 * mp.pi * t * t / 2, 1e-3),
     "flower": (lambda t: mp.pi * t * t * (1 + mpf(0.3) ** 2 / 2), 1e-3), "sector": (sector, 1e-3),
     "disc under a wave": (disc_under_wave, 1e-3), "moving triangle": (moving_triangle, 1e-3),
@@ -315,4 +316,9 @@ TRUTHS: dict[str, Callable[[Any], Truth]] = {
     "two bands": two_bands, "product of normals": normal_product,
     "density of states": lambda t: (states(t), mp.diff(states, t)),
 }  # fmt: skip
-SECONDS: dict[str, Value] = {name: second(VALUES[name][0]) for name in ("folium", "lens", "ring")}
+SECONDS: dict[str, Value] = {
+    **{name: second(VALUES[name][0]) for name in (
+        "folium", "lens", "ring", "superellipse", "union of discs", "hyperbola", "fourth powers, by a delta",
+    )},
+    "band": lambda t: mp.diff(states, t), "density of states": lambda t: mp.diff(states, t, 2),
+}  # fmt: skip

@@ -165,6 +165,8 @@ VALUES: dict[str, tuple[Value, float]] = {
     "three cylinders": (lambda r: 8 * (2 - mp.sqrt(2)) * r**3, 1e-3), "cone": (lambda t: mp.pi * t * t / 3, 1e-3),
     "six below": (lambda t: t**6, 1e-3), "smooth, 8-D": (smooth_eight, 1e-3),
     "smooth, 8-D, nested": (smooth_eight, 1e-3), "five normals": (five_normals, 1e-3),
+    "sphere, by a delta": (lambda t: 2 * mp.pi * mp.sqrt(t), 1e-3),
+    "moved sphere, by a delta": (lambda t: 2 * mp.pi * mp.exp(t) * mp.sinh(mpf(0.8)), 1e-3),
     "ridge in space": (ridge, 1e-2), "cylinder and lens": (lambda d: 2 * lens(d), 1e-3),
 }  # fmt: skip
 TRUTHS: dict[str, Callable[[Any], Truth]] = {
@@ -172,4 +174,6 @@ TRUTHS: dict[str, Callable[[Any], Truth]] = {
     "three cosines": three_cosines, "two half spaces, 4-D": exactly(two_half_spaces),
     "three half spaces": exactly(three_half_spaces),
 }  # fmt: skip
-SECONDS: dict[str, Value] = {name: second(VALUES[name][0]) for name in ("half space, 3-D", "cone")}
+SECONDS: dict[str, Value] = {name: second(VALUES[name][0]) for name in (
+    "half space, 3-D", "cone", "ball", "ball cut off", "sphere, by a delta", "moved sphere, by a delta",
+)}  # fmt: skip
