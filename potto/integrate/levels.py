@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from potto.calculus.decomposition.sweep import Cut, Level
+from potto.calculus.decomposition.surface_cuts import Cut
+from potto.calculus.decomposition.sweep import Level
 from potto.core.terms import Lam, function_of, tuple_
 
 

@@ -17,7 +17,8 @@ from potto.calculus.algebra.degree import degree, plane
 from potto.calculus.algebra.polytopes import Number
 from potto.calculus.checking.solvability import monotone
 from potto.calculus.decomposition.critical import MOST_EQUATIONS, slopes_of
-from potto.calculus.decomposition.sweep import Cut, Level, along, sweep
+from potto.calculus.decomposition.surface_cuts import Cut, along
+from potto.calculus.decomposition.sweep import Level, sweep
 from potto.calculus.differentiation.level_sets import LevelSet, placed_along
 from potto.calculus.inlining.expand import expanded
 from potto.calculus.inlining.unrolled import unrolled

@@ -14,8 +14,9 @@ from potto.core.terms import Term
 from potto.integrate.adaptive.refining import integrated
 from potto.integrate.adaptive.root_sums import Rows, over_roots
 from potto.integrate.decomposition.critical_places import critical_rows
-from potto.integrate.decomposition.cuts import Cuts, Row, at_rest, frame_rows, segments, standing
+from potto.integrate.decomposition.cuts import Cuts, at_rest, frame_rows, segments, standing
 from potto.integrate.decomposition.effective_range import concentrated
+from potto.integrate.decomposition.meetings import Row
 from potto.integrate.decomposition.sections import searched_rows
 from potto.integrate.decomposition.vanishing import vanishes
 from potto.integrate.degenerate.coincidences import Scene, count_places, count_slivers, note_folds

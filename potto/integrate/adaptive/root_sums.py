@@ -11,7 +11,7 @@ import numpy as np
 from potto.calculus.differentiation.derivative import partial
 from potto.calculus.differentiation.level_sets import LevelSet
 from potto.core.terms import function_of, tuple_
-from potto.integrate.decomposition.cuts import SEARCHED, Row, as_array, tangents
+from potto.integrate.decomposition.meetings import SEARCHED, Row, as_array, tangents
 from potto.integrate.events import at_a_fold, root_on_a_bound
 from potto.integrate.pieces import Evaluator, Sums, components, gather, take
 from potto.integrate.plan import Plan

@@ -17,7 +17,7 @@ import numpy as np
 
 from potto.calculus.decomposition.critical import Critical, slopes_of
 from potto.core.terms import Term, function_of, tuple_
-from potto.integrate.decomposition.cuts import SEARCHED, Row, as_array, tangents
+from potto.integrate.decomposition.meetings import SEARCHED, Row, as_array, tangents
 from potto.integrate.decomposition.root_isolation import between, flat
 from potto.integrate.events import Unsearched
 from potto.integrate.levels import LevelPlan

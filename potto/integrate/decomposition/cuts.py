@@ -13,13 +13,24 @@ from typing import Any
 
 import numpy as np
 
+from potto.integrate.decomposition.meetings import (
+    SEARCHED,
+    Edge,
+    Fold,
+    Meeting,
+    Row,
+    Sliver,
+    as_array,
+    folds_at,
+    meetings,
+    slivers,
+    tangents,
+)
 from potto.integrate.levels import LevelPlan
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.substitution import Segments, choose
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 
-# How far off, in units of the last place, a root may be that was found by numbers.
-SEARCHED = 4
 # The part of a range up to which cuts that rounding does not tell apart are taken for one: what is further off, however
 # little is known of where it is, is not to be lost.
 ONE_PLACE = 1e-6
@@ -27,87 +38,6 @@ ONE_PLACE = 1e-6
 NARROW = 16 * EPS
 # How far beside cuts that are taken for one a place is clear of all of them, in terms of how far off they may be.
 BLUR = 8
-
-
-@dataclass
-class Row:
-    """One candidate cut for the whole batch: where it is, how it moves, which cut of the level it belongs to.
-
-    e, et: how far off the place, and its speeds, may be by rounding; None where that is not known.
-    hides: how long the stretch around it is on all of which the surface is 0 to rounding, if there is one.
-    """
-
-    x: Array
-    t: tuple[Any, ...]
-    cut: int
-    turning: bool
-    e: Any = None
-    et: tuple[Any, ...] = ()
-    hides: Any = None
-
-
-@dataclass
-class Edge:
-    """A surface that lies on a bound, for some of the batch: `owner` (m,), at the upper bound or not, its speeds."""
-
-    cut: int
-    owner: Ints
-    upper: bool
-    x: Array
-    root_t: Array
-    bound_t: Array
-
-    def pick(self, index: Any) -> Edge:
-        return Edge(self.cut, self.owner[index], self.upper, self.x[index], self.root_t[:, index],
-                    self.bound_t[:, index])  # fmt: skip
-
-
-@dataclass
-class Meeting:
-    """Jumps at one place that move apart, for some of the batch: `owner` (B,), place (B,), speeds (n, k, B).
-
-    merged_t: the speed with which all of them were integrated, (k, B).
-    """
-
-    cuts: tuple[int, ...]
-    owner: Ints
-    x: Array
-    speeds: Array
-    merged_t: Array
-
-    def pick(self, index: Any) -> Meeting:
-        return Meeting(self.cuts, self.owner[index], self.x[index], self.speeds[:, :, index], self.merged_t[:, index])
-
-
-@dataclass
-class Sliver:
-    """Jumps that rounding does not tell apart, from one another or from a bound, for some of the batch.
-
-    `owner` (m,), place (m,), width (m,): how far apart they may be all the same; speed (m,): that of the fastest, over
-    the range of the variable; upper: whether seen from below. passes: (k, m) how fast a jump that rounding puts beside
-    a bound goes across it, so that it may be on either side: 0 where it is on the bound.
-    """
-
-    cuts: tuple[int, ...]
-    owner: Ints
-    x: Array
-    width: Array
-    speed: Array
-    upper: bool
-    passes: Array
-
-    def pick(self, index: Any) -> Sliver:
-        return Sliver(self.cuts, self.owner[index], self.x[index], self.width[index], self.speed[index], self.upper,
-                      self.passes[:, index])  # fmt: skip
-
-
-@dataclass
-class Fold:
-    """Sections of a surface that appear, merge or turn just here, for some of the batch: `owner` (m,), place (m,)."""
-
-    cut: int
-    owner: Ints
-    x: Array
 
 
 @dataclass
@@ -130,12 +60,6 @@ class Cuts:
     folds: list[Fold] = field(default_factory=list)
     slivers: list[Sliver] = field(default_factory=list)
     lost: Array | None = None
-
-
-def as_array(x: Any, batch: int) -> Array:
-    if isinstance(x, np.ndarray):
-        return x
-    return np.full(batch, x)
 
 
 def frame_rows(plan: LevelPlan, values: tuple[Value, ...]) -> tuple[Cell, Cell, list[Row]]:
@@ -215,106 +139,12 @@ def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, d
     cuts = _pieces(x, e, t, rank, blur, sign, beyond, edges)
     cuts.conflict, cuts.brushes = conflict, brushes
     if merged or edges or not nested or any(row.hides is not None for row in rows):
-        cuts.slivers = _slivers(plan, rows, low, high, ((tl, el), (th, eh)), directions, batch)
+        cuts.slivers = slivers(plan, rows, low, high, ((tl, el), (th, eh)), directions, batch)
     if directions:
-        cuts.folds = _folds(plan, rows, low, high, directions, batch)
+        cuts.folds = folds_at(plan, rows, low, high, directions, batch)
     if conflict:
-        cuts.meetings = _meetings(plan, rows, inside, low.size, directions)
+        cuts.meetings = meetings(plan, rows, inside, low.size, directions)
     return cuts
-
-
-def _meetings(plan: LevelPlan, rows: list[Row], inside: Bools, batch: int, directions: int) -> list[Meeting]:
-    """The jumps of different surfaces that coincide inside the bounds and move apart."""
-    jumps = [i for i, row in enumerate(rows) if row.cut >= 0 and plan.level.cuts[row.cut].decides]
-    x = np.stack([as_array(rows[i].x, batch) for i in jumps]) if jumps else np.zeros((0, batch))
-    e = np.stack([as_array(0.0 if rows[i].e is None else rows[i].e, batch) for i in jumps]) if jumps else x
-    t = np.stack([tangents(rows[i].t, batch, directions) for i in jumps]) if jumps else np.zeros((0, 0, batch))
-    there = inside[[i + 1 for i in jumps]] & np.isfinite(t).all(axis=1)
-    out: list[Meeting] = []
-    for n, i in enumerate(jumps):
-        other = np.array([rows[j].cut != rows[i].cut for j in jumps])
-        on = there & there[n] & (np.abs(x - x[n]) <= e + e[n]) & other[:, None]
-        apart = (np.abs(t - t[n]) > 1e-9 * (np.abs(t) + np.abs(t[n]))).any(axis=1)
-        here = np.nonzero((on & apart).any(axis=0) & ~on[:n].any(axis=0))[0]
-        on[n] = True
-        for pattern in np.unique(on[:, here], axis=1).T if here.size else ():
-            owner = here[(on[:, here] == pattern[:, None]).all(axis=0)]
-            met = np.nonzero(pattern)[0]
-            speeds = t[met][:, :, owner]
-            merged = np.take_along_axis(speeds, x[met][:, owner].argmin(axis=0)[None, None], axis=0)[0]
-            out.append(Meeting(tuple(rows[jumps[m]].cut for m in met), owner, x[n, owner], speeds, merged))
-    return out
-
-
-def _slivers(
-    plan: LevelPlan, rows: list[Row], low: Array, high: Array, ends: tuple[Any, Any], directions: int, batch: int
-) -> list[Sliver]:
-    jumps = [row for row in rows if row.cut >= 0 and plan.level.cuts[row.cut].decides]
-    if not jumps:
-        return []
-    x = np.stack([as_array(row.x, batch) for row in jumps])
-    off = np.stack([as_array(np.nan if row.e is None else row.e, batch) for row in jumps])
-    off = np.where(np.isnan(off), SEARCHED * EPS * np.abs(x), off)
-    off = np.where(np.isfinite(off), off, 0.0)
-    out: list[Sliver] = []
-
-    def put(of: tuple[int, ...], at: Array, gap: Array, width: Array, upper: bool, passes: Any = 0.0) -> None:
-        owner = np.nonzero((gap <= width) & (width > 0) & (low < high))[0]
-        if owner.size:
-            every = np.broadcast_to(np.where(gap > 0, passes, 0.0), (directions, batch))[:, owner]
-            moves = np.abs([tangents(jumps[i].t, batch, directions) for i in of]).max(axis=(0, 1), initial=0.0)
-            fast = (moves / (high - low))[owner]
-            out.append(Sliver(tuple(jumps[i].cut for i in of), owner, at[owner], width[owner], fast, upper, every))
-
-    for bound, (moves, e), upper in ((low, ends[0], False), (high, ends[1], True)):
-        gap, width = np.abs(x - bound), off + e
-        for i in np.nonzero((gap <= width).any(axis=1))[0].tolist():
-            put((i,), bound, gap[i], width[i], upper, np.abs(tangents(jumps[i].t, batch, directions) - moves))
-    for j, i in _close(x, off):
-        if jumps[j].cut != jumps[i].cut:
-            gap = np.where((x[i] > low) & (x[i] < high), np.abs(x[i] - x[j]), np.inf)
-            put((j, i), x[i], gap, off[i] + off[j], True)
-    for i, row in enumerate(jumps):
-        if row.hides is not None:
-            put((i, i), x[i], np.where((x[i] > low) & (x[i] < high), 0.0, np.inf), row.hides, True)
-    return out
-
-
-def _close(x: Array, off: Array) -> list[tuple[int, int]]:
-    """The pairs of rows that are as close for some member as they may be off; by neighbours, next but one, and so on,
-    until none are close enough."""
-    order = np.argsort(x, axis=0, kind="stable")
-    x, off = np.take_along_axis(x, order, axis=0), np.take_along_axis(off, order, axis=0)
-    pairs: set[tuple[int, int]] = set()
-    for step in range(1, len(x)):
-        gap = x[step:] - x[:-step]
-        if not (gap <= 2 * off.max(axis=0)).any():
-            break
-        place, owner = np.nonzero(gap <= off[step:] + off[:-step])
-        both = np.sort((order[place, owner], order[place + step, owner]), axis=0)
-        pairs.update(zip(*both.tolist(), strict=True))
-    return sorted(pairs)
-
-
-def _folds(plan: LevelPlan, rows: list[Row], low: Array, high: Array, directions: int, batch: int) -> list[Fold]:
-    """Where roots of one surface are at one place, or one on which the integrand jumps moves infinitely fast."""
-    out: list[Fold] = []
-    before: dict[int, list[Any]] = {}
-    for row in rows:
-        others = before.setdefault(row.cut, [])
-        others.append(row.x)
-        if row.cut < 0 or not (plan.level.cuts[row.cut].decides or row.turning or plan.level.cuts[row.cut].turning):
-            continue
-        x = as_array(row.x, batch)
-        folded: Any = np.zeros(batch, dtype=bool)
-        if plan.level.cuts[row.cut].decides and any(not np.isfinite(t).all() for t in row.t if t is not None):
-            folded = ~np.isfinite(tangents(row.t, batch, directions)).all(axis=0)
-        for other in others[:-1]:
-            folded = folded | (x == other)
-        owner = np.nonzero(folded & (x >= low) & (x <= high))[0]
-        if owner.size:
-            out.append(Fold(row.cut, owner, x[owner]))
-    return out
 
 
 def standing(cuts: Cuts) -> Cuts:
@@ -327,14 +157,6 @@ def at_rest(cuts: Cuts) -> Cuts:
     seg = cuts.segments
     seg.ta, seg.tb, seg.da, seg.db = (np.zeros_like(speed) for speed in (seg.ta, seg.tb, seg.da, seg.db))
     return replace(cuts, moving=False)
-
-
-def tangents(t: tuple[Any, ...], batch: int, directions: int) -> Array:
-    out = np.zeros((directions, batch))
-    for d, x in enumerate(t):
-        if x is not None:
-            out[d] = x
-    return out
 
 
 def _edges(row: Row, root: Array, off: Any, lower: _End, upper: _End, directions: int, batch: int) -> list[Edge]:

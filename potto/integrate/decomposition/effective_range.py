@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from potto.core.terms import Var, postorder
-from potto.integrate.decomposition.cuts import as_array
+from potto.integrate.decomposition.meetings import as_array
 from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.intervals import ANYTHING, Interval, enclosure

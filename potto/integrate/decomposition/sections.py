@@ -15,7 +15,7 @@ import numpy as np
 
 from potto.calculus.solving.enclosable import slope_of
 from potto.core.terms import Lam, Term, function_of
-from potto.integrate.decomposition.cuts import SEARCHED, Row, as_array
+from potto.integrate.decomposition.meetings import SEARCHED, Row, as_array
 from potto.integrate.decomposition.root_isolation import between, isolated
 from potto.integrate.events import ROOTS_NOT_SEPARATED, TOO_MANY_ROOTS, Unsearched
 from potto.integrate.levels import LevelPlan

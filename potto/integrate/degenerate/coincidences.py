@@ -21,7 +21,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from potto.core.terms import Term
-from potto.integrate.decomposition.cuts import Cuts, Edge, Meeting, as_array
+from potto.integrate.decomposition.cuts import Cuts
+from potto.integrate.decomposition.meetings import Edge, Meeting, as_array
 from potto.integrate.events import Fold, TwoSided, on_a_bound
 from potto.integrate.levels import LevelPlan
 from potto.integrate.panels.iterated import Iterated

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from potto.integrate.decomposition.cuts import SEARCHED, Row, as_array, tangents
+from potto.integrate.decomposition.meetings import SEARCHED, Row, as_array, tangents
 from potto.integrate.degenerate.coincidences import MOST_AT_ONE_PLACE, Scene, picked
 from potto.integrate.events import CROWDED, EMPTY_UNDEFINED, EMPTY_UNSEEN, Shortfall, TwoSided
 from potto.integrate.levels import LevelPlan

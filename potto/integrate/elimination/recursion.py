@@ -16,7 +16,8 @@ import numpy as np
 from potto.calculus.algebra.affine import affine
 from potto.calculus.algebra.ranges import range_of
 from potto.calculus.decomposition.elimination import Step, eliminate
-from potto.calculus.decomposition.sweep import MOST_CENTERS, Level, cut_along, points_of, sweep
+from potto.calculus.decomposition.surface_cuts import MOST_CENTERS, cut_along, points_of
+from potto.calculus.decomposition.sweep import Level, sweep
 from potto.calculus.surfaces.case_split import cased
 from potto.calculus.surfaces.discontinuities import Finding, Kind, Resolve, TooDeep, findings, undecided
 from potto.core.simplify import simplify

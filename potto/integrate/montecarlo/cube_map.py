@@ -17,7 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from potto.integrate.decomposition.cuts import as_array, frame_rows
+from potto.integrate.decomposition.cuts import frame_rows
+from potto.integrate.decomposition.meetings import as_array
 from potto.integrate.levels import LevelPlan
 from potto.integrate.pieces import still
 from potto.integrate.plan import Plan

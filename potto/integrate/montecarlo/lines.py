@@ -10,7 +10,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from potto.calculus.decomposition.sweep import Level, cut_along
+from potto.calculus.decomposition.surface_cuts import cut_along
+from potto.calculus.decomposition.sweep import Level
 from potto.core.simplify import simplify
 from potto.core.terms import Integral, Term, add, mul, neg, sub, substitute, var
 from potto.integrate.levels import LevelPlan

@@ -24,7 +24,7 @@ import numpy as np
 
 from potto.calculus.algebra.ranges import range_of
 from potto.core.terms import Integral, Term
-from potto.integrate.decomposition.cuts import as_array
+from potto.integrate.decomposition.meetings import as_array
 from potto.integrate.degenerate.undefined import fallen
 from potto.integrate.montecarlo.cube_map import Chart, Point, label_of
 from potto.integrate.montecarlo.surface_terms import Surface

@@ -26,9 +26,10 @@ from typing import Any
 
 import numpy as np
 
-from potto.calculus.decomposition.sweep import Face, Product
+from potto.calculus.decomposition.surface_cuts import Face, Product
 from potto.core.terms import App, Const, Prim, Term, const, function_of, mul, postorder, sub, var
-from potto.integrate.decomposition.cuts import Row, as_array, frame_rows
+from potto.integrate.decomposition.cuts import frame_rows
+from potto.integrate.decomposition.meetings import Row, as_array
 from potto.integrate.decomposition.sections import searched_rows
 from potto.integrate.events import UNKNOWN_JUMP
 from potto.integrate.montecarlo.cube_map import Chart, Point, label_of

@@ -17,7 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from potto.integrate.decomposition.cuts import Row, frame_rows
+from potto.integrate.decomposition.cuts import frame_rows
+from potto.integrate.decomposition.meetings import Row
 from potto.integrate.decomposition.sections import searched_rows
 from potto.integrate.events import BOUNDLESS, INNER, Degenerate, Fold, OneSidedDerivatives, TwoSided
 from potto.integrate.pieces import Sums, still

@@ -1,0 +1,189 @@
+"""Surfaces as cuts of one variable: what they decide, what they are a product of, and where their roots are.
+
+Owns `Cut`, `Face` and `Product`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from itertools import islice
+
+from potto.calculus.algebra.radicals import minus
+from potto.calculus.algebra.ranges import positive
+from potto.calculus.solving.enclosable import slope_of
+from potto.calculus.solving.solve import Family, Sections, Unsolvable, sections
+from potto.core.simplify import normalized_surface
+from potto.core.terms import Const, Prim, Term, prim
+
+RATIONAL = frozenset(("add", "neg", "mul", "div"))
+MOST_CENTERS = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Jump:
+    """A branch of the integrand: the path of its trace, and which side of its group's canonical surface it takes."""
+
+    path: tuple[int, ...]
+    orientation: int
+    strict: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Face:
+    """A surface as it was written, and the canonical form, of the same sign, by which it is known."""
+
+    form: Term
+    key: Term
+
+
+@dataclass(frozen=True, slots=True)
+class Cut:
+    """A surface that cuts one variable.
+
+    surface: as it was written, on the side of its canonical form: multiplied out, (x - 1e8)^2 + (y - 1e8)^2 - t^2 would
+        lose its t. key: the canonical form, so that the same condition met twice is one cut.
+    jumps: the branches that it decides; none for a kink, an edge or a place where an inner section changes.
+    steps: a branch that is decided further in jumps here all the same: of (x - t)*(y - s) >= 0 at x = t.
+    turning: the integrand behaves like a square root there.
+    roots: closed-form sections, or None where they are found by numbers.
+    center: nothing happens at it but that a smooth integrand may be concentrated there.
+    """
+
+    surface: Term
+    key: Term
+    jumps: tuple[Jump, ...]
+    turning: bool
+    roots: tuple[Term, ...] | None
+    families: tuple[Family, ...] = ()
+    steps: bool = False
+    product: Product | None = None
+    center: bool = False
+
+    @property
+    def decides(self) -> bool:
+        """Whether it matters on which side of it a stretch lies."""
+        return bool(self.jumps) or self.steps
+
+
+@dataclass(frozen=True, slots=True)
+class Product:
+    """A surface as a product: (sign) * along * outer factors, up to a positive scale.
+
+    along: what varies with the variable that the surface cuts. outer: factors that do not.
+    """
+
+    along: Term
+    outer: tuple[Face, ...]
+    sign: int
+
+
+@dataclass(slots=True)
+class Placed:
+    """A surface, what it is a product of (up to `sign`), and what is known of it."""
+
+    face: Face
+    factors: tuple[Face, ...]
+    sign: int
+    jumps: list[Jump] = field(default_factory=list)
+    turning: bool = False
+    steps: bool = False
+
+
+@lru_cache(maxsize=8192)
+def face_of(surface: Term) -> tuple[Face, int]:
+    """A surface on the side of its canonical form, and +1 or -1 for whether it was there already.
+
+    Where variables cancel in the canonical form, that is the surface.
+    """
+    key, side = normalized_surface(surface)
+    form = surface if side > 0 else minus(surface)
+    return Face(form if form.free == key.free else key, key), side
+
+
+@lru_cache(maxsize=8192)
+def sections_in(surface: Term, variable: str) -> Sections | Unsolvable:
+    return sections(surface, variable)
+
+
+def cut_of(placed: Placed, variable: str) -> Cut:
+    jumps, turning, steps = tuple(placed.jumps), placed.turning, placed.steps
+    here = tuple(f for f in placed.factors if variable in f.key.free)
+    outer = tuple(f for f in placed.factors if variable not in f.key.free)
+    product = Product(_product(tuple(f.form for f in here)), outer, placed.sign) if outer else None
+    surface, key = placed.face.form, placed.face.key
+    roots: dict[Term, None] = {}
+    families: dict[Family, None] = {}
+    for part in here:
+        found = _roots(part, variable)
+        if found is None:
+            return Cut(surface, key, jumps, turning, None, (), steps, product)
+        roots.update(dict.fromkeys((*found.roots, *found.poles)))
+        families.update(dict.fromkeys((*found.families, *found.pole_families)))
+    return Cut(surface, key, jumps, turning, tuple(roots), tuple(families), steps, product)
+
+
+def _roots(part: Face, variable: str) -> Sections | None:
+    """All the roots of a factor: of the form as written, which keeps digits, else of the canonical one."""
+    for surface in (part.form, part.key):
+        found = sections_in(surface, variable)
+        if isinstance(found, Sections) and found.complete:
+            return found
+    return None
+
+
+def cut_along(surface: Term, variable: str) -> Cut:
+    """A surface as a cut of one variable, whatever it decides."""
+    return cut_of(Placed(Face(surface, surface), *factored(surface, 1)), variable)
+
+
+def _product(terms: tuple[Term, ...]) -> Term:
+    return prim("mul", *terms) if len(terms) > 1 else terms[0]
+
+
+def factored(surface: Term, orientation: int) -> tuple[tuple[Face, ...], int]:
+    """The factors of a surface written as a product, and the sign of its canonical form against theirs.
+
+    A surface that is none, or in which a factor comes twice, is its own and only factor.
+    """
+    found: dict[Term, Face] = {}
+    sign, waiting = orientation, [surface]
+    while waiting:
+        item = waiting.pop()
+        match item:
+            case Prim(op="mul" | "div", args=args):
+                waiting.extend(args)
+            case Prim(op="neg", args=(inner,)):
+                sign = -sign
+                waiting.append(inner)
+            case Const(value=value):
+                sign = -sign if value < 0 else sign
+            case _ if positive(item):
+                pass
+            case _:
+                face, turned = face_of(item)
+                if face.key in found or not face.key.free:
+                    return (face_of(surface)[0],), 1
+                sign *= turned
+                found[face.key] = face
+    return (tuple(found.values()), sign) if len(found) > 1 else ((face_of(surface)[0],), 1)
+
+
+def points_of(centers: Iterable[Term], variable: str) -> tuple[Term, ...]:
+    """Where the centers are, if that can be said in closed form."""
+    found = (sections_in(center, variable) for center in centers)
+    return tuple(dict.fromkeys(root for s in found if isinstance(s, Sections) and not s.families for root in s.roots))
+
+
+def around_centers(centers: Iterable[Term], variable: str) -> tuple[Cut, ...]:
+    """The centers that are more than points in closed form, and can be found."""
+    rest = (c for c in centers if not isinstance(found := sections_in(c, variable), Sections) or found.families)
+    cuts = (replace(cut_along(c, variable), center=True) for c in rest)
+    known = (cut for cut in cuts if cut.roots is not None or slope_of(cut.surface, variable) is not None)
+    return tuple(islice(known, MOST_CENTERS))
+
+
+def along(cut: Cut) -> Term:
+    """What of a cut's surface varies with the variable that it cuts."""
+    return cut.surface if cut.product is None else cut.product.along
