@@ -141,8 +141,8 @@ def test_a_hard_member_costs_the_others_nothing(body: str, hard: list[float], pl
             assert np.array_equal(a, b, equal_nan=True) or abs(a - b) <= slack
         assert one.converged == together.member_converged[i] and set(one.reasons) == set(together.reasons_of(i))
         assert math.isinf(one.tangent_error) == math.isinf(together.tangent_error[i])
-    # what is hard is met once in the batch and once by itself
-    assert together.evals <= 1.7 * sum(one.evals for one in single) + 400
+    # what is hard is met once in the batch and once by itself; beside a narrow panel polynomials take general rules
+    assert together.evals <= 2.5 * sum(one.evals for one in single) + 400
     assert {note.surface for one in single for note in one.notes} == {note.surface for note in together.notes}
 
 
