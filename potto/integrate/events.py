@@ -172,6 +172,9 @@ NO_SAMPLE = Shortfall(
     "no sample fell where it counts: the error estimate says nothing",
     "sample more (`--samples`), or integrate by `--method quadrature`",
 )
+MEETINGS = Shortfall(
+    "two surfaces coincide at single places, where a second derivative would hold a product of deltas", BESIDE
+)
 DISAGREE = Shortfall("the second derivative is not known: its formula and numbers disagree about the first one")
 
 # What numbers say by themselves.

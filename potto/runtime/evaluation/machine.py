@@ -22,7 +22,8 @@ from potto.core.terms import Branch, Deriv, Global, Hole, If, Integral, Lam, Sum
 from potto.core.terms import Delta as DeltaTerm
 from potto.diagnostics import PottoError
 from potto.integrate.costs import Costs
-from potto.integrate.events import Event, Events, Members
+from potto.integrate.events import MEETINGS, Event, Events, Members
+from potto.integrate.pieces import STRAY
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Ints, Number, Pattern, Trace, Value, pad, pattern
 from potto.kernels.chunks import in_chunks, many
@@ -330,7 +331,10 @@ class Machine:
     def falls(self, surface: Number, strict: bool) -> tuple[Any, Any]:
         """Which side a surface falls on, and nan wherever it is nan."""
         mask = surface > 0 if strict else surface >= 0
-        if self.directions and self.record.second and np.any(surface == 0):
+        met = np.count_nonzero(surface == 0) if self.directions and self.record.second else 0
+        if met and not self.root and STRAY * met < np.size(surface):
+            self.note(MEETINGS)  # at single nodes: the apex of a cone
+        elif met:
             raise PottoError([PRODUCT_OF_DELTAS(
                 errors.NOWHERE,
                 "the second derivative does not exist here: two surfaces coincide, or one passes through a corner",
