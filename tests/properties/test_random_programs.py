@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import random
 from collections import Counter
+from collections.abc import Callable, Iterable
 
 import pytest
 from how_many import examples
@@ -19,12 +20,12 @@ EACH = examples(9, 100)
 RARE = ("refused", "slow", "one side", "sampled", "value without", "slope without", "no reason")
 
 
-def outcomes(numbers: list[int]) -> tuple[Counter[str], list[Wrong]]:
+def outcomes(numbers: Iterable[int], checked: Callable[[int], str] = check) -> tuple[Counter[str], list[Wrong]]:
     counts: Counter[str] = Counter()
     wrong: list[Wrong] = []
     for number in numbers:
         try:
-            counts[check(number)] += 1
+            counts[checked(number)] += 1
         except Wrong as failure:
             counts[failure.kind] += 1
             wrong.append(failure)
@@ -45,5 +46,7 @@ def test_programs_of_all_kinds(chunk: int) -> None:
 @pytest.mark.parametrize("start", range(10_000, 10_840, 140))
 def test_many_programs_converge_where_nothing_is_awkward(start: int) -> None:
     """Most of them do, and to what was asked for."""
-    found = [held(tame(number)) for number in range(start, start + 140)]
-    assert found.count("compared") >= 105, Counter(found)
+    counts, wrong = outcomes(range(start, start + 140), lambda number: held(tame(number)))
+    unbounded = [failure for failure in wrong if "inf" in str(failure)]  # the budget was spent, and the answer says so
+    assert len(wrong) == len(unbounded) <= 2, "\n".join(map(str, wrong))
+    assert counts["compared"] >= 105, counts
