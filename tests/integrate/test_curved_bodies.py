@@ -45,14 +45,19 @@ BODIES: list[tuple[str, str, dict[str, float], str, str, Any, float]] = [
     ("ring, both radii", PLANE.format("[a^2 < x^2 + y^2]*[x^2 + y^2 < b^2]"), {"a": 0.6, "b": 1.2}, "a", "b", 0, 1e-9),
     ("weight on a moved disc", PLANE.format("[(x - c)^2 + y^2 < r^2]*x"), {"c": 0.2, "r": 1.1}, "c", "r",
      2 * PI * 1.1, 1e-4),
-    ("cone", SPACE.format("[sqrt(x^2 + y^2) < z*t]*[z < 1]*[z > 0]"), {"t": 0.8}, "t", "t", 2 * PI / 3,
-     2e-6),  # surfaces meet at its apex
+    ("cone", SPACE.format("[sqrt(x^2 + y^2) < z*t]*[z < 1]*[z > 0]"), {"t": 0.8}, "t", "t", 2 * PI / 3, 1e-8),
     ("simplex", "integral ([0, 1], [0, 1], [0, 1]) [x + y + z < t] d(x, y, z)", {"t": 0.7}, "t", "t", 0.7, 1e-10),
     ("half-plane", "integral ([0, 1], [0, 1]) [a*x + b*y < 1] d(x, y)", {"a": 2.0, "b": 3.0}, "a", "b", 1 / 72, 1e-10),
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("name", "text", "at", "one", "two", "exact", "most"), BODIES, ids=[row[0] for row in BODIES])
+UNMET = {"cone": "a bar of 1e-6: surfaces meet at its apex"}
+
+
+@pytest.mark.parametrize(("name", "text", "at", "one", "two", "exact", "most"), [
+    pytest.param(*row, id=row[0], marks=pytest.mark.xfail(row[0] in UNMET, reason=UNMET.get(row[0], ""), strict=True))
+    for row in BODIES
+])  # fmt: skip
 def test_second_derivatives_of_bodies_are_covered(
     name: str, text: str, at: dict[str, float], one: str, two: str, exact: Any, most: float
 ) -> None:
