@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 
 from potto.integrate.adaptive.iterated import Iteration
+from potto.integrate.fixed.alike import together
 from potto.integrate.fixed.tensor_product import uncut
 from potto.integrate.pieces import Sums
 from potto.integrate.plan import Plan
-from potto.kernels.cells import Array, Value, map_arrays
+from potto.kernels.cells import Array, Bools, Value, map_arrays
 from potto.runtime.evaluation.machine import Machine
 
 START_ORDER = 11
@@ -42,29 +43,54 @@ def within(most: int | None, plan: Plan, machine: Machine, env: dict[str, Value]
 
 
 def in_parts(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> Sums:
-    """Quadrature: whole boxes first, where there are many, then a bounded number of members of the batch at a time."""
-    if batch < FEW or plan.box is None:
-        return iterated(plan, machine, env, batch)
-    with one_thread():
-        found = uncut(plan.box, machine, env, batch)
+    """Quadrature: what a product rule settles first, then a bounded number of members of the batch at a time."""
+    found: Sums | None = None
+    rest = np.arange(batch)
+    for way in (_uncut, _alike):
+        here = env if rest.size == batch else {n: map_arrays(v, operator.itemgetter(rest)) for n, v in env.items()}
+        with one_thread():
+            part = way(plan, machine, here, rest.size)
+        if part is None:
+            continue
+        done, sums = part
+        found = sums if found is None else _filled(found, rest[done], sums, done)
+        rest = rest[~done]
+        if not rest.size:
+            return found
     if found is None:
         return iterated(plan, machine, env, batch)
-    done, sums = found
-    rest = np.nonzero(~done)[0]
-    if machine.costs is not None:
-        machine.costs.whole += batch - rest.size
-    if rest.size:
-        here = {n: map_arrays(v, operator.itemgetter(rest)) for n, v in env.items()}
-        apart = machine.apart()
-        part = iterated(plan, apart, here, rest.size)
-        machine.events.take(apart.events, rest)
-        for name in ("v", "e", "t", "et"):
-            getattr(sums, name)[..., rest] = getattr(part, name)
-        if part.gross is None or sums.gross is None:
-            sums.gross = None
-        else:
-            sums.gross[:, rest] = part.gross
-    return sums
+    here = {n: map_arrays(v, operator.itemgetter(rest)) for n, v in env.items()}
+    apart = machine.apart()
+    sums = iterated(plan, apart, here, rest.size)
+    machine.events.take(apart.events, rest)
+    return _filled(found, rest, sums, slice(None))
+
+
+def _uncut(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> tuple[Bools, Sums] | None:
+    """Whole boxes, where there are many."""
+    if batch < FEW or plan.box is None:
+        return None
+    found = uncut(plan.box, machine, env, batch)
+    if found is not None and machine.costs is not None:
+        machine.costs.whole += int(found[0].sum())
+    return found
+
+
+def _alike(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> tuple[Bools, Sums] | None:
+    """Members with cells that are alike, where all of their cuts are plain."""
+    if plan.straight is None or any(level.peaks for level in plan.levels):
+        return None
+    return together(plan.straight, plan.degrees, machine, env, batch)
+
+
+def _filled(whole: Sums, index: Any, part: Sums, picked: Any) -> Sums:
+    for name in ("v", "e", "t", "et"):
+        getattr(whole, name)[..., index] = getattr(part, name)[..., picked]
+    if part.gross is None or whole.gross is None:
+        whole.gross = None
+    else:
+        whole.gross[:, index] = part.gross[:, picked]
+    return whole
 
 
 def iterated(

@@ -1,0 +1,128 @@
+"""Members of an array that are cut alike are integrated by one rule: values, derivatives, bars, and what it costs.
+
+Answers are closed forms, and mpmath's where there is none; members that are not plain (a line through a corner, a
+circle that touches the bounds) get what they get by themselves.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+import potto
+
+PLAIN = np.linspace(-0.99, -0.01, 200)
+
+
+def answered(text: str, at: Any, **others: Any) -> Any:
+    return potto.deriv(potto.compile(text).f)((at, 1.0), **others)
+
+
+def covered(answer: Any, value: Any, slope: Any, rtol: float = 1e-11) -> None:
+    """Each member within its own bars, and these within `rtol`: roundings of a few hundred nodes are 1e-13."""
+    assert answer.converged
+    for number, error, exact in (
+        (answer.value, answer.error, value), (answer.tangent, answer.tangent_error, slope)
+    ):  # fmt: skip
+        assert (np.abs(number - exact) <= error).all()
+        assert (error <= rtol * np.maximum(np.abs(exact), 1e-2)).all()
+
+
+def test_the_line_of_equation_1() -> None:
+    shade = "1/(sqrt(2)*(x + y + c) + 2)^2"
+    answer = answered(f"def f(c) integral ([0, 1], [0, 1]) {shade} * [x + y + c >= 0] d(x, y)", PLAIN)
+
+    def value(c: Any) -> Any:
+        """The shader depends on s = x + y alone: its density is s up to 1, 2 - s beyond."""
+        return mp.quad(lambda s: min(s, 2 - s) / (mp.sqrt(2) * (s + c) + 2) ** 2, [-c, 1, 2])
+
+    for i in (0, 57, 121, 199):
+        c = mp.mpf(float(PLAIN[i]))
+        exact, slope = value(c), mp.diff(value, c, h=mp.mpf("1e-6"))
+        assert abs(answer.value[i] - exact) <= answer.error[i] <= 1e-12
+        assert abs(answer.tangent[i] - slope) <= answer.tangent_error[i] + 1e-10  # what is left of a difference
+    assert answer.converged and answer.evals <= 450 * PLAIN.size
+
+
+@pytest.mark.parametrize("order", ["x, y", "y, x"])
+def test_circles_turn_at_both_ends(order: str) -> None:
+    r = np.linspace(0.2, 0.95, 100)
+    answer = answered(f"def f(r) integral ([-1, 1], [-1, 1]) [x*x + y*y < r*r]/(2 + x) d({order})", r)
+    root = np.sqrt(4 - r * r)
+    covered(answer, 2 * math.pi * (2 - root), 2 * math.pi * r / root, 1e-10)
+    assert answer.evals <= (100 if order == "x, y" else 1200) * r.size
+
+
+def test_circles_that_leave_the_bounds() -> None:
+    """Where the circle touches and leaves them, other rows bound its cells: four shapes in one array."""
+    r = np.linspace(0.3, 1.35, 211)
+    beyond = np.maximum(r, 1.0)
+    angle = np.arccos(1 / beyond)
+    area = math.pi * r * r - np.where(r > 1, 4 * (r * r * angle - np.sqrt(beyond * beyond - 1)), 0.0)
+    slope = r * (2 * math.pi - 8 * np.where(r > 1, angle, 0.0))
+    answer = answered("def f(r) integral ([-1, 1], [-1, 1]) [x*x + y*y < r*r] d(x, y)", r)
+    assert (np.abs(answer.value - area) <= answer.error).all() and np.max(answer.error) <= 1e-9
+    away = np.abs(r - 1) > 1e-9  # at r = 1 the derivative has an infinite one
+    assert (np.abs(answer.tangent - slope) <= answer.tangent_error)[away].all()
+
+
+def test_polynomials_between_planes_are_exact() -> None:
+    """The share of a cube below x + y + z = c, a cubic spline: three shapes, and their corners at whole numbers."""
+    c = np.linspace(0.05, 2.95, 59)
+    answer = answered("def f(c) integral ([0, 1], [0, 1], [0, 1]) [x + y + z < c] d(x, y, z)", c)
+
+    def spline(n: int) -> Any:
+        parts = (k * np.maximum(c - j, 0.0) ** n for j, k in ((0, 1), (1, -3), (2, 3)))
+        return sum(parts) / math.factorial(n)
+
+    covered(answer, spline(3), spline(2))
+    assert answer.evals <= 200 * c.size
+
+
+def test_members_at_corners_are_as_by_themselves() -> None:
+    """The line goes through corners at -2, -1 and 0, where the derivative has two sides or the line leaves."""
+    c = np.array([-2.5, -2.0, -1.5, -1.0, -0.5, 0.0, 0.5, *np.linspace(-1.9, -0.1, 30)])
+    f = potto.deriv(potto.compile("def f(c) integral ([0, 1], [0, 1]) [x + y + c >= 0]*exp(x) d(x, y)").f)
+    together = f((c, 1.0))
+    for i, each in enumerate(c):
+        alone = f((float(each), 1.0))
+        assert abs(together.value[i] - alone.value) <= together.error[i] + alone.error
+        assert abs(together.tangent[i] - alone.tangent) <= together.tangent_error[i] + alone.tangent_error
+        assert together.error[i] <= 1e-12 and together.tangent_error[i] <= 1e-11
+
+
+def test_where_the_derivative_crosses_0_nobody_looks_twice() -> None:
+    """There rounding is more of it than was asked for, by any rule."""
+    t = np.concatenate([np.linspace(-1, 1, 101), 1e-12 * np.arange(-5.0, 6.0)])
+    answer = answered("def f(t) integral ([0, 1], [0, 1]) [x < 0.5 + t*t]*cos(y*t) d(x, y)", 0.4 * t)
+    a = 0.4 * t
+    with np.errstate(all="ignore"):
+        sinc = np.where(np.abs(a) < 1e-3, 1 - a * a / 6, np.sin(a) / np.where(a == 0, 1, a))
+        rate = np.where(np.abs(a) < 1e-3, -a / 3 + a**3 / 30, (np.cos(a) - sinc) / np.where(a == 0, 1, a))
+    value, slope = (0.5 + a * a) * sinc, 2 * a * sinc + (0.5 + a * a) * rate
+    assert (np.abs(answer.value - value) <= answer.error + 1e-15).all()
+    assert (np.abs(answer.tangent - slope) <= answer.tangent_error + 1e-12).all()  # the closed form's own cancellation
+    assert answer.evals <= 200 * t.size
+
+
+def test_parameters_that_do_not_move_cost_nothing() -> None:
+    """Only one of four is differentiated by; the tangent is that one's."""
+    text = "def f(a, b, h, c) integral ([a, a + h], [b, b + h]) [x + 2*y < c]*(x + y) d(x, y)"
+    g = np.linspace(0, 1, 24, endpoint=False)
+    a, b = (z.ravel() for z in np.meshgrid(g, g))
+    f = potto.deriv(potto.compile(text).f)
+    answer = f((a, 0.0), (b, 0.0), (1 / 24, 0.0), (1.1, 1.0))
+    assert answer.converged
+
+    def whole(c: float) -> float:
+        """Over the unit square, cut off at y = (c - x)/2."""
+        x, y = mp.mpf(c), mp.mpf(c) / 2
+        return float(mp.quad(lambda s: mp.quad(lambda t: s + t, [0, (c - s) / 2]), [0, 1])) if x and y else 0.0
+
+    assert float(np.sum(answer.value)) == pytest.approx(whole(1.1), rel=1e-13)
+    edge = float(mp.quad(lambda s: (s + (mp.mpf("1.1") - s) / 2) / 2, [0, 1]))  # what the line sweeps
+    assert float(np.sum(answer.tangent)) == pytest.approx(edge, rel=1e-13)
