@@ -29,7 +29,7 @@ from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays
 from potto.primitives import PRIMITIVES
 
 # Nodes per variable that are tried, one after the other.
-ORDERS = (6, 8, 10, 12, 15, 20, 28)
+ORDERS = (6, 8, 12, 14, 20, 28)
 MOST_NODES = 4096
 POINTS = 1 << 15
 # A rule is good enough for a cell if what it may be off is this part of the accuracy asked for.
@@ -41,7 +41,7 @@ PILOTS = 16
 FEW = 4 * PILOTS
 ENOUGH = 0.9
 # How near to 0, of what it comes to elsewhere on the cell, the edge of a builtin's domain may be at a node.
-EDGE = 0.04
+EDGE = 0.1
 # What errors may be where what is added up cancels, as a part of that: no other way would mend it.
 CANCELS = 1e-13
 
@@ -125,7 +125,7 @@ def _tried(
     if all(known):
         return tried[:1]
     if cell.members.size <= FEW:
-        return tried[3:]
+        return tried[2:]
     few = cell.members[:: max(1, cell.members.size // PILOTS)]
     for number, rule in enumerate(tried[:-1]):
         if rule.good(rule.applied(env, few)).mean() >= ENOUGH:

@@ -1,0 +1,123 @@
+"""The experiments behind the numbers that error estimates rest on: `python benchmarks/calibration.py [NAME]`.
+
+truncation, analytic: how often the two estimates of `potto.integrate.rules.gauss` are exceeded, by how much, and how
+much larger than the error they are. edge: how near a piece may come to the edge of a builtin's domain before the
+coefficients no longer tell (`EDGE` in `potto.integrate.fixed.alike`). Functions are drawn from families that are told
+in their names; the truth is a rule of 20 nodes on 800 graded panels.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from potto.integrate.rules.gauss import EPS, analytic_truncation, gauss, truncation
+from potto.kernels.cells import Array
+
+Function = Callable[[Array], Array]
+Estimate = Callable[[Array], Array]
+DRAWN = 600
+NODES = (6, 8, 11, 12, 16, 20)
+POWERS = (-0.7, -0.5, -0.25, 0.25, 0.5, 0.75, 1.5, 2.5, 3.5, 5.5)
+# What a sum of n products may lose to rounding, and what the truth may, both as a part of what is added up.
+ROUNDING = 300 * EPS
+
+
+def drawn(family: str, random: np.random.Generator) -> Function:
+    """A function on [0, 1] with random scales: features as narrow as a fiftieth of it and as wide as five times."""
+    at, wide = random.uniform(-0.5, 1.5), 10 ** random.uniform(-1.7, 0.7)
+    wave, phase = 10 ** random.uniform(0, 1.6), random.uniform(0, 2 * np.pi)
+    power = random.choice(POWERS)
+
+    def x(u: Array) -> Array:  # what nears 0 at an end
+        return u
+
+    families: dict[str, Function] = {
+        "pole beside": lambda u: 1 / ((u - at) ** 2 + wide * wide),
+        "pole on the line": lambda u: 1 / (x(u) + wide / 2) ** 2,
+        "peak": lambda u: np.exp(-(((u - at) / wide) ** 2)),
+        "step": lambda u: np.tanh((u - at) / wide) + 0.3,
+        "wave": lambda u: np.cos(wave * u + phase),
+        "power beside": lambda u: (x(u) + wide / 3) ** power,
+        "logarithm beside": lambda u: np.log(x(u) + wide / 3),
+        "wave over pole": lambda u: np.exp(np.sin(wave * u + phase)) / (x(u) + wide),
+        "pole to a power": lambda u: x(u) * np.exp(wave * u / 6) / ((u - at) ** 2 + wide * wide) ** 1.5,
+        "circle": lambda u: np.sin(np.pi * u) ** 2 / (1 + wide - np.cos(np.pi * u)),
+        "power": lambda u: x(u) ** power,
+        "power times growth": lambda u: x(u) ** power * np.exp(wave * u / 8),
+    }
+    return families[family]
+
+
+ANALYTIC = ("pole beside", "pole on the line", "peak", "step", "wave", "power beside", "logarithm beside",
+            "wave over pole", "pole to a power", "circle")  # fmt: skip
+SINGULAR = ("power", "power times growth")
+
+
+def truth(function: Function) -> float:
+    """The integral over [0, 1]: panels graded towards both ends."""
+    fine = 2.0 ** -np.arange(9, 50)
+    ends = np.unique(np.concatenate([np.linspace(0, 1, 601), fine, 1 - fine[fine > 1e-16]]))
+    rule, width = gauss(20), np.diff(ends)
+    return float((function(ends[:-1, None] + width[:, None] * rule.nodes) @ rule.weights) @ width)
+
+
+def measured(functions: list[Function], exact: Array, n: int) -> Iterator[tuple[str, Array, Array]]:
+    """Errors of the rule with n nodes, and the bounds by each estimate."""
+    rule = gauss(n)
+    values = np.array([f(rule.nodes) for f in functions])
+    sizes, floor = np.abs(values @ rule.transform), ROUNDING * (np.abs(values) @ rule.weights)
+    error = np.maximum(np.abs(values @ rule.weights - exact) - floor, 0.0)
+    for name, estimate in (("truncation", truncation), ("analytic", analytic_truncation)):
+        yield name, error, estimate(sizes) + floor
+
+
+def estimates(which: str) -> None:
+    """A line a family: of how many functions the bound is exceeded, by how much at worst, and by how many digits it is
+    larger than the error in the median, for each number of nodes."""
+    print(f"{which}: {DRAWN} functions a family; exceeded (at worst times), digits to spare, at {NODES} nodes")
+    for family in (*ANALYTIC, *SINGULAR):
+        random = np.random.default_rng(7)
+        functions = [drawn(family, random) for _ in range(DRAWN)]
+        exact = np.array(list(map(truth, functions)))
+        cells = []
+        for n in NODES:
+            error, bound = next((e, b) for name, e, b in measured(functions, exact, n) if name == which)
+            beyond = error > bound
+            worst = float((error / bound).max())
+            spare = np.median(np.log10(bound / np.maximum(error, 1e-3 * bound)))
+            cells.append(f"{beyond.sum():3d} ({worst:8.1f}) {spare:3.1f}" if beyond.any() else f"  0            {spare:3.1f}")
+        print(f"  {family:20s}" + " | ".join(cells))
+
+
+def edge() -> None:
+    """x^a exp(b x) from x = d/(1 - d) of a piece's length off 0: the worst ratio of error and `analytic` bound."""
+    print(f"edge: the worst error in units of the analytic bound, by the ratio of the least and the most, at {NODES} nodes")
+    random = np.random.default_rng(3)
+    for nearest in (1e-4, 0.01, 0.02, 0.04, 0.08, 0.16):
+        gap = nearest / (1 - nearest)
+        functions = [
+            lambda u, g=gap, a=random.choice(POWERS), b=random.uniform(-4, 4): (u + g) ** a * np.exp(b * u)
+            for _ in range(DRAWN)
+        ]
+        exact = np.array(list(map(truth, functions)))
+        worst = []
+        for n in NODES:
+            error, bound = next((e, b) for name, e, b in measured(functions, exact, n) if name == "analytic")
+            worst.append(float((error / bound).max()))
+        print(f"  {nearest:6g}  " + "  ".join(f"{w:9.3g}" for w in worst))
+
+
+EXPERIMENTS: dict[str, Callable[[], None]] = {
+    "truncation": lambda: estimates("truncation"),
+    "analytic": lambda: estimates("analytic"),
+    "edge": edge,
+}
+
+
+if __name__ == "__main__":
+    for name in sys.argv[1:] or EXPERIMENTS:
+        with np.errstate(all="ignore"):
+            EXPERIMENTS[name]()
