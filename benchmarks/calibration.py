@@ -88,20 +88,22 @@ def estimates(which: str) -> None:
             beyond = error > bound
             worst = float((error / bound).max())
             spare = np.median(np.log10(bound / np.maximum(error, 1e-3 * bound)))
-            cells.append(f"{beyond.sum():3d} ({worst:8.1f}) {spare:3.1f}" if beyond.any() else f"  0            {spare:3.1f}")
+            told = f"{beyond.sum():3d} ({worst:8.1f})" if beyond.any() else f"{'  0':14s}"
+            cells.append(f"{told} {spare:3.1f}")
         print(f"  {family:20s}" + " | ".join(cells))
+
+
+def power_times_growth(gap: float, power: float, rate: float) -> Function:
+    return lambda u: (u + gap) ** power * np.exp(rate * u)
 
 
 def edge() -> None:
     """x^a exp(b x) from x = d/(1 - d) of a piece's length off 0: the worst ratio of error and `analytic` bound."""
-    print(f"edge: the worst error in units of the analytic bound, by the ratio of the least and the most, at {NODES} nodes")
+    print(f"edge: worst error by analytic bound, for ratios of the least and the most on the piece, at {NODES} nodes")
     random = np.random.default_rng(3)
     for nearest in (1e-4, 0.01, 0.02, 0.04, 0.08, 0.16):
         gap = nearest / (1 - nearest)
-        functions = [
-            lambda u, g=gap, a=random.choice(POWERS), b=random.uniform(-4, 4): (u + g) ** a * np.exp(b * u)
-            for _ in range(DRAWN)
-        ]
+        functions = [power_times_growth(gap, random.choice(POWERS), random.uniform(-4, 4)) for _ in range(DRAWN)]
         exact = np.array(list(map(truth, functions)))
         worst = []
         for n in NODES:
