@@ -91,7 +91,7 @@ def show_stats(estimates: Sequence[Estimate], console: Console) -> None:
     """What evaluations cost, all together, for the person."""
     seconds = sum(estimate.seconds for estimate in estimates)
     compiling = sum(estimate.compile_seconds for estimate in estimates)
-    console.complain(f"time: {seconds * 1e3:.2f} ms, {compiling * 1e3:.2f} ms of it making kernels")
+    console.complain(f"time: {seconds * 1e3:.2f} ms, {compiling * 1e3:.2f} ms of it for plans and kernels, made once")
     found = totals(estimates)
     surfaces = found.pop("surfaces")
     for name, total in found.items():

@@ -17,6 +17,7 @@ import numpy as np
 from potto.core.terms import Term
 from potto.kernels.cells import Array
 
+LONGEST = 120  # characters of a surface that is shown whole
 _wanted: ContextVar[bool] = ContextVar("potto_counting", default=False)
 
 
@@ -128,7 +129,7 @@ class Costs:
         """As a part of an estimate's `stats`."""
         from potto.core.printer import format_term
 
-        surfaces = [{"surface": f"{format_term(s)} = 0", "kept": seen.kept, "why": seen.why}
+        surfaces = [{"surface": f"{_short(format_term(s))} = 0", "kept": seen.kept, "why": seen.why}
                     for s, seen in self.surfaces.items()]  # fmt: skip
         return {
             "interior evaluations": self.interior,
@@ -139,3 +140,10 @@ class Costs:
             "members that no surface crosses": self.whole,
             "surfaces": surfaces,
         }
+
+
+def _short(formula: str) -> str:
+    """A formula that fits a line, by its beginning and its end."""
+    if len(formula) <= LONGEST:
+        return formula
+    return f"{formula[: LONGEST // 2]} … {formula[-LONGEST // 3 :]} ({len(formula):,} characters)"

@@ -10,7 +10,6 @@ function, and editing it back compiles nothing.
 from __future__ import annotations
 
 import threading
-import time
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -42,6 +41,7 @@ from potto.core.terms import (
 from potto.kernels import support
 from potto.kernels.cells import Cell, Pattern, Trace, Value, scalar_parts
 from potto.kernels.emit import Lines, Scalar
+from potto.kernels.making import counts, making
 
 MOST_KERNELS = 4096
 
@@ -77,16 +77,8 @@ class Kernel:
     plain: bool = False
 
 
-@dataclass(slots=True)
-class CacheCounts:
-    compiled: int = 0
-    reused: int = 0
-    seconds: float = 0.0
-
-
 _cache: OrderedDict[Any, Kernel] = OrderedDict()
 _cache_lock = threading.Lock()
-counts = CacheCounts()
 
 
 @lru_cache(maxsize=16384)
@@ -104,12 +96,11 @@ def kernel(lam: Lam, patterns: tuple[Pattern, ...], directions: int, rounding: b
             _cache.move_to_end(key)
             counts.reused += 1
             return found
-    start = time.perf_counter()
-    made = _Compiler(lam, patterns, directions, rounding, rt).compile()
+    with making:
+        made = _Compiler(lam, patterns, directions, rounding, rt).compile()
     with _cache_lock:
         _cache[key] = made
         counts.compiled += 1
-        counts.seconds += time.perf_counter() - start
         if len(_cache) > MOST_KERNELS:
             _cache.popitem(last=False)
     return made

@@ -18,9 +18,9 @@ from potto.core.printer import format_term
 from potto.core.terms import Integral, Term
 from potto.diagnostics import PottoError
 from potto.integrate.events import INFINITE, ROUGH, Shortfall
-from potto.kernels import compile as compiling
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Value
+from potto.kernels.making import counts
 from potto.projects.settings import DEFAULTS, Settings
 from potto.runtime.answers.convergence import CANCELS, Shortfalls, converged_members, members_of, merged, missed
 from potto.runtime.answers.estimate import Estimate, OneSided
@@ -105,16 +105,16 @@ class Clock:
 
     def __enter__(self) -> Clock:
         self.start = time.perf_counter()
-        self.compiled = compiling.counts.compiled
-        self.reused = compiling.counts.reused
-        self.spent = compiling.counts.seconds
+        self.compiled = counts.compiled
+        self.reused = counts.reused
+        self.spent = counts.seconds
         return self
 
     def __exit__(self, *exc: object) -> None:
         self.seconds = time.perf_counter() - self.start
-        self.compiled = compiling.counts.compiled - self.compiled
-        self.reused = compiling.counts.reused - self.reused
-        self.spent = compiling.counts.seconds - self.spent
+        self.compiled = counts.compiled - self.compiled
+        self.reused = counts.reused - self.reused
+        self.spent = counts.seconds - self.spent
 
 
 def report(value: Value, machine: Machine, clock: Clock) -> Estimate:

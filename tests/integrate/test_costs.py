@@ -110,3 +110,32 @@ def test_pixels_that_no_surface_crosses_are_told_apart():
     x, y = np.meshgrid(np.arange(128) / 128, np.arange(128) / 128)
     whole = costs(lambda: m.p(x, y))["members that no surface crosses"]
     assert 128 * 128 - 3 * 128 <= whole <= 128 * 128 - 127
+
+
+def test_what_is_made_once_is_told_apart() -> None:
+    """Of a first call most goes into plans, proofs and kernels; a second one makes nothing."""
+    text = "def f(t, a) integral ([0, 1], [0, 1]) [1/(1 + (x + a*y)^2) > t]*[x*x + y*y < a]*sin(x*y + 0.123) d(x, y)"
+    f = potto.deriv(potto.compile(text).f)
+    first, second = (f((0.7, 1.0), (0.62, 0.0)) for _ in range(2))
+    assert first.compile_seconds > 0.5 * first.seconds
+    assert second.compile_seconds < 0.1 * first.compile_seconds
+
+
+def test_a_surface_is_named_in_a_line() -> None:
+    long = " + ".join(f"sin({k}*x + 0.{k}*y)/{k}" for k in range(1, 40))
+    with potto.counting():
+        answer = potto.compile(f"def f(t) integral ([0, 1], [0, 1]) [{long} < t] d(x, y)").f(0.3)
+    (surface,) = answer.stats["surfaces"]
+    assert len(surface["surface"]) < 150 and "characters" in surface["surface"]
+
+
+def test_members_that_are_cut_alike_tell_what_they_met() -> None:
+    """A line that moves, one that no member meets, and one that nothing moves."""
+    text = "def f(c, s) integral ([0, 1], [0, 1]) [x + y + c >= 0]*[x < s]*[y < 2*x + 5]*exp(x) d(x, y)"
+    with potto.counting():
+        stats = potto.deriv(potto.compile(text).f)((np.linspace(-0.8, -0.2, 90), 1.0), (0.5, 0.0)).stats
+    told = {entry["surface"]: entry["why"] for entry in stats["surfaces"]}
+    assert sum(why.startswith("it moves") for why in told.values()) == 1
+    assert sum(why.startswith("nothing that is differentiated") for why in told.values()) == 1
+    # where the line leaves the square beyond x = s there is one lit cell, else a second below its end
+    assert stats["cells"] == 45 + 2 * 45 and stats["boundary evaluations"] == 0

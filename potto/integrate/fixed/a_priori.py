@@ -39,6 +39,7 @@ from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.proved_orders import Cell as Stretch
 from potto.integrate.rules.proved_orders import Region, proved
 from potto.kernels.cells import Cell, Value
+from potto.kernels.making import making
 
 MOST_VARIABLES, MOST_CUTS, MOST_CELLS, MOST_NODES, MOST_TERMS = 3, 8, 24, 60_000, 300
 # The truncation error that is proved for the value, as a part of the accuracy that is asked for; nobody gains by less
@@ -249,7 +250,8 @@ def _region(
             if len(plan.regions) >= MOST_REGIONS:
                 plan.regions.clear()
             middle, radius = {n: m for n, m, _ in places}, {n: r for n, _, r in places}
-            region = proved(plan.variables, plan.items, cells, middle, radius, MARGIN * rtol)
+            with making:
+                region = proved(plan.variables, plan.items, cells, middle, radius, MARGIN * rtol)
             plan.regions[key] = region
         if region is not None:
             return region  # type: ignore[return-value]

@@ -18,7 +18,7 @@ from potto.core.terms import Const, Term, children
 from potto.integrate.fixed.a_priori import CLEAR, Path, Straight
 from potto.integrate.fixed.moving_sums import evaluated
 from potto.integrate.pieces import Evaluator
-from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays
+from potto.kernels.cells import Array, Bools, Cell, Ints, Number, Value, map_arrays
 
 MOST_SHAPES = 64
 
@@ -50,6 +50,10 @@ class _Search:
             return
         values = evaluated(self.plan.frames[i], self.machine, _for(self.plan.frames[i].params, env))
         places, off = _rows(values, members.size)
+        if self.machine.costs is not None:
+            for surface, rows in self.plan.jumps[i]:
+                roots = [(values[row].v, values[row].t) for row in rows]
+                self.machine.costs.saw(surface, roots, places[0], places[1], self.machine.directions > 0)
         codes, fine = in_order(places, off)
         self.plain[members[~fine]] = False
         for code in np.unique(codes[fine]):
@@ -82,8 +86,10 @@ class _Search:
 
 def topologies(plan: Straight, machine: Evaluator, env: dict[str, Value], batch: int) -> tuple[Bools, list[Uniform]]:
     """Which members are plain, and all cells of these, by shape."""
-    search = _Search(plan, machine.with_directions(0).tracking(), np.ones(batch, dtype=bool), [])
-    here = {n: _spread(env[n], batch) for n in plan.names}
+    moving = machine.costs is not None  # then it is told how surfaces move
+    tracking = (machine if moving else machine.with_directions(0)).tracking()
+    search = _Search(plan, tracking, np.ones(batch, dtype=bool), [])
+    here = {n: _spread(env[n], batch, moving) for n in plan.names}
     search.over(0, here, np.arange(batch), ())
     if len(search.cells) > MOST_SHAPES:
         return np.zeros(batch, dtype=bool), []
@@ -91,10 +97,15 @@ def topologies(plan: Straight, machine: Evaluator, env: dict[str, Value], batch:
     return search.plain, [cell for cell in kept if cell.members.size]
 
 
-def _spread(value: Value, batch: int) -> Value:
-    """A number of every member, standing still, with its error if it has one."""
+def _spread(value: Value, batch: int, moving: bool) -> Value:
+    """A number of every member, with its error if it has one."""
     assert isinstance(value, Cell)
-    return Cell(np.broadcast_to(value.v, (batch,)), None if value.e is None else np.broadcast_to(value.e, (batch,)))
+
+    def every(part: Number | None) -> Array | None:
+        return None if part is None else np.broadcast_to(part, (batch,))
+
+    v, e = np.broadcast_to(value.v, (batch,)), every(value.e)
+    return Cell(v, e, tuple(map(every, value.t)), tuple(map(every, value.et))) if moving else Cell(v, e)
 
 
 def _for(names: tuple[str, ...], env: dict[str, Value]) -> dict[str, Value]:

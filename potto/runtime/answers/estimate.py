@@ -72,7 +72,8 @@ class Estimate:
     converged: whether the accuracy asked for was reached, by all members of a batch; `reasons` says why not.
     member_converged: the same of each member, an array of the batch's shape; None for a single answer.
     shortfalls: why not, with what helps, and of which members of a batch, as a mask of its shape; True for all.
-    evals: evaluations of integrands. seconds, compile_seconds: time in all, and the part spent on making kernels.
+    evals: evaluations of integrands. seconds, compile_seconds: time in all, and the part that went into what is
+        made once: plans, proofs, kernels.
     notes: what a careful reader should know (one-sided derivatives).
     """
 

@@ -21,6 +21,7 @@ from potto.integrate.events import BUDGET_SPENT
 from potto.integrate.pieces import Sums, still
 from potto.kernels import errors
 from potto.kernels.cells import Array, Cell, Ints, Number, Value, all_arrays, map_arrays, pad
+from potto.kernels.making import making
 from potto.runtime.answers.convergence import allowance, widest
 from potto.runtime.evaluation.directional import stepped
 from potto.runtime.evaluation.machine import Machine
@@ -40,14 +41,16 @@ def integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
     known = linker.placed.get(key)
     if known is None:
         shapes = dict(zip(names, key[1]))
-        known = linker.placed[key] = placed(term, linker.reach, shapes.get, machine.directions > 0)
+        with making:
+            known = linker.placed[key] = placed(term, linker.reach, shapes.get, machine.directions > 0)
     if not isinstance(known, Integral):
         return stepped(machine, known, {n: env[n] for n in known.free})
     term = known
     if machine.frozen:
         term, stopped = held(term)
         env = {**env, **{new: pad(still(env[old]), machine.directions) for old, new in stopped}}
-    ready = prepared(term, linker.reach)
+    with making:
+        ready = prepared(term, linker.reach)
     if ready is not term:
         return machine.evaluate(function_of(ready), {n: env[n] for n in ready.free}, None)
     return integrate(machine, term, env)

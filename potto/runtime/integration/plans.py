@@ -22,6 +22,7 @@ from potto.integrate.elimination.recursion import Eliminated, eliminated
 from potto.integrate.pieces import still
 from potto.integrate.plan import Plan, make
 from potto.kernels.cells import Array, Bools, Cell, Value, map_arrays
+from potto.kernels.making import making
 from potto.runtime.evaluation.functions import Closure, Derivative
 from potto.runtime.evaluation.machine import Machine
 
@@ -80,13 +81,14 @@ def plan_for(machine: Machine, term: Integral, linked: Linked) -> Plan:
     for plan in candidates:
         if all(decide(machine, t, linked) == value for t, value in plan.decisions) and _holds(plan, machine, linked):
             return plan
-    plan = make(
-        term,
-        lambda head: linked.functions.get(head.name) if isinstance(head, Var) else machine.linker.function(head),
-        lambda plain: decide(machine, plain, linked),
-        lambda head: _plainly(head, linked) if isinstance(head, Var) else machine.linker.function(head),
-        _Numbers(machine, linked),
-    )
+    with making:
+        plan = make(
+            term,
+            lambda head: linked.functions.get(head.name) if isinstance(head, Var) else machine.linker.function(head),
+            lambda plain: decide(machine, plain, linked),
+            lambda head: _plainly(head, linked) if isinstance(head, Var) else machine.linker.function(head),
+            _Numbers(machine, linked),
+        )
     with _lock:
         _plans.setdefault(key, []).append(plan)
         _plans.move_to_end(key)
@@ -149,9 +151,10 @@ def eliminated_for(machine: Machine, term: Integral, linked: Linked) -> Eliminat
     with _lock:
         if key in _eliminated:
             return _eliminated[key]
-    found = eliminated(
-        term, lambda head: _plainly(head, linked) if isinstance(head, Var) else machine.linker.function(head)
-    )
+    with making:
+        found = eliminated(
+            term, lambda head: _plainly(head, linked) if isinstance(head, Var) else machine.linker.function(head)
+        )
     with _lock:
         _eliminated[key] = found
         if len(_eliminated) > MOST_PLANS:

@@ -10,7 +10,7 @@ from typing import Any
 from potto.checking.check import absolute
 from potto.elaborate import elaborate_expression
 from potto.evaluating.world import EXPRESSION
-from potto.kernels import compile as compiling
+from potto.kernels.making import counts
 from potto.projects.settings import Settings
 from potto.reports.render import Located, ProgramError
 from potto.runtime.answers.estimate import Estimate
@@ -102,11 +102,11 @@ def show_time(session: Conversation, text: str) -> Iterator[Part]:
     program = session.world.program
     program.linker.inexact(term)  # follows every definition that the term refers to
     _lap(phases, "link", start)
-    made = compiling.counts.compiled
+    made = counts.compiled
     estimate = session.evaluate(text, session.settings).estimate
     phases["compile"] += estimate.compile_seconds
     phases["evaluate"] = max(estimate.seconds - estimate.compile_seconds, 0.0)
-    kernels = compiling.counts.compiled - made
+    kernels = counts.compiled - made
     total = sum(phases.values())
     rows = [f"{name:<9} {format_seconds(spent):>9}  {spent / total:4.0%}" for name, spent in phases.items()]
     rows += [f"{'total':<9} {format_seconds(total):>9}", f"{kernels} kernels made, {estimate.evals:,} evaluations"]
