@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mpmath import mp
 
 import potto
 
@@ -136,3 +137,23 @@ def test_an_odd_integrand_over_an_even_domain_is_0() -> None:
     f = potto.compile("def f(t)\n    integral ([-1, 1], [-1, 1]) [abs(x) < 1/2]*[abs(y) < 1/4]*x*y*t d(x, y)").f
     answer = f(1.0)
     assert abs(answer.value) <= answer.error <= 1e-14 and answer.converged
+
+
+@pytest.mark.parametrize("ulps", [-10, -2, -1, 0, 1, 2, 10])
+@pytest.mark.parametrize("scale", [1.0, 3.0])
+def test_a_fold_hit_to_the_last_place(ulps: int, scale: float) -> None:
+    """x^3 - x < t at its local maximum, which no double is: below it two roots move infinitely fast, above is one.
+
+    The value is to either side of it 2 + 2/sqrt(3), to sqrt(rounding); the slope of the root that stays is 1/3.
+    """
+    fold = scale * 2 / (3 * math.sqrt(3))
+    t = fold + ulps * math.ulp(fold)
+    text = f"def f(t) integral [-2, 2] [{scale!r}*(x^3 - x) < t] d(x)"
+    answer = potto.deriv(potto.compile(text).f)((t, 1.0))
+    with mp.workdps(40):
+        below = max(float(mp.mpf(2) / (3 * mp.sqrt(3)) - mp.mpf(t) / scale), 0.0)
+    gap = 2 * math.sqrt(below / math.sqrt(3))  # that x^3 - x leaves open around its maximum
+    assert abs(answer.value - (2 + 2 / math.sqrt(3) - gap)) <= answer.error <= 1e-6
+    assert not answer.converged
+    (note,) = answer.notes
+    assert float(note.backward) == math.inf and abs(float(note.forward) - 1 / (3 * scale)) <= 1e-9

@@ -10,6 +10,7 @@ from __future__ import annotations
 import random
 from fractions import Fraction
 
+import pytest
 from exact_answers import held_against
 from exact_polygons import Line, Scene, Truth
 from how_many import examples, the_same
@@ -106,3 +107,34 @@ def test_half_planes_in_awkward_places(number: int) -> None:
 def test_a_line_all_but_parallel_to_a_bound_that_moves_onto_it() -> None:
     """6e-17 off parallel, and a unit in the last place away: there are other derivatives to both sides of that."""
     check(20056)
+
+
+@pytest.mark.parametrize("number", [300453, 301124, 305117, 305131, 305134, 305767, 305821, 307081])
+def test_scenes_that_were_wrong(number: int) -> None:
+    """Lines that coincide and run along an axis up to rounding; places that rounding moves further than they matter."""
+    check(number)
+
+
+@pytest.mark.parametrize("spelling", ["bracket", "nested", "swapped", "if"])
+@pytest.mark.parametrize("slope", [0.0, 1e-18, 6e-17, -6e-17, 3e-16, 1e-15, 1e-13])
+@pytest.mark.parametrize("condition", ["{0} and not {1}", "{0} or not {1}", "not {0} and {1}"])
+def test_between_two_lines_that_coincide(slope: float, spelling: str, condition: str) -> None:
+    """What opens between them is seen from neither side, where no double lies between the ends of either."""
+    truth = {
+        "{0} and not {1}": lambda s: s[0] and not s[1],
+        "{0} or not {1}": lambda s: s[0] or not s[1],
+        "not {0} and {1}": lambda s: not s[0] and s[1],
+    }[condition]
+    lines = (Line(0.25, slope, 0.125, 1.0), Line(0.5, 2 * slope, 0.25, 0.0))
+    s = Scene((-1.0, 0.0, 1.0, 0.0, -1.0, 1.0), lines, truth, (2.0, 1.0, 0.0))
+    text = program(s, condition, spelling)
+    held_against(text, 0.0, s.value(Fraction(0)), s.rate, False)
+
+
+@pytest.mark.parametrize("t", [-1e-8, 1e-8, 0.0, 3e-9, -2.5e-9, 1e-7])
+@pytest.mark.parametrize("slope", [1e-8, 3e-9, 1e-7, -1e-8, 1e-6])
+def test_a_steep_line_through_a_corner(slope: float, t: float) -> None:
+    """Sections that sweep the range while the parameter goes on by a rounding: its bar tells."""
+    lines = (Line(2.0, slope, 2.00000001, 1.0), Line(slope, 0.25, 0.125000005, 1.0))
+    s = Scene((-1.0, 0.0, 1.0, 0.0, -1.0, 1.0), lines, lambda k: k[0] or k[1], (1.0, 0.0, 0.0))
+    held_against(program(s, "{0} or {1}", "nested"), t, s.value(Fraction(t)), s.rate, True)

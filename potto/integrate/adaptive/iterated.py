@@ -84,7 +84,8 @@ class Iteration:
         level = self.plan.levels[number]
         if self.plan.over is not None and number + 1 == len(self.plan.levels):
             return over_roots(self.plan, self.rows(level, env, batch, machine), env, batch, sides, machine)
-        cuts, collapsed = self.cut(level, env, batch, machine)
+        kin = None if not number else np.zeros(batch, dtype=np.int64) if root is None else root
+        cuts, collapsed = self.cut(level, env, batch, machine, kin)
         seg = cuts.segments
         if self.extent is not None:
             self.extent.saw_range(number, seg, batch, root)
@@ -146,9 +147,9 @@ class Iteration:
         return (rest if keep is None else np.intersect1d(keep, rest)), lost
 
     def cut(
-        self, level: LevelPlan, env: dict[str, Value], batch: int, machine: Evaluator
+        self, level: LevelPlan, env: dict[str, Value], batch: int, machine: Evaluator, kin: Ints | None
     ) -> tuple[Cuts, list[Collapsed]]:
-        """Where the members are cut, and which of them have a range of length zero."""
+        """Where the members are cut, and which of them have a range of length zero. kin: as `segments` takes it."""
         lo, hi, rows, lost = self.rows(level, env, batch, machine)
         if self.face is not None:  # its sections are nowhere, or anywhere
             rows = [row for row in rows if row.cut < 0 or level.level.cuts[row.cut].surface is not self.face.surface]
@@ -161,7 +162,7 @@ class Iteration:
         for row in rows if self.still else ():
             if row.cut >= 0 and level.level.cuts[row.cut].surface in self.still:
                 row.t = ()
-        cuts = segments(level, lo, hi, rows, batch, machine.directions, level is not self.plan.levels[0])
+        cuts = segments(level, lo, hi, rows, batch, machine.directions, kin)
         if self.resting(level, lo, hi, cuts.segments):
             cuts = at_rest(cuts)
         cuts.lost = lost

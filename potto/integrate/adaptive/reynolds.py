@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from potto.integrate.panels.panel_batch import PanelBatch
+from potto.integrate.panels.roundoff import hidden_steps
 from potto.integrate.pieces import Ends, Pieces, Sums
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array
@@ -47,11 +48,20 @@ def totals(work: PanelBatch, p: Pieces, ends: Ends | None) -> Totals:
         value, bound = value + swept, bound + rounding
     if steps is not None:
         value, bound = steps.added((value, bound), ends is not None)
-    if work.misplaced is not None:
-        rows = work.misplaced.reshape(-1, work.seg.a.size)
-        bound = bound + np.stack([np.bincount(work.seg.owner, row, work.batch) for row in rows]).reshape(bound.shape)
+    for lost in (work.misplaced, _hidden(work, ends)):
+        if lost is not None:
+            rows = lost.reshape(-1, work.seg.a.size)
+            each = np.stack([np.bincount(work.seg.owner, row, work.batch) for row in rows])
+            bound = bound + each.reshape(bound.shape)
     apart = np.abs(moving[0] - value)
     return Totals(integral, error, size, moving, (value, bound), np.where(np.isfinite(apart), apart, 0.0))
+
+
+def _hidden(work: PanelBatch, ends: Ends | None) -> Array | None:
+    """What the fixed form leaves out where the integrand is taken to be continuous, by segment: (m, k, S)."""
+    if ends is not None or work.at_ends is None or not work.seg.blur.any():
+        return None
+    return hidden_steps(work.at_ends, work.seg, work.steps is None)
 
 
 def added(work: PanelBatch, x: Array, p: Pieces, count: int) -> Array:
@@ -79,6 +89,11 @@ def boundary(work: PanelBatch, ends: Ends) -> tuple[Array, Array]:
     speeds = np.concatenate((seg.tb, -seg.ta), axis=1)
     terms = np.concatenate((ends.high, ends.low), axis=1)[:, None, :] * speeds
     rounded = np.concatenate((ends.high_error, ends.low_error), axis=1)[:, None, :] * np.abs(speeds)
+    if work.at_ends is not None:
+        low, high = work.just_inside()
+        steep, low_off, high_off = work.at_ends[1], seg.ea + (low - seg.a), seg.eb + (seg.b - high)
+        slips = np.concatenate((steep[:, 1] * high_off, steep[:, 0] * low_off), axis=1)
+        rounded += np.where(np.isfinite(slips), slips, 0.0)[:, None, :] * np.abs(speeds)
     nothing = (speeds == 0) | np.isinf(np.concatenate((seg.b, seg.a)))
     if nothing.any():
         terms, rounded = np.where(nothing, 0.0, terms), np.where(nothing, 0.0, rounded)

@@ -92,8 +92,14 @@ def _ends(lo: Cell, hi: Cell, batch: int, directions: int) -> tuple[_End, _End, 
     return (low, tl, el), (high, th, eh), sign
 
 
-def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, directions: int, nested: bool) -> Cuts:
-    """Cut [lo, hi] at the rows; reversed bounds are turned round and counted negative."""
+def segments(
+    plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, directions: int, kin: Ints | None
+) -> Cuts:
+    """Cut [lo, hi] at the rows; reversed bounds are turned round and counted negative.
+
+    kin: of a batch of nodes of variables further out, whose they are; None where there is no variable further out.
+    """
+    nested = kin is not None
     (low, tl, el), (high, th, eh), sign = _ends(lo, hi, batch, directions)
     count = len(rows)
     x = np.empty((count + 2, batch))
@@ -139,7 +145,7 @@ def segments(plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, d
     cuts = _pieces(x, e, t, rank, blur, sign, beyond, edges)
     cuts.conflict, cuts.brushes = conflict, brushes
     if merged or edges or not nested or any(row.hides is not None for row in rows):
-        cuts.slivers = slivers(plan, rows, low, high, ((tl, el), (th, eh)), directions, batch)
+        cuts.slivers = slivers(plan, rows, low, high, ((tl, el), (th, eh)), directions, batch, kin)
     if directions:
         cuts.folds = folds_at(plan, rows, low, high, directions, batch)
     if conflict:

@@ -74,7 +74,7 @@ class Sliver:
 
     `owner` (m,), place (m,), width (m,): how far apart they may be all the same; speed (m,): that of the fastest, over
     the range of the variable; upper: whether seen from below. passes: (k, m) how fast a jump that rounding puts beside
-    a bound goes across it, so that it may be on either side: 0 where it is on the bound.
+    a bound goes across it, so that it may be on either side: 0 where it is exactly on the bound.
     """
 
     cuts: tuple[int, ...]
@@ -137,8 +137,10 @@ def meetings(plan: LevelPlan, rows: list[Row], inside: Bools, batch: int, direct
 
 
 def slivers(
-    plan: LevelPlan, rows: list[Row], low: Array, high: Array, ends: tuple[Any, Any], directions: int, batch: int
-) -> list[Sliver]:
+    plan: LevelPlan, rows: list[Row], low: Array, high: Array, ends: tuple[Any, Any], directions: int, batch: int,
+    kin: Ints | None,
+) -> list[Sliver]:  # fmt: skip
+    """Jumps that rounding does not tell apart. kin: of nodes of variables further out, whose they are."""
     jumps = [row for row in rows if row.cut >= 0 and plan.level.cuts[row.cut].decides]
     if not jumps:
         return []
@@ -151,8 +153,13 @@ def slivers(
     def put(of: tuple[int, ...], at: Array, gap: Array, width: Array, upper: bool, passes: Any = 0.0) -> None:
         owner = np.nonzero((gap <= width) & (width > 0) & (low < high))[0]
         if owner.size:
-            every = np.broadcast_to(np.where(gap > 0, passes, 0.0), (directions, batch))[:, owner]
+            off_it = gap > 0
+            if kin is not None:  # on a bound at some nodes, a few doubles beside it at others: on it by an accident
+                off_it = off_it | np.isin(kin, kin[off_it & (gap <= SEARCHED * EPS * np.abs(at))])
+            every = np.broadcast_to(np.where(off_it, passes, 0.0), (directions, batch))[:, owner]
             moves = np.abs([tangents(jumps[i].t, batch, directions) for i in of]).max(axis=(0, 1), initial=0.0)
+            if of.count(of[0]) > 1:  # roots that merge move infinitely fast
+                moves = np.where(moves > 0, np.inf, 0.0)
             fast = (moves / (high - low))[owner]
             out.append(Sliver(tuple(jumps[i].cut for i in of), owner, at[owner], width[owner], fast, upper, every))
 
@@ -187,7 +194,8 @@ def _close(x: Array, off: Array) -> list[tuple[int, int]]:
 
 
 def folds_at(plan: LevelPlan, rows: list[Row], low: Array, high: Array, directions: int, batch: int) -> list[Fold]:
-    """Where roots of one surface are at one place, or one on which the integrand jumps moves infinitely fast."""
+    """Where roots of one surface are at one place, to rounding, or one on which the integrand jumps moves infinitely
+    fast."""
     out: list[Fold] = []
     before: dict[int, list[Any]] = {}
     for row in rows:
@@ -199,6 +207,8 @@ def folds_at(plan: LevelPlan, rows: list[Row], low: Array, high: Array, directio
         folded: Any = np.zeros(batch, dtype=bool)
         if plan.level.cuts[row.cut].decides and any(not np.isfinite(t).all() for t in row.t if t is not None):
             folded = ~np.isfinite(tangents(row.t, batch, directions)).all(axis=0)
+        if row.hides is not None and plan.level.cuts[row.cut].decides:
+            folded = folded | (tangents(row.t, batch, directions) != 0).any(axis=0)
         for other in others[:-1]:
             folded = folded | (x == other)
         owner = np.nonzero(folded & (x >= low) & (x <= high))[0]

@@ -21,21 +21,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from potto.core.terms import Term
-from potto.integrate.decomposition.cuts import Cuts
+from potto.integrate.decomposition.cuts import NARROW, Cuts
 from potto.integrate.decomposition.meetings import Edge, Meeting, as_array
 from potto.integrate.events import Fold, TwoSided, on_a_bound
 from potto.integrate.levels import LevelPlan
 from potto.integrate.panels.iterated import Iterated
 from potto.integrate.pieces import Evaluator, Sums, gather, mostly, still, take
 from potto.integrate.rules.gauss import EPS
-from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value
+from potto.integrate.rules.substitution import Segments
+from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value, pad
 
 MOST_AT_ONE_PLACE = 4
 SURE = 1.001  # what rounding may add to a bound
-# Beside a place, in its own size: where surfaces that are 0 at it, to so many times their rounding, have a side. And
-# the part of how they change up to there that the rounding of the place itself comes to.
+# Beside a place, in its own size: where surfaces that are 0 at it, to so many times their rounding, have a side.
 BESIDE, CLEAR = 1e-7, 4.0
-MISPLACED = CLEAR * EPS / BESIDE
 
 
 @dataclass(frozen=True)
@@ -61,13 +60,17 @@ class Scene:
         """Which of a batch count: not single nodes of the variables further out."""
         return np.isin(owner, mostly(owner, self.root, self.batch)) if self.number else np.ones(owner.size, dtype=bool)
 
-    def flips(self, cuts: Sequence[int], owner: Ints, x: Array, above: bool) -> tuple[Array, Array]:
+    def flips(
+        self, cuts: Sequence[int], owner: Ints, x: Array, above: bool, room: Array | None = None
+    ) -> tuple[Array, Array]:
         """F just beside x with every subset of some cuts' surfaces flipped: (2^n, m, B); bit i stands for cut i.
 
-        And the errors of that. Two sections of one surface flip it twice, one at which it only touches 0 not at all.
+        And the errors of that, nan where it depends on the side of another surface that rounding hides. Two sections of
+        one surface flip it twice, one at which it only touches 0 not at all. room: (B,) how far it is to the next cut.
         """
-        here, inner = around(self.level, owner, x, above, self.env, self.sides, self.machine)
-        _, beyond = around(self.level, owner, x, not above, self.env, self.sides, self.machine)
+        hidden: dict[int, Bools] = {}
+        here, inner = around(self.level, owner, x, above, self.env, self.sides, self.machine, room, hidden)
+        _, beyond = around(self.level, owner, x, not above, self.env, self.sides, self.machine, room)
         groups = [group_of(self.level, cut) for cut in cuts]
         frozen = self.machine.with_directions(0)
         found = []
@@ -80,7 +83,12 @@ class Scene:
                     if flipped.count(g) % 2
                 }
                 both = {**inner, **way}
-                found.append(self.parent.inside(self.number, here, owner.size, both, frozen, self.below(owner)))
+                f, e = self.parent.inside(self.number, here, owner.size, both, frozen, self.below(owner))
+                for g in hidden.keys() - set(groups):
+                    turned = {**both, g: np.asarray(both[g]) ^ hidden[g]}
+                    other, _ = self.parent.inside(self.number, here, owner.size, turned, frozen, self.below(owner))
+                    e = np.where(other == f, e, np.nan)
+                found.append((f, e))
         return np.stack([f for f, _ in found]), np.stack([e for _, e in found])
 
     def as_it_falls(self, owner: Ints, x: Array) -> Array:
@@ -105,11 +113,11 @@ def count_places(scene: Scene, cuts: Cuts, sums: Sums) -> None:
     for meeting in cuts.meetings:
         named = TwoSided(level.variable, scene.surface(meeting.cuts[0]), scene.surface(meeting.cuts[1]))
         met = meeting.pick(scene.counted(meeting.owner))
-        places.append((met.owner, lambda m=met: at_one_place(scene, m), True, named))  # type: ignore[misc]
+        places.append((met.owner, lambda m=met: at_one_place(scene, cuts.segments, m), True, named))  # type: ignore[misc]
     for group in _on_one_bound(cuts.edges, cuts.sign.size):
         named = TwoSided(level.variable, scene.surface(group[0].cut))
         on = [edge.pick(scene.counted(edge.owner)) for edge in group]
-        places.append((on[0].owner, lambda g=on: at_a_bound(scene, g), False, named))  # type: ignore[misc]
+        places.append((on[0].owner, lambda g=on: at_a_bound(scene, cuts.segments, g), False, named))  # type: ignore[misc]
     for owner, changes, counts, named in places:
         if not owner.size:
             continue
@@ -135,7 +143,8 @@ def count_slivers(scene: Scene, cuts: Cuts, sums: Sums) -> None:
         sliver = found.pick(scene.counted(found.owner))
         if not sliver.owner.size:
             continue
-        f, _ = scene.flips(sliver.cuts, sliver.owner, sliver.x, not sliver.upper)
+        far = room(cuts.segments, sliver.owner, sliver.x)
+        f, _ = scene.flips(sliver.cuts, sliver.owner, sliver.x, not sliver.upper, far)
         apart = np.abs(f - f[0]).max(axis=0)
         lost = SURE * apart * sliver.width
         lost = np.where(np.isfinite(lost), lost, 0.0)
@@ -175,13 +184,14 @@ def _not_known(scene: Scene, sums: Sums, owner: Ints, unknown: Bools, named: Two
     scene.machine.note(on_a_bound(named), scene.below(owner[unknown.any(axis=(0, 1))]))
 
 
-def at_one_place(scene: Scene, meeting: Meeting) -> tuple[Array, Array, Array]:
+def at_one_place(scene: Scene, seg: Segments, meeting: Meeting) -> tuple[Array, Array, Array]:
     """What the forward and the backward derivative have beyond that of the merged cut, (m, k, B); and their size."""
     v, count = meeting.speeds, len(meeting.cuts)
     if count > MOST_AT_ONE_PLACE:
         nothing = np.full((1, *v.shape[1:]), np.nan)
         return nothing, nothing, np.zeros_like(nothing)
-    f, _ = scene.flips(meeting.cuts, meeting.owner, meeting.x, False)
+    f, e = scene.flips(meeting.cuts, meeting.owner, meeting.x, False, room(seg, meeting.owner, meeting.x))
+    f = np.where(np.isnan(e), np.nan, f)
     merged = (f[0] - f[-1])[:, None] * meeting.merged_t
     found = []
     for sign in (1, -1):
@@ -194,14 +204,16 @@ def at_one_place(scene: Scene, meeting: Meeting) -> tuple[Array, Array, Array]:
     return found[0], found[1], scale
 
 
-def at_a_bound(scene: Scene, edges: Sequence[Edge]) -> tuple[Array, Array, Array]:
+def at_a_bound(scene: Scene, seg: Segments, edges: Sequence[Edge]) -> tuple[Array, Array, Array]:
     """What the forward and the backward derivative have beyond that without these surfaces, (m, k, B); their size."""
     first = edges[0]
     inward = np.stack([e.bound_t - e.root_t if e.upper else e.root_t - e.bound_t for e in edges])
     if len(edges) > MOST_AT_ONE_PLACE:
         nothing = np.full((1, *inward.shape[1:]), np.nan)
         return nothing, nothing, np.zeros_like(nothing)
-    f, _ = scene.flips([e.cut for e in edges], first.owner, first.x, not first.upper)
+    far = room(seg, first.owner, first.x)
+    f, e = scene.flips([edge.cut for edge in edges], first.owner, first.x, not first.upper, far)
+    f = np.where(np.isnan(e), np.nan, f)
     found = []
     for sign in (1, -1):
         speed = np.maximum(sign * inward, 0.0)
@@ -213,6 +225,18 @@ def at_a_bound(scene: Scene, edges: Sequence[Edge]) -> tuple[Array, Array, Array
         ]
         found.append(sign * np.sum(gained, axis=0))
     return found[0], found[1], np.abs(f[0])[:, None] + np.abs(f[-1])[:, None]
+
+
+def room(seg: Segments, owner: Ints, x: Array) -> Array:
+    """How far it is from places of some members to the next cut that rounding tells from them, (B,)."""
+    place, found = np.full((2, max(seg.owner.max(initial=0), owner.max(initial=0)) + 1), np.inf)
+    place[owner] = x
+    at = place[seg.owner]
+    for end in (seg.a, seg.b):
+        with np.errstate(invalid="ignore"):
+            gap = np.abs(end - at)
+            np.minimum.at(found, seg.owner, np.where(gap > NARROW * np.abs(at), gap, np.inf))
+    return np.asarray(found[owner])
 
 
 def picked(f: Array, bits: Ints) -> Array:
@@ -248,19 +272,28 @@ def group_of(level: LevelPlan, cut: int) -> int:
 
 def around(
     level: LevelPlan, owner: Ints, x: Array, above: bool, env: dict[str, Value], sides: dict[int, Mask],
-    machine: Evaluator,
+    machine: Evaluator, room: Array | None = None, hidden: dict[int, Bools] | None = None,
 ) -> tuple[dict[str, Value], dict[int, Mask]]:  # fmt: skip
-    """The environment of some members at x, and the sides of all surfaces just above or just below it."""
+    """The environment of some members at x, and the sides of all surfaces just above or just below it.
+
+    room: how far it is to where they change. hidden: takes, by group, for whom rounding hides the side.
+    """
     here, inner = placed(level, owner, x, env, sides)
     if not level.decided:
         return here, inner
-    step = BESIDE * (1 + np.abs(x)) * (1 if above else -1)
-    at, beside = (surfaces_at(level, {**here, level.variable: Cell(place)}, owner.size, machine)
+    size = 1 + np.abs(x)
+    step = (BESIDE * size if room is None else np.minimum(BESIDE * size, 0.5 * room)) * (1 if above else -1)
+    # The part of how they change up to there that the rounding of the place itself comes to.
+    misplaced = CLEAR * EPS * size / np.abs(step)
+    along = machine.with_directions(1)
+    at, beside = (_with_slopes(level, {**here, level.variable: Cell(place, None, (1.0,))}, owner.size, along)
                   for place in (x, x + step))  # fmt: skip
-    up = [
-        np.where(np.abs(v) > CLEAR * e + MISPLACED * np.abs(w - v), v, w) >= 0
-        for (v, e), (w, _) in zip(at, beside, strict=True)
-    ]
+    up = []
+    for group, (v, e, slope), (w, off, _) in zip(level.decided, at, beside, strict=True):
+        if hidden is not None and (there := (e > 0) & (np.abs(v) <= CLEAR * e) & (np.abs(w) <= CLEAR * off)).any():
+            hidden[group] = there
+        there = np.where((np.abs(w) > CLEAR * off) | (slope == 0), w, slope * step)  # what is steep further out is flat
+        up.append(np.where(np.abs(v) > CLEAR * e + misplaced * np.abs(w - v), v, there) >= 0)
     return here, decided(level, inner, up)
 
 
@@ -277,13 +310,21 @@ def surfaces_at(
     level: LevelPlan, here: dict[str, Value], count: int, machine: Evaluator
 ) -> list[tuple[Array, Array]]:
     """The surfaces that a level decides the sides of, with their rounding, (B,) each."""
-    env = {n: here[n] for n in level.surfaces.params}
-    values = machine.with_directions(0).tracking().evaluate(level.surfaces, env, None)
+    return [(v, e) for v, e, _ in _with_slopes(level, here, count, machine.with_directions(0))]
+
+
+def _with_slopes(
+    level: LevelPlan, here: dict[str, Value], count: int, machine: Evaluator
+) -> list[tuple[Array, Array, Array]]:
+    """The same, and how they change in the one direction that there may be, (B,) each."""
+    env = {n: pad(here[n], machine.directions) for n in level.surfaces.params}
+    values = machine.tracking().evaluate(level.surfaces, env, None)
     assert isinstance(values, tuple)
     found = []
     for value in values:
         assert isinstance(value, Cell)
-        found.append((as_array(value.v, count), as_array(0.0 if value.e is None else value.e, count)))
+        v, e, slope = (as_array(0.0 if x is None else x, count) for x in (value.v, value.e, *value.t, None)[:3])
+        found.append((v, e, slope))
     return found
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from potto.integrate.decomposition.cuts import NARROW, Cuts
 from potto.integrate.degenerate.coincidences import Scene, around
-from potto.integrate.degenerate.faces import THIN, Place, crossing
+from potto.integrate.degenerate.faces import THIN, Place, crossing, several
 from potto.integrate.events import Degenerate
 from potto.integrate.panels.panel_batch import PanelBatch
 from potto.integrate.pieces import Crossing, Pieces, gather, still, take
@@ -44,6 +44,10 @@ def steps_at_cuts(work: PanelBatch, whole: Pieces) -> Crossing | None:
               for part in BESIDE for end, sign in ((x, 1.0), (seg.b[left], -1.0))]  # fmt: skip
     index = np.concatenate([right, left] * parts)
     sides: dict[int, Mask] = {g: np.broadcast_to(take(m, index), index.shape) for g, m in work.sides.items()}
+    crowded = (seg.a[right] > seg.b[left]) | (seg.blur[0, right] > 0)
+    if crowded.any() and (hidden := _between(scene, seg, left[crowded], right[crowded])).size:
+        work.machine.note(Degenerate(work.level.variable), scene.below(hidden))
+        return None
     values = _inside(scene, owner, np.concatenate(beside), sides)
     after, before = values[:, 0::2], values[:, 1::2]
     mean = whole.size.reshape(work.width, -1, seg.a.size)[:, 0] / (seg.b - seg.a)
@@ -65,6 +69,13 @@ def steps_at_cuts(work: PanelBatch, whole: Pieces) -> Crossing | None:
         for part in (whole.integral, whole.error, whole.floor):
             part.reshape(work.width, -1, seg.a.size)[:, 1:, i + 1 : j] = 0.0
     return found
+
+
+def _between(scene: Scene, seg: Segments, left: Ints, right: Ints) -> Ints:
+    """The members for which several surfaces run along what is further in between two segments, where neither says
+    what lies between them."""
+    owner, x = seg.owner[right], seg.a[right]
+    return np.unique(owner[several(scene, owner, x, np.maximum(seg.ea[right], x - seg.b[left]))])
 
 
 def _neighbours(seg: Segments) -> tuple[Ints, Ints]:

@@ -1,6 +1,6 @@
 """Faces of surfaces that run along all variables further in: what crosses them, integrated over these variables.
 
-Owns `crossing` and `Face`. Where a surface psi = 0 is a place of one variable x, whatever the variables y
+Owns `crossing`, `several` and `Face`. Where a surface psi = 0 is a place of one variable x, whatever the variables y
 further in are, it has no section in y. Its boundary term is then an integral over y, in which F stands with the surface
 on either side and everything else as it falls at the place:
 
@@ -89,7 +89,8 @@ def crossing(scene: Scene, place: Place, tolerance: Array) -> Crossing | None:
     is further in jump."""
     if scene.parent.plan.hides or scene.machine.frozen:
         return None
-    which = _running_along(scene, place)
+    along = _running_along(scene, place.owner, place.x, place.off)
+    which = None if along is None else _the_only_one(scene, along)
     if which is None or (which < 0).any() or not np.isfinite(place.speed).all():
         return None
     found = Crossing(*np.zeros((4, place.jump.shape[0], scene.machine.directions, scene.batch)))
@@ -122,17 +123,32 @@ def _crossed(scene: Scene, place: Place, group: int, here: Bools) -> tuple[Array
     return sums.v, sums.e, sums.t, sums.et
 
 
-def _running_along(scene: Scene, place: Place) -> Ints | None:
-    """Per place the group of the one surface that is 0 there all along the variables further in, -1 if there is none,
-    or several; None where that cannot be looked at."""
+def several(scene: Scene, owner: Ints, x: Array, off: Array) -> Bools:
+    """At which places, of some members, more than one surface runs along the variables further in: what lies between
+    them may be seen from neither side."""
+    along = _running_along(scene, owner, x, off)
+    return np.zeros(owner.size, dtype=bool) if along is None else along.sum(axis=0) > 1
+
+
+def _the_only_one(scene: Scene, along: Bools) -> Ints:
+    """Per place the group of the one surface that runs along, -1 if there is none, or several."""
+    further = scene.parent.plan.levels[scene.number + 1 :]
+    groups = np.array([group for level in further for group in level.decided])
+    found: Ints = np.where(along.sum(axis=0) == 1, groups[np.argmax(along, axis=0)], -1)
+    return found
+
+
+def _running_along(scene: Scene, owner: Ints, x: Array, off: Array) -> Bools | None:
+    """Which of the surfaces further in are 0 at some places, all along the variables further in, (G, P); None where
+    that cannot be looked at."""
     further = scene.parent.plan.levels[scene.number + 1 :]
     if not any(level.decided for level in further):
         return None
     quiet = scene.machine.with_directions(1).tracking()
-    many = np.tile(place.owner, len(FRACTIONS))
+    many = np.tile(owner, len(FRACTIONS))
     here = gather({n: pad(still(v), 1) for n, v in scene.env.items()}, many)
-    here[scene.level.variable] = Cell(np.tile(place.x, len(FRACTIONS)), None, (1.0,))
-    fraction, off = np.repeat(FRACTIONS, place.x.size), np.tile(place.off + EPS * np.abs(place.x), len(FRACTIONS))
+    here[scene.level.variable] = Cell(np.tile(x, len(FRACTIONS)), None, (1.0,))
+    fraction, off = np.repeat(FRACTIONS, x.size), np.tile(off + EPS * np.abs(x), len(FRACTIONS))
     along = []
     for level in further:
         ends = quiet.evaluate(level.bounds, {n: here[n] for n in level.bounds.params}, None)
@@ -144,6 +160,4 @@ def _running_along(scene: Scene, place: Place) -> Ints | None:
             slope = _size(psi.t[0])
             near = (np.abs(psi.v) <= CLEAR * (_size(psi.e) + slope * off)) & (slope > 0)
             along.append(np.broadcast_to(near, off.shape).reshape(len(FRACTIONS), -1).all(axis=0))
-    groups = np.array([group for level in further for group in level.decided])
-    found: Ints = np.where(np.sum(along, axis=0) == 1, groups[np.argmax(along, axis=0)], -1)
-    return found
+    return np.array(along)

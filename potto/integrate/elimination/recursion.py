@@ -178,7 +178,7 @@ def _table(
                  for at, kind in places if kind != "center")  # fmt: skip
     hints = points_of((at for at, kind in places if kind == "center"), state)[:MOST_CENTERS]
     level = level_plan(Level(state, const(span[0]), const(span[1]), hints, cuts), (), ())
-    found, _ = iteration.cut(level, env, 1, machine)
+    found, _ = iteration.cut(level, env, 1, machine, np.zeros(1, dtype=np.int64))
     segments = found.segments
     size = np.fmin(np.maximum(np.abs(segments.a), np.abs(segments.b)), FARTHEST)
     segments = segments.pick(segments.b - segments.a > SLIVER * EPS * size)  # a span is rounded outwards

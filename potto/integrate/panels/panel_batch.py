@@ -15,7 +15,7 @@ import numpy as np
 from potto.integrate.levels import LevelPlan
 from potto.integrate.panels.iterated import Iterated
 from potto.integrate.panels.mending import mend
-from potto.integrate.panels.roundoff import few_doubles, misplaced, noise, shake, together
+from potto.integrate.panels.roundoff import few_doubles, misplaced, noise, note_ends, shake, together
 from potto.integrate.pieces import Crossing, Ends, Evaluator, Pieces, Sums, column, gather, joined, spread, still
 from potto.integrate.rules import substitution
 from potto.integrate.rules.gauss import EPS, Rule, gauss, truncation
@@ -52,6 +52,7 @@ class PanelBatch:
     filled: Array | None = None  # (B,) which part of the range integrands take up, where that is known
     steps: Crossing | None = None  # what crosses faces at which cuts only bends were expected
     misplaced: Array | None = None  # (m, k, S) what the rounding of the ends of segments means for the fixed form
+    at_ends: Array | None = None  # (2, m, 2, S) the integrand and its slope at the ends of segments
 
     def __post_init__(self) -> None:
         self.k = self.machine.directions
@@ -132,6 +133,10 @@ class PanelBatch:
         p.floor = 4 * EPS * p.size + (size @ rule.slopes) * shake
         if self.ends is not None and self.last and not self.parent.tracked:
             p.floor += noise(self.ends, self.width, p, seg)
+        if self.both:
+            if self.at_ends is None:
+                self.at_ends = np.zeros((2, self.width, 2, self.seg.a.size))
+            note_ends(self.at_ends, p, seg, coefficients[:: height.shape[0] // self.width], rule)
         if self.k:
             # speeds are rounded too, and so are the places of the cuts, which matters where they are close together
             place = np.maximum(seg.ea, seg.eb) / (seg.b - seg.a)

@@ -1,7 +1,7 @@
 """What rounding does to the integral over a piece.
 
-Owns `shake` and `few_doubles` (of nodes), `noise` (of the integrand), `misplaced` (of the ends of segments) and
-`together` (of derivatives that move with the nodes).
+Owns `shake` and `few_doubles` (of nodes), `noise` (of the integrand), `misplaced`, `note_ends` and `hidden_steps` (of
+the ends of segments) and `together` (of derivatives that move with the nodes).
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import numpy as np
 
 from potto.integrate.pieces import Ends, Pieces
 from potto.integrate.rules import substitution
-from potto.integrate.rules.gauss import EPS
+from potto.integrate.rules.gauss import EPS, Rule
 from potto.integrate.rules.substitution import Segments
 from potto.kernels.cells import Array, Ints
 
@@ -20,6 +20,9 @@ NODE_ROUNDING = 0.5
 FAR = 8
 # Up to how many times their rounding apart an end and a turning place are one.
 ITSELF = 4.0
+# Up to which part of its size two interpolants of one integrand differ at their common end by their rounding; from
+# which on that is a jump, which is looked for where cuts move in different ways (`degenerate.degeneracies`).
+SMOOTH, STEP = 1e-13, 1e-6
 
 
 def few_doubles(seg: Segments, weight: Array) -> bool:
@@ -78,6 +81,38 @@ def misplaced(p: Pieces, seg: Segments, at_ends: Array) -> tuple[Ints, Array]:
     share = np.divide(off, slope, out=np.zeros_like(off), where=counts)
     lost = np.abs(at_ends[:, :, index]) * np.minimum(share, 1.0)
     return index, np.where(np.isfinite(lost), lost, 0.0).sum(axis=-1)
+
+
+def note_ends(at_ends: Array, p: Pieces, seg: Segments, coefficients: Array, rule: Rule) -> None:
+    """Put down what the integrand, and how steep it, is at the ends of segments, (2, m, 2, all segments), by the pieces
+    there: 0 where a map or a grade makes that unknown.
+
+    coefficients: (m, P, n) of its values times the length of each piece.
+    """
+    length = ((seg.b - seg.a) * (p.u1 - p.u0))[:, None]
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        value = coefficients @ rule.ends / length
+        slope = np.abs(coefficients @ (rule.slopes[:, None] * rule.ends)) / (length * length)
+    found = np.stack((value, slope))
+    plain = (p.end == 0) & (seg.kind == substitution.LINEAR) & np.isfinite(found).all(axis=(0, 1, 3))
+    found = np.where(plain[:, None], found, 0.0)
+    for upper, there in enumerate((p.u0 == 0, p.u1 == 1)):
+        at_ends[:, :, upper, p.segment[there]] = found[..., there, upper]
+
+
+def hidden_steps(at_ends: Array, seg: Segments, jumps: bool) -> Array:
+    """What is left out where an integrand that is said to bend at cuts takes a step across several that rounding takes
+    for one, (m, k, S) by the segment above: the step times how fast it moves. jumps: or only what is no plain jump."""
+    before, after = at_ends[0][:, 1, :-1], at_ends[0][:, 0, 1:]
+    size = np.abs(before) + np.abs(after)
+    step = np.abs(after - before)
+    merged = (seg.owner[1:] == seg.owner[:-1]) & (seg.a[1:] == seg.b[:-1]) & (seg.rank[1:] == 1) & (seg.blur[0, 1:] > 0)
+    merged &= (seg.kind[1:] == substitution.LINEAR) & (seg.kind[:-1] == substitution.LINEAR)
+    counts = merged & (step > SMOOTH * size) & (jumps | (step <= STEP * size))
+    lost: Array = np.zeros((at_ends.shape[1], seg.ta.shape[0], seg.a.size))
+    with np.errstate(invalid="ignore"):
+        lost[:, :, 1:] = np.where(counts, step, 0.0)[:, None] * np.abs(seg.ta[:, 1:])
+    return np.where(np.isnan(lost), 0.0, lost)
 
 
 def together(common: Array, ft: Array, fx: Array, v: Array, d: int) -> Array:

@@ -10,6 +10,7 @@ none.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -17,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from potto.core.terms import Integral
 from potto.integrate.decomposition.cuts import frame_rows
 from potto.integrate.decomposition.meetings import Row
 from potto.integrate.decomposition.sections import searched_rows
@@ -26,6 +28,7 @@ from potto.integrate.plan import Plan
 from potto.kernels.cells import Array, Cell, Value, map_arrays
 from potto.runtime.evaluation.functions import Closure
 from potto.runtime.evaluation.machine import Machine
+from potto.runtime.integration.choices import orders
 from potto.runtime.integration.problem import Problem
 from potto.runtime.integration.quadrature import iterated
 
@@ -40,17 +43,18 @@ SETTLING, SAME = 0.75, 1e-6
 MISSED = 1 / 16  # the least part of what is extrapolated that may be wrong
 # What is nearer to a fold than this lies at it, as far as steps that parameters notice can tell.
 TOGETHER = 1e-9
+# The part of a derivative, or how many errors of the value, its error may be that no other order is tried.
+ROUGH, ROUNDED = 1e-9, 1e4
 MOST_MEMBERS = 16  # of a batch that are looked at
 
 
-def from_both_sides(problem: Problem, plan: Plan, sums: Sums) -> Sums:
+def from_both_sides(problem: Problem, order: Integral, sums: Sums) -> Sums:
     """Note the one-sided derivatives of an integral in which a part has two; where the whole has one, that is it."""
     causes, machine = problem.events.every(TwoSided), problem.machine
     problem.events.forget(TwoSided)
-    sides = (replace(machine.apart(), side=side) for side in (-1, 1))
-    found = [iterated(plan, one_side, problem.env, problem.batch) for one_side in sides]
-    backward, forward = (np.where(np.isfinite(part.et), part.t, np.nan) for part in found)
-    before, beyond = (np.where(np.isfinite(part.et), part.et, 0.0) for part in found)
+    sides = [_one_side(problem, order, side) for side in (-1, 1)]
+    backward, forward = (np.where(np.isfinite(part.et), part.t, np.nan) for part, _ in sides)
+    before, beyond = (np.where(np.isfinite(part.et), part.et, 0.0) for part, _ in sides)
     same = np.abs(forward - backward) <= 1e-12 * (np.abs(forward) + np.abs(backward))
     differ = np.nonzero(~same.all(axis=(0, 1)))[0]
     for cause, members in causes:
@@ -58,7 +62,28 @@ def from_both_sides(problem: Problem, plan: Plan, sums: Sums) -> Sums:
         if there.size:
             sided = (x[..., there] for x in (backward, forward, before, beyond))
             machine.note(OneSidedDerivatives(cause, *sided), there)
-    return replace(sums, t=np.where(same, forward, sums.t))
+    t, et = np.where(same, forward, sums.t), sums.et
+    if any(turned for _, turned in sides):
+        nearer = np.where(np.abs(t - forward) <= np.abs(t - backward), forward, backward)
+        off = np.maximum(before, beyond)
+        better = np.isfinite(nearer) & (off < et) & (np.abs(t - nearer) <= et)
+        t, et = np.where(better, nearer, t), np.where(better, off, et)
+    return replace(sums, t=t, et=et)
+
+
+def _one_side(problem: Problem, order: Integral, side: int) -> tuple[Sums, bool]:
+    """The derivatives to one side, and whether they are by another order of the variables: where surfaces are steep in
+    the variable that is innermost rounding leaves them few digits."""
+    machine = replace(problem.machine.apart(), side=side)
+    found, turned = iterated(problem.plan(order), machine, problem.env, problem.batch), False
+    for other in itertools.islice(orders(order), 1, None):
+        if (found.et <= ROUGH * np.abs(found.t) + ROUNDED * found.e[:, None]).all() or machine.exhausted():
+            break
+        apart = replace(machine.apart(), side=side)
+        part = iterated(problem.plan(other), apart, problem.env, problem.batch)
+        if (part.et <= found.et).all() and not apart.events.touched(problem.batch).any():
+            found, turned = part, True
+    return found, turned
 
 
 def beside_folds(problem: Problem, plan: Plan, sums: Sums, evaluated: Evaluated) -> None:
@@ -82,8 +107,9 @@ def beside_folds(problem: Problem, plan: Plan, sums: Sums, evaluated: Evaluated)
             known = np.isfinite(t) & (np.abs(t - forward) <= SAME * np.abs(forward) + et)
             t[:], et[:] = np.where(known, t, forward), np.where(known, et, off[0] + off[1])
             continue
-        t[:] = np.where(np.isfinite(t), t, np.where(np.isfinite(backward), backward, forward))
-        et[:] = np.where(np.isfinite(t), np.where(np.isfinite(et), et, 0.0), np.inf)
+        known = np.isfinite(t) & np.isfinite(et)
+        t[:] = np.where(known, t, np.where(np.isfinite(backward), backward, forward))
+        et[:] = np.where(known, et, np.where(np.isfinite(t), np.where(np.isfinite(backward), *off), np.inf))
         _endless(machine, backward, forward, t, et)
         machine.note(OneSidedDerivatives(cause, backward, forward, *off))
     events.forget(Fold)
@@ -163,9 +189,10 @@ def _both(
 def _step(machine: Machine, plan: Plan, env: dict[str, Value], d: int, where: Fold | None) -> float | None:
     """The largest step that moves the roots that fold, or all roots, by a small part of the range, either way.
 
-    Where nobody knows the roots, since an integral further in has them, a small part of the parameters.
+    Where nobody knows the roots, since an integral further in has them or they have no closed form, a small part of the
+    parameters.
     """
-    if where is not None and where.number == INNER:
+    if where is not None and (where.number == INNER or _searched(plan, where)):
         sizes = [float(np.abs(cell.v)) for value in env.values() for cell in _moving(value, d)]
         return APART**2 * max([1.0, *sizes]) if sizes else None
     both = np.concatenate(([0.0], STEPS, -STEPS))
@@ -192,6 +219,11 @@ def _step(machine: Machine, plan: Plan, env: dict[str, Value], d: int, where: Fo
     moves = (off > 0)[1:].reshape(2, -1).any(axis=0)
     fits = np.logical_and.accumulate(fits) & moves
     return float(STEPS[np.nonzero(fits)[0][-1]]) if fits.any() else None
+
+
+def _searched(plan: Plan, where: Fold) -> bool:
+    level = plan.levels[where.number]
+    return level.level.cuts[where.cut] in level.searched
 
 
 def _room(low: Array, high: Array, rows: Sequence[Row], where: Fold | None) -> Array:

@@ -223,7 +223,7 @@ def on_both_sides(problem: Problem, order: Integral, sums: Sums) -> Sums:
     """Where parts have two derivatives."""
     if not problem.events.every(TwoSided) or problem.machine.side:
         return sums
-    return from_both_sides(problem, problem.plan(order), sums)
+    return from_both_sides(problem, order, sums)
 
 
 def at_folds(problem: Problem, order: Integral, sums: Sums) -> Sums:
