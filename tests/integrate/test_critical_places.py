@@ -142,3 +142,24 @@ def test_a_torus_is_covered_by_its_errors() -> None:
     text = "def f(r) integral ([-2, 2], [-2, 2], [-1, 1]) [(sqrt(x^2 + y^2) - 1)^2 + z^2 < r^2] d(x, y, z)"
     answer = potto.compile(text).f(0.4)
     assert abs(answer.value - 2 * mp.pi**2 * mp.mpf(0.4) ** 2) <= answer.error <= 1e-8
+
+
+@pytest.mark.parametrize("t", [0.3, 0.5, 0.8, 1.0, 1.5, 2.0, 5.0])
+def test_a_level_area_of_a_quartic(t: float) -> None:
+    """In polar coordinates a r^4 + b r^2 = t, a = cos^4 + sin^4 + cos^2 sin^2, b = cos sin: a quadratic in r^2."""
+
+    def shape(u: mp.mpf) -> tuple[mp.mpf, mp.mpf]:
+        c, s = mp.cos(u), mp.sin(u)
+        return c**4 + s**4 + c * c * s * s, c * s
+
+    def root(u: mp.mpf) -> mp.mpf:
+        a, b = shape(u)
+        return mp.sqrt(b * b + 4 * a * t)
+
+    places = [k * mp.pi / 4 for k in range(9)]
+    area = mp.quad(lambda u: (root(u) - shape(u)[1]) / (4 * shape(u)[0]), places)
+    slope = mp.quad(lambda u: 1 / (2 * root(u)), places)
+    f = potto.compile("def f(t) integral ([-2, 2], [-2, 2]) [x^4 + x*y + y^4 + x^2*y^2 < t] d(x, y)").f
+    answer = potto.deriv(f)((t, 1.0))
+    assert abs(answer.value - area) <= answer.error <= 1e-9 and answer.converged
+    assert abs(answer.tangent - slope) <= answer.tangent_error + 1e-13 and answer.tangent_error <= 1e-9

@@ -33,7 +33,7 @@ FINEST = 2.0**-40  # of the range: a box so narrow along the variable that is cu
 INFLATED = 0.1  # by how much a box is larger on which a solution is looked for: it may lie on the edge of one
 SAME = 2.0**-44  # of the range: solutions no farther apart are one
 SHRUNK = 0.7  # of a side: what a step leaves no larger is not halved
-POLISH = 6
+POLISH, STUCK = 12, 0.9  # steps at most; the part of each of its sides that the last one leaves of a box
 BEYOND = 0.125  # how far beyond its range a turning place is looked for, which the map of nodes takes care of
 
 
@@ -212,7 +212,7 @@ class _Search:
                 lo, hi = np.maximum(box[:, 0], step[:, 0]), np.minimum(box[:, 1], step[:, 1])
                 fine = np.isfinite(step).all(axis=(0, 1)) & (lo <= hi).all(axis=0)
                 better = np.where(fine, np.stack((lo, hi), axis=1), box)
-                done = (better[0, 1] - better[0, 0] > 0.5 * (box[0, 1] - box[0, 0])).all()
+                done = (better[:, 1] - better[:, 0] >= STUCK * (box[:, 1] - box[:, 0])).all()
                 box = better
                 if done:
                     break
