@@ -128,6 +128,7 @@ class Asked:
     spelling: int = 0
     flat: bool = False
     settings: tuple[tuple[str, Any], ...] = ()
+    unit: float = 1.0  # in which t is given: parameters may be large, or small
 
     @property
     def method(self) -> str:
@@ -140,7 +141,8 @@ def asked(number: int) -> Asked:
     tolerance = pick.choice(((), (), (), (("rtol", 1e-4),), (("rtol", 1e-7),), (("rtol", 1e-13),)))
     method = pick.choice(((),) * 18 + ((("method", "mc"), ("samples", 4000)), (("method", "qmc"), ("samples", 4096))))
     point = awkward(number) if pick.random() < 0.35 else where(number)
-    return Asked(number, point, pick.choice((0, 1, 2)), pick.random() < 0.3, method or tolerance)
+    flat, spelling = pick.random() < 0.3, pick.choice((0, 1, 2))
+    return Asked(number, point, spelling, flat, method or tolerance, pick.choice((*(1.0,) * 8, 2.0**27, 2.0**-20)))
 
 
 def tame(number: int) -> Asked:
@@ -154,7 +156,7 @@ def check(number: int) -> str:
 
 def held(ask: Asked) -> str:
     """What came of one program. Raises Wrong."""
-    text, program = random_program(ask.number, ask.flat, ask.spelling)
+    text, program = random_program(ask.number, ask.flat, ask.spelling, ask.unit)
     context = f"{ask}\n{text}"
     try:
         value, off = estimate(program, **ask.point.moved(0.0))
@@ -192,12 +194,13 @@ def held(ask: Asked) -> str:
 def _function(ask: Asked) -> Any:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", potto.ProgramWarning)  # where only `f` is broken
-        return potto.compile(random_program(ask.number, ask.flat, ask.spelling)[0]).f
+        return potto.compile(random_program(ask.number, ask.flat, ask.spelling, ask.unit)[0]).f
 
 
 def _answer(ask: Asked, context: str) -> Any:
     """The dual; as a number and, now and then, as a member of an array and by `grad`: these must agree."""
     p, f = ask.point, _function(ask)
+    p = replace(p, t=p.t * ask.unit, dt=p.dt * ask.unit)
     dual = potto.deriv(f)((p.t, p.dt), (p.s, p.ds))
     pick = random.Random(ask.number + 5)
     if pick.random() < 0.2 and ask.method == "auto":

@@ -8,8 +8,8 @@ from __future__ import annotations
 import random
 
 import numpy as np
-from plain_quadrature import Program
-from program_nodes import Binder, Node, call, minus, name, number, over, plus, times, weighted
+from plain_quadrature import Array, Environment, Program, Record
+from program_nodes import Binder, Node, call, minus, name, number, over, plus, power, times, weighted
 from scipy import special
 
 SPREAD = 9.0  # standard deviations
@@ -37,12 +37,29 @@ def _beta(v: str, a: float, b: float) -> tuple[str, Node, Node, Node]:
     return f"beta({a!r}, {b!r})", number(0.0), number(1.0), density
 
 
+def _categorical(v: str, weights: list[Node], fixed: bool) -> Binder:
+    """0, 1, 2, each as often as its weight says."""
+
+    def within(body: Program) -> Program:
+        def run(env: Environment, record: Record | None, n: int) -> Array:
+            found = [w(env, record, n) for w in weights]
+            parts = [w * body({**env, v: np.full(n, float(k))}, record, n) for k, w in enumerate(found)]
+            return sum(parts) / sum(found)
+
+        return run
+
+    return Binder(v, f"{v} ~ categorical({', '.join(w.text for w in weights)})", within, fixed)
+
+
 def measures(pick: random.Random, v: str, parameters: list[Node], outer: list[Node]) -> Binder:
     """Of a variable; a mean may be a parameter or a variable further out."""
     places = [number(0.0), number(0.5), *parameters, *outer]
     m, sd = pick.choice(places), pick.choice((1.0, 0.5, 0.1, 2.0))
     fixed = m not in outer
-    kind = pick.randrange(6)
+    kind = pick.randrange(7)
+    if kind == 6:
+        weights = [number(1.0), number(pick.choice((0.0, 0.5, 2.0))), plus(power(m, 2), number(0.25))]
+        return _categorical(v, weights, fixed)
     if kind < 4:
         text, lo, hi, density = (
             _normal(v, m, sd), _uniform(v, m, sd), _exponential(v, pick.choice((1.0, 2.0, 0.5))),

@@ -206,6 +206,28 @@ class Source(Terms):
             return Node(f"({' + '.join(f'(let k = {k} in {body.text})' for k in range(1, last + 1))})", run)
         return Node(f"(sum k in 1..{last} ({body.text}))", run)
 
+    def fold(self, names: list[str]) -> Node:
+        """A state that is stepped a few times, by recursion, perhaps with a jump at each step."""
+        last, x = self.pick(2, 3, 5), self.smooth([*names, *PARAMETERS], 1)
+        below = compare("<", self.affine(names), times(name(self.pick(*PARAMETERS)), name("k")))
+        grown = times(self.bracket(below), self.constant()) if self.likely(0.6) else times(number(0.3), name("k"))
+        step = plus(times(number(self.pick(0.5, -0.5, 0.9)), name("state")), grown)
+        f, given = self.define("fold"), ", ".join(dict.fromkeys([*names, *PARAMETERS]))
+        written = {v: self.written.get(v, v) for v in names}
+        here = ", ".join([*(written[v] for v in names), *PARAMETERS])
+        text = step.text
+        for v in names:  # inside of the function a variable is written as it is
+            text = text.replace(written[v], v)
+        self.definitions.append(f"def {f}(k, state, {given})\n    if k > 0 then {f}(k - 1, {text}, {given}) else state")
+
+        def run(env: Environment, record: Record | None, n: int) -> Array:
+            state = x(env, record, n)
+            for k in range(last, 0, -1):
+                state = step({**env, "k": np.full(n, float(k)), "state": state}, record, n)
+            return state
+
+        return Node(f"{f}({last}, {x.text}, {here})", run)
+
     def body(self, names: list[str]) -> Node:
         every, jump = names + PARAMETERS, self.jump(names)
         return self.behind(self.one_of((
@@ -217,7 +239,8 @@ class Source(Terms):
             (0.75, lambda: power(jump, self.pick(2, 3))),
             (0.80, lambda: bent(self.pick("min", "max"), jump, self.smooth(every, 1))),
             (0.84, lambda: call(np.exp, "exp(%s)", call(np.sin, "sin(%s)", jump))),
-            (0.89, lambda: self.total(names)),
+            (0.88, lambda: self.total(names)),
+            (0.92, lambda: self.fold(names)),
             (1.01, lambda: self.rough(every, 2)),
         )), names, "body")  # fmt: skip
 
@@ -313,8 +336,15 @@ class Source(Terms):
         return call(np.sin, "sin(%s)", whole) if self.likely(0.15) else whole
 
 
-def random_program(seed: int, flat: bool = False, spelling: int = 0) -> tuple[str, Program]:
-    """The source of a function f(t, s), and its meaning. `flat`: integrals over one variable only."""
+def random_program(seed: int, flat: bool = False, spelling: int = 0, unit: float = 1.0) -> tuple[str, Program]:
+    """The source of a function f(t, s), and its meaning. `flat`: integrals over one variable only.
+
+    unit: what one of t comes to in the source, which then is f(t*unit, s).
+    """
     source = Source(seed, spelling)
     whole = source.program(flat)
-    return "\n".join([*source.definitions, f"def f(t, s)\n    {whole.text}\n"]), whole.run
+    name = "f" if unit == 1.0 else "plain"
+    ends = [f"def {name}(t, s)\n    {whole.text}\n"]
+    if unit != 1.0:
+        ends.append(f"def f(t, s) plain(t/{unit!r}, s)\n")
+    return "\n".join([*source.definitions, *ends]), whole.run
