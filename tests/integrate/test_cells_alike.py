@@ -126,3 +126,12 @@ def test_parameters_that_do_not_move_cost_nothing() -> None:
     assert float(np.sum(answer.value)) == pytest.approx(whole(1.1), rel=1e-13)
     edge = float(mp.quad(lambda s: (s + (mp.mpf("1.1") - s) / 2) / 2, [0, 1]))  # what the line sweeps
     assert float(np.sum(answer.tangent)) == pytest.approx(edge, rel=1e-13)
+
+
+@pytest.mark.parametrize("e", [1e-3, 1e-5, 1e-7, 1e-12])
+@pytest.mark.parametrize("text", ["exp(-x/e)", "exp(-x/e)*[x < 2 + e]"])
+def test_what_no_node_sees_at_the_ends(text: str, e: float) -> None:
+    """A layer at an end of the range, e wide: e, and 1 for the derivative, to exp(-1000)."""
+    answer = potto.deriv(potto.compile(f"def f(e) integral [0, 1] {text} d(x)").f)((e, 1.0))
+    assert abs(answer.value - e) <= answer.error + 1e-15 * e and answer.error <= 1e-9 * e
+    assert abs(answer.tangent - 1) <= answer.tangent_error + 1e-15 and answer.tangent_error <= 1e-8

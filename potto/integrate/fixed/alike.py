@@ -42,6 +42,8 @@ FEW = 4 * PILOTS
 ENOUGH = 0.9
 # How near to 0, of what it comes to elsewhere on the cell, the edge of a builtin's domain may be at a node.
 EDGE = 0.1
+# How many times larger than at all nodes the integrand may be at the ends of stretches: else something narrow is there.
+PEAK = 8.0
 # What errors may be where what is added up cancels, as a part of that: no other way would mend it.
 CANCELS = 1e-13
 
@@ -180,11 +182,18 @@ class Rule:
         off, most = self.rounded(some, few)
         gross = np.maximum(most, np.abs(number))
         rounding = ELSEWHERE * (off + SUMMED * gross)
-        truncated[:, ~(every.plain & some.plain)] = np.inf
+        plain = every.plain & some.plain
+        if not all(self.exact):
+            quiet, resting = self.machine.with_directions(0), {n: still(v) for n, v in here.items()}
+            corners = self.at_nodes(quiet, resting, members.size, few, True)
+            plain &= ~(_largest(corners.value) > PEAK * _largest(every.value[:1]))
+        truncated[:, ~plain] = np.inf
         return Measured(number, truncated, rounding, gross)
 
-    def at_nodes(self, machine: Evaluator, env: dict[str, Value], count: int, picked: Sequence[Ints]) -> Nodes:
-        """The integrand at those of the nodes that are `picked`, per variable."""
+    def at_nodes(
+        self, machine: Evaluator, env: dict[str, Value], count: int, picked: Sequence[Ints], corners: bool = False
+    ) -> Nodes:
+        """The integrand at those of the nodes that are `picked`, per variable; or at the ends of its stretches."""
         here, shape, k = dict(env), (count,), machine.directions
         plain = np.ones(count, dtype=bool)
         widths = []
@@ -198,7 +207,7 @@ class Rule:
             widths.append((width, off))
             if i:
                 plain &= _clear(values, low, high, ends[0])
-            nodes = self.axis(i)[0][picked[i]]
+            nodes = np.array([0.0, 1.0]) if corners else self.axis(i)[0][picked[i]]
             at = lo[:, None] + width[:, None] * nodes.reshape(-1, *(1,) * len(shape))
             moves = [values[low].t[d] is not None or values[high].t[d] is not None for d in range(k)]
             errors = (None,) * (1 + k) if machine is self.machine else off
@@ -211,7 +220,7 @@ class Rule:
         cell = machine.evaluate(function, {name: here[name] for name in function.params}, None)
         assert isinstance(cell, Cell)
         value, off = _block((cell,), k, shape)
-        if machine is not self.machine:
+        if machine is not self.machine and not corners:
             plain &= self.clear_of_edges(machine.with_directions(0), here, shape)
         return Nodes(value[:, 0], off[:, 0], widths, plain)
 
@@ -278,6 +287,12 @@ def edges_of(term: Term) -> tuple[Term, ...]:
         if edge.free
     )
     return tuple(dict.fromkeys(found))
+
+
+def _largest(value: Array) -> Array:
+    """Of numbers (..., M) the largest without regard to sign, those that are none left out: (M,)."""
+    size = np.abs(value)
+    return np.asarray(np.where(np.isfinite(size), size, 0.0).reshape(-1, value.shape[-1]).max(axis=0))
 
 
 def _block(cells: Sequence[Cell], k: int, shape: tuple[int, ...]) -> tuple[Array, Array]:
