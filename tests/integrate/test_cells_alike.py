@@ -53,7 +53,7 @@ def test_circles_turn_at_both_ends(order: str) -> None:
     r = np.linspace(0.2, 0.95, 100)
     answer = answered(f"def f(r) integral ([-1, 1], [-1, 1]) [x*x + y*y < r*r]/(2 + x) d({order})", r)
     root = np.sqrt(4 - r * r)
-    covered(answer, 2 * math.pi * (2 - root), 2 * math.pi * r / root, 1e-10)
+    covered(answer, 2 * math.pi * r * r / (2 + root), 2 * math.pi * r / root, 1e-10)
     assert answer.evals <= (150 if order == "x, y" else 1400) * r.size
 
 

@@ -34,8 +34,8 @@ MOST_NODES = 4096
 POINTS = 1 << 15
 # A rule is good enough for a cell if what it may be off is this part of the accuracy asked for.
 SHARE = 0.03
-# How much more than at the nodes where it is known rounding may be elsewhere on the cell.
-ELSEWHERE = 2.0
+# At how many nodes rounding is followed at each; and how much more it may be elsewhere where it is at a few.
+TRACKED, ELSEWHERE = 1 << 12, 2.0
 # How many members tell the order for all, and up to how many it does not pay to ask them.
 PILOTS = 16
 FEW = 4 * PILOTS
@@ -77,8 +77,8 @@ def together(
         done[cell.members[~fine]] = False
     number, truncated, rounding, gross = total
     asked = 0.5 * np.maximum(machine.atol, machine.rtol * np.abs(number))
-    most = gross.max(axis=0)
-    fine = (rounding <= np.maximum(asked, CANCELS * most)) & (truncated <= np.maximum(asked, CANCELS * most))
+    most = CANCELS * gross.max(axis=0) if batch > 1 else 0.0  # for one there are other ways
+    fine = (rounding <= np.maximum(asked, most)) & (truncated <= np.maximum(asked, most))
     done &= fine.all(axis=0)
     if not done.any():
         return None
@@ -175,18 +175,23 @@ class Rule:
         """The integrals over the cells of some members."""
         here = {n: map_arrays(v, lambda a: a[members] if a.ndim else a) for n, v in env.items()}
         self.machine.count(members.size * math.prod(self.orders))
-        every = self.at_nodes(self.machine, here, members.size, [np.arange(n) for n in self.orders])
-        few = [np.unique([0, n // 2, n - 1]) for n in self.orders]
-        some = self.at_nodes(self.machine.tracking(), here, members.size, few)
+        whole = [np.arange(n) for n in self.orders]
+        tracking = self.machine.tracking()
+        if members.size * math.prod(self.orders) <= TRACKED:
+            some = every = self.at_nodes(tracking, here, members.size, whole)
+            few, beyond = whole, 1.0
+        else:
+            few, beyond = [np.unique([0, n // 2, n - 1]) for n in self.orders], ELSEWHERE
+            every = self.at_nodes(self.machine, here, members.size, whole)
+            some = self.at_nodes(tracking, here, members.size, few)
         number, truncated = self.added(every)
         off, most = self.rounded(some, few)
         gross = np.maximum(most, np.abs(number))
-        rounding = ELSEWHERE * (off + SUMMED * gross)
+        rounding = beyond * off + ELSEWHERE * SUMMED * gross
         plain = every.plain & some.plain
         if not all(self.exact):
-            quiet, resting = self.machine.with_directions(0), {n: still(v) for n, v in here.items()}
-            corners = self.at_nodes(quiet, resting, members.size, few, True)
-            plain &= ~(_largest(corners.value) > PEAK * _largest(every.value[:1]))
+            corners = self.at_nodes(tracking, here, members.size, few, True)
+            plain &= ~(_largest(corners.value[:1]) > PEAK * _largest(every.value[:1]))
         truncated[:, ~plain] = np.inf
         return Measured(number, truncated, rounding, gross)
 
@@ -210,7 +215,7 @@ class Rule:
             nodes = np.array([0.0, 1.0]) if corners else self.axis(i)[0][picked[i]]
             at = lo[:, None] + width[:, None] * nodes.reshape(-1, *(1,) * len(shape))
             moves = [values[low].t[d] is not None or values[high].t[d] is not None for d in range(k)]
-            errors = (None,) * (1 + k) if machine is self.machine else off
+            errors = off if machine is not self.machine else (None,) * (1 + k)
             here[variable] = Cell(
                 at[0], errors[0], tuple(at[d] if m else None for d, m in enumerate(moves, 1)),
                 tuple(errors[d] if m else None for d, m in enumerate(moves, 1)),
@@ -227,8 +232,10 @@ class Rule:
     def clear_of_edges(self, machine: Evaluator, here: dict[str, Value], shape: tuple[int, ...]) -> Bools:
         """The members on whose cells nothing comes to the edge of where it is analytic, as a root of x does at 0: there
         coefficients fall so slowly that they don't tell."""
-        fine = np.ones(shape[-1], dtype=bool)
-        edges = function_of(tuple_(edges_of(self.cell.face)))
+        fine, found = np.ones(shape[-1], dtype=bool), edges_of(self.cell.face)
+        if not found:
+            return fine
+        edges = function_of(tuple_(found))
         for cell in evaluated(edges, machine, {name: still(here[name]) for name in edges.params}):
             size = np.broadcast_to(np.abs(cell.v), shape).reshape(-1, shape[-1])
             fine &= size.min(axis=0) > EDGE * size.max(axis=0)
