@@ -63,7 +63,9 @@ from potto.core.walking import (
     postorder_by,
     rebuild,
     rename_bound,
+    replaced,
     substitute,
+    transform,
 )
 
 __all__ = [
@@ -117,9 +119,11 @@ __all__ = [
     "proj",
     "rebuild",
     "rename_bound",
+    "replaced",
     "sub",
     "substitute",
     "sum_",
+    "transform",
     "tuple_",
     "var",
 ]

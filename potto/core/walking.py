@@ -118,8 +118,8 @@ def rebuild(term: Term, parts: tuple[Term, ...]) -> Term:
             return deriv(parts[0])
 
 
-def postorder(*roots: Term) -> list[Term]:
-    """Every distinct subterm once, children before parents. Does not recurse."""
+def postorder(*roots: Term, below: Callable[[Term], Sequence[Term]] | None = None) -> list[Term]:
+    """Every distinct subterm once, children (or whatever `below` leads to) before parents. Does not recurse."""
     seen: set[Term] = set()
     order: list[Term] = []
     stack: list[Term | None] = list(reversed(roots))  # None: the term below it has all its children in the order
@@ -130,16 +130,35 @@ def postorder(*roots: Term) -> list[Term]:
             order.append(pop())  # type: ignore[arg-type]
         elif term not in seen:
             seen.add(term)
-            below = _CHILDREN[type(term)](term)
-            if not below:
+            parts = _CHILDREN[type(term)](term) if below is None else below(term)
+            if not parts:
                 order.append(term)
                 continue
             push(term)
             push(None)
-            for child in reversed(below):
+            for child in reversed(parts):
                 if child not in seen:
                     push(child)
     return order
+
+
+def transform(
+    root: Term, change: Callable[[Term, Term], Term], below: Callable[[Term], Sequence[Term]] = children
+) -> Term:
+    """A term rebuilt from below: `change` makes of every part, and of the same over changed children, what it becomes.
+
+    below: the children of a part, or none where it is changed only as a whole.
+    """
+    made: dict[Term, Term] = {}
+    for node in postorder(root, below=below):
+        parts = tuple([made[child] for child in below(node)])
+        made[node] = change(node, rebuild(node, parts) if parts else node)
+    return made[root]
+
+
+def replaced(root: Term, parts: Mapping[Term, Term]) -> Term:
+    """A term with some of its parts replaced; what is in them is not looked at."""
+    return transform(root, lambda node, new: parts.get(node, new), lambda n: () if n in parts else children(n))
 
 
 class Holding:
@@ -202,18 +221,7 @@ def substitute(term: Term, mapping: Mapping[str, Term]) -> Term:
 
 def postorder_by(root: Term, below: Callable[[Term], Sequence[Term]]) -> list[Term]:
     """Every distinct term that `below` leads to from the root once, after what is below it. Does not recurse."""
-    seen: set[Term] = set()
-    order: list[Term] = []
-    stack: list[tuple[Term, bool]] = [(root, False)]
-    while stack:
-        node, done = stack.pop()
-        if done:
-            order.append(node)
-        elif node not in seen:
-            seen.add(node)
-            stack.append((node, True))
-            stack.extend((part, False) for part in reversed(below(node)) if part not in seen)
-    return order
+    return postorder(root, below=below)
 
 
 class _Substitution:

@@ -7,17 +7,17 @@ says what is wrong; a person reads the formula and beside it, once, where it hol
 from __future__ import annotations
 
 from potto.core.printer import format_term
-from potto.core.terms import Hole, If, Term, children, postorder, rebuild
+from potto.core.terms import Hole, If, Term, transform
 
 
 def unguarded(term: Term) -> tuple[Term, tuple[str, ...]]:
     """The term without the guards of its measures, and their conditions as Potto writes them, each once."""
     conditions: dict[str, None] = {}
-    memo: dict[Term, Term] = {}
-    for node in postorder(term):
-        if isinstance(node, If) and isinstance(node.orelse, Hole) and node.orelse.measure:
+
+    def change(node: Term, new: Term) -> Term:
+        if isinstance(node, If) and isinstance(new, If) and isinstance(node.orelse, Hole) and node.orelse.measure:
             conditions[format_term(node.condition)] = None
-            memo[node] = memo[node.then]
-        else:
-            memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
-    return memo[term], tuple(conditions)
+            return new.then
+        return new
+
+    return transform(term, change), tuple(conditions)

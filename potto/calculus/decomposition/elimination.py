@@ -40,6 +40,7 @@ from potto.core.terms import (
     postorder,
     prim,
     rebuild,
+    transform,
     var,
 )
 
@@ -97,11 +98,11 @@ def eliminate(term: Integral) -> tuple[Step, ...] | None:
 
 def _bare(body: Term) -> Term:
     """Conditionals with the coordinate that decides alone."""
-    memo: dict[Term, Term] = {}
-    for node in postorder(body):
-        new = rebuild(node, tuple(memo[c] for c in children(node)))
-        memo[node] = branch(new.coordinates[:1], new.strict, new.then, new.orelse) if isinstance(new, Branch) else new
-    return memo[body]
+
+    def change(_: Term, new: Term) -> Term:
+        return branch(new.coordinates[:1], new.strict, new.then, new.orelse) if isinstance(new, Branch) else new
+
+    return transform(body, change)
 
 
 def _split(term: Term, here: Names, inner: Names) -> tuple[Term, Term]:

@@ -45,7 +45,6 @@ from potto.core.terms import (
     Tuple,
     add,
     branch,
-    children,
     const,
     delta,
     fresh,
@@ -56,10 +55,10 @@ from potto.core.terms import (
     postorder,
     prim,
     proj,
-    rebuild,
     sub,
     substitute,
     sum_,
+    transform,
     tuple_,
     var,
 )
@@ -156,14 +155,14 @@ def _instances(
     here = conjunction(prim("eq", var(s.variable), names[s.variable]) for s in sums)
 
     def run(right: bool) -> Term:
-        memo: dict[Term, Term] = {}
         signs = {f.branch: f.right if right else f.left for f in flips}
-        for node in postorder(body):
-            new = rebuild(node, tuple(memo[c] for c in children(node)))
+
+        def change(node: Term, new: Term) -> Term:
             if isinstance(node, Branch) and node in signs and isinstance(new, Branch):
-                new = if_(here, side_of(substitute(signs[node], names), new.then, new.orelse, box), new)
-            memo[node] = new
-        return memo[body]
+                return if_(here, side_of(substitute(signs[node], names), new.then, new.orelse, box), new)
+            return new
+
+        return transform(body, change)
 
     return run, names
 

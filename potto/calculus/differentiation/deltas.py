@@ -24,15 +24,14 @@ from potto.core.terms import (
     Sum,
     Term,
     Tuple,
-    children,
     delta,
     integral,
     neg,
     postorder,
     prim,
-    rebuild,
     substitute,
     sum_,
+    transform,
     tuple_,
 )
 from potto.diagnostics import PottoError, declare
@@ -66,11 +65,7 @@ def without_deltas(node: Integral, folding: bool = False) -> Term:
 
 
 def _inner_first(body: Term, folding: bool) -> Term:
-    memo: dict[Term, Term] = {}
-    for node in postorder(body):
-        new = rebuild(node, tuple(memo[c] for c in children(node)))
-        memo[node] = without_deltas(new, folding) if isinstance(new, Integral) else new
-    return memo[body]
+    return transform(body, lambda _, new: without_deltas(new, folding) if isinstance(new, Integral) else new)
 
 
 def _next(node: Integral, folding: bool) -> list[Term] | None:

@@ -42,6 +42,7 @@ from potto.core.terms import (
     postorder_by,
     proj,
     rebuild,
+    transform,
     tuple_,
     var,
 )
@@ -71,11 +72,7 @@ def shifted(term: Integral, resolve: Resolve, leads: Callable[[Term], bool], sha
 
 def _spelled(term: Term, resolve: Resolve) -> Term:
     """With derivatives that have names written out."""
-    memo: dict[Term, Term] = {}
-    for node in postorder(term):
-        new = rebuild(node, tuple(memo[c] for c in children(node)))
-        memo[node] = _derivative_named(new, resolve) if isinstance(new, Global) else new
-    return memo[term]
+    return transform(term, lambda _, new: _derivative_named(new, resolve) if isinstance(new, Global) else new)
 
 
 def _derivative_named(name: Global, resolve: Resolve) -> Term:
@@ -85,11 +82,7 @@ def _derivative_named(name: Global, resolve: Resolve) -> Term:
 
 def _projected(body: Term) -> Term:
     """With the parts of conditionals, sums and integrals taken inside of them."""
-    memo: dict[Term, Term] = {}
-    for node in postorder(body):
-        new = rebuild(node, tuple(memo[c] for c in children(node)))
-        memo[node] = _part(new.term, new.index) if isinstance(new, Proj) else new
-    return memo[body]
+    return transform(body, lambda _, new: _part(new.term, new.index) if isinstance(new, Proj) else new)
 
 
 def _part(term: Term, index: int) -> Term:

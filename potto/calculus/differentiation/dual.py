@@ -53,6 +53,7 @@ from potto.core.terms import (
     rebuild,
     substitute,
     sum_,
+    transform,
     tuple_,
     var,
 )
@@ -398,13 +399,11 @@ class _Pass:
 def _without(term: Term) -> Term:
     """Deltas that are left outside of level sets vary with no variable of integration: they stand for a jump that
     nothing sweeps."""
-    memo: dict[Term, Term] = {}
-    for node in postorder(term):
-        if isinstance(node, Integral) and level_set(node) is not None:
-            memo[node] = node
-        else:
-            memo[node] = ZERO if isinstance(node, Delta) else rebuild(node, tuple(memo[c] for c in children(node)))
-    return memo[term]
+
+    def below(node: Term) -> tuple[Term, ...]:
+        return () if isinstance(node, Integral) and level_set(node) is not None else children(node)
+
+    return transform(term, lambda _, new: ZERO if isinstance(new, Delta) else new, below)
 
 
 def _over(node: Integral, body: Term) -> Term:

@@ -20,12 +20,11 @@ from potto.core.terms import (
     Lam,
     Term,
     app,
-    children,
     fresh,
     lam,
     mul,
     postorder,
-    rebuild,
+    replaced,
     var,
 )
 from potto.diagnostics import PottoError
@@ -65,11 +64,8 @@ def moving_deltas(node: Integral, rate: Callable[[Term], Term]) -> list[Term]:
     found: list[Term] = []
     hidden = fresh("spike", {name for inner in postorder(node.body) for name in inner.free})
     for spike in [inner for inner in postorder(node.body) if isinstance(inner, Delta)]:
-        memo: dict[Term, Term] = {}
-        for inner in postorder(node.body):
-            memo[inner] = var(hidden) if inner is spike else rebuild(inner, tuple(memo[c] for c in children(inner)))
         speed = rate(spike.coordinates[0])
         if speed is not ZERO:
             steep = app(var("delta'"), (spike.coordinates[0],))
-            found.append(mul(partial(memo[node.body], hidden), speed, steep))
+            found.append(mul(partial(replaced(node.body, {spike: var(hidden)}), hidden), speed, steep))
     return found

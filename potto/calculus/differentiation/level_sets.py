@@ -34,7 +34,6 @@ from potto.core.terms import (
     Term,
     Var,
     add,
-    children,
     const,
     delta,
     div,
@@ -45,7 +44,7 @@ from potto.core.terms import (
     postorder,
     pow_,
     prim,
-    rebuild,
+    replaced,
     sub,
     substitute,
     var,
@@ -100,15 +99,12 @@ def deltas_over(node: Integral) -> list[Delta]:
 def coefficient(body: Term, what: Term) -> tuple[Term, Term] | None:
     """f and g of f what + g; None where it is not linear in what, a delta or a sum of such. Raises NoClosedForm."""
     hidden = fresh("delta", {n for t in postorder(body) for n in t.free})
-    memo: dict[Term, Term] = {what: var(hidden)}
-    for node in postorder(body):
-        if node not in memo:
-            memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
+    opened = replaced(body, {what: var(hidden)})
     try:
-        factor = partial(memo[body], hidden)
+        factor = partial(opened, hidden)
     except NotSmooth as problem:
         raise NoClosedForm("a delta is given to a function that is not known") from problem
-    return None if hidden in factor.free else (factor, substitute(memo[body], {hidden: ZERO}))
+    return None if hidden in factor.free else (factor, substitute(opened, {hidden: ZERO}))
 
 
 @lru_cache(maxsize=4096)

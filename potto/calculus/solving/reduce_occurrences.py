@@ -34,9 +34,9 @@ from potto.core.terms import (
     postorder,
     pow_,
     prim,
-    rebuild,
     sub,
     substitute,
+    transform,
     var,
 )
 from potto.primitives import PRIMITIVES
@@ -93,7 +93,7 @@ def _polynomial_in_something(term: Prim, value: Term, name: str) -> Steps | None
         if inner is whole or inner is term:
             continue
         hidden = inner.name if isinstance(inner, Var) else fresh("z", whole.free)
-        outer = whole if isinstance(inner, Var) else replaced(whole, inner, var(hidden))
+        outer = whole if isinstance(inner, Var) else _replaced(whole, inner, var(hidden))
         found = collect(outer, hidden)
         steps = None if found is None else _from_collected(found, hidden)
         if steps is not None:
@@ -110,13 +110,13 @@ def _polynomial_in_something(term: Prim, value: Term, name: str) -> Steps | None
     return None
 
 
-def replaced(term: Term, old: Term, new: Term) -> Term:
-    """`term` with a subterm replaced."""
-    memo: dict[Term, Term] = {old: new}
-    for node in postorder(term):
-        if node not in memo:
-            memo[node] = rebuild(node, tuple(memo[c] for c in node.args)) if isinstance(node, Prim) else node
-    return memo[term]
+def _replaced(term: Term, old: Term, new: Term) -> Term:
+    """A formula with a part replaced; what is no builtin in it is not gone into."""
+
+    def below(node: Term) -> tuple[Term, ...]:
+        return node.args if isinstance(node, Prim) and node is not old else ()
+
+    return transform(term, lambda node, made: new if node is old else made, below)
 
 
 def _from_collected(found: Collected, name: str) -> tuple[Step, ...] | None:
@@ -319,7 +319,7 @@ def _cases(term: Prim, value: Term, name: str) -> Steps | None:
             continue
         pieces = _pieces_of(node)
         if pieces is not None:
-            return tuple(Step(replaced(term, node, piece), value, guards) for piece, guards in pieces)
+            return tuple(Step(_replaced(term, node, piece), value, guards) for piece, guards in pieces)
     return None
 
 

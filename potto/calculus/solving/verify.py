@@ -15,7 +15,7 @@ from fractions import Fraction
 from potto.calculus.algebra.point_values import points, sample_value
 from potto.calculus.algebra.rational_form import equal
 from potto.calculus.solving.isolate import Guard
-from potto.core.terms import Const, Term, children, const, postorder, prim, rebuild, substitute, var
+from potto.core.terms import Const, Term, const, postorder, prim, substitute, transform, var
 
 _POINTS = 4000
 _ENOUGH = 200
@@ -126,15 +126,15 @@ def _closely(round_trip: Sequence[Term], variables: Sequence[str], passed: _Pass
 
 def _as_written(term: Term) -> Term:
     """The term with the decimals of its text as what they say: 0.1 is a tenth, and not the double beside it."""
-    memo: dict[Term, Term] = {}
-    for node in postorder(term):
-        new = rebuild(node, tuple(memo[c] for c in children(node)))
+
+    def change(node: Term, new: Term) -> Term:
         if isinstance(node, Const) and node.name is None and math.isfinite(node.value) and not node.value.is_integer():
             tenth = Fraction(repr(node.value))
             if max(abs(tenth.numerator), tenth.denominator) < 2**53:  # both are doubles
-                new = prim("div", const(float(tenth.numerator)), const(float(tenth.denominator)))
-        memo[node] = new
-    return memo[term]
+                return prim("div", const(float(tenth.numerator)), const(float(tenth.denominator)))
+        return new
+
+    return transform(term, change)
 
 
 def _is_rounded(term: Term) -> bool:

@@ -22,12 +22,11 @@ from potto.core.terms import (
     Sum,
     Term,
     branch,
-    children,
     mul,
     neg,
     postorder,
-    rebuild,
     substitute,
+    transform,
 )
 
 Box = Mapping[str, tuple[float, float]]
@@ -72,13 +71,13 @@ def forced(body: Term, flips: Flips, right: bool, box: Box = NOWHERE) -> Term:
     if not flips:
         return body
     signs = {f.branch: f.right if right else f.left for f in flips}
-    memo: dict[Term, Term] = {}
-    for node in postorder(body):
-        new = rebuild(node, tuple(memo[c] for c in children(node)))
+
+    def change(node: Term, new: Term) -> Term:
         if isinstance(node, Branch) and node in signs and isinstance(new, Branch):
-            new = side_of(signs[node], new.then, new.orelse, box)
-        memo[node] = new
-    return memo[body]
+            return side_of(signs[node], new.then, new.orelse, box)
+        return new
+
+    return transform(body, change)
 
 
 def side_of(slope: Term, then: Term, orelse: Term, box: Box = NOWHERE) -> Term:
@@ -144,11 +143,7 @@ def _both(slope: Term, variable: str, at: Term, bends: int) -> tuple[Term, Term]
 
 def unguarded(root: Term) -> Term:
     """A root as it is where it exists."""
-    memo: dict[Term, Term] = {}
-    for node in postorder(root):
-        new = rebuild(node, tuple(memo[c] for c in children(node)))
-        memo[node] = new.then if isinstance(new, Branch) and new.orelse is NAN else new
-    return memo[root]
+    return transform(root, lambda _, new: new.then if isinstance(new, Branch) and new.orelse is NAN else new)
 
 
 def without_poles(surface: Term) -> Term:

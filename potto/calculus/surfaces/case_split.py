@@ -21,7 +21,8 @@ from potto.core.terms import (
     neg,
     postorder,
     postorder_by,
-    rebuild,
+    replaced,
+    transform,
 )
 from potto.primitives import PRIMITIVES
 
@@ -33,11 +34,11 @@ def cased(term: Integral) -> Integral:
     """An equal integral, or the same one where there is nothing to take apart."""
     if not any(isinstance(node, Branch) and _changes(node) for node in postorder(term.body)):
         return term
-    memo: dict[Term, Term] = {}
-    for node in postorder(term.body):
-        new = rebuild(node, tuple(memo[c] for c in children(node)))
-        memo[node] = _apart(new, MOST) if isinstance(node, Branch) and _changes(node) else new
-    return integral(term.variables, term.bounds, memo[term.body], term.hints)
+
+    def change(node: Term, new: Term) -> Term:
+        return _apart(new, MOST) if isinstance(node, Branch) and _changes(node) else new
+
+    return integral(term.variables, term.bounds, transform(term.body, change), term.hints)
 
 
 def resolved(term: Term) -> Term:
@@ -46,11 +47,7 @@ def resolved(term: Term) -> Term:
 
     [x*y > 0] is [y > 0] where x > 0, and [y < 0] where it is not: a formula for its roots in y says nothing of x = 0.
     """
-    memo: dict[Term, Term] = {}
-    for node in postorder(term):
-        new = rebuild(node, tuple(memo[c] for c in children(node)))
-        memo[node] = _by_factors(cased(unnested(new))) if isinstance(new, Integral) else new
-    return memo[term]
+    return transform(term, lambda _, new: _by_factors(cased(unnested(new))) if isinstance(new, Integral) else new)
 
 
 def unnested(term: Integral) -> Integral:
@@ -65,11 +62,8 @@ def unnested(term: Integral) -> Integral:
 
 
 def _by_factors(term: Integral) -> Integral:
-    memo: dict[Term, Term] = {}
-    for node in postorder(term.body):
-        new = rebuild(node, tuple(memo[c] for c in children(node)))
-        memo[node] = _split(new, MOST) if isinstance(new, Branch) else new
-    return integral(term.variables, term.bounds, memo[term.body], term.hints)
+    body = transform(term.body, lambda _, new: _split(new, MOST) if isinstance(new, Branch) else new)
+    return integral(term.variables, term.bounds, body, term.hints)
 
 
 def _split(node: Term, most: int) -> Term:
@@ -106,7 +100,7 @@ def _apart(node: Term, most: int) -> Term:
     margin, first, second = PRIMITIVES[bent.op].cases(*bent.args)  # type: ignore[misc]
     cases = []
     for value in (first, second):
-        coordinates = tuple(_put(c, bent, value) for c in node.coordinates)
+        coordinates = tuple(replaced(c, {bent: value}) for c in node.coordinates)
         cases.append(_apart(branch(coordinates, node.strict, node.then, node.orelse), most // 2))
     return branch((margin,), False, cases[0], cases[1])
 
@@ -114,11 +108,3 @@ def _apart(node: Term, most: int) -> Term:
 def _outside(surface: Term) -> list[Term]:
     """The parts of a surface that are not inside an integral or a sum of it, whose variables mean nothing outside."""
     return postorder_by(surface, lambda node: () if bound_names(node) else children(node))
-
-
-def _put(term: Term, old: Term, new: Term) -> Term:
-    memo: dict[Term, Term] = {old: new}
-    for node in postorder(term):
-        if node not in memo:
-            memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
-    return memo[term]

@@ -31,13 +31,12 @@ from potto.core.terms import (
     Sum,
     Term,
     Tuple,
-    children,
     const,
     outside,
     postorder,
     proj,
-    rebuild,
     substitute,
+    transform,
 )  # fmt: skip
 from potto.primitives import PRIMITIVES
 
@@ -124,14 +123,9 @@ def carried_out(surface: Term, resolve: Resolve, depth: int = 0) -> Term:
 
     A recursion stays a call after a few rounds.
     """
-    order = postorder(surface)
-    if depth > _DEEPEST_SURFACE or not any(isinstance(node, App) for node in order):
+    if depth > _DEEPEST_SURFACE or not any(isinstance(node, App) for node in postorder(surface)):
         return surface
-    memo: dict[Term, Term] = {}
-    for node in order:
-        made = rebuild(node, tuple(memo[c] for c in children(node)))
-        memo[node] = _result(made, resolve, depth) if isinstance(made, App) else made
-    return memo[surface]
+    return transform(surface, lambda _, new: _result(new, resolve, depth) if isinstance(new, App) else new)
 
 
 def _result(call: App, resolve: Resolve, depth: int) -> Term:

@@ -23,13 +23,12 @@ from potto.core.terms import (
     add,
     bound_names,
     branch,
-    children,
     integral,
     neg,
     postorder,
-    rebuild,
     substitute,
     sum_,
+    transform,
 )
 
 MOST = 6  # branches taken out of one integral: each doubles the integrals that there are
@@ -86,11 +85,7 @@ def _carried_out(body: Term, resolve: Resolve) -> Term:
 
 
 def _taken_out(body: Term) -> Term:
-    memo: dict[Term, Term] = {}
-    for node in postorder(body):
-        new = rebuild(node, tuple(memo[c] for c in children(node)))
-        memo[node] = _outside(new) if isinstance(new, Integral) else new
-    return memo[body]
+    return transform(body, lambda _, new: _outside(new) if isinstance(new, Integral) else new)
 
 
 def _outside(term: Integral) -> Term:
@@ -138,12 +133,12 @@ def _same(node: Term, decided: Branch) -> bool:
 
 def _with(term: Term, decided: Branch, side: bool) -> Term:
     """The term where one branch is decided, wherever its surface is met."""
-    memo: dict[Term, Term] = {}
-    for node in postorder(term):
-        new = rebuild(node, tuple(memo[c] for c in children(node)))
+
+    def change(node: Term, new: Term) -> Term:
         if isinstance(new, Branch) and _same(node, decided):
-            new = new.then if side else new.orelse
-        memo[node] = new
-    return memo[term]
+            return new.then if side else new.orelse
+        return new
+
+    return transform(term, change)
 
 

@@ -16,11 +16,9 @@ from potto.core.terms import (
     Lam,
     Sum,
     Term,
-    children,
     outside,
     postorder,
-    postorder_by,
-    rebuild,
+    replaced,
 )
 
 BINDERS = (Integral, Sum, Lam)
@@ -58,13 +56,5 @@ def pieces(surface: Term) -> tuple[Term, ...]:
         if inner is None or len(done) + len(waiting) >= _MOST_PIECES:
             done[term] = None
         else:
-            waiting.extend(_in_place(term, inner, case) for case in (inner.orelse, inner.then))
+            waiting.extend(replaced(term, {inner: case}) for case in (inner.orelse, inner.then))
     return tuple(done)
-
-
-def _in_place(term: Term, old: Term, new: Term) -> Term:
-    memo: dict[Term, Term] = {old: new}
-    for node in postorder_by(term, lambda node: () if node is old else children(node)):
-        if node not in memo:
-            memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
-    return memo[term]
