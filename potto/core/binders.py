@@ -8,7 +8,7 @@ do not.
 from __future__ import annotations
 
 from potto.core.kinds import Term
-from potto.core.walking import bound_names, children, fresh, postorder_by, rebuild, rename_bound
+from potto.core.walking import bound_names, children, fresh, rebuild, rename_bound, transform, unknown
 
 # Of a term the names that binders in it bind, and whether one of them is bound by a binder around it too.
 Bound = dict[Term, tuple[frozenset[str], bool]]
@@ -20,11 +20,10 @@ def apart(root: Term, known: Bound | None = None) -> Term:
     known: what is known of terms already; it grows, and what is in it is not looked through again.
     """
     known = {} if known is None else known
-    for node in postorder_by(root, lambda node: () if node in known else children(node)):
-        if node not in known:
-            own, below = frozenset(bound_names(node)), [known[c] for c in children(node)]
-            inside = frozenset[str]().union(*(names for names, _ in below))
-            known[node] = own | inside, any(clash for _, clash in below) or not own.isdisjoint(inside)
+    for node in unknown(root, known):
+        own, below = frozenset(bound_names(node)), [known[c] for c in children(node)]
+        inside = frozenset[str]().union(*(names for names, _ in below))
+        known[node] = own | inside, any(clash for _, clash in below) or not own.isdisjoint(inside)
     names, clash = known[root]
     return _Apart(names | root.free).run(root, root.free) if clash or not names.isdisjoint(root.free) else root
 
@@ -34,26 +33,25 @@ class _Apart:
 
     def __init__(self, taken: frozenset[str]) -> None:
         self.taken = set(taken)
-        self.memo: dict[tuple[Term, frozenset[str]], Term] = {}
+        self.made: dict[frozenset[str], dict[Term, Term]] = {}
 
     def run(self, root: Term, around: frozenset[str]) -> Term:
         """`around`: the names that binders in the term must not have. Recursion only at binders."""
-        for node in postorder_by(root, lambda node: () if bound_names(node) else children(node)):
-            if (node, around) not in self.memo:
-                parts = children(node)
-                bound = bool(bound_names(node))
-                self.memo[node, around] = (
-                    self.binder(node, around) if bound else rebuild(node, tuple(self.memo[c, around] for c in parts))
-                )
-        return self.memo[root, around]
+        return transform(
+            root,
+            lambda node, new: self.binder(node, around) if bound_names(node) else new,
+            lambda node: () if bound_names(node) else children(node),
+            self.made.setdefault(around, {}),
+        )
 
     def binder(self, node: Term, around: frozenset[str]) -> Term:
-        names: dict[str, str] = {}
-        for name in bound_names(node):
-            if name in around:
-                names[name] = fresh(name, self.taken | node.free)
-                self.taken.add(names[name])
-        if names:
+        clash = around.intersection(bound_names(node))
+        if clash:
+            names: dict[str, str] = {}
+            for name in bound_names(node):
+                if name in clash:
+                    names[name] = fresh(name, self.taken | node.free)
+                    self.taken.add(names[name])
             node = rename_bound(node, names)
         inner = around.union(bound_names(node))
-        return rebuild(node, tuple(self.run(part, inner) for part in children(node)))
+        return rebuild(node, tuple([self.run(part, inner) for part in children(node)]))

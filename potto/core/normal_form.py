@@ -12,16 +12,14 @@ import math
 from collections.abc import Callable, Mapping
 from fractions import Fraction
 
-from potto.core.polynomials import Monomial, Polynomial, TooLarge, bounded, monomial_term, number, total
+from potto.core import polynomials
+from potto.core.polynomials import Monomial, Polynomial, TooLarge, bounded, total
 from potto.core.terms import (
-    ZERO,
     Const,
     Prim,
     Term,
     Var,
-    add,
     children,
-    neg,
     postorder,
     prim,
     rebuild,
@@ -42,15 +40,7 @@ def normal_form(term: Term) -> Polynomial:
 
 def as_term(polynomial: Polynomial) -> Term | None:
     """A polynomial as a term, monomials in order; None if a coefficient cannot be written exactly."""
-    terms: list[Term] = []
-    for monomial in sorted(polynomial, key=_monomial_order):
-        coefficient = polynomial[monomial]
-        scale = number(abs(coefficient))
-        if scale is None:
-            return None
-        term = monomial_term(scale, monomial)
-        terms.append(neg(term) if coefficient < 0 else term)
-    return add(*terms) if terms else ZERO
+    return polynomials.as_term({monomial: polynomial[monomial] for monomial in sorted(polynomial, key=_monomial_order)})
 
 
 def leading(polynomial: Polynomial) -> Monomial:

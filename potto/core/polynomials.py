@@ -1,8 +1,8 @@
 """Polynomials over terms as atoms, with exact coefficients: what both normal forms compute with.
 
 Owns `Polynomial`, sums, the bound on sizes, and how coefficients and monomials are written as terms. `normal_form` puts
-terms in order and must keep their values everywhere; `calculus.normal` recognizes zero and may use identities between
-atoms, so that their products differ.
+terms in order and must keep their values everywhere; `calculus.algebra.rational_form`
+recognizes zero and may use identities between atoms, so that their products differ.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from fractions import Fraction
 
-from potto.core.terms import Prim, Term, const, div, mul, pow_
+from potto.core.terms import Prim, Term, add, const, div, mul, neg, pow_
 
 Monomial = tuple[tuple[Term, int], ...]
 """Atoms with their exponents, in an order that their owner keeps."""
@@ -65,6 +65,19 @@ def monomial_term(scale: Term, monomial: Monomial) -> Term:
     else:
         above = [scale, *above]
     return div(mul(*above), mul(*below))
+
+
+def as_term(polynomial: Polynomial, rounded: bool = False) -> Term | None:
+    """A polynomial as a term, monomials in the order in which they stand; None if a coefficient cannot be written
+    exactly, unless it may be `rounded`."""
+    terms: list[Term] = []
+    for monomial, coefficient in polynomial.items():
+        scale = const(float(abs(coefficient))) if rounded else number(abs(coefficient))
+        if scale is None:
+            return None
+        term = monomial_term(scale, monomial)
+        terms.append(neg(term) if coefficient < 0 else term)
+    return add(*terms)
 
 
 def _power_term(atom: Term, n: int) -> Term:

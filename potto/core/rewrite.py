@@ -7,7 +7,7 @@ to merge. Sums and products have their own file, `collecting`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from potto.core.collecting import product_of, sum_of
 from potto.core.terms import (
@@ -26,13 +26,13 @@ from potto.core.terms import (
     children,
     const,
     if_,
-    integral,
     neg,
     postorder,
     prim,
     proj,
     rebuild,
-    sum_,
+    transform,
+    unknown,
 )
 from potto.primitives import EXACT, PRIMITIVES, UNDOES
 
@@ -50,9 +50,7 @@ class Rewriter:
         self.surfaces: dict[Term, frozenset[Term]] = {}
 
     def run(self, term: Term) -> Term:
-        for node in postorder(term):
-            self.memo[node] = self.node(rebuild(node, tuple(self.memo[c] for c in children(node))))
-        return self.memo[term]
+        return transform(term, lambda _, new: self.node(new), made=self.memo)
 
     def node(self, node: Term) -> Term:
         match node:
@@ -88,29 +86,29 @@ class Rewriter:
 
     def found(self, term: Term) -> frozenset[Term]:
         """The canonical surfaces of the branches in a term; none where there are too many."""
-        for node in postorder(term):
-            if node not in self.surfaces:
-                own = (self.surface(node.surface)[0],) if isinstance(node, Branch) else ()
-                below = frozenset().union(own, *(self.surfaces[c] for c in children(node)))
-                self.surfaces[node] = below if len(below) <= _MANY else _NONE
+        for node in unknown(term, self.surfaces):
+            own = (self.surface(node.surface)[0],) if isinstance(node, Branch) else ()
+            below = frozenset().union(own, *(self.surfaces[c] for c in children(node)))
+            self.surfaces[node] = below if len(below) <= _MANY else _NONE
         return self.surfaces[term]
 
     def assume(self, arm: Term, canonical: Term, sign: int, strict: bool, holds: bool) -> Term:
         """An arm of a branch, with the branches on the same surface in it decided."""
         if not arm.free & canonical.free or canonical not in self.found(arm):
             return arm
-        memo: dict[Term, Term] = {}
-        for node in postorder(arm):
-            if canonical not in self.found(node) or not canonical.free.isdisjoint(bound_names(node)):
-                memo[node] = node
-                continue
-            new = rebuild(node, tuple(memo[c] for c in children(node)))
-            if isinstance(node, Branch) and isinstance(new, Branch):
-                inner, inner_sign = self.surface(node.surface)
-                taken = _decided(strict, holds, node.strict, sign == inner_sign) if inner is canonical else None
-                new = new if taken is None else new.then if taken else new.orelse
-            memo[node] = new
-        return memo[arm]
+
+        def below(node: Term) -> Sequence[Term]:
+            hidden = canonical not in self.found(node) or not canonical.free.isdisjoint(bound_names(node))
+            return () if hidden else children(node)
+
+        def change(node: Term, new: Term) -> Term:
+            if not (isinstance(node, Branch) and isinstance(new, Branch)):
+                return new
+            inner, inner_sign = self.surface(node.surface)
+            taken = _decided(strict, holds, node.strict, sign == inner_sign) if inner is canonical else None
+            return new if taken is None else new.then if taken else new.orelse
+
+        return transform(arm, change, below)
 
 
 def _decided(strict: bool, holds: bool, inner_strict: bool, same_side: bool) -> bool | None:
@@ -181,26 +179,11 @@ def _logic(node: Prim) -> Term:
 def _component(term: Term, index: int) -> Term:
     """A component of a tuple, taken inside of what chooses, integrates or adds up tuples."""
     memo: dict[Term, Term] = {}
-    stack: list[tuple[Term, bool]] = [(term, False)]
-    while stack:
-        node, done = stack.pop()
-        if not done:
-            inner = _spine(node)
-            stack.append((node, True))
-            stack.extend((part, False) for part in inner if part not in memo)
-            continue
-        match node:
-            case Branch():
-                then, orelse = memo[node.then], memo[node.orelse]
-                memo[node] = then if then is orelse else branch(node.coordinates, node.strict, then, orelse)
-            case If():
-                memo[node] = if_(node.condition, memo[node.then], memo[node.orelse])
-            case Integral():
-                memo[node] = integral(node.variables, node.bounds, memo[node.body], node.hints)
-            case Sum():
-                memo[node] = sum_(node.variable, node.lo, node.hi, memo[node.body])
-            case _:
-                memo[node] = proj(node, index)
+    for node in postorder(term, below=_spine):
+        own = _spine(node)
+        kept = children(node)[: -len(own)] if own else ()
+        new = rebuild(node, (*kept, *(memo[part] for part in own))) if own else proj(node, index)
+        memo[node] = new.then if isinstance(new, Branch) and new.then is new.orelse else new
     return memo[term]
 
 

@@ -5,9 +5,9 @@ Owns what every pass is made of. Only binders recurse, and they nest no deeper t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence, Set
 from operator import attrgetter, is_
-from typing import Any
+from typing import Any, TypeVar
 
 from potto.core.folding import apply
 from potto.core.kinds import (
@@ -42,6 +42,8 @@ from potto.core.kinds import (
     union_of,
     var,
 )
+
+Binder = TypeVar("Binder", bound=Term)
 
 
 def children(term: Term) -> tuple[Term, ...]:
@@ -143,14 +145,18 @@ def postorder(*roots: Term, below: Callable[[Term], Sequence[Term]] | None = Non
 
 
 def transform(
-    root: Term, change: Callable[[Term, Term], Term], below: Callable[[Term], Sequence[Term]] = children
+    root: Term,
+    change: Callable[[Term, Term], Term],
+    below: Callable[[Term], Sequence[Term]] = children,
+    made: dict[Term, Term] | None = None,
 ) -> Term:
     """A term rebuilt from below: `change` makes of every part, and of the same over changed children, what it becomes.
 
-    below: the children of a part, or none where it is changed only as a whole.
+    below: the children of a part, or none where it is changed only as a whole. made: what parts have become; it grows.
     """
-    made: dict[Term, Term] = {}
-    for node in postorder(root, below=below):
+    order = postorder(root, below=below) if made is None else unknown(root, made, below)
+    made = {} if made is None else made
+    for node in order:
         parts = tuple([made[child] for child in below(node)])
         made[node] = change(node, rebuild(node, parts) if parts else node)
     return made[root]
@@ -159,6 +165,14 @@ def transform(
 def replaced(root: Term, parts: Mapping[Term, Term]) -> Term:
     """A term with some of its parts replaced; what is in them is not looked at."""
     return transform(root, lambda node, new: parts.get(node, new), lambda n: () if n in parts else children(n))
+
+
+def unknown(
+    root: Term, known: Container[Term], below: Callable[[Term], Sequence[Term]] = children
+) -> list[Term]:
+    """The parts of a term that nothing is known of yet, children first: what is known is not gone into."""
+    order = postorder(root, below=lambda node: () if node in known else below(node))
+    return [node for node in order if node not in known]
 
 
 class Holding:
@@ -170,9 +184,8 @@ class Holding:
 
     def __call__(self, term: Term) -> bool:
         known = self.known
-        for node in postorder_by(term, lambda node: () if node in known else children(node)):
-            if node not in known:
-                known[node] = isinstance(node, self.kinds) or any(known[c] for c in children(node))
+        for node in unknown(term, known):
+            known[node] = isinstance(node, self.kinds) or any(known[c] for c in children(node))
         return known[term]
 
 
@@ -211,96 +224,79 @@ def fresh(name: str, taken: Iterable[str]) -> str:
     return candidate
 
 
-def substitute(term: Term, mapping: Mapping[str, Term]) -> Term:
-    """Replace free variables by terms at once, renaming binders that would capture."""
-    mapping = {name: new for name, new in mapping.items() if name in term.free}
-    if not mapping:
-        return term
-    return _Substitution(mapping).run(term)
-
-
 def postorder_by(root: Term, below: Callable[[Term], Sequence[Term]]) -> list[Term]:
     """Every distinct term that `below` leads to from the root once, after what is below it. Does not recurse."""
     return postorder(root, below=below)
 
 
-class _Substitution:
-    """One mapping and what it has made of the terms met so far. Recursion only at binders."""
+def substitute(term: Term, mapping: Mapping[str, Term]) -> Term:
+    """Replace free variables by terms at once, renaming binders that would capture. Recursion only at binders."""
+    mapping = {name: new for name, new in mapping.items() if name in term.free}
+    if not mapping:
+        return term
+    names, incoming = frozenset(mapping), union_of(mapping.values())
 
-    def __init__(self, mapping: Mapping[str, Term]) -> None:
-        self.mapping = mapping
-        self.names = frozenset(mapping)
-        self.memo: dict[Term, Term] = {}
-        self.incoming = union_of(mapping.values())
+    def below(node: Term) -> Sequence[Term]:
+        return () if names.isdisjoint(node.free) or bound_names(node) else children(node)
 
-    def run(self, root: Term) -> Term:
-        stack: list[tuple[Term, bool]] = [(root, False)]
-        memo = self.memo
-        while stack:
-            term, ready = stack.pop()
-            if term in memo:
-                continue
-            if not (term.free & self.names):
-                memo[term] = term
-            elif isinstance(term, Var):
-                memo[term] = self.mapping[term.name]
-            elif bound_names(term):
-                memo[term] = self.binder(term)
-            elif ready:
-                memo[term] = rebuild(term, tuple(memo[c] for c in children(term)))
-            else:
-                stack.append((term, True))
-                stack.extend((c, False) for c in children(term) if c not in memo)
-        return memo[root]
+    def change(node: Term, new: Term) -> Term:
+        if names.isdisjoint(node.free):
+            return node
+        if isinstance(node, Var):
+            return mapping[node.name]
+        return _in_scopes(node, mapping, _fresh_names(node, incoming)) if bound_names(node) else new
 
-    def binder(self, term: Term) -> Term:
-        bound = bound_names(term)
-        inner = {n: t for n, t in self.mapping.items() if n not in bound}
-        clash = [n for n in bound if n in self.incoming]
-        if clash:
-            taken = set(self.incoming) | set(term.free) | set(bound) | {n for c in children(term) for n in c.free}
-            names: dict[str, str] = {}
-            for n in clash:
-                names[n] = fresh(n, taken)
-                taken.add(names[n])
-            term = rename_bound(term, names)
-            return self.binder(term)
-        if isinstance(term, Integral):
-            return self.integral(term)
-        if isinstance(term, Sum):
-            return sum_(term.variable, self.run(term.lo), self.run(term.hi), substitute(term.body, inner))
-        assert isinstance(term, Lam)
-        return lam(term.params, substitute(term.body, inner))
-
-    def integral(self, term: Integral) -> Term:
-        """Bounds of variable k see the variables before k only: the mapping thins as it goes in."""
-        inner = dict(self.mapping)
-        bounds: list[tuple[Term, Term]] = []
-        hints: list[tuple[Term, ...]] = []
-        for name, (lo, hi), points in zip(term.variables, term.bounds, term.hints, strict=True):
-            bounds.append((substitute(lo, inner), substitute(hi, inner)))
-            hints.append(tuple(substitute(p, inner) for p in points))
-            inner.pop(name, None)
-        return integral(term.variables, tuple(bounds), substitute(term.body, inner), tuple(hints))
+    return transform(term, change, below)
 
 
-def rename_bound(term: Term, names: Mapping[str, str]) -> Term:
+def _fresh_names(binder: Term, taken: Set[str]) -> dict[str, str]:
+    """Other names for what a binder binds, where those are taken."""
+    names: dict[str, str] = {}
+    clash = [name for name in bound_names(binder) if name in taken]
+    if clash:
+        used = {*taken, *bound_names(binder), *(name for part in children(binder) for name in part.free)}
+        for name in clash:
+            names[name] = fresh(name, used)
+            used.add(names[name])
+    return names
+
+
+def rename_bound(term: Binder, names: Mapping[str, str]) -> Binder:
     """The same binder with other names for (some of) the variables that it binds."""
-    renaming = {old: var(new) for old, new in names.items()}
+    renamed = _in_scopes(term, {}, names)
+    assert isinstance(renamed, type(term))
+    return renamed
+
+
+def bound_apart(term: Binder, taken: Set[str]) -> Binder:
+    """The same binder with other names for the variables that it binds, where those are taken."""
+    names = _fresh_names(term, taken)
+    return rename_bound(term, names) if names else term
+
+
+def _in_scopes(term: Term, mapping: Mapping[str, Term], names: Mapping[str, str]) -> Term:
+    """A binder with free variables replaced, and with names for those that it binds, each where it is seen: bounds of
+    an integral see the variables before them only."""
+    seen = dict(mapping)
+
+    def enter(name: str) -> str:
+        seen.pop(name, None)
+        if name in names:
+            seen[name] = var(names[name])
+        return names.get(name, name)
+
     match term:
         case Lam():
-            return lam(tuple(names.get(p, p) for p in term.params), substitute(term.body, renaming))
+            return lam(tuple([enter(name) for name in term.params]), substitute(term.body, seen))
         case Sum():
-            return sum_(names.get(term.variable, term.variable), term.lo, term.hi, substitute(term.body, renaming))
+            lo, hi = substitute(term.lo, seen), substitute(term.hi, seen)
+            return sum_(enter(term.variable), lo, hi, substitute(term.body, seen))
         case Integral():
-            bounds, hints, seen = [], [], dict[str, Term]()
+            variables, bounds, hints = list[str](), list[tuple[Term, Term]](), list[tuple[Term, ...]]()
             for name, (lo, hi), points in zip(term.variables, term.bounds, term.hints, strict=True):
                 bounds.append((substitute(lo, seen), substitute(hi, seen)))
-                hints.append(tuple(substitute(p, seen) for p in points))
-                if name in renaming:
-                    seen[name] = renaming[name]
-            return integral(
-                tuple(names.get(v, v) for v in term.variables), tuple(bounds), substitute(term.body, seen), tuple(hints)
-            )
+                hints.append(tuple([substitute(p, seen) for p in points]))
+                variables.append(enter(name))
+            return integral(tuple(variables), tuple(bounds), substitute(term.body, seen), tuple(hints))
         case _:
             raise TypeError(f"{type(term).__name__} binds nothing")

@@ -7,7 +7,9 @@ imported, on this floor: a rule gets the arithmetic that it is to work with.
 
 from __future__ import annotations
 
+import builtins
 import math
+import operator
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -53,9 +55,9 @@ class Primitive:
     Values:
     numpy: the name of a ufunc: "sqrt" is numpy's, "special.erf" is scipy.special's, "potto.xyz" is one of
         potto.kernels.ufuncs (for `clamp` and the like).
-    mpmath: the name of the function in mpmath; "potto.xyz" is one of potto.core.reference.functions.
-    scalar: its name in the module math, for numbers one by one; where there is none mpmath is asked.
-    decimal: its name in potto.core.decimals, for proofs by digits; without one it is an unknown function there.
+    mpmath: the name of the function in mpmath; "potto.xyz" is one of potto.core.reference.functions, "operator.xyz" and
+        "builtins.xyz" are Python's.
+    scalar: the same for numbers one by one, "math.xyz" as a rule; where there is none mpmath is asked.
     ulp: what its numeric form may be off, in units of half a last place, as a number or by the arguments; 0 if its
         values are those of an argument, perhaps with the other sign.
     off: what it may be off beside that, absolutely: of functions that keep no digits where they cross 0.
@@ -106,7 +108,6 @@ class Primitive:
     numpy: str = ""
     mpmath: str = ""
     scalar: str = ""
-    decimal: str = ""
     ulp: float | Callable[..., Any] = 1.0
     off: float = 0.0
     guarded: bool = False
@@ -151,6 +152,12 @@ UNDOES: dict[str, str] = {}
 """f and g with f(g(x)) = x wherever g(x) is defined: read off the inverses."""
 EXACT: dict[tuple[str, float], float] = {}
 """Values of builtins of one argument that are known exactly."""
+
+
+def of_python(name: str) -> Callable[..., Any]:
+    """A function of one of Python's own modules, by both names."""
+    module, _, name = name.rpartition(".")
+    return getattr({"math": math, "operator": operator, "builtins": builtins}[module], name)  # type: ignore[no-any-return]
 
 
 def register(primitive: Primitive) -> Primitive:

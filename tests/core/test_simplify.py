@@ -6,7 +6,7 @@ import math
 from fractions import Fraction
 
 import pytest
-from core_terms import HALF, THREE, TWO, UNIT, area, bracket, c, n, s, t, terms, x, y
+from core_terms import THREE, TWO, UNIT, area, bracket, c, n, s, t, terms, x, y
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from mpmath import mp
@@ -15,7 +15,7 @@ from potto.core.lint import lint
 from potto.core.normal_form import as_term, normal_form
 from potto.core.printer import format_term
 from potto.core.reference import evaluate
-from potto.core.simplify import is_zero, normalized_surface, polynomial, simplify
+from potto.core.simplify import normalized_surface, simplify
 from potto.core.terms import (
     ONE,
     PI,
@@ -155,84 +155,6 @@ def near_a_surface(term: Term, point: dict[str, float]) -> bool:
 def test_simplifying_twice_changes_nothing_more(term: Term) -> None:
     once = simplify(term)
     assert len(postorder(simplify(once))) <= len(postorder(once))
-
-
-# Zero
-
-
-@pytest.mark.parametrize(
-    "term",
-    [
-        sub(mul(x, y), mul(y, x)),
-        sub(pow_(add(x, y), TWO), add(mul(x, x), mul(TWO, x, y), mul(y, y))),
-        sub(mul(sub(x, y), add(x, y)), sub(mul(x, x), mul(y, y))),
-        add(pow_(prim("sin", x), TWO), pow_(prim("cos", x), TWO), const(-1.0)),
-        sub(prim("tanh", x), div(prim("sinh", x), prim("cosh", x))),
-        sub(prim("exp", add(x, y)), mul(prim("exp", x), prim("exp", y))),
-        sub(prim("sin", mul(TWO, x)), mul(TWO, prim("sin", x), prim("cos", x))),
-        sub(prim("erf", x), sub(ONE, prim("erfc", x))),
-        sub(prim("atan", x), prim("asin", div(x, prim("sqrt", add(ONE, mul(x, x)))))),
-        sub(prim("max", x, y), div(add(x, y, prim("abs", sub(x, y))), TWO)),
-        sub(prim("hypot", x, y), prim("sqrt", add(mul(x, x), mul(y, y)))),
-        sub(app(global_("m", "f"), (add(x, y),)), app(global_("m", "f"), (add(y, x),))),
-    ],
-)
-def test_zero(term: Term) -> None:
-    assert is_zero(term)
-
-
-@pytest.mark.parametrize(
-    "term",
-    [
-        sub(mul(const(1.0000000000000002), x), x),  # one unit in the last place
-        mul(const(1e-300), x),
-        add(pow_(prim("sin", x), TWO), pow_(prim("cos", x), TWO), const(-1.0000000000000002)),
-        sub(prim("atan2", x, t), prim("atan", div(x, t))),  # equal where t > 0 only
-        sub(prim("sqrt", mul(x, x)), x),
-        sub(app(global_("m", "f"), (x,)), app(global_("m", "f"), (y,))),
-        prim("log", prim("neg", mul(x, x))),  # defined nowhere
-        PI,
-    ],
-)
-def test_not_zero(term: Term) -> None:
-    assert not is_zero(term)
-
-
-# Polynomials
-
-
-@pytest.mark.parametrize(
-    ("term", "coefficients"),
-    [
-        (sub(pow_(add(x, t), TWO), mul(THREE, x)), ["t^2", "2*t - 3", "1"]),
-        (div(sub(mul(t, x), ONE), s), ["-1/s", "t/s"]),
-        (sub(mul(x, t), mul(t, x)), ["0"]),
-        (add(t, ONE), ["t + 1"]),
-        (mul(sub(x, ONE), sub(x, TWO), sub(x, THREE)), ["-6", "11", "-6", "1"]),
-        (neg(x), ["0", "-1"]),
-        (pow_(x, const(4.0)), ["0", "0", "0", "0", "1"]),
-    ],
-)
-def test_polynomial(term: Term, coefficients: list[str]) -> None:
-    found = polynomial(term, "x")
-    assert found is not None and [format_term(k) for k in found] == coefficients
-
-
-@pytest.mark.parametrize(
-    "term",
-    [
-        prim("sin", x),
-        div(ONE, x),
-        pow_(x, HALF),
-        pow_(x, const(5.0)),
-        bracket(x),
-        pow_(TWO, x),
-        prim("abs", x),
-        pow_(x, t),
-    ],
-)
-def test_no_polynomial(term: Term) -> None:
-    assert polynomial(term, "x") is None
 
 
 # Surfaces

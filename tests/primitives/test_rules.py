@@ -15,9 +15,7 @@ from mpmath import mp
 
 from potto.calculus.algebra.floats import FLOATS
 from potto.calculus.algebra.ranges import ARITHMETIC, RANGES, ranges
-from potto.core.decimals import Undefined
 from potto.core.reference import function
-from potto.core.sampling import DIGITS
 from potto.core.terms import Const, const, postorder, prim, var
 from potto.integrate.rules.complex_enclosures import DISCS, Form, enclosed
 from potto.integrate.rules.intervals import INTERVALS, enclosure
@@ -26,7 +24,7 @@ from potto.primitives import EXACT, PRIMITIVES, Primitive
 from potto.primitives.walking import Domain
 
 DOMAINS: dict[str, Domain[Any]] = {
-    "floats": FLOATS, "digits": DIGITS, "ranges": RANGES, "intervals": INTERVALS, "discs": DISCS, "arrays": ARRAYS,
+    "floats": FLOATS, "ranges": RANGES, "intervals": INTERVALS, "discs": DISCS, "arrays": ARRAYS,
 }  # fmt: skip
 NUMERIC = [p for p in PRIMITIVES.values() if not p.truth]
 OF_ONE = [p for p in NUMERIC if p.arity == 1]
@@ -182,24 +180,3 @@ def test_formulas_are_what_they_define(primitive: Primitive, data: st.DataObject
         wanted = function(primitive.name)(*map(mp.mpf, point))
         found = evaluate(formula, dict(zip(names, point)))
         assert abs(found - wanted) <= mp.mpf("1e-20") * (1 + abs(wanted))
-
-
-@pytest.mark.parametrize("primitive", [p for p in NUMERIC if p.decimal or p.formula], ids=by_name)
-@settings(deadline=None, max_examples=10)
-@given(data=st.data())
-def test_digits_are_digits(primitive: Primitive, data: st.DataObject) -> None:
-    """Right also next to the edge of a domain, where half of the 50 digits are lost."""
-    from decimal import Decimal
-
-    if "digits" in primitive.lacks:
-        return
-    domain = primitive.domain * (2 if primitive.arity is None else 1)
-    point = [data.draw(st.floats(max(lo, -3.0), min(hi, 3.0))) for lo, hi in domain]
-    assume(all(x == 0 or abs(x) > 1e-6 for x in point))
-    try:
-        found = DIGITS.apply(primitive.name, [Decimal(x) for x in point])
-    except (Undefined, ArithmeticError):
-        assume(False)
-    with mp.workdps(60):
-        wanted = function(primitive.name)(*map(mp.mpf, point))
-        assert abs(mp.mpf(str(found)) - wanted) <= mp.mpf("1e-20") * (1 + abs(wanted))

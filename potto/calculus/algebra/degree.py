@@ -19,8 +19,8 @@ def degree(term: Term, variables: Iterable[str]) -> int | None:
     polynomial."""
     found: dict[Term, int | None] = {}
     names = frozenset(variables)
-    for node in postorder_by(term, _values):
-        found[node] = 0 if names.isdisjoint(node.free) else _node(node, [found[part] for part in _values(node)])
+    for node in postorder_by(term, value_parts):
+        found[node] = 0 if names.isdisjoint(node.free) else _node(node, [found[part] for part in value_parts(node)])
     return found[term]
 
 
@@ -32,7 +32,7 @@ def plane(term: Term, variables: Iterable[str]) -> bool:
     return steady and degree(term, names) in (0, 1)
 
 
-def _values(node: Term) -> Sequence[Term]:
+def value_parts(node: Term) -> Sequence[Term]:
     """What a term's value is made of: of a conditional both sides, whatever decides."""
     return (node.then, node.orelse) if isinstance(node, Branch | If) else children(node)
 

@@ -6,16 +6,14 @@ of enclosure get where they are asked about single intervals.
 
 from __future__ import annotations
 
-import builtins
 import math
-import operator
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 from typing import Any
 
 from potto.core.terms import Branch, Const, If, Term
 from potto.primitives import PRIMITIVES
-from potto.primitives.registry import Primitive
+from potto.primitives.registry import Primitive, of_python
 from potto.primitives.walking import Domain
 
 NAN = math.nan
@@ -29,43 +27,8 @@ def product(*args: float) -> float:
     return math.prod(args)
 
 
-def divide(a: float, b: float) -> float:
-    return a / b if b else NAN
-
-
 def sign(x: float) -> float:
     return float((x > 0) - (x < 0))
-
-
-def less(a: float, b: float) -> float:
-    return float(a < b)
-
-
-def less_equal(a: float, b: float) -> float:
-    return float(a <= b)
-
-
-def equal(a: float, b: float) -> float:
-    return float(a == b)
-
-
-def not_equal(a: float, b: float) -> float:
-    return float(a != b)
-
-
-def logical_and(*parts: float) -> float:
-    return float(all(parts))
-
-
-def logical_or(*parts: float) -> float:
-    return float(any(parts))
-
-
-def logical_not(part: float) -> float:
-    return float(not part)
-
-
-_MODULES: Mapping[str, Any] = {"math": math, "operator": operator, "builtins": builtins}
 
 
 class Floats(Domain[float]):
@@ -97,7 +60,7 @@ def _rule(op: str) -> Callable[..., float] | None:
     entry = PRIMITIVES[op]
     if entry.scalar:
         where, _, name = entry.scalar.rpartition(".")
-        return _guarded(getattr(_MODULES[where], name) if where in _MODULES else globals()[name], entry)
+        return _guarded(globals()[name] if where == "potto" else of_python(entry.scalar), entry)
     return None if entry.formula is not None else _guarded(_by_mpmath(op), entry)
 
 

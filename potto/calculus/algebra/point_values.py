@@ -11,7 +11,7 @@ import random
 from collections.abc import Iterator, Mapping, Sequence
 
 from potto.calculus.algebra.floats import FLOATS
-from potto.core.terms import Const, Prim, Term, Var, children, postorder_by
+from potto.core.terms import Branch, Const, If, Prim, Term, Var, unknown
 
 
 def sample_value(term: Term, point: Mapping[str, float], known: dict[Term, float] | None = None) -> float:
@@ -20,9 +20,8 @@ def sample_value(term: Term, point: Mapping[str, float], known: dict[Term, float
     known: the values there of terms that were met before.
     """
     values = {} if known is None else known
-    for node in postorder_by(term, lambda node: () if node in values else children(node)):
-        if node not in values:
-            values[node] = point.get(node.name, math.nan) if isinstance(node, Var) else FLOATS.node(node, {}, values)
+    for node in unknown(term, values):
+        values[node] = point.get(node.name, math.nan) if isinstance(node, Var) else FLOATS.node(node, {}, values)
     return values[term]
 
 
@@ -42,9 +41,8 @@ def not_zero(term: Term) -> bool:
     """
     if len(_values) > _MOST_VALUES:
         _values.clear()
-    for node in postorder_by(term, lambda node: () if node in _values else children(node)):
-        if node not in _values:
-            _values[node] = _value_and_error(node)
+    for node in unknown(term, _values):
+        _values[node] = _value_and_error(node)
     value, error = _values[term]
     return math.isfinite(value) and abs(value) > _CLEAR * error
 
@@ -53,6 +51,11 @@ def _value_and_error(node: Term) -> tuple[float, float]:
     """A value at a point, and how far off it may be by rounding: a running error analysis."""
     if isinstance(node, Const):
         return node.value, 0.0
+    if isinstance(node, Branch):
+        side, error = _values[node.surface]
+        return _values[node.then if side > 0 else node.orelse] if abs(side) > _CLEAR * error else (math.nan, 0.0)
+    if isinstance(node, If):
+        return math.nan, 0.0
     if not isinstance(node, Prim):
         return 0.5 + random.Random(node.digest).random(), 0.0
     values, errors = zip(*(_values[a] for a in node.args), strict=True)

@@ -30,7 +30,7 @@ from potto.core.terms import (
     div,
     mul,
     neg,
-    postorder_by,
+    unknown,
     var,
 )
 
@@ -71,14 +71,9 @@ class Forms:
 
     def of(self, term: Term) -> Form | None:
         """The term as an affine function of the variables; None if it is not written as one."""
-        if term not in self.known:
-            for node in postorder_by(term, self._below):
-                if node not in self.known:
-                    self.known[node] = self._form(node)
+        for node in unknown(term, self.known, lambda node: children(node) if node.free & self.names else ()):
+            self.known[node] = self._form(node)
         return self.known[term]
-
-    def _below(self, node: Term) -> tuple[Term, ...]:
-        return () if node in self.known or not node.free & self.names else children(node)
 
     def short(self, form: Form) -> Term:
         """The term of a form, whose parts are known from now on."""

@@ -7,13 +7,13 @@ range may be too wide, never too narrow; bounds are rounded outwards.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from weakref import WeakKeyDictionary
 
 from potto.calculus.algebra.floats import OPS
-from potto.core.terms import Branch, Const, If, Prim, Term, Var, children, postorder
+from potto.core.terms import Branch, Const, If, Prim, Term, unknown
 from potto.primitives import PRIMITIVES
 from potto.primitives.bounds import between_turns
 from potto.primitives.registry import Primitive
@@ -56,10 +56,9 @@ def _range(lo: float, hi: float, zero: bool = True) -> Range:
 
 def ranges(term: Term, box: Mapping[str, tuple[float, float]] | None = None) -> dict[Term, Range]:
     """The range of every subterm; `box` bounds variables."""
-    box = box or {}
+    bounds = {name: (min(ends), max(ends)) for name, ends in (box or {}).items()}
     found: dict[Term, Range] = {}
-    for node in postorder(term):
-        found[node] = _node(node, found, box)
+    RANGES.walk((term,), {name: Range(lo, hi, lo <= 0 <= hi) for name, (lo, hi) in bounds.items()}, found)
     return found
 
 
@@ -70,16 +69,8 @@ _known: WeakKeyDictionary[Term, Range] = WeakKeyDictionary()
 def range_of(term: Term, box: Mapping[str, tuple[float, float]] | None = None) -> Range:
     if box:
         return ranges(term, box)[term]
-    stack = [term]
-    while stack:
-        node = stack[-1]
-        missing = [c for c in children(node) if c not in _known]
-        if node in _known or not missing:
-            stack.pop()
-            if node not in _known:
-                _known[node] = _node(node, _known, {})
-        else:
-            stack.extend(missing)
+    for node in unknown(term, _known):
+        _known[node] = RANGES.node(node, {}, _known)
     return _known[term]
 
 
@@ -88,21 +79,27 @@ def positive(term: Term) -> bool:
     return range_of(term).positive
 
 
+def vanishing(term: Term) -> Iterator[Term]:
+    """What a term is 0 with: its factors, but for those that show by their form that they never are."""
+    waiting = [term]
+    while waiting:
+        match waiting.pop():
+            case Prim(op="mul", args=args):
+                waiting.extend(reversed(args))
+            case Prim(op="neg" | "div", args=(inner, *_)):
+                waiting.append(inner)
+            case Prim(op="pow", args=(inner, exponent)) if not range_of(exponent).hi <= 0:
+                waiting.append(inner)
+            case Prim(op=op, args=(inner,)) if PRIMITIVES[op].roots == (0.0,):
+                waiting.append(inner)
+            case factor if factor.free and not positive(factor):
+                yield factor
+            case _:
+                pass
+
+
 def nonnegative(term: Term) -> bool:
     return range_of(term).lo >= 0
-
-
-def _node(node: Term, found: Mapping[Term, Range], box: Mapping[str, tuple[float, float]]) -> Range:
-    match node:
-        case Const(value=value) if value == value:
-            return Range(value, value, value == 0)
-        case Var(name=name) if name in box:
-            lo, hi = min(box[name]), max(box[name])
-            return Range(lo, hi, lo <= 0 <= hi)
-        case Prim():
-            return RANGES.builtin(node, found)
-        case _:
-            return RANGES.other(node, found)
 
 
 class _Ranges(Domain[Range]):

@@ -17,16 +17,25 @@ from fractions import Fraction
 from functools import lru_cache
 
 from potto.calculus.algebra.point_values import not_zero
+from potto.core import polynomials
 from potto.core.kinds import union_of
-from potto.core.polynomials import ONE, Monomial, Polynomial, TooLarge, monomial_term, number, total
+from potto.core.normal_form import as_term as ordered
+from potto.core.normal_form import normal_form
+from potto.core.polynomials import ONE, Monomial, Polynomial, TooLarge, total
 from potto.core.terms import (
-    ZERO,
+    App,
     Const,
+    Deriv,
+    Integral,
+    Lam,
+    ListOf,
     Prim,
+    Sum,
     Term,
+    Tuple,
+    Var,
     add,
     children,
-    const,
     div,
     mul,
     neg,
@@ -49,8 +58,6 @@ class Rational:
     @property
     def whole(self) -> bool:
         return self.below == ONE
-
-
 
 
 def normal(term: Term, name: str | None = None) -> Rational | None:
@@ -119,18 +126,34 @@ def _without_it(term: Term, name: str) -> Term:
     return term
 
 
+_OPAQUE = (App, Deriv, Integral, Lam, ListOf, Sum, Tuple)  # equal ones are told by their normal forms
+
+
+@lru_cache(maxsize=8192)
 def is_zero(term: Term) -> bool:
-    """Whether a term is 0 wherever it is defined. False also where that is not known."""
+    """Whether a term is 0 wherever it is defined. False also where that is not known.
+
+    A value at one point in doubles says no to nearly all that are not; then the normal form says yes, or sample points
+    do, to 50 digits, where an identity is needed that it does not know.
+    """
+    if any(isinstance(node, _OPAQUE) for node in postorder(term)):
+        term = ordered(normal_form(term)) or term
     if isinstance(term, Const):
         return term.value == 0
     if not_zero(term):
         return False
     found = normal(term)
-    return found is not None and not found.top
+    if found is not None and all(isinstance(atom, Const | Var) for monomial in found.top for atom, _ in monomial):
+        return not found.top  # a polynomial in variables only is 0 only if all of its coefficients are
+    from potto.core.reference import vanishes  # slow to import, and seldom needed
+
+    return vanishes(term)
 
 
 def equal(first: Term, second: Term) -> bool:
-    return first is second or is_zero(add(first, neg(second)))
+    """Whether two terms are equal wherever both are defined, by symbols alone."""
+    found = normal(add(first, neg(second)))
+    return first is second or (found is not None and not found.top)
 
 
 def shorter(term: Term) -> Term:
@@ -165,16 +188,11 @@ def _size(term: Term) -> int:
 
 
 def as_term(polynomial: Polynomial, rounded: bool = False) -> Term | None:
-    """A polynomial as a term; None if a coefficient is no double, unless it may be `rounded` to one."""
-    terms: list[Term] = []
-    for monomial, coefficient in polynomial.items():
-        scale = const(float(abs(coefficient))) if rounded else number(abs(coefficient))
-        if scale is None:
-            return None
-        term = monomial_term(scale, monomial)
-        terms.append(neg(term) if coefficient < 0 else term)
-    terms.sort(key=lambda t: isinstance(t, Prim) and t.op == "neg")
-    return add(*terms) if terms else ZERO
+    """A polynomial as a term, what is taken away last; None if a coefficient is no double, unless it may be `rounded`
+    to one."""
+    last = {monomial: c for monomial, c in polynomial.items() if monomial and c < 0}
+    first = {monomial: c for monomial, c in polynomial.items() if monomial not in last}
+    return polynomials.as_term({**first, **last}, rounded)
 
 
 # Arithmetic

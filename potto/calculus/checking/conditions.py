@@ -12,7 +12,7 @@ leads to no condition is not exported: a definition costs by its own size and no
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from potto.calculus.algebra.point_values import sample_value
@@ -37,6 +37,7 @@ from potto.core.terms import (
     Term,
     Tuple,
     Var,
+    bound_apart,
     branch,
     children,
     fresh,
@@ -44,9 +45,9 @@ from potto.core.terms import (
     lam,
     postorder,
     proj,
-    rebuild,
     substitute,
     sum_,
+    transform,
     tuple_,
     var,
 )
@@ -100,7 +101,7 @@ def skeleton(term: Term, leads_on: Callable[[Global], bool] = lambda _: True) ->
 
 def _kept(term: Term, leads_on: Callable[[Global], bool]) -> Term:
     items: dict[Term, None] = {}
-    for node in _outside_binders(term):
+    for node in postorder(term, below=_outside_bodies):
         match node:
             case Branch() if node.surface.free:
                 items[branch(node.coordinates, node.strict, ONE, ZERO)] = None
@@ -141,25 +142,11 @@ def has_conditions(exported: Term | None) -> bool:
     return isinstance(exported, Lam) and not (isinstance(body, Tuple) and not body.items)
 
 
-def _outside_binders(root: Term) -> list[Term]:
-    order: list[Term] = []
-    seen: set[Term] = set()
-    stack = [root]
-    while stack:
-        node = stack.pop()
-        if node in seen:
-            continue
-        seen.add(node)
-        order.append(node)
-        if isinstance(node, Integral):
-            stack.extend(b for pair in node.bounds for b in pair)
-        elif isinstance(node, Sum):
-            stack.extend((node.lo, node.hi))
-        elif isinstance(node, Lam):
-            stack.append(node.body)
-        else:
-            stack.extend(reversed(children(node)))
-    return order
+def _outside_bodies(node: Term) -> Sequence[Term]:
+    """The children of a node but for what is integrated or summed."""
+    if isinstance(node, Integral):
+        return [bound for pair in node.bounds for bound in pair]
+    return (node.lo, node.hi) if isinstance(node, Sum) else children(node)
 
 
 def conditions_of(term: Term, skeletons: Resolve, whole: Resolve) -> tuple[Condition, ...]:
@@ -320,17 +307,14 @@ class _Walk:
 
     def apart(self, body: Term, params: tuple[str, ...]) -> tuple[Term, tuple[str, ...]]:
         """A copy of the body in which neither parameters nor bound variables are called like anything met so far."""
-        bound = [v for n in postorder(body) for v in (n.variables if isinstance(n, Integral) else ())]
-        taken = self.taken | set(self.box) | set(body.free) | set(bound)
+        met = self.taken | self.box.keys()
+        taken = met.union(body.free, *(n.variables for n in postorder(body) if isinstance(n, Integral)))
         own: list[str] = []
         for param in params:
             own.append(fresh(param, taken))
             taken.add(own[-1])
         body = substitute(body, {p: var(o) for p, o in zip(params, own, strict=True)})
-        clash = [v for v in bound if v in self.taken or v in self.box]
-        if clash:
-            names = {v: fresh(v, taken) for v in dict.fromkeys(clash)}
-            body = _renamed(body, names)
+        body = transform(body, lambda _, new: bound_apart(new, met) if isinstance(new, Integral) else new)
         self.taken |= set(own)
         return body, tuple(own)
 
@@ -367,20 +351,6 @@ def _reached(terms: Iterable[Term], place: _Place) -> set[str]:
         stands_for = place.mapping.get(name) or place.functions.get(name)
         found.update((name,) if stands_for is None else stands_for.free)
     return found
-
-
-def _renamed(term: Term, names: Mapping[str, str]) -> Term:
-    """Bound variables under other names, everywhere. Names of binders in one definition are distinct."""
-    memo: dict[Term, Term] = {}
-    for node in postorder(term):
-        if isinstance(node, Var):
-            memo[node] = var(names.get(node.name, node.name))
-            continue
-        new = rebuild(node, tuple(memo[c] for c in children(node)))
-        if isinstance(new, Integral) and any(v in names for v in new.variables):
-            new = integral(tuple(names.get(v, v) for v in new.variables), new.bounds, new.body, new.hints)
-        memo[node] = new
-    return memo[term]
 
 
 def _primal(arg: Term) -> Term:

@@ -22,7 +22,6 @@ from potto.calculus.checking.solvability import (
     Verdict,
     failure,
     judge,
-    listed,
     searched,
     singular,
 )
@@ -31,11 +30,10 @@ from potto.calculus.differentiation.derivative import NotSmooth
 from potto.calculus.differentiation.dual import Differentiator
 from potto.calculus.inlining.expand import expanded
 from potto.calculus.inlining.relevance import may_integrate
-from potto.calculus.solving.branch_hints import box_of, guards_of
-from potto.calculus.solving.inverse_map import Failure, Inverse, invert
+from potto.calculus.solving.inverse_map import Failure, Inverse, invert, listed
 from potto.calculus.solving.isolate import Guard
 from potto.calculus.solving.pivots import NoClosedForm
-from potto.calculus.solving.verify import Refuted, Untested, Verified, verify
+from potto.calculus.solving.verify import Refuted, Untested, Verified, box_of, guards_of, verify
 from potto.calculus.surfaces.branch_assignment import unguarded
 from potto.calculus.surfaces.trace import spine
 from potto.core.simplify import simplify

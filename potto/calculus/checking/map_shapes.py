@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from potto.calculus.checking.solvability import COMPONENTS, NO_INVERSE, NOT_DIFFERENTIABLE, Problem, kinks, listed
+from potto.calculus.checking.solvability import COMPONENTS, NO_INVERSE, NOT_DIFFERENTIABLE, Problem, kinks
+from potto.calculus.solving.inverse_map import listed
 from potto.core.printer import format_term
 from potto.core.terms import App, Term, postorder
 

@@ -18,7 +18,7 @@ from potto.calculus.algebra.ranges import ranges
 from potto.calculus.algebra.rational_form import is_zero
 from potto.calculus.differentiation.derivative import NotSmooth, partial
 from potto.calculus.solving.enclosable import searchable
-from potto.calculus.solving.inverse_map import Failure, Inverse, dependence, invert, jacobian
+from potto.calculus.solving.inverse_map import Failure, Inverse, dependence, invert, jacobian, listed
 from potto.calculus.solving.solve import Sections, sections
 from potto.calculus.surfaces.nested_brackets import nested, pieces
 from potto.core.printer import format_term
@@ -178,11 +178,6 @@ def monotone(surface: Term, name: str, box: Box) -> bool:
 
 def shown(terms: Sequence[Term]) -> str:
     return ", ".join(f"`{format_term(t)}`" for t in terms)
-
-
-def listed(names: Sequence[str], last: str = "and") -> str:
-    quoted = [f"`{n}`" for n in names]
-    return quoted[0] if len(quoted) == 1 else ", ".join(quoted[:-1]) + f" {last} " + quoted[-1]
 
 
 def singular(coordinates: Sequence[Term], variables: Sequence[str]) -> Problem | None:

@@ -16,11 +16,11 @@ from functools import lru_cache
 from potto.calculus.algebra.affine import determinant
 from potto.calculus.algebra.point_values import not_zero, sample_value
 from potto.calculus.algebra.radicals import squared
-from potto.calculus.algebra.ranges import positive, range_of
+from potto.calculus.algebra.ranges import range_of, vanishing
 from potto.calculus.differentiation.derivative import NotSmooth, partial
 from potto.calculus.solving.enclosable import enclosable, slope_of
 from potto.core.simplify import simplify
-from potto.core.terms import Const, Prim, Term, mul, sub, substitute
+from potto.core.terms import Prim, Term, mul, sub, substitute
 
 MOST_EQUATIONS = 3  # a search takes about 2^n times as long for n of them
 
@@ -84,7 +84,7 @@ def folds(surface: Term, variable: str, lo: Term, hi: Term, steps: bool = False)
     slope = slope_of(surface, variable)
     if slope is None:
         return
-    for factor in _factors(slope):
+    for factor in vanishing(slope):
         yield Critical((surface, factor), (Within(variable, lo, hi),), True, steps)
 
 
@@ -141,7 +141,7 @@ def _slopes(system: Critical) -> Iterator[Term]:
     for surface in system.equations if not system.turning else ():
         slope = slope_of(surface, system.within[0].variable)
         if slope is not None:
-            yield from _factors(slope)
+            yield from vanishing(slope)
 
 
 def infinite(bound: Term) -> bool:
@@ -160,20 +160,6 @@ def _turns(system: Critical, variable: str) -> Iterator[Term]:
     except NotSmooth:
         return
     for turn in whole:
-        for factor in _factors(simplify(turn)):
+        for factor in vanishing(simplify(turn)):
             if enclosable(factor, jumps=True):
                 yield factor
-
-
-def _factors(term: Term) -> Iterator[Term]:
-    """What a product is 0 with: its factors, but for those that show by their form that they never are."""
-    match term:
-        case Prim(op="mul", args=args):
-            for arg in dict.fromkeys(args):
-                yield from _factors(arg)
-        case Prim(op="neg", args=(inner,)) | Prim(op="div", args=(inner, _)):
-            yield from _factors(inner)
-        case Prim(op="pow", args=(inner, Const(value=exponent))) if exponent > 0:
-            yield from _factors(inner)
-        case _ if term.free and not positive(term):
-            yield term

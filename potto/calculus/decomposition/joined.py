@@ -25,10 +25,9 @@ from potto.core.terms import (
     Prim,
     Term,
     apply,
-    fresh,
+    bound_apart,
     integral,
     postorder,
-    rename_bound,
     substitute,
 )
 
@@ -47,16 +46,7 @@ def joined(term: Integral, resolve: Resolve) -> Integral:
 
 
 def _one(outer: Integral, inner: Integral) -> Integral:
-    taken = {*outer.variables, *outer.free, *inner.free, *inner.variables, *inner.body.free}
-    names: dict[str, str] = {}
-    for name in inner.variables:
-        if name in outer.variables or name in outer.free:
-            names[name] = fresh(name, taken)
-            taken.add(names[name])
-    if names:
-        renamed = rename_bound(inner, names)
-        assert isinstance(renamed, Integral)
-        inner = renamed
+    inner = bound_apart(inner, outer.free.union(outer.variables))
     return integral(
         outer.variables + inner.variables, outer.bounds + inner.bounds, inner.body, outer.hints + inner.hints
     )
@@ -96,15 +86,7 @@ def _among_factors(body: Prim, around: frozenset[str], resolve: Resolve, calls: 
 
 def _with(inner: Integral, body: Prim, at: int) -> Integral:
     """The integral with what the body does to it done to its integrand."""
-    clash = {name: name for name in inner.variables if name in body.free}
-    if clash:
-        taken = {*inner.variables, *inner.free, *inner.body.free, *body.free}
-        for name in clash:
-            clash[name] = fresh(name, taken)
-            taken.add(clash[name])
-        renamed = rename_bound(inner, clash)
-        assert isinstance(renamed, Integral)
-        inner = renamed
+    inner = bound_apart(inner, body.free)
     args = list(body.args)
     args[at] = inner.body
     return _over(inner, apply(body.op, *args))

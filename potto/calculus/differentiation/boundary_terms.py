@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 from potto.calculus.algebra.radicals import NAN
 from potto.calculus.algebra.ranges import range_of
+from potto.calculus.algebra.rational_form import is_zero
 from potto.calculus.differentiation.derivative import partial, zero_like
 from potto.calculus.solving.pivots import NoClosedForm as NoClosedForm
 from potto.calculus.solving.pivots import Root, chosen, conjunction, pivots
@@ -31,7 +32,7 @@ from potto.calculus.surfaces.branch_assignment import (
     summed_over,
     unguarded,
 )
-from potto.core.simplify import is_zero, normalized_surface
+from potto.core.simplify import normalized_surface
 from potto.core.terms import (
     ONE,
     ZERO,

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from potto.calculus.algebra.radicals import quotient
 from potto.calculus.algebra.ranges import range_of
+from potto.calculus.algebra.rational_form import is_zero
 from potto.calculus.differentiation import level_sets
 from potto.calculus.differentiation.boundary_terms import between, remaining, scaled, total, vanishes
 from potto.calculus.differentiation.derivative import partial, zero_like
 from potto.calculus.solving.pivots import NoClosedForm, Root, chosen, pivots
 from potto.calculus.surfaces.branch_assignment import branches_of, flipping, forced, unguarded
 from potto.core.printer import format_term
-from potto.core.simplify import is_zero, normalized_surface
+from potto.core.simplify import normalized_surface
 from potto.core.terms import (
     ONE,
     Branch,

@@ -6,13 +6,13 @@ does to batches.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import lru_cache
 
+from potto.calculus.algebra.degree import value_parts
 from potto.calculus.algebra.ranges import ARITHMETIC, RANGES
 from potto.calculus.differentiation.derivative import NotSmooth, partial
 from potto.core.simplify import simplify
-from potto.core.terms import Branch, Const, If, Prim, Proj, Sum, Term, Var, children, postorder_by
+from potto.core.terms import Branch, Const, If, Prim, Proj, Sum, Term, Var, postorder_by
 
 
 def enclosable(term: Term, jumps: bool = False) -> bool:
@@ -25,13 +25,8 @@ def enclosable(term: Term, jumps: bool = False) -> bool:
         or (isinstance(node, Proj) and isinstance(node.term, Proj | Var))
         or (isinstance(node, Prim) and (node.op in ARITHMETIC or RANGES.knows(node.op)))
         or (jumps and isinstance(node, Branch))
-        for node in postorder_by(term, _values)
+        for node in postorder_by(term, value_parts)
     )
-
-
-def _values(node: Term) -> Sequence[Term]:
-    """What a term's value is made of: of a conditional both sides, whatever decides."""
-    return (node.then, node.orelse) if isinstance(node, Branch | If) else children(node)
 
 
 @lru_cache(maxsize=4096)

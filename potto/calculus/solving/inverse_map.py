@@ -95,7 +95,7 @@ def dependence(coordinates: Sequence[Term], variables: Sequence[str]) -> str:
     rows = jacobian(coordinates, variables)
     for i, row in enumerate(rows):
         if all(is_zero(entry) for entry in row):
-            return f"coordinate {i + 1} does not vary with {_listed(variables)}"
+            return f"coordinate {i + 1} does not vary with {listed(variables, 'or')}"
         for j in range(i):
             minors = (sub(mul(rows[j][a], row[b]), mul(rows[j][b], row[a])) for a in range(len(row)) for b in range(a))
             if all(is_zero(m) for m in minors):
@@ -103,9 +103,9 @@ def dependence(coordinates: Sequence[Term], variables: Sequence[str]) -> str:
     return "one coordinate is a function of the others"
 
 
-def _listed(names: Sequence[str]) -> str:
+def listed(names: Sequence[str], last: str = "and") -> str:
     quoted = [f"`{n}`" for n in names]
-    return quoted[0] if len(quoted) == 1 else ", ".join(quoted[:-1]) + " or " + quoted[-1]
+    return quoted[0] if len(quoted) == 1 else ", ".join(quoted[:-1]) + f" {last} " + quoted[-1]
 
 
 Branches = tuple[tuple[Term, ...], ...]

@@ -14,7 +14,7 @@ from fractions import Fraction
 
 from potto.calculus.algebra.polynomial_in import collect
 from potto.calculus.algebra.radicals import NAN, guarded
-from potto.calculus.algebra.ranges import positive
+from potto.calculus.algebra.ranges import positive, vanishing
 from potto.calculus.algebra.rational_form import settled, shorter
 from potto.calculus.solving.isolate import Guard, Step, Stuck, step
 from potto.calculus.solving.reduce_occurrences import split
@@ -297,30 +297,10 @@ def _turning(roots: Iterable[Term], indices: frozenset[str]) -> tuple[Term, ...]
     found: dict[Term, None] = {}
     for node in postorder(*roots):
         for edge in _edges(node):
-            for term in _factors(edge):
-                if term.free and not term.free & indices and not positive(term):
+            for term in vanishing(edge):  # the surface and the cases of a branch are looked at on their own
+                if not isinstance(term, Branch) and not term.free & indices:
                     found.setdefault(neg(term) if neg(term) in found else term)
     return tuple(found)
-
-
-def _factors(term: Term) -> list[Term]:
-    """Terms whose zeros together are those of `term`."""
-    found: list[Term] = []
-    waiting = [term]
-    while waiting:
-        item = waiting.pop()
-        match item:
-            case Prim(op="mul", args=args):
-                waiting.extend(reversed(args))
-            case Prim(op="div" | "pow", args=(inner, _)):
-                waiting.append(inner)
-            case Prim(op=op, args=(inner,)) if PRIMITIVES[op].roots == (0.0,):
-                waiting.append(inner)
-            case Branch():
-                pass  # its surface and its cases are looked at on their own
-            case _:
-                found.append(item)
-    return found
 
 
 def _edges(node: Term) -> tuple[Term, ...]:

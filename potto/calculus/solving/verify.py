@@ -1,21 +1,23 @@
 """An author's inverse, verified.
 
-Owns `verify`: by symbols where they decide (inverse after map is the identity), else at sample points, and then it says
-so. Doubles sort out at many points what is plainly wrong, or not defined; at a few of them numbers of fifty digits find
-what is wrong by less. Those are loaded only for an inverse that symbols do not decide.
+Owns `guards_of` and `box_of`, what the author's `where` says of a branch, and `verify`: by symbols where they decide
+(inverse after map is the identity), else at sample points, and then it says so. Doubles sort out at many points what is
+plainly wrong, or not defined; at a few of them numbers of fifty digits find what is wrong by less. Those are loaded
+only for an inverse that symbols do not decide.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
+from potto.calculus.algebra.affine import affine
 from potto.calculus.algebra.point_values import points, sample_value
 from potto.calculus.algebra.rational_form import equal
 from potto.calculus.solving.isolate import Guard
-from potto.core.terms import Const, Term, const, postorder, prim, substitute, transform, var
+from potto.core.terms import ONE, ZERO, Const, Prim, Term, const, if_, postorder, prim, sub, substitute, transform, var
 
 _POINTS = 4000
 _ENOUGH = 200
@@ -145,3 +147,31 @@ def _is_rounded(term: Term) -> bool:
 def _holds(guard: Guard, point: Mapping[str, float]) -> bool:
     value = sample_value(guard.surface, point)
     return value > 0 if guard.strict else value >= 0
+
+
+# What the author says of a branch
+
+
+def guards_of(truth: Term) -> list[Guard]:
+    """A condition of `where`, as surfaces that are positive where it holds."""
+    match truth:
+        case Prim(op="and", args=args):
+            return [guard for arg in args for guard in guards_of(arg)]
+        case Prim(op="lt" | "le" as op, args=(a, b)):
+            return [Guard(sub(b, a), op == "lt")]
+        case _:
+            return [Guard(sub(if_(truth, ONE, ZERO), const(0.5)))]
+
+
+def box_of(where: Iterable[Guard], variables: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """Bounds of single variables, where `where` says them as constants."""
+    box: dict[str, tuple[float, float]] = {}
+    for guard in where:
+        for name in guard.surface.free & frozenset(variables):
+            found = affine(guard.surface, (name,))
+            if found is None or not isinstance(found.rest, Const) or not isinstance(found.coefficients[0], Const):
+                continue
+            slope, bound = found.coefficients[0].value, -found.rest.value / found.coefficients[0].value
+            lo, hi = box.get(name, (float("-inf"), float("inf")))
+            box[name] = (max(lo, bound), hi) if slope > 0 else (lo, min(hi, bound))
+    return box

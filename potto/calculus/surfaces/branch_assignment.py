@@ -11,9 +11,8 @@ from dataclasses import dataclass
 
 from potto.calculus.algebra.radicals import NAN
 from potto.calculus.algebra.ranges import range_of
-from potto.calculus.algebra.rational_form import as_term, normal
+from potto.calculus.algebra.rational_form import as_term, is_zero, normal
 from potto.calculus.differentiation.derivative import partial
-from potto.core.simplify import is_zero
 from potto.core.terms import (
     ONE,
     Branch,

@@ -6,10 +6,12 @@ tests and checks import it; mpmath is an optional dependency.
 """
 
 from potto.core.reference.functions import function
+from potto.core.reference.sampling import vanishes
 from potto.core.reference.walk import NotAccurate, evaluate
 
 __all__ = [
     "NotAccurate",
     "evaluate",
     "function",
+    "vanishes",
 ]

@@ -15,7 +15,7 @@ from mpmath import mp
 
 from potto.core.terms import Const
 from potto.primitives import PRIMITIVES
-from potto.primitives.registry import Primitive
+from potto.primitives.registry import Primitive, of_python
 from potto.primitives.walking import Domain
 
 Number = Any  # an mpmath number; mpmath has no types
@@ -94,44 +94,8 @@ def total(*args: Number) -> Number:
     return sum(args, mp.mpf(0))
 
 
-def negative(x: Number) -> Number:
-    return -x
-
-
-def magnitude(x: Number) -> Number:
-    return abs(x)
-
-
 def log1p(x: Number) -> Number:
     return mp.log1p(x) if x > -1 else mp.log(1 + x)
-
-
-def less(a: Number, b: Number) -> bool:
-    return bool(a < b)
-
-
-def less_equal(a: Number, b: Number) -> bool:
-    return bool(a <= b)
-
-
-def equal(a: Number, b: Number) -> bool:
-    return bool(a == b)
-
-
-def not_equal(a: Number, b: Number) -> bool:
-    return bool(a != b)
-
-
-def logical_and(*parts: bool) -> bool:
-    return all(parts)
-
-
-def logical_or(*parts: bool) -> bool:
-    return any(parts)
-
-
-def logical_not(part: bool) -> bool:
-    return not part
 
 
 class _Exact(Domain[Number]):
@@ -144,7 +108,7 @@ class _Exact(Domain[Number]):
         where, _, name = entry.mpmath.rpartition(".")
         if not name:
             return None
-        own = globals()[name] if where else getattr(mp, name)
+        own = getattr(mp, name) if not where else globals()[name] if where == "potto" else of_python(entry.mpmath)
         return _real(own, entry.within) if not entry.truth and entry.name not in _TAKES_ANYTHING else own
 
 

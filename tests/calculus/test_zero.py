@@ -1,0 +1,49 @@
+"""What is 0 wherever it is defined is found, by its normal form or by digits."""
+
+from __future__ import annotations
+
+import pytest
+
+from potto.calculus.algebra.rational_form import is_zero
+from potto.core.terms import ONE, PI, Term, add, app, const, div, global_, mul, pow_, prim, sub, var
+
+x, y, t = map(var, "xyt")
+TWO = const(2.0)
+
+
+@pytest.mark.parametrize(
+    "term",
+    [
+        sub(mul(x, y), mul(y, x)),
+        sub(pow_(add(x, y), TWO), add(mul(x, x), mul(TWO, x, y), mul(y, y))),
+        sub(mul(sub(x, y), add(x, y)), sub(mul(x, x), mul(y, y))),
+        add(pow_(prim("sin", x), TWO), pow_(prim("cos", x), TWO), const(-1.0)),
+        sub(prim("tanh", x), div(prim("sinh", x), prim("cosh", x))),
+        sub(prim("exp", add(x, y)), mul(prim("exp", x), prim("exp", y))),
+        sub(prim("sin", mul(TWO, x)), mul(TWO, prim("sin", x), prim("cos", x))),
+        sub(prim("erf", x), sub(ONE, prim("erfc", x))),
+        sub(prim("atan", x), prim("asin", div(x, prim("sqrt", add(ONE, mul(x, x)))))),
+        sub(prim("max", x, y), div(add(x, y, prim("abs", sub(x, y))), TWO)),
+        sub(prim("hypot", x, y), prim("sqrt", add(mul(x, x), mul(y, y)))),
+        sub(app(global_("m", "f"), (add(x, y),)), app(global_("m", "f"), (add(y, x),))),
+    ],
+)
+def test_zero(term: Term) -> None:
+    assert is_zero(term)
+
+
+@pytest.mark.parametrize(
+    "term",
+    [
+        sub(mul(const(1.0000000000000002), x), x),  # one unit in the last place
+        mul(const(1e-300), x),
+        add(pow_(prim("sin", x), TWO), pow_(prim("cos", x), TWO), const(-1.0000000000000002)),
+        sub(prim("atan2", x, t), prim("atan", div(x, t))),  # equal where t > 0 only
+        sub(prim("sqrt", mul(x, x)), x),
+        sub(app(global_("m", "f"), (x,)), app(global_("m", "f"), (y,))),
+        prim("log", prim("neg", mul(x, x))),  # defined nowhere
+        PI,
+    ],
+)
+def test_not_zero(term: Term) -> None:
+    assert not is_zero(term)
