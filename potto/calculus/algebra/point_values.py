@@ -31,34 +31,49 @@ _UNIT = 2.0**-53
 _CLEAR = 1e3
 _AMPLIFIED = 1e4
 _MOST_VALUES = 1 << 16
-_values: dict[Term, tuple[float, float]] = {}
+_TRIES = 8  # points that are tried until a term has a value at one
+_values: list[dict[Term, tuple[float, float]]] = [{} for _ in range(_TRIES)]
 
 
-def not_zero(term: Term) -> bool:
-    """Whether a term's value at one point shows that it is not 0 everywhere, as a formula in what is no builtin in it.
+def not_zero(term: Term) -> bool | None:
+    """Whether a term's value at a point shows that it is not 0 everywhere, as a formula in what is no builtin in it.
 
-    False also where that is not known.
+    False where it may be 0; None where no point was found at which it has a value.
     """
-    if len(_values) > _MOST_VALUES:
-        _values.clear()
-    for node in unknown(term, _values):
-        _values[node] = _value_and_error(node)
-    value, error = _values[term]
-    return math.isfinite(value) and abs(value) > _CLEAR * error
+    for attempt, known in enumerate(_values):
+        if len(known) > _MOST_VALUES:
+            known.clear()
+        for node in unknown(term, known):
+            known[node] = _value_and_error(node, known, attempt)
+        value, error = known[term]
+        if math.isfinite(value):
+            return abs(value) > _CLEAR * error
+    return None
 
 
-def _value_and_error(node: Term) -> tuple[float, float]:
+def _value_and_error(node: Term, known: Mapping[Term, tuple[float, float]], attempt: int) -> tuple[float, float]:
     """A value at a point, and how far off it may be by rounding: a running error analysis."""
-    if isinstance(node, Const):
-        return node.value, 0.0
-    if isinstance(node, Branch):
-        side, error = _values[node.surface]
-        return _values[node.then if side > 0 else node.orelse] if abs(side) > _CLEAR * error else (math.nan, 0.0)
-    if isinstance(node, If):
-        return math.nan, 0.0
-    if not isinstance(node, Prim):
-        return 0.5 + random.Random(node.digest).random(), 0.0
-    values, errors = zip(*(_values[a] for a in node.args), strict=True)
+    match node:
+        case Const(value=value):
+            return value, 0.0
+        case Branch():
+            side, error = known[node.surface]
+            return known[node.then if side > 0 else node.orelse] if abs(side) > _CLEAR * error else (math.nan, 0.0)
+        case If(condition=Prim(op="lt" | "le" | "eq" | "ne" as op, args=args)):
+            (a, off), (b, also) = known[args[0]], known[args[1]]
+            taken = node.then if FLOATS.apply(op, (a, b)) else node.orelse
+            return known[taken] if abs(a - b) > _CLEAR * (off + also) else (math.nan, 0.0)
+        case If():
+            return math.nan, 0.0
+        case Prim():
+            return _of_builtin(node, known)
+        case _:
+            source = random.Random(node.digest + bytes(attempt))
+            return (0.5 + source.random()) * (source.choice((1, -1)) if attempt % 2 else 1), 0.0
+
+
+def _of_builtin(node: Prim, known: Mapping[Term, tuple[float, float]]) -> tuple[float, float]:
+    values, errors = zip(*(known[a] for a in node.args), strict=True)
     value = FLOATS.apply(node.op, values)
     match node.op:
         case "add":

@@ -140,11 +140,14 @@ def is_zero(term: Term) -> bool:
         term = ordered(normal_form(term)) or term
     if isinstance(term, Const):
         return term.value == 0
-    if not_zero(term):
+    differs = not_zero(term)
+    if differs:
         return False
     found = normal(term)
     if found is not None and all(isinstance(atom, Const | Var) for monomial in found.top for atom, _ in monomial):
         return not found.top  # a polynomial in variables only is 0 only if all of its coefficients are
+    if differs is None:
+        return False
     from potto.core.reference import vanishes  # slow to import, and seldom needed
 
     return vanishes(term)
