@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 from core_terms import HALF, THREE, TWO, area, bracket, c, n, s, t, terms, x, y
 from hypothesis import given, settings
+from lint import lint
 from mpmath import mp
 
 from potto.calculus.differentiation.derivative import NotSmooth, partial
-from potto.core.lint import lint
 from potto.core.printer import format_term
 from potto.core.reference import evaluate
 from potto.core.simplify import simplify

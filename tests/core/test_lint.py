@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 from core_terms import UNIT, area, bracket, t, x, y
+from lint import lint
 
-from potto.core.lint import lint
 from potto.core.terms import ONE, ZERO, Term, add, branch, deriv, if_, integral, lam, mul, prim, sub, sum_, tuple_, var
 
 LESS = prim("lt", x, y)

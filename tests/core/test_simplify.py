@@ -9,9 +9,9 @@ import pytest
 from core_terms import THREE, TWO, UNIT, area, bracket, c, n, s, t, terms, x, y
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from lint import lint
 from mpmath import mp
 
-from potto.core.lint import lint
 from potto.core.normal_form import as_term, normal_form
 from potto.core.printer import format_term
 from potto.core.reference import evaluate

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from textwrap import dedent
 
-from potto.core.lint import lint
+from lint import lint
+
 from potto.core.printer import format_term
 from potto.core.terms import Term
 from potto.elaborate import Elaborated, core

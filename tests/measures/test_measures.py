@@ -6,10 +6,10 @@ import random
 from functools import cache
 
 import pytest
+from lint import lint
 from mpmath import mp
 
 from potto.calculus.differentiation.derivative import partial
-from potto.core.lint import lint
 from potto.core.reference import evaluate
 from potto.core.terms import Term, const, integral, mul, prim, sub, sum_, var
 from potto.measures import MEASURES, Measure

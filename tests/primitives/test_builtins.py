@@ -8,10 +8,10 @@ import pytest
 from builtin_terms import EPS, builtin, double
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from lint import lint
 from mpmath import mp
 
 from potto.calculus.differentiation.derivative import partial
-from potto.core.lint import lint
 from potto.core.reference import evaluate, function
 from potto.core.terms import Const, Prim, const, postorder, prim, sub, var
 from potto.primitives import PRIMITIVES, Primitive

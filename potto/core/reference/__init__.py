@@ -6,8 +6,9 @@ tests and checks import it; mpmath is an optional dependency.
 """
 
 from potto.core.reference.functions import function
+from potto.core.reference.integrals import NotAccurate
 from potto.core.reference.sampling import vanishes
-from potto.core.reference.walk import NotAccurate, evaluate
+from potto.core.reference.walk import evaluate
 
 __all__ = [
     "NotAccurate",

@@ -1,7 +1,7 @@
 """Derivatives of the oracle: differences of values that were computed to more digits.
 
-Owns `derivative`. A dual is a family: what a value is when all parameters have moved by h along their tangents. The
-derivative of a function maps families to families; only a number at the end is differentiated, at h = 0.
+Owns `derivative` and `call`. A dual is a family: what a value is when all parameters have moved by h along their
+tangents. The derivative of a function maps families to families; only a number at the end is differentiated, at h = 0.
 """
 
 from __future__ import annotations
@@ -30,8 +30,6 @@ class Dual:
         families = [family_of(arg) for arg in args]
 
         def moved(h: Any) -> Value:
-            from potto.core.reference.walk import call
-
             return call(self.family(h), tuple(f(h) for f in families))
 
         return _dual(moved, self.digits)
@@ -99,3 +97,13 @@ def _pair(value: Value, points: dict[int, Value], h: Any) -> Value:
         return [_pair(v, {k: p[i] for k, p in points.items()}, h) for i, v in enumerate(value)]
     slope = sum((points[k] - points[-k]) * mp.mpf(a) / b for k, (a, b) in enumerate(_WEIGHTS, 1))
     return value, slope / h
+
+
+def call(function: Value, args: tuple[Value, ...]) -> Value:
+    """One group of arguments; a group of n parameters also takes one tuple of n, and back."""
+    arity = getattr(function, "arity", len(args))
+    if arity != len(args) and len(args) == 1 and isinstance(args[0], tuple):
+        args = args[0]
+    elif arity != len(args) and arity == 1:
+        args = (args,)
+    return function(*args)

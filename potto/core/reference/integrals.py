@@ -1,26 +1,39 @@
 """Integrals of the oracle: iterated tanh-sinh quadrature between the points where the integrand decides differently.
 
-Owns `integrate`. The integrand is evaluated on a grid with its trace; where the trace changes between two points, the
-place is found by bisection. Where a number that decides comes close to 0 without changing sign, its extremum is
-looked at too, so that two roots between two points of the grid are found.
+Owns `integrate` and traces. The integrand is evaluated on a grid with its trace; where the trace changes between two
+points, the place is found by bisection. Where a number that decides comes close to 0 without changing sign, its
+extremum is looked at too, so that two roots between two points of the grid are found.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from mpmath import mp
 
-from potto.core.terms import Integral
+from potto.core.terms import Delta, Integral
 
 if TYPE_CHECKING:
-    from potto.core.reference.walk import Environment, Oracle, Trace, Value
+    from potto.core.reference.walk import Environment, Oracle, Value
 
 _MOST_SPLITS = 6  # halvings of a piece on which quadrature does not settle
 _MOST_TRIES = 4  # at finding a root faster than by halving
 _MOST_STEPS = 40  # towards the bottom of a dip
+
+
+class NotAccurate(ArithmeticError):
+    """The oracle cannot vouch for the digits asked for."""
+
+
+@dataclass
+class Trace:
+    """What was decided in one evaluation, in order, and the numbers that decided."""
+
+    sides: list[object] = field(default_factory=list)
+    values: list[Any] = field(default_factory=list)
 
 
 def integrate(oracle: Oracle, term: Integral, env: Environment) -> Value:
@@ -54,7 +67,7 @@ def _between(oracle: Oracle, term: Integral, env: dict[str, Any], level: int, lo
             return _zero_like(inner(lo)) if mp.isfinite(lo) else mp.mpf(0)
         oracle.trace = None
         value = _pieces(oracle, inner, [lo, *cuts, hi])
-        return _plus(value, [look.delta_at(cut) for cut in cuts])
+        return plus(value, [look.delta_at(cut) for cut in cuts])
     finally:
         oracle.trace, oracle.forced = outside, forced
 
@@ -67,8 +80,6 @@ class _Look:
         self.inner = inner
 
     def trace(self, x: Any) -> Trace:
-        from potto.core.reference.walk import Trace
-
         before = self.oracle.trace
         self.oracle.trace, self.oracle.deltas = Trace(), 0
         try:
@@ -81,8 +92,6 @@ class _Look:
     def value(self, x: Any) -> Value:
         before, self.oracle.trace = self.oracle.trace, None
         try:
-            from potto.core.reference.walk import Trace
-
             self.oracle.trace = Trace()  # inner integrals are not worked out while a trace is written
             return self.inner(x)
         finally:
@@ -201,8 +210,6 @@ class _Look:
 
     def delta_at(self, x: Any) -> Value:
         """The factors of the deltas that have their root here, over the slopes of what is under them."""
-        from potto.core.terms import Delta
-
         step = mp.mpf(10) ** -(mp.dps // 3) * max(abs(x), 1)
         before, after = self.trace(x - step), self.trace(x + step)
         total = mp.mpf(0)
@@ -213,7 +220,7 @@ class _Look:
             number += 1
             if side != other:
                 slope = mp.diff(lambda s, k=k: self.trace(s).values[k], x)
-                total = _plus(total, [_scaled(self.factor(x, number), 1 / abs(slope))])
+                total = plus(total, [_scaled(self.factor(x, number), 1 / abs(slope))])
         return total
 
     def factor(self, x: Any, number: int) -> Value:
@@ -223,7 +230,7 @@ class _Look:
             self.oracle.forced, self.oracle.deltas, self.oracle.trace = forced, 0, None
             values.append(self.inner(x))
         self.oracle.forced = None
-        return _plus(values[0], [_scaled(values[1], -1)])
+        return plus(values[0], [_scaled(values[1], -1)])
 
 
 def _touching(trace: Trace) -> list[object]:
@@ -292,8 +299,6 @@ def _pieces(oracle: Oracle, inner: Callable[[Any], Value], ends: list[Any]) -> V
 
 
 def _piece(oracle: Oracle, f: Callable[[Any], Any], a: Any, b: Any, splits: int) -> Any:
-    from potto.core.reference.walk import NotAccurate
-
     # A node that is rounded to an end, where the integrand need not exist, has no weight to speak of.
     # Next to a singular end x has few digits of its distance from there: those of a second try are enough.
     for precision in (mp.dps, 2 * mp.dps):
@@ -315,13 +320,14 @@ def _zero_like(value: Value) -> Value:
     return tuple(map(_zero_like, value)) if isinstance(value, tuple) else mp.mpf(0)
 
 
-def _plus(value: Value, others: list[Value]) -> Value:
+def plus(value: Value, others: list[Value]) -> Value:
+    """The sum of numbers, or of tuples component by component."""
     for other in others:
         if isinstance(value, tuple):
             other = other if isinstance(other, tuple) else (other,) * len(value)
-            value = tuple(_plus(v, [o]) for v, o in zip(value, other, strict=True))
+            value = tuple(plus(v, [o]) for v, o in zip(value, other, strict=True))
         elif isinstance(other, tuple):
-            value = _plus((value,) * len(other), [other])
+            value = plus((value,) * len(other), [other])
         else:
             value = value + other
     return value

@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -17,6 +17,7 @@ from mpmath import mp
 
 from potto.core.reference import differences, integrals
 from potto.core.reference.functions import function
+from potto.core.reference.integrals import Trace
 from potto.core.terms import (
     App,
     Branch,
@@ -46,10 +47,6 @@ Environment = Mapping[str, Value]
 GUARD = 15  # digits beyond those asked for
 _NAMED = {"pi": lambda: +mp.pi, "inf": lambda: mp.inf}
 _DEEP = 60_000
-
-
-class NotAccurate(ArithmeticError):
-    """The oracle cannot vouch for the digits asked for."""
 
 
 def evaluate(
@@ -87,14 +84,6 @@ def as_value(value: Any) -> Value:
     if isinstance(value, list):
         return list(map(as_value, value))
     return value if callable(value) or isinstance(value, bool) else mp.mpf(value)
-
-
-@dataclass
-class Trace:
-    """What was decided in one evaluation, in order, and the numbers that decided."""
-
-    sides: list[object] = field(default_factory=list)
-    values: list[Any] = field(default_factory=list)
 
 
 class Oracle:
@@ -137,7 +126,7 @@ class Oracle:
             case Lam():
                 return _Closure(self, term, env)
             case App(function=function, args=args):
-                return call(self.run(function, env), tuple(self.run(arg, env) for arg in args))
+                return differences.call(self.run(function, env), tuple(self.run(arg, env) for arg in args))
             case Global(module=module, name=name):
                 if self.lookup is None:
                     raise KeyError(f"{module}.{name}: there is no lookup")
@@ -187,7 +176,7 @@ class Oracle:
     def sum(self, term: Sum, env: Environment) -> Value:
         lo, hi = int(mp.ceil(self.run(term.lo, env))), int(mp.floor(self.run(term.hi, env)))
         parts = [self.run(term.body, {**env, term.variable: mp.mpf(i)}) for i in range(lo, hi + 1)]
-        return plus(parts) if parts else mp.mpf(0)
+        return integrals.plus(parts[0], parts[1:]) if parts else mp.mpf(0)
 
 
 _PLACES = tuple(f"#{i}" for i in range(1000))
@@ -211,20 +200,3 @@ class _Closure:
     @property
     def arity(self) -> int:
         return len(self.term.params)
-
-
-def call(function: Value, args: tuple[Value, ...]) -> Value:
-    """One group of arguments; a group of n parameters also takes one tuple of n, and back."""
-    arity = getattr(function, "arity", len(args))
-    if arity != len(args) and len(args) == 1 and isinstance(args[0], tuple):
-        args = args[0]
-    elif arity != len(args) and arity == 1:
-        args = (args,)
-    return function(*args)
-
-
-def plus(parts: list[Value]) -> Value:
-    """The sum of numbers, or of tuples component by component."""
-    if isinstance(parts[0], tuple):
-        return tuple(plus(list(column)) for column in zip(*parts, strict=True))
-    return sum(parts, mp.mpf(0))
