@@ -108,7 +108,7 @@ def tangent(ops: Elementwise, a: Ends) -> Ends:
 
 def angle(ops: Elementwise, y: Ends, x: Ends) -> Ends:
     """Of a rectangle that neither holds the origin nor meets the cut, the corners are the extremes."""
-    corners = [ops.of("atan2")(b, a) for b in y for a in x]
+    corners = [ops.of("atan2")(b + 0.0, a) for b in y for a in x]  # -0 is 0: at it the function would jump too
     lo = hi = corners[0]
     for corner in corners[1:]:
         lo, hi = ops.least(lo, corner), ops.most(hi, corner)
