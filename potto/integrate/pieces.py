@@ -5,6 +5,7 @@ Owns `Sums`, `Pieces` and `Evaluator`, the integrator's view of the machine.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -15,7 +16,7 @@ from potto.integrate.costs import Costs
 from potto.integrate.events import Event, Events, Members
 from potto.integrate.rules import substitution
 from potto.integrate.rules.gauss import gauss, leaning
-from potto.kernels.cells import Array, Cell, Ints, Mask, Trace, Value, map_arrays
+from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Trace, Value, map_arrays, map_cells
 from potto.kernels.errors import not_a_number
 
 STRAY = 8
@@ -68,6 +69,25 @@ class Sums:
     et: Array
     gross: Array | None = field(default=None, kw_only=True)
     common: Array | None = field(default=None, kw_only=True)
+
+    def pick(self, index: Any) -> Sums:
+        """Some members of the batch."""
+        gross, common = (None if x is None else x[..., index] for x in (self.gross, self.common))
+        v, e, t, et = (x[..., index] for x in (self.v, self.e, self.t, self.et))
+        return Sums(v, e, t, et, gross=gross, common=common)
+
+    @staticmethod
+    def joined(parts: Sequence[Sums]) -> Sums:
+        """Batches one after the other; one component may stand for all, where nothing is integrated."""
+        m = max(part.v.shape[0] for part in parts)
+
+        def rows(name: str) -> Array:
+            found = (getattr(part, name) for part in parts)
+            return np.concatenate([np.broadcast_to(x, (m, *x.shape[1:])) for x in found], axis=-1)
+
+        gross = [part.gross for part in parts if part.gross is not None]
+        known = np.concatenate(gross, axis=-1) if len(gross) == len(parts) else None
+        return Sums(rows("v"), rows("e"), rows("t"), rows("et"), gross=known)
 
 
 @dataclass(frozen=True)
@@ -200,7 +220,7 @@ def mostly(owner: Ints, root: Ints | None, size: int) -> Ints:
     return owner[(STRAY * np.bincount(root[owner], minlength=counts.size) >= counts)[root[owner]]]
 
 
-def gather(env: dict[str, Value], index: Ints) -> dict[str, Value]:
+def gather(env: dict[str, Value], index: Ints | Bools | slice | int) -> dict[str, Value]:
     """The environment at some members of its batch."""
     return {name: map_arrays(value, lambda a: a[index]) for name, value in env.items()}
 
@@ -221,13 +241,7 @@ def components(value: Value) -> list[Cell]:
 
 def still(value: Value) -> Value:
     """The value with its tangents and errors left out."""
-    if isinstance(value, Cell):
-        return Cell(value.v)
-    if isinstance(value, tuple):
-        return tuple(still(v) for v in value)
-    if isinstance(value, list):
-        return [still(v) for v in value]
-    return value.still()  # type: ignore[attr-defined, no-any-return]
+    return map_cells(value, lambda cell: Cell(cell.v))
 
 
 def take(mask: Mask, index: Ints) -> Mask:

@@ -7,9 +7,12 @@ cells, tuples and lists of values, and functions (anything with the methods of `
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Protocol, Union
 
 import numpy as np
+
+from potto.kernels.errors import not_a_number, wrong_call
 
 if TYPE_CHECKING:
     from potto.core.terms import Lam
@@ -53,9 +56,8 @@ class Cell:
     def __repr__(self) -> str:
         return f"Cell(v={self.v!r}, e={self.e!r}, t={self.t!r}, et={self.et!r})"
 
-    def map(self, change: Any) -> Cell:
+    def map(self, change: Callable[[Array], Number]) -> Cell:
         """The cell with `change` done to every part that is an array."""
-
         e, *rest = [x if x is None or not isinstance(x, np.ndarray) else change(x) for x in (self.e, *self.t, *self.et)]
         v, k = change(self.v) if isinstance(self.v, np.ndarray) else self.v, len(self.t)
         return Cell(v, e, tuple(rest[:k]), tuple(rest[k:]))
@@ -71,6 +73,7 @@ class FunctionLike(Protocol):
     captured: dict[str, Value]
 
     def pattern(self, directions: int) -> Pattern: ...
+    def change(self, how: Callable[[Value], Value]) -> FunctionLike: ...
 
 
 Value = Union[Cell, "tuple[Value, ...]", "list[Value]", FunctionLike]
@@ -95,8 +98,6 @@ def pattern(value: Value, directions: int) -> Pattern:
 def scalar_parts(value: Value, directions: int) -> tuple[Number, ...]:
     """(v, e, t..., et...) of a cell with zeros for what is missing: what generated code unpacks."""
     if not isinstance(value, Cell):
-        from potto.kernels.errors import not_a_number
-
         raise not_a_number(value)
     zero = (0.0,) * directions
     t = tuple(0.0 if x is None else x for x in value.t) or zero
@@ -104,38 +105,68 @@ def scalar_parts(value: Value, directions: int) -> tuple[Number, ...]:
     return (value.v, 0.0 if value.e is None else value.e, *t, *et)
 
 
+def map_cells(value: Value, change: Callable[[Cell], Cell]) -> Value:
+    """The value with `change` done to every number in it, those that functions have captured as well."""
+    if isinstance(value, Cell):
+        return change(value)
+    if isinstance(value, tuple):
+        return tuple([map_cells(item, change) for item in value])
+    if isinstance(value, list):
+        return [map_cells(item, change) for item in value]
+    return value.change(lambda inner: map_cells(inner, change))
+
+
+def all_cells(value: Value) -> list[Cell]:
+    """Every number in a value."""
+    if isinstance(value, Cell):
+        return [value]
+    items = value if isinstance(value, tuple | list) else value.captured.values()
+    return [cell for item in items for cell in all_cells(item)]
+
+
 def pad(value: Value, directions: int) -> Value:
     """The value seen with more directions, in which it does not move."""
-    if isinstance(value, Cell):
-        more = directions - len(value.t)
-        return Cell(value.v, value.e, value.t + (None,) * more, value.et + (None,) * more) if more else value
-    if isinstance(value, tuple):
-        return tuple(pad(item, directions) for item in value)
-    if isinstance(value, list):
-        return [pad(item, directions) for item in value]
-    return value.padded(directions)  # type: ignore[attr-defined, no-any-return]
+
+    def padded(cell: Cell) -> Cell:
+        more = (None,) * (directions - len(cell.t))
+        return Cell(cell.v, cell.e, cell.t + more, cell.et + more) if more else cell
+
+    return map_cells(value, padded)
 
 
-def map_arrays(value: Value, change: Any) -> Value:
+def map_arrays(value: Value, change: Callable[[Array], Number]) -> Value:
     """The value with `change` done to every array in it (a gather, a reshape)."""
-    if isinstance(value, Cell):
-        return value.map(change)
-    if isinstance(value, tuple):
-        return tuple(map_arrays(item, change) for item in value)
-    if isinstance(value, list):
-        return [map_arrays(item, change) for item in value]
-    return value.mapped(change)  # type: ignore[attr-defined, no-any-return]
+    return map_cells(value, lambda cell: cell.map(change))
 
 
 def all_arrays(value: Value) -> list[Array]:
-    if isinstance(value, Cell):
-        return value.arrays()
-    if isinstance(value, (tuple, list)):
-        return [a for item in value for a in all_arrays(item)]
-    return [a for item in value.captured.values() for a in all_arrays(item)]
+    return [a for cell in all_cells(value) for a in cell.arrays()]
 
 
-def map_trace(trace: Trace | None, change: Any) -> Trace | None:
+def combined(change: Callable[..., Number], *values: Value) -> Value:
+    """Values of one kind as one, part by part: the numbers, their errors, the tangents and theirs.
+
+    A part that only some of them have is 0 for the others, one that none has is not there. Raises PottoError.
+    """
+    first = values[0]
+    cells = [value for value in values if isinstance(value, Cell)]
+    if len(cells) == len(values):
+        k = max(len(cell.t) for cell in cells)
+        none = (None,) * k
+        rows = zip(*[(c.v, c.e, *(c.t or none), *(c.et or none)) for c in cells], strict=True)
+        v, e, *rest = [
+            None if all(x is None for x in row) else change(*[0.0 if x is None else x for x in row]) for row in rows
+        ]
+        assert v is not None
+        return Cell(v, e, tuple(rest[:k]), tuple(rest[k:]))
+    if isinstance(first, tuple | list) and all(type(x) is type(first) and len(x) == len(first) for x in values):
+        return type(first)([combined(change, *items) for items in zip(*values)])
+    if all(value is first for value in values):
+        return first
+    raise wrong_call("the members of a batch of points have values of different kinds")
+
+
+def map_trace(trace: Trace | None, change: Callable[[Array], Any]) -> Trace | None:
     """The trace with `change` done to every mask that is an array."""
     if trace is None:
         return None

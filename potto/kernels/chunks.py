@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from potto.kernels.cells import Cell, Trace, Value, map_arrays, map_trace
+from potto.kernels.cells import Cell, Number, Trace, Value, combined, map_arrays, map_trace
 from potto.kernels.compile import Kernel, Runtime
 
 # Points at once: a few arrays of this length fit the second-level cache. A kernel of 60 operations takes 60 to 100 ns a
@@ -41,26 +41,11 @@ def in_chunks(kernel: Kernel, rt: Runtime, trace: Trace | None, args: list[Value
 
         parts.append(kernel.run(rt, map_trace(trace, cut), *(map_arrays(arg, cut) for arg in args)))
     sizes = [min(step, shape[0] - start) for start in range(0, shape[0], step)]
-    return _joined(parts, sizes, shape)
 
-
-def _joined(parts: list[Value], sizes: list[int], shape: tuple[int, ...]) -> Value:
-    first = parts[0]
-    if isinstance(first, tuple | list):
-        return type(first)(_joined(list(items), sizes, shape) for items in zip(*parts, strict=True))
-    assert isinstance(first, Cell)
-
-    def whole(rows: list[Any]) -> Any:
+    def whole(*rows: Number) -> Number:
         """Parts that are the same number everywhere stay one."""
-        if not any(isinstance(row, np.ndarray) for row in rows):
-            if all(row is None or row == rows[0] for row in rows) and rows[0] is not None:
-                return rows[0]
-            if all(row is None for row in rows):
-                return None
-        filled = (0.0 if row is None else row for row in rows)
-        return np.concatenate([np.broadcast_to(row, (n, *shape[1:])) for row, n in zip(filled, sizes, strict=True)])
+        if not any(isinstance(row, np.ndarray) for row in rows) and len(set(rows)) == 1:
+            return rows[0]
+        return np.concatenate([np.broadcast_to(row, (n, *shape[1:])) for row, n in zip(rows, sizes, strict=True)])
 
-    cells: list[Any] = parts
-    t = tuple(whole([c.t[d] for c in cells]) for d in range(len(first.t)))
-    et = tuple(whole([c.et[d] for c in cells]) for d in range(len(first.et)))
-    return Cell(whole([c.v for c in cells]), whole([c.e for c in cells]), t, et)
+    return combined(whole, *parts)

@@ -10,14 +10,13 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Mapping
-from functools import lru_cache, reduce
+from functools import lru_cache, partial, reduce
 from typing import Any
 
 import numpy as np
 
 from potto.core.terms import Branch, Const, If, Term
-from potto.kernels.cells import Cell, Mask, Number, Value
-from potto.kernels.errors import wrong_call
+from potto.kernels.cells import Mask, Number, Value, combined
 from potto.kernels.whole import ROUNDING
 from potto.primitives import PRIMITIVES, Primitive
 from potto.primitives.registry import Elementwise
@@ -114,21 +113,4 @@ def select_value(mask: Mask, a: Value, b: Value) -> Value:
     """`select` for values of any kind; both must have the same structure."""
     if not isinstance(mask, np.ndarray):
         return a if mask else b
-    if isinstance(a, Cell) and isinstance(b, Cell):
-        k = max(len(a.t), len(b.t))
-
-        def part(x: Number | None, y: Number | None) -> Number | None:
-            if x is None and y is None:
-                return None
-            return select(mask, 0.0 if x is None else x, 0.0 if y is None else y)
-
-        def parts(x: tuple[Number | None, ...], y: tuple[Number | None, ...]) -> tuple[Number | None, ...]:
-            x, y = x or (None,) * k, y or (None,) * k
-            return tuple(map(part, x, y))
-
-        return Cell(select(mask, a.v, b.v), part(a.e, b.e), parts(a.t, b.t), parts(a.et, b.et))
-    if isinstance(a, tuple) and isinstance(b, tuple) and len(a) == len(b):
-        return tuple(select_value(mask, x, y) for x, y in zip(a, b, strict=True))
-    if a is b:
-        return a
-    raise wrong_call("the two sides of a conditional over a batch of points are not of the same kind")
+    return combined(partial(select, mask), a, b)

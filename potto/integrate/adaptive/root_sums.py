@@ -16,7 +16,7 @@ from potto.integrate.events import at_a_fold, root_on_a_bound
 from potto.integrate.pieces import Evaluator, Sums, components, gather, take
 from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import EPS
-from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value
+from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value, map_cells
 
 CLEAR = 64.0  # times what the rounding of a surface and of its place comes to; where it is larger it jumps
 
@@ -94,9 +94,7 @@ def _roots(over: LevelSet, here: dict[str, Value], machine: Evaluator) -> tuple[
 
 
 def _without_tangents(value: Value) -> Value:
-    if isinstance(value, Cell):
-        return Cell(value.v, value.e)
-    return tuple(map(_without_tangents, value)) if isinstance(value, tuple) else value.still()  # type: ignore[union-attr]
+    return map_cells(value, lambda cell: Cell(cell.v, cell.e))
 
 
 def _added(cells: list[Cell], owner: Ints, inside: Bools, unsure: Bools, batch: int, k: int) -> Sums:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from potto.core.terms import Lam, function_of
-from potto.integrate.pieces import Evaluator
+from potto.integrate.pieces import Evaluator, gather
 from potto.integrate.rules.gauss import EPS, gauss
 from potto.integrate.rules.proved_orders import Cell as Stretch
 from potto.integrate.rules.proved_orders import Region
@@ -157,7 +157,7 @@ def _integrand(
         env, index = {n: here[n] for n in function.params}, None
         if len(faces) > 1:
             index = np.nonzero(np.array([cell.body is face for cell in cells])[owner])[0]
-            env = {n: v.map(lambda a, index=index: a[index]) for n, v in env.items()}  # type: ignore[union-attr]
+            env = gather(env, index)
         cell = machine.evaluate(function, env, None)
         assert isinstance(cell, Cell)
         for part, numbers in enumerate(((cell.v, *cell.t), (cell.e, *cell.et))):

@@ -21,7 +21,7 @@ from potto.calculus.solving.enclosable import enclosable
 from potto.calculus.surfaces.discontinuities import Finding
 from potto.core.kinds import union_of
 from potto.core.terms import Integral, Lam, Prim, Term, function_of, postorder, tuple_
-from potto.integrate.pieces import Evaluator, Sums, components, still
+from potto.integrate.pieces import Evaluator, Sums, components, gather, still
 from potto.integrate.rules.gauss import EPS, gauss, truncation
 from potto.integrate.rules.intervals import Interval, enclosure
 from potto.kernels.cells import Array, Bools, Cell, Value, map_arrays
@@ -109,7 +109,7 @@ def uncut(box: Box, machine: Evaluator, env: dict[str, Value], batch: int) -> tu
         todo = np.nonzero(free & ~done)[0]
         size = max(1, POINTS // order ** len(box.variables))
         for index in (todo[i : i + size] for i in range(0, todo.size, size)):
-            here = {n: map_arrays(env[n], lambda a, index=index: a[index]) for n in box.body.params if n in env}
+            here = gather({n: env[n] for n in box.body.params if n in env}, index)
             found = _product(box, machine, here, low[:, index], high[:, index], order)
             if found is None:
                 return None

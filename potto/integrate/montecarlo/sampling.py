@@ -77,16 +77,12 @@ def sample(plan: Plan, machine: Any, env: dict[str, Value], batch: int, method: 
         machine.sampled((len(rows) + share) / batch, method == "auto")
 
     for i in range(batch):
-        member = {n: map_arrays(v, _member(i)) for n, v in env.items()}
+        member = {n: map_arrays(v, lambda a, i=i: float(a[i])) for n, v in env.items()}  # type: ignore[misc]
         with machine.among(np.array([i])) as alone:
             rows.append(_plain(plan, alone, member, told) if method == "mc"
                         else _quasi(plan, alone, member, method, told))  # fmt: skip
         machine.events.take(alone.events, np.array([i]))
-    return Sums(*(np.stack([getattr(r, name) for r in rows], axis=-1) for name in ("v", "e", "t", "et")))
-
-
-def _member(i: int) -> Callable[[Array], Any]:
-    return lambda a: float(a[i])
+    return Sums.joined([Sums(*(x[..., None] for x in (r.v, r.e, r.t, r.et))) for r in rows])
 
 
 def _plain(plan: Plan, machine: Any, env: dict[str, Value], told: Told) -> Sums:

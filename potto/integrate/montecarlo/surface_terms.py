@@ -142,7 +142,7 @@ class Surface:
         if along.plan is None:
             return nothing
         if n > LINES and along.plan.searched:
-            return joined([self.crossing(u[i : i + LINES], pivot) for i in range(0, n, LINES)])
+            return Sums.joined([self.crossing(u[i : i + LINES], pivot) for i in range(0, n, LINES)])
         labels: list[Array | None] = list(u.T)
         labels.insert(pivot, None)
         before = self.chart.place(self.chart.start(n, k), labels, 0, pivot, crowding=range(pivot))
@@ -380,12 +380,6 @@ class Surface:
         assert isinstance(value, Cell)
         t = value.t or (None,) * wide
         return as_array(value.v, n), np.stack([as_array(0.0 if x is None else x, n) + np.zeros(n) for x in t])
-
-
-def joined(parts: list[Sums]) -> Sums:
-    """Sums of several batches put together."""
-    names = ("v", "e", "t", "et")
-    return Sums(*(np.concatenate([getattr(p, name) for p in parts], axis=-1) for name in names))
 
 
 def _reach(lo: Cell, hi: Cell, x: Array) -> Array:

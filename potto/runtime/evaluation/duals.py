@@ -9,6 +9,7 @@ term, which is then differentiated like any other.
 from __future__ import annotations
 
 from potto.calculus.inlining.currying import sizes_of
+from potto.integrate.pieces import still
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Trace, Value
 from potto.runtime.evaluation.compared import compared
@@ -86,13 +87,13 @@ def call_paired(
 ) -> Value:
     """Call a function on duals for each direction that is carried."""
     k = machine.directions
-    still = machine.with_directions(0)
+    quiet = machine.with_directions(0)
     v: Cell | None = None
     t: list[object] = []
     et: list[object] = []
     for d in range(max(k, 1)):
         pairs = tuple(tuple(_pair(arg, d) for arg in group) for group in groups)
-        result = still.call(function.pairs.still(), pairs, trace)
+        result = quiet.call(still(function.pairs), pairs, trace)
         if not (isinstance(result, tuple) and len(result) == 2 and all(isinstance(r, Cell) for r in result)):
             raise errors.wrong_call("a function given for a derivative must give a pair `(value, tangent)`")
         assert isinstance(result[0], Cell) and isinstance(result[1], Cell)

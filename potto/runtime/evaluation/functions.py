@@ -8,11 +8,9 @@ A function written by hand for duals (`Paired`) is called with pairs instead.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 from potto.core.terms import Lam
-from potto.integrate.pieces import still
-from potto.kernels.cells import Cell, Pattern, Value, map_arrays, pad
+from potto.kernels.cells import Cell, Pattern, Value, pad
 
 
 class Closure:
@@ -39,12 +37,6 @@ class Closure:
 
     def padded(self, directions: int) -> Closure:
         return self.change(lambda v: pad(v, directions))
-
-    def mapped(self, change: Any) -> Closure:
-        return self.change(lambda v: map_arrays(v, change))
-
-    def still(self) -> Closure:
-        return self.change(still)
 
 
 class Derivative(Closure):

@@ -1,19 +1,33 @@
 """Conditionals whose sides are evaluated only where they are taken.
 
-Owns `lazy`. With one outcome for the whole batch one side is evaluated; otherwise the batch is split, each side
-evaluated on its own members, and the results put together again.
+Owns `lazy`, and `apart`. With one outcome for the whole batch one side is evaluated; otherwise the batch is split, each
+side evaluated on its own members, and the results put together again.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from potto.core.terms import Branch, If, function_of
-from potto.kernels.cells import Array, Cell, Number, Trace, Value, all_arrays, map_arrays, map_trace
-from potto.kernels.errors import wrong_call
+from potto.kernels.cells import (
+    Array,
+    Bools,
+    Cell,
+    Number,
+    Trace,
+    Value,
+    all_arrays,
+    combined,
+    map_arrays,
+    map_cells,
+    map_trace,
+)
 from potto.runtime.evaluation.machine import Machine
+
+Pick = Callable[[Array], Array]
 
 
 def lazy(machine: Machine, mask: Any, term: If | Branch, env: dict[str, Value], traces: tuple[Any, Any]) -> Value:
@@ -37,48 +51,39 @@ def side(machine: Machine, term: If | Branch, env: dict[str, Value], which: int,
 
 def split(machine: Machine, mask: Any, term: If | Branch, env: dict[str, Value], traces: tuple[Any, Any]) -> Value:
     arrays = [a for value in env.values() for a in all_arrays(value)]
-    shape = np.broadcast_shapes(mask.shape, *(a.shape for a in arrays))
-    full = np.broadcast_to(mask, shape)
-    results = []
-    for which, where in ((0, full), (1, ~full)):
+    full = np.broadcast_to(mask, np.broadcast_shapes(mask.shape, *(a.shape for a in arrays)))
 
-        def pick(a: Array, where: Any = where) -> Array:
-            chosen: Array = np.broadcast_to(a, shape)[where]
+    def evaluated(which: int, here: dict[str, Value], pick: Pick) -> Value:
+        return side(machine, term, here, which, map_trace(traces[which], pick))
+
+    return apart((full, ~full), env, evaluated)
+
+
+def apart(
+    masks: Sequence[Bools], env: dict[str, Value], evaluated: Callable[[int, dict[str, Value], Pick], Value]
+) -> Value:
+    """The values of a batch, the members of each mask evaluated together and apart from the others.
+
+    evaluated: from the number of a mask, the environment of its members and what picks these from an array.
+    """
+    shape = masks[0].shape
+    parts = []
+    for number, mask in enumerate(masks):
+
+        def pick(a: Array, mask: Bools = mask) -> Array:
+            chosen: Array = np.broadcast_to(a, shape)[mask]
             return chosen
 
-        here = {n: map_arrays(v, pick) for n, v in env.items()}
-        results.append(side(machine, term, here, which, map_trace(traces[which], pick)))
-    return merge(full, results[0], results[1])
+        parts.append(evaluated(number, {n: map_arrays(v, pick) for n, v in env.items()}, pick))
 
+    def whole(*rows: Number) -> Array:
+        out = np.empty(shape)
+        for mask, row in zip(masks, rows, strict=True):
+            out[mask] = row
+        return out
 
-def merge(mask: Any, a: Value, b: Value) -> Value:
-    """Values for the members where the mask holds and for the others, put together."""
-    if isinstance(a, Cell) and isinstance(b, Cell):
-        k = max(len(a.t), len(b.t))
-
-        def parts(x: tuple[Any, ...], y: tuple[Any, ...]) -> tuple[Any, ...]:
-            return tuple(_merge(mask, p, q) for p, q in zip(x or (None,) * k, y or (None,) * k, strict=True))
-
-        v = _merge(mask, a.v, b.v)
-        assert v is not None
-        return Cell(v, _merge(mask, a.e, b.e), parts(a.t, b.t), parts(a.et, b.et))
-    if isinstance(a, tuple) and isinstance(b, tuple) and len(a) == len(b):
-        return tuple(merge(mask, x, y) for x, y in zip(a, b, strict=True))
-    raise wrong_call("the two sides of a conditional over a batch of points are not of the same kind")
-
-
-def _merge(mask: Any, a: Number | None, b: Number | None) -> Number | None:
-    if a is None and b is None:
-        return None
-    out = np.empty(mask.shape)
-    out[mask] = 0.0 if a is None else a
-    out[~mask] = 0.0 if b is None else b
-    return out
+    return combined(whole, *parts)
 
 
 def _spoil(value: Value, nan: Number) -> Value:
-    if isinstance(value, Cell):
-        return Cell(value.v + nan, value.e, value.t, value.et)
-    if isinstance(value, tuple):
-        return tuple(_spoil(v, nan) for v in value)
-    return value
+    return map_cells(value, lambda cell: Cell(cell.v + nan, cell.e, cell.t, cell.et))

@@ -5,6 +5,7 @@ Owns `total`. Where no side is forced in the terms, all of them are evaluated in
 
 from __future__ import annotations
 
+import operator
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,10 @@ import numpy as np
 from potto.core.terms import Sum, lam
 from potto.diagnostics import PottoError
 from potto.kernels import errors
-from potto.kernels.cells import Array, Cell, Number, Trace, Value, all_arrays, map_arrays
+from potto.kernels.cells import Cell, Number, Trace, Value, all_arrays, combined, map_arrays
 from potto.kernels.whole import UNIT_ROUNDOFF
 from potto.runtime.evaluation.machine import Machine
+from potto.runtime.evaluation.selection import Pick, apart
 
 MOST_TERMS = 10_000_000
 CHUNK = 1 << 18
@@ -74,45 +76,16 @@ def _one_by_one(
 
 def _grouped(machine: Machine, term: Sum, first: Number, last: Number, env: dict[str, Value]) -> Value:
     """Bounds that differ over the batch: the members with equal bounds together."""
-    from potto.runtime.evaluation.selection import merge
-
     arrays = [a for v in env.values() for a in all_arrays(v)]
     shape = np.broadcast_shapes(np.shape(first), np.shape(last), *(a.shape for a in arrays))
     lo, hi = np.broadcast_to(first, shape), np.broadcast_to(last, shape)
     pairs = np.unique(np.stack([lo.ravel(), hi.ravel()]), axis=1).T
-    result: Value | None = None
-    done = np.zeros(shape, dtype=bool)
-    for a, b in pairs:
-        mask = (lo == a) & (hi == b)
 
-        def pick(x: Array, mask: Any = mask) -> Array:
-            chosen: Array = np.broadcast_to(x, shape)[mask]
-            return chosen
+    def evaluated(number: int, here: dict[str, Value], _: Pick) -> Value:
+        a, b = pairs[number]
+        return total(machine, term, Cell(float(a)), Cell(float(b)), here, None)
 
-        here = {n: map_arrays(v, pick) for n, v in env.items()}
-        value = _full(total(machine, term, Cell(float(a)), Cell(float(b)), here, None), int(mask.sum()))
-        if result is None:
-            result = value
-        else:
-            either = mask | done
-            inner = mask[either]
-            result = map_arrays(merge(inner, value, result), lambda x: x)
-        done |= mask
-    assert result is not None
-    return map_arrays(result, lambda a: a.reshape(shape))
-
-
-def _full(value: Value, size: int) -> Value:
-    if isinstance(value, Cell):
-
-        def part(x: Number | None) -> Number | None:
-            return None if x is None else np.broadcast_to(x, (size,))
-
-        v = part(value.v)
-        assert v is not None
-        return Cell(v, part(value.e), tuple(map(part, value.t)), tuple(map(part, value.et)))
-    assert isinstance(value, tuple)
-    return tuple(_full(v, size) for v in value)
+    return apart([(lo == a) & (hi == b) for a, b in pairs], env, evaluated)
 
 
 def _reduce(value: Value, shape: tuple[int, ...], count: int) -> Value:
@@ -121,33 +94,16 @@ def _reduce(value: Value, shape: tuple[int, ...], count: int) -> Value:
     if not isinstance(value, Cell):
         raise errors.not_a_number(value)
 
-    def part(x: Number | None) -> Number | None:
-        if x is None:
-            return None
+    def part(x: Number) -> Number:
         full = np.broadcast_to(x, (*shape, count)) if np.ndim(x) == 0 or np.shape(x)[-1] != count else np.asarray(x)
         summed = np.add.reduce(full, axis=-1)
         return float(summed) if summed.ndim == 0 else summed
 
-    v, e = part(value.v), part(value.e)
-    assert v is not None
-    size = part(np.abs(value.v))
-    assert size is not None
-    rounding = 8 * UNIT_ROUNDOFF * size
-    return Cell(v, rounding if e is None else e + rounding, tuple(map(part, value.t)), tuple(map(part, value.et)))
+    found = combined(part, value)
+    assert isinstance(found, Cell)
+    rounding = 8 * UNIT_ROUNDOFF * part(np.abs(value.v))
+    return Cell(found.v, rounding if found.e is None else found.e + rounding, found.t, found.et)
 
 
 def _plus(a: Value, b: Value) -> Value:
-    if isinstance(a, Cell) and isinstance(b, Cell):
-
-        def plus(x: Number | None, y: Number | None) -> Number | None:
-            return x if y is None else y if x is None else x + y
-
-        k = max(len(a.t), len(b.t))
-        at, bt = a.t or (None,) * k, b.t or (None,) * k
-        aet, bet = a.et or (None,) * k, b.et or (None,) * k
-        v = plus(a.v, b.v)
-        assert v is not None
-        return Cell(v, plus(a.e, b.e), tuple(map(plus, at, bt)), tuple(map(plus, aet, bet)))
-    if isinstance(a, tuple) and isinstance(b, tuple):
-        return tuple(_plus(x, y) for x, y in zip(a, b, strict=True))
-    raise errors.wrong_call("the terms of a sum are not of the same kind")
+    return combined(operator.add, a, b)

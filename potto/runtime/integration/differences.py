@@ -9,14 +9,12 @@ a gap between the sides that does not shrink with the step (a kink) speak agains
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
-from potto.integrate.pieces import Sums, still
-from potto.kernels.cells import Array, Cell, Value, map_arrays
-from potto.runtime.evaluation.functions import Closure
-from potto.runtime.integration.one_sided import Evaluated, moved
+from potto.integrate.pieces import Sums, gather, still
+from potto.kernels.cells import Array, Value
+from potto.runtime.integration.one_sided import Evaluated, moved, moving
 from potto.runtime.integration.problem import Problem
 
 ROUGH = 1e-6  # from which relative error on another way is looked for
@@ -40,10 +38,10 @@ def by_differences(problem: Problem, sums: Sums, evaluated: Evaluated) -> None:
     rough = ~(sums.et <= ROUGH * np.abs(sums.t)) & np.isfinite(sums.v)[:, None] & ~(sums.et <= machine.atol)
     if sums.gross is not None:
         rough &= ~(sums.et <= CANCELLED * np.where(np.isfinite(sums.gross[1]), sums.gross[1], 0.0))
-    for member in np.nonzero(rough.any(axis=(0, 1)))[0]:
-        env = {n: map_arrays(v, lambda a, m=member: a[m]) for n, v in problem.env.items()}
+    for member in map(int, np.nonzero(rough.any(axis=(0, 1)))[0]):
+        env = gather(problem.env, member)
         for d in np.nonzero(rough[:, :, member].any(axis=0))[0]:
-            step = min(_reaches(env.values(), int(d)), default=0.0) * REACH / 4
+            step = min(_reaches(env, int(d)), default=0.0) * REACH / 4
             if not 0 < step < np.inf:
                 continue
             noise = 2 * np.abs(WEIGHTS).sum() / (step / 2) * sums.e[:, member]
@@ -58,17 +56,12 @@ def by_differences(problem: Problem, sums: Sums, evaluated: Evaluated) -> None:
             t[:], et[:] = np.where(better, value, t), np.where(better, off, et)
 
 
-def _reaches(values: Any, d: int) -> Iterator[float]:
+def _reaches(env: dict[str, Value], d: int) -> Iterator[float]:
     """Of each number that moves, the step after which it is twice as large."""
-    for value in values:
-        if isinstance(value, Cell):
-            t = value.t[d] if d < len(value.t) else None
-            if t is not None and t != 0 and value.v != 0:
-                yield abs(float(value.v) / float(t))
-        elif isinstance(value, tuple):
-            yield from _reaches(value, d)
-        elif isinstance(value, Closure):
-            yield from _reaches(value.captured.values(), d)
+    for value in env.values():
+        for cell in moving(value, d):
+            if cell.v != 0:
+                yield abs(float(cell.v) / float(cell.t[d] or 0.0))
 
 
 def _derivative(

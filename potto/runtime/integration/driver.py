@@ -7,7 +7,6 @@ solved (`solving`), and gives the result the shape of the batch again.
 from __future__ import annotations
 
 import math
-import operator
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
@@ -18,7 +17,7 @@ from potto.calculus.surfaces.discontinuities import TooDeep
 from potto.core.terms import Integral, function_of
 from potto.diagnostics import PottoError
 from potto.integrate.events import BUDGET_SPENT
-from potto.integrate.pieces import Sums, still
+from potto.integrate.pieces import Sums, gather, still
 from potto.kernels import errors
 from potto.kernels.cells import Array, Cell, Ints, Number, Value, all_arrays, map_arrays, pad
 from potto.kernels.making import making
@@ -106,9 +105,9 @@ def _grouped(problem: Problem, flat: dict[str, Value]) -> Sums:
 
 def _in_groups(problem: Problem, flat: dict[str, Value], groups: Iterable[Ints]) -> Sums:
     """The integrals of a batch, group by group."""
-    found = Whole(problem.batch)
+    found = Whole()
     for index in groups:
-        here = {n: map_arrays(v, operator.itemgetter(index)) for n, v in flat.items()}
+        here = gather(flat, index)
         with problem.among(index, link(here)) as part:
             found.put(index, _in_cases(part, here))
         problem.events.take(part.events, index)

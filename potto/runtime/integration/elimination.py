@@ -35,7 +35,7 @@ def step_by_step(problem: Problem, limit: float) -> Sums | None:
             return None
         rows.append(row)
     problem.machine.record.methods.add("quadrature")
-    return Sums(*(np.concatenate([getattr(r, name) for r in rows], axis=-1) for name in ("v", "e", "t", "et")))
+    return Sums.joined(rows)
 
 
 def _member(known: Eliminated, problem: Problem) -> Sums | None:

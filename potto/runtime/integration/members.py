@@ -10,7 +10,7 @@ by one.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -47,8 +47,7 @@ class Ways:
 class Whole:
     """The sums of a batch, put together from those of its parts."""
 
-    def __init__(self, batch: int) -> None:
-        self.batch = batch
+    def __init__(self) -> None:
         self.parts: list[tuple[Ints, Sums]] = []
 
     def put(self, index: Ints, part: Sums) -> None:
@@ -57,14 +56,8 @@ class Whole:
 
     @property
     def sums(self) -> Sums:
-        """One component may stand for all where nothing is integrated."""
-        m, k = max(p.v.shape[0] for _, p in self.parts), self.parts[0][1].t.shape[1]
-        v, e, gross = (np.zeros((rows, self.batch)) for rows in (m, m, 2))
-        t, et = np.zeros((2, m, k, self.batch))
-        for index, part in self.parts:
-            v[:, index], e[:, index], t[:, :, index], et[:, :, index] = part.v, part.e, part.t, part.et
-            gross[:, index] = added_up(part)
-        return Sums(v, e, t, et, gross=gross)
+        order = np.argsort(np.concatenate([index for index, _ in self.parts]))
+        return Sums.joined([replace(part, gross=added_up(part)) for _, part in self.parts]).pick(order)
 
 
 @dataclass(frozen=True)
@@ -86,14 +79,9 @@ def added_up(sums: Sums) -> Array:
     return most if sums.gross is None else np.maximum(most, sums.gross)
 
 
-def some(sums: Sums, index: Ints) -> Sums:
-    gross = None if sums.gross is None else sums.gross[:, index]
-    return Sums(sums.v[:, index], sums.e[:, index], sums.t[:, :, index], sums.et[:, :, index], gross=gross)
-
-
 def by_members(problem: Problem, ways: Ways, bad: Callable[[Sums], Bools]) -> Sums:
     """The sums of a batch. bad: the members that are not as accurate as was asked for."""
-    found = Whole(problem.batch)
+    found = Whole()
     everybody = np.arange(problem.batch)
     alone = [everybody] if problem.batch <= FEW_MEMBERS else _together(problem, everybody, ways, bad, found)
     for i in map(int, np.concatenate(alone)):
@@ -150,10 +138,10 @@ def _settle(
     """Put what some of the members come to, and return those that are not accurate enough."""
     with here.among(group) as part:
         part.events.take(here.events.of(group, TwoSided), np.arange(group.size))
-        settled = ways.settled(order, part, some(sums, group))
+        settled = ways.settled(order, part, sums.pick(group))
     rough = bad(settled)
     if rough.sum() > MOST_ROUGH:
         rough[:] = False
     keep = np.nonzero(~rough)[0]
-    into.put(group[keep], some(settled, keep), part.events.of(keep))
+    into.put(group[keep], settled.pick(keep), part.events.of(keep))
     return into.todo[group[rough]]

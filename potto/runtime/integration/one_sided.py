@@ -14,7 +14,6 @@ import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -23,10 +22,9 @@ from potto.integrate.decomposition.cuts import frame_rows
 from potto.integrate.decomposition.meetings import Row
 from potto.integrate.decomposition.sections import searched_rows
 from potto.integrate.events import BOUNDLESS, INNER, Degenerate, Fold, OneSidedDerivatives, TwoSided
-from potto.integrate.pieces import Sums, still
+from potto.integrate.pieces import Sums, gather, still
 from potto.integrate.plan import Plan
-from potto.kernels.cells import Array, Cell, Value, map_arrays
-from potto.runtime.evaluation.functions import Closure
+from potto.kernels.cells import Array, Cell, Value, all_cells, map_cells
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.integration.choices import orders
 from potto.runtime.integration.problem import Problem
@@ -122,9 +120,8 @@ def beside_axes(problem: Problem, plan: Plan, sums: Sums, variable: str, evaluat
         return False
     problem.events.forget(Degenerate)
     found = list(_sides(problem, plan, range(batch), None, evaluated))
-    moving = [any(any(_moving(v, d)) for v in problem.env.values()) for d in range(machine.directions)]
-    still_ones = batch * moving.count(False)
-    if len(found) + still_ones < batch * machine.directions:
+    resting = sum(not any(moving(v, d) for v in problem.env.values()) for d in range(machine.directions))
+    if len(found) + batch * resting < batch * machine.directions:
         return False
     for member, d, backward, forward, off in found:
         t, et = sums.t[:, d, member], sums.et[:, d, member]
@@ -159,7 +156,7 @@ def _sides(
 ) -> Iterator[tuple[int, int, Array, Array, tuple[Array, Array]]]:  # fmt: skip
     """Member, direction, the derivatives before and behind the parameters, of all components, and how far off each."""
     for member in members[:MOST_MEMBERS]:
-        env = {n: map_arrays(v, lambda a, m=member: a[m]) for n, v in problem.env.items()}
+        env = gather(problem.env, member)
         for d in range(problem.machine.directions):
             sides = _both(problem.machine.apart(), plan, env, d, where, evaluated)
             if sides is not None:
@@ -193,10 +190,10 @@ def _step(machine: Machine, plan: Plan, env: dict[str, Value], d: int, where: Fo
     parameters.
     """
     if where is not None and (where.number == INNER or _searched(plan, where)):
-        sizes = [float(np.abs(cell.v)) for value in env.values() for cell in _moving(value, d)]
+        sizes = [float(np.abs(cell.v)) for value in env.values() for cell in moving(value, d)]
         return APART**2 * max([1.0, *sizes]) if sizes else None
     both = np.concatenate(([0.0], STEPS, -STEPS))
-    here = {n: moved(v, both, d, moving=False) for n, v in env.items()}
+    here = {n: still(moved(v, both, d)) for n, v in env.items()}
     quiet, size = machine.with_directions(0), both.size
     outer = () if where is None else where.outer
     for number, level in enumerate(plan.levels[: 1 + (0 if where is None else where.number)]):
@@ -245,40 +242,24 @@ def _near(x: Array) -> Array:
     return np.concatenate(([np.nan], *(np.full(STEPS.size, place) for place in found)))
 
 
-def _moving(value: Value, d: int) -> Iterator[Cell]:
+def moving(value: Value, d: int) -> list[Cell]:
     """The numbers in a value that move in a direction."""
-    if isinstance(value, Cell):
-        t = value.t[d] if d < len(value.t) else None
-        if t is not None and np.any(t):
-            yield value
-    elif isinstance(value, tuple):
-        for item in value:
-            yield from _moving(item, d)
-    elif isinstance(value, Closure):
-        for inner in value.captured.values():
-            yield from _moving(inner, d)
+    return [c for c in all_cells(value) if d < len(c.t) and (t := c.t[d]) is not None and np.any(t)]
 
 
-def moved(value: Value, step: Any, d: int, moving: bool = True) -> Value:
-    """A value after so large a step along its tangents in direction d, which it keeps if it goes on `moving`."""
-    if isinstance(value, Cell):
-        t = value.t[d] if d < len(value.t) else None
-        v = value.v if t is None else value.v + step * t
-        return Cell(v, value.e, value.t, value.et) if moving else Cell(v)
-    if isinstance(value, tuple):
-        return tuple(moved(item, step, d, moving) for item in value)
-    if isinstance(value, Closure):
-        return value.change(lambda inner: moved(inner, step, d, moving))
-    return value if moving else still(value)
+def moved(value: Value, step: float | Array, d: int) -> Value:
+    """A value after so large a step along its tangents in direction d, which it keeps."""
+
+    def after(cell: Cell) -> Cell:
+        t = cell.t[d] if d < len(cell.t) else None
+        return cell if t is None else Cell(cell.v + step * t, cell.e, cell.t, cell.et)
+
+    return map_cells(value, after)
 
 
 def one_direction(value: Value, d: int) -> Value:
     """A value that moves in direction d alone, as its only one."""
-    if isinstance(value, Cell):
-        return Cell(value.v, value.e, value.t[d : d + 1], value.et[d : d + 1])
-    if isinstance(value, tuple):
-        return tuple(one_direction(item, d) for item in value)
-    return value.change(lambda inner: one_direction(inner, d)) if isinstance(value, Closure) else value
+    return map_cells(value, lambda cell: Cell(cell.v, cell.e, cell.t[d : d + 1], cell.et[d : d + 1]))
 
 
 def _limit(far: float, nearer: float, nearest: float, noise: float) -> tuple[float, float]:

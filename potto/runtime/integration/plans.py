@@ -180,7 +180,7 @@ def decide(machine: Machine, plain: Term, linked: Linked) -> float | None:
                 return None
             env[name] = Cell(float(flat.flat[0]))
         else:
-            env[name] = value.still() if isinstance(value, Closure) else value
+            env[name] = still(value) if isinstance(value, Closure) else value
     try:
         result = machine.with_directions(0).term(plain, env)
     except PottoError:

@@ -6,7 +6,6 @@ Owns `within`, `in_parts` and `iterated`.
 from __future__ import annotations
 
 import math
-import operator
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from functools import lru_cache
@@ -17,9 +16,9 @@ import numpy as np
 from potto.integrate.adaptive.iterated import Iteration
 from potto.integrate.fixed.alike import together
 from potto.integrate.fixed.tensor_product import uncut
-from potto.integrate.pieces import Sums
+from potto.integrate.pieces import Sums, gather
 from potto.integrate.plan import Plan
-from potto.kernels.cells import Array, Bools, Value, map_arrays
+from potto.kernels.cells import Bools, Ints, Value
 from potto.runtime.evaluation.machine import Machine
 
 START_ORDER = 11
@@ -44,26 +43,27 @@ def within(most: int | None, plan: Plan, machine: Machine, env: dict[str, Value]
 
 def in_parts(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> Sums:
     """Quadrature: what a product rule settles first, then a bounded number of members of the batch at a time."""
-    found: Sums | None = None
+    places: list[Ints] = []
+    parts: list[Sums] = []
     rest = np.arange(batch)
     for way in (_uncut, _alike):
-        here = env if rest.size == batch else {n: map_arrays(v, operator.itemgetter(rest)) for n, v in env.items()}
         with one_thread():
-            part = way(plan, machine, here, rest.size)
-        if part is None:
-            continue
-        done, sums = part
-        found = sums if found is None else _filled(found, rest[done], sums, done)
-        rest = rest[~done]
+            found = way(plan, machine, gather(env, rest) if parts else env, rest.size)
+        if found is not None:
+            done, sums = found
+            places.append(rest[done])
+            parts.append(sums.pick(done))
+            rest = rest[~done]
         if not rest.size:
-            return found
-    if found is None:
+            break
+    if not parts:
         return iterated(plan, machine, env, batch)
-    here = {n: map_arrays(v, operator.itemgetter(rest)) for n, v in env.items()}
-    apart = machine.apart()
-    sums = iterated(plan, apart, here, rest.size)
-    machine.events.take(apart.events, rest)
-    return _filled(found, rest, sums, slice(None))
+    if rest.size:
+        apart = machine.apart()
+        parts.append(iterated(plan, apart, gather(env, rest), rest.size))
+        places.append(rest)
+        machine.events.take(apart.events, rest)
+    return Sums.joined(parts).pick(np.argsort(np.concatenate(places)))
 
 
 def _uncut(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> tuple[Bools, Sums] | None:
@@ -83,16 +83,6 @@ def _alike(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> t
     return together(plan.straight, plan.degrees, machine, env, batch)
 
 
-def _filled(whole: Sums, index: Any, part: Sums, picked: Any) -> Sums:
-    for name in ("v", "e", "t", "et"):
-        getattr(whole, name)[..., index] = getattr(part, name)[..., picked]
-    if part.gross is None or whole.gross is None:
-        whole.gross = None
-    else:
-        whole.gross[:, index] = part.gross[:, picked]
-    return whole
-
-
 def iterated(
     plan: Plan, machine: Machine, env: dict[str, Value], batch: int, start_order: int = START_ORDER
 ) -> Sums:
@@ -104,24 +94,16 @@ def iterated(
         parts = []
         for start in range(0, batch, BATCH):
             index = slice(start, min(start + BATCH, batch))
-            here = {n: map_arrays(v, operator.itemgetter(index)) for n, v in env.items()}
             apart = machine.apart()
-            parts.append(Iteration(plan, apart, order).whole(here, index.stop - start))
+            parts.append(Iteration(plan, apart, order).whole(gather(env, index), index.stop - start))
             machine.events.take(apart.events, np.arange(index.start, index.stop))
-    m = max(p.v.shape[0] for p in parts)
-
-    def joined(name: str) -> Array:
-        rows = [getattr(p, name) for p in parts]
-        return np.concatenate([np.broadcast_to(r, (m, *r.shape[1:])) for r in rows], axis=-1)
-
-    gross = None if any(p.gross is None for p in parts) else np.concatenate([p.gross for p in parts], axis=-1)
-    return Sums(joined("v"), joined("e"), joined("t"), joined("et"), gross=gross)
+    return Sums.joined(parts)
 
 
 def best_order(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> int:
     """The number of nodes to start with that is the cheapest for a few members spread over the batch."""
     index = np.linspace(0, batch - 1, PILOTS).astype(np.int64)
-    here = {n: map_arrays(v, operator.itemgetter(index)) for n, v in env.items()}
+    here = gather(env, index)
     costs = []
     for order in ORDERS:
         before = machine.record.evaluations
