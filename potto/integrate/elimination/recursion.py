@@ -21,7 +21,23 @@ from potto.calculus.decomposition.sweep import Level, sweep
 from potto.calculus.surfaces.case_split import cased
 from potto.calculus.surfaces.discontinuities import Finding, Kind, Resolve, TooDeep, findings, undecided
 from potto.core.simplify import simplify
-from potto.core.terms import Deriv, Integral, Lam, Term, Tuple, const, function_of, integral, substitute, tuple_
+from potto.core.terms import (
+    ZERO,
+    Deriv,
+    Integral,
+    Lam,
+    Term,
+    Tuple,
+    const,
+    function_of,
+    if_,
+    integral,
+    mul,
+    prim,
+    substitute,
+    tuple_,
+    var,
+)
 from potto.integrate.adaptive.iterated import Iteration
 from potto.integrate.decomposition.vanishing import vanishing_of
 from potto.integrate.elimination.interpolants import Table, tabulated
@@ -39,6 +55,9 @@ AFFORDABLE = 3_000_000  # evaluations, a few seconds: more than that is no good 
 FARTHEST = np.finfo(float).max
 SLIVER = 16  # roundings of its ends, that a piece of a table is longer than
 MOST_PLACES = 64  # where the integral over one variable is not smooth in the number that it depends on
+
+# 0 where the weight is, whatever is further in.
+WEIGHTED = function_of(if_(prim("eq", var("weight"), ZERO), ZERO, mul(var("weight"), var("further"))))
 
 # A place in the state of a step, as a surface, and what is there.
 Place = tuple[Term, Kind]
@@ -131,16 +150,17 @@ class _Tabled(Iteration):
     further: Table | Cell | None = None
 
     def body(self, env: dict[str, Value], sides: dict[int, Mask], machine: Evaluator) -> Value:
-        value, k = super().body(env, sides, machine.tracking()), self.machine.directions
+        tracking, k = machine.tracking(), self.machine.directions
+        weight = super().body(env, sides, tracking)
         if self.further is None:
-            return value
-        if isinstance(self.further, Cell):
-            assert isinstance(value, Cell)
-            return _times(value, self.further)
-        assert isinstance(value, tuple)
-        weight, passed = value
-        assert isinstance(weight, Cell) and isinstance(passed, Cell)
-        return _times(weight, self.further.at(passed, k, machine.directions))
+            return weight
+        further = self.further
+        if isinstance(further, Table):
+            assert isinstance(weight, tuple)
+            weight, passed = weight
+            assert isinstance(passed, Cell)
+            further = further.at(passed, k, machine.directions)
+        return tracking.evaluate(WEIGHTED, {"further": pad(further, machine.directions), "weight": weight}, None)
 
 
 def one_by_one(known: Eliminated, machine: Any, env: dict[str, Value]) -> Sums | None:
@@ -231,27 +251,3 @@ def _span(step: Step, passed: Term, box: dict[str, tuple[float, float]]) -> tupl
 def _cell(sums: Sums) -> Cell:
     return Cell(float(sums.v[0, 0]), float(sums.e[0, 0]), tuple(map(float, sums.t[0, :, 0])),
                 tuple(map(float, sums.et[0, :, 0])))  # fmt: skip
-
-
-def _times(a: Cell, b: Cell) -> Cell:
-    """The product; 0 where the first is 0, whatever the other is."""
-    wide = max(len(a.t), len(b.t))
-
-    def part(x: Any) -> Any:
-        return 0.0 if x is None else x
-
-    def of(x: tuple[Any, ...], d: int) -> Any:
-        return part(x[d]) if d < len(x) else 0.0
-
-    nothing = np.asarray(a.v) == 0
-    v, e = np.where(nothing, 0.0, b.v), np.where(nothing, 0.0, part(b.e))
-    value = a.v * v
-    error = np.abs(a.v) * e + np.abs(v) * part(a.e) + 2 * EPS * np.abs(value)
-    t, et = [], []
-    for d in range(wide):
-        at, bt = of(a.t, d), np.where(nothing, 0.0, of(b.t, d))
-        aet, bet = of(a.et, d), np.where(nothing, 0.0, of(b.et, d))
-        t.append(at * v + a.v * bt)
-        et.append(np.abs(at) * e + np.abs(v) * aet + np.abs(a.v) * bet + np.abs(bt) * part(a.e)
-                  + 2 * EPS * (np.abs(at * v) + np.abs(a.v * bt)))  # fmt: skip
-    return Cell(value, error, tuple(t), tuple(et))

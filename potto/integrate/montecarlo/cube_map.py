@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from potto.core.terms import function_of, mul, var
 from potto.integrate.decomposition.cuts import frame_rows
 from potto.integrate.decomposition.meetings import as_array
 from potto.integrate.levels import LevelPlan
@@ -24,6 +25,8 @@ from potto.integrate.pieces import still
 from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Cell, Number, Value, map_arrays, pad
+
+PRODUCT = function_of(mul(var("a"), var("b")))
 
 
 @dataclass
@@ -79,9 +82,8 @@ class Chart:
             if held is not None and number >= held:
                 x = Cell(x.v, None, tuple(None if d < self.machine.directions else y for d, y in enumerate(x.t)))
             env[level.variable] = x
-            volume = _times(volume, length)
-            if weight is not None:
-                volume = _times(volume, Cell(weight))
+            for factor in (length,) if weight is None else (length, Cell(weight)):
+                volume = machine.evaluate(PRODUCT, {"a": volume, "b": factor}, None)
         return Point(env, volume)
 
     def crowded(self, level: LevelPlan, env: dict[str, Value], u: Array) -> tuple[Array, Array | None]:
@@ -185,12 +187,3 @@ def _mix(a: tuple[Any, ...], b: tuple[Any, ...], d: int, label: Array) -> Number
     if p is None and q is None:
         return None
     return (0.0 if p is None else p) * (1 - label) + (0.0 if q is None else q) * label
-
-
-def _times(a: Cell, b: Cell) -> Cell:
-    def part(p: Any, q: Any) -> Any:
-        terms = [x * y for x, y in ((p, b.v), (q, a.v)) if x is not None]
-        return None if not terms else sum(terms[1:], terms[0])
-
-    k = max(len(a.t), len(b.t))
-    return Cell(a.v * b.v, None, tuple(map(part, a.t or (None,) * k, b.t or (None,) * k)))

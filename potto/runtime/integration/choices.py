@@ -11,8 +11,7 @@ from collections.abc import Iterable, Iterator
 from potto.calculus.decomposition.elimination import eliminate
 from potto.calculus.differentiation.level_sets import placed_along
 from potto.core.terms import Integral, integral
-from potto.runtime.evaluation.machine import Machine
-from potto.runtime.integration.plans import Linked, plan_for
+from potto.runtime.integration.problem import Problem
 
 # Up to how many variables iterated quadrature is never in question; what it takes beyond them, in evaluations, and how
 # much of that is acceptable. From LOOSE on, a relative accuracy is reached by fewer samples.
@@ -26,26 +25,28 @@ FEW_NODES = 30_000  # up to which iterated quadrature is no slower
 TRIAL, TRIAL_FACTOR = 12_000, 25
 
 
-def too_many(machine: Machine, term: Integral, linked: Linked) -> bool:
+def too_many(problem: Problem) -> bool:
     """Whether an integral has too many variables and surfaces for quadrature, or too few digits are asked for."""
-    if len(term.variables) <= MOST_LEVELS or placed_along(term) is not None:
+    settings, term = problem.machine.settings, problem.term
+    if settings.method != "auto" or len(term.variables) <= MOST_LEVELS or placed_along(term) is not None:
         return False
-    return machine.settings.rtol >= LOOSE or expected(machine, term, linked) > AFFORDABLE
+    return settings.rtol >= LOOSE or expected(problem) > AFFORDABLE
 
 
-def many(machine: Machine, term: Integral, linked: Linked) -> bool:
+def many(problem: Problem) -> bool:
     """Whether it pays to look whether the variables can be eliminated."""
-    fits = len(term.variables) > MOST_LEVELS and not machine.frozen and placed_along(term) is None
-    return fits and expected(machine, term, linked) > FEW_NODES
+    if len(problem.term.variables) <= MOST_LEVELS or problem.machine.frozen or placed_along(problem.term) is not None:
+        return False
+    return expected(problem) > FEW_NODES
 
 
-def expected(machine: Machine, term: Integral, linked: Linked) -> int:
+def expected(problem: Problem) -> int:
     """About how many evaluations iterated quadrature takes."""
-    plan = plan_for(machine, term, linked)
+    plan, count = problem.plan(), len(problem.term.variables)
     if plan.degrees and None not in plan.degrees[1:]:
         nodes = (PER_LEVEL if degree is None else degree + 1 for degree in plan.degrees)
         return math.prod(n * (1 + len(own.level.cuts) // MET) for n, own in zip(nodes, plan.levels, strict=True))
-    return PER_LEVEL ** len(term.variables) * 2**plan.doublings  # type: ignore[no-any-return]
+    return PER_LEVEL**count * 2**plan.doublings  # type: ignore[no-any-return]
 
 
 def orders(term: Integral) -> Iterator[Integral]:
@@ -68,34 +69,34 @@ def orders(term: Integral) -> Iterator[Integral]:
         )
 
 
-def trials(machine: Machine, term: Integral, linked: Linked, outermost: bool) -> Iterator[tuple[Integral, int | None]]:
+def trials(problem: Problem) -> Iterator[tuple[Integral, int | None]]:
     """Orders, and how many evaluations may go into trying them: where a jump is searched for, roots that merge further
     out at places that are not known may make one order a hundred times as expensive as another."""
-    found = preferred(machine, term, linked)
-    most = TRIAL * TRIAL_FACTOR ** max(len(term.variables) - 2, 0)
-    if isinstance(found, list) and outermost and len(found) > 1 and searches(machine, found[0], linked):
+    found = preferred(problem)
+    most = TRIAL * TRIAL_FACTOR ** max(len(problem.term.variables) - 2, 0)
+    if isinstance(found, list) and problem.outermost and len(found) > 1 and searches(problem, found[0]):
         yield from ((order, most) for order in found)
-    elif outermost and passes_on(machine, term):
-        yield term, most
+    elif problem.outermost and passes_on(problem):
+        yield problem.term, most
     yield from ((order, None) for order in found)
 
 
-def passes_on(machine: Machine, term: Integral) -> bool:
+def passes_on(problem: Problem) -> bool:
     """Whether variables may be eliminated where iterated quadrature, which suits so few, turns out to take long."""
-    return len(term.variables) == MOST_LEVELS and not machine.frozen and eliminate(term) is not None
+    three = len(problem.term.variables) == MOST_LEVELS
+    return three and not problem.machine.frozen and eliminate(problem.term) is not None
 
 
-def preferred(machine: Machine, term: Integral, linked: Linked) -> Iterable[Integral]:
+def preferred(problem: Problem) -> Iterable[Integral]:
     """The orders, those first in which the fewest jumps have to be searched for; a list where any have."""
-    if not searches(machine, term, linked):
-        return orders(term)
-    return sorted(orders(term), key=lambda order: searches(machine, order, linked))
+    if not searches(problem, problem.term):
+        return orders(problem.term)
+    return sorted(orders(problem.term), key=lambda order: searches(problem, order))
 
 
-def searches(machine: Machine, term: Integral, linked: Linked) -> int:
+def searches(problem: Problem, order: Integral) -> int:
     """How many jumps are searched for, having no closed form in the variable that they cut; 0 where none would be.
 
     Each leaves, besides what it takes, unknown places further out where its roots merge.
     """
-    plan = plan_for(machine, term, linked)
-    return sum(cut.decides for level in plan.levels for cut in level.searched)
+    return sum(cut.decides for level in problem.plan(order).levels for cut in level.searched)

@@ -25,9 +25,8 @@ from potto.runtime.answers.convergence import allowance, widest
 from potto.runtime.evaluation.directional import stepped
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.integration.members import Whole
-from potto.runtime.integration.plans import Mixed, link, split_by_decisions
 from potto.runtime.integration.preparation import filled, held, placed, prepared, shape_of
-from potto.runtime.integration.problem import Problem
+from potto.runtime.integration.problem import Mixed, Problem, linked
 from potto.runtime.integration.solving import solve
 
 
@@ -83,7 +82,7 @@ def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermos
     record.integrals += 1
     if machine.overdrawn() and not outermost:
         return given_up(machine, shape)
-    problem = Problem(machine.apart(), term, link(flat), batch, outermost)
+    problem = Problem(machine.apart(), term, *linked(flat), batch, outermost)
     sums = poisoned(_grouped(problem, flat), problem.env)
     if not outermost:
         for event, _ in problem.events:
@@ -99,8 +98,8 @@ def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermos
 
 def _grouped(problem: Problem, flat: dict[str, Value]) -> Sums:
     """What an integral amounts to; members for which recursions take different courses apart from one another."""
-    groups = split_by_decisions(problem.machine, problem.term, problem.linked, problem.batch)
-    return _in_cases(problem, flat) if groups is None else _in_groups(problem, flat, groups)
+    groups = problem.courses() if problem.batch > 1 else []
+    return _in_groups(problem, flat, groups) if len(groups) > 1 else _in_cases(problem, flat)
 
 
 def _in_groups(problem: Problem, flat: dict[str, Value], groups: Iterable[Ints]) -> Sums:
@@ -108,7 +107,7 @@ def _in_groups(problem: Problem, flat: dict[str, Value], groups: Iterable[Ints])
     found = Whole()
     for index in groups:
         here = gather(flat, index)
-        with problem.among(index, link(here)) as part:
+        with problem.among(index, here) as part:
             found.put(index, _in_cases(part, here))
         problem.events.take(part.events, index)
     return found.sums

@@ -5,8 +5,6 @@ Owns `step_by_step`.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from potto.integrate.elimination.recursion import Eliminated, one_by_one
@@ -15,7 +13,6 @@ from potto.integrate.pieces import Sums
 from potto.kernels.cells import Value
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.integration.one_sided import beside_folds
-from potto.runtime.integration.plans import eliminated_for
 from potto.runtime.integration.problem import Problem
 
 # How accurate the answer must be, relatively, instead of that of iteration, and instead of that of samples.
@@ -24,12 +21,12 @@ ACCURATE, WORTH = 1e-8, 1e-4
 
 def step_by_step(problem: Problem, limit: float) -> Sums | None:
     """The integrals of a batch, where each variable hands one number on; None where errors are larger than `limit`."""
-    known = eliminated_for(problem.machine, problem.term, problem.linked)
+    known = problem.steps()
     if known is None:
         return None
     rows = []
     for i in range(problem.batch):
-        alone = replace(problem.apart(), linked=problem.picked(np.array([i])), batch=1)
+        alone = problem.picked(np.array([i])).apart()
         row = _member(known, alone)
         if row is None or alone.events or not accurate(row, max(limit, alone.machine.rtol), alone.machine):
             return None

@@ -1,67 +1,242 @@
-"""An integral to be solved: its term, what it calls, and its parameters.
+"""An integral to be solved: its term, what it calls, its parameters, and what is known of it before any number.
 
-Owns `Problem`.
+Owns `Problem` and `linked`. A plan is found by the content of the integral and of all that it calls, and by the course
+that recursions and sums take in it, once; members of a batch that take different ones are told apart.
 """
 
 from __future__ import annotations
 
+import math
+import threading
+from collections import OrderedDict
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-from potto.core.terms import Integral
+import numpy as np
+
+from potto.calculus.algebra.point_values import sample_value
+from potto.calculus.inlining.deciding import deciding
+from potto.core.terms import Deriv, Integral, Lam, Term, Var, deriv, substitute, var
+from potto.diagnostics import PottoError
+from potto.integrate.elimination.recursion import Eliminated, eliminated
 from potto.integrate.events import Events
-from potto.integrate.plan import Plan
-from potto.kernels.cells import Array, Ints, Value, map_arrays
+from potto.integrate.pieces import still
+from potto.integrate.plan import Plan, make
+from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays
+from potto.kernels.making import making
+from potto.runtime.evaluation.functions import Closure, Derivative
 from potto.runtime.evaluation.machine import Machine
-from potto.runtime.integration.plans import Linked, link, plan_for
+
+MOST_INTEGRALS = 1024
+
+Functions = dict[str, Lam | Deriv]
+
+
+def linked(env: dict[str, Value]) -> tuple[Functions, dict[str, Value]]:
+    """The functions that an integral calls, as terms whose free variables have names of their own, and the environment
+    with these."""
+    functions: Functions = {}
+    extended: dict[str, Value] = dict(env)
+
+    def add(name: str, function: Closure) -> None:
+        derivative = isinstance(function, Derivative)
+        while isinstance(function, Derivative):
+            function = function.primal
+        renamed: dict[str, Term] = {}
+        for inner, value in function.captured.items():
+            own = f"{name}@{inner}"
+            renamed[inner] = var(own)
+            extended[own] = value
+            if isinstance(value, Closure):
+                add(own, value)
+        term = substitute(function.lam, renamed)
+        assert isinstance(term, Lam)
+        functions[name] = deriv(term) if derivative else term
+
+    for name, value in env.items():
+        if isinstance(value, Closure):
+            add(name, value)
+    return functions, extended
+
+
+@dataclass
+class Known:
+    """What was found out about an integral and all that it calls: plans, one for each course that it may take; the
+    steps that eliminate its variables; the parameters that decide its course. Empty where nobody has asked."""
+
+    plans: list[Plan] = field(default_factory=list)
+    steps: list[Eliminated | None] = field(default_factory=list)
+    deciding: list[frozenset[str]] = field(default_factory=list)
+
+
+_known: OrderedDict[Any, Known] = OrderedDict()
+_lock = threading.Lock()
+
+
+class Mixed(Exception):
+    """Members of a batch for which the plan of the first one does not hold. `fits`: for which it does."""
+
+    def __init__(self, fits: Bools) -> None:
+        self.fits = fits
 
 
 @dataclass(frozen=True)
 class Problem:
     """An integral for a batch of parameters; `outermost` where no other integral asks for it.
 
-    machine: what evaluates, and notes what is met. linked: the parameters, and the functions among them as terms.
+    machine: what evaluates, and notes what is met. functions, env: see `linked`.
     """
 
     machine: Machine
     term: Integral
-    linked: Linked
+    functions: Functions
+    env: dict[str, Value]
     batch: int = 1
     outermost: bool = False
-
-    @property
-    def env(self) -> dict[str, Value]:
-        return self.linked.env
 
     @property
     def events(self) -> Events:
         return self.machine.events
 
-    def plan(self, order: Integral | None = None) -> Plan:
-        """The plan, with the variables in this order."""
-        return plan_for(self.machine, self.term if order is None else order, self.linked)
+    # Others like it
+
+    def at(self, env: dict[str, Value], **changes: Any) -> Problem:
+        """The problem at other parameters."""
+        functions, extended = linked(env)
+        return replace(self, functions=functions, env=extended, **changes)
 
     def apart(self) -> Problem:
         """The problem with events of its own."""
         return replace(self, machine=self.machine.apart())
 
     @contextmanager
-    def among(self, index: Ints, members: Linked | None = None) -> Iterator[Problem]:
+    def among(self, index: Ints, env: dict[str, Value] | None = None) -> Iterator[Problem]:
         """The problem of some members by themselves, with a budget and events of their own."""
-        linked = self.picked(index) if members is None else members
         with self.machine.among(index) as machine:
-            yield replace(self, machine=machine, linked=linked, batch=index.size)
+            part = self.picked(index) if env is None else self.at(env, batch=index.size)
+            yield replace(part, machine=machine)
 
-    def picked(self, index: Ints) -> Linked:
-        """Some members of the batch; one of them by itself as plain numbers."""
+    def picked(self, index: Ints) -> Problem:
+        """The problem of some members; one of them by itself has plain numbers."""
 
         def part(a: Array) -> Any:
             return float(a[index[0]]) if index.size == 1 else a[index]
 
-        return Linked(self.linked.functions, {name: map_arrays(value, part) for name, value in self.env.items()})
+        env = {name: map_arrays(value, part) for name, value in self.env.items()}
+        return replace(self, env=env, batch=index.size)
 
     def moved(self, env: dict[str, Value]) -> Problem:
         """One member at other parameters; what is met there is forgotten."""
-        return Problem(self.machine.apart(), self.term, link(env))
+        return self.at(env, machine=self.machine.apart(), batch=1, outermost=False)
+
+    # What is known before any number
+
+    def plan(self, order: Integral | None = None) -> Plan:
+        """The plan for these functions and plain values, with the variables in this order; made once."""
+        problem = self if order is None or order is self.term else replace(self, term=order)
+        known = problem.known.plans
+        for plan in tuple(known):
+            if all(problem.decided(t) == value for t, value in plan.decisions) and problem.fitting(plan).all():
+                return plan
+        with making:
+            plan = make(problem.term, problem.function, problem.decided, problem.plain_function, _Sampled(problem))
+        known.append(plan)
+        fits = problem.fitting(plan)
+        if not fits.all():
+            raise Mixed(fits)
+        return plan
+
+    def steps(self) -> Eliminated | None:
+        """The steps of an integral over many variables that each depend on one number, if it has such; found once."""
+        known = self.known.steps
+        if not known:
+            with making:
+                known.append(eliminated(self.term, self.plain_function))
+        return known[0]
+
+    def courses(self) -> list[Ints]:
+        """The members for which recursions and sums under the integral take the same course, each with the others."""
+        known = self.known.deciding
+        if not known:
+            bounds = (bound for pair in self.term.bounds for bound in pair)
+            known.append(deciding((self.term.body, *bounds, *self.functions.values()), self.function))
+        cells = (self.env.get(name) for name in sorted(known[0]))
+        rows = [c.v for c in cells if isinstance(c, Cell) and isinstance(c.v, np.ndarray) and c.v.size > 1]
+        if not rows:
+            return [np.arange(self.batch)]
+        _, where = np.unique(np.stack(rows), axis=1, return_inverse=True)
+        where = np.asarray(where).reshape(-1)
+        return [np.nonzero(where == number)[0] for number in range(int(where.max()) + 1)]
+
+    @property
+    def known(self) -> Known:
+        functions = tuple((name, f.digest) for name, f in sorted(self.functions.items()))
+        key = (self.term.digest, functions, self.machine.linker.reached(self.term, *self.functions.values()))
+        with _lock:
+            found = _known.setdefault(key, Known())
+            _known.move_to_end(key)
+            if len(_known) > MOST_INTEGRALS:
+                _known.popitem(last=False)
+        return found
+
+    def function(self, head: Term) -> Lam | Deriv | None:
+        """The function, or derivative of one, that a term leads to."""
+        return self.functions.get(head.name) if isinstance(head, Var) else self.machine.linker.function(head)
+
+    def plain_function(self, head: Term) -> Lam | Deriv | None:
+        """The same, but none that stands for a function on duals."""
+        if isinstance(head, Var) and type(self.env.get(head.name)) is not Closure:
+            return None
+        return self.function(head)
+
+    def fitting(self, plan: Plan) -> Bools:
+        """The members for which a plan holds."""
+        if plan.premise is None:
+            return np.ones(1, dtype=bool)
+        env = {name: still(self.env[name]) for name in plan.premise.params}
+        found = self.machine.with_directions(0).evaluate(plan.premise, env, None)
+        assert isinstance(found, Cell)
+        return np.asarray(found.v) > 0
+
+    def decided(self, plain: Term) -> float | None:
+        """The value of a plain term over parameters, where it is one number for the whole batch."""
+        env: dict[str, Value] = {}
+        for name in plain.free:
+            value = self.env.get(name)
+            if value is None:
+                return None
+            if isinstance(value, Cell):
+                flat = np.asarray(value.v)
+                if flat.ndim and flat.size and not (flat == flat.flat[0]).all():
+                    return None
+                value = Cell(float(flat.flat[0]))
+            env[name] = still(value) if isinstance(value, Closure) else value
+        result = self.number(plain, env)
+        return None if result is None else float(np.asarray(result).flat[0])
+
+    def number(self, plain: Term, env: dict[str, Value]) -> Any:
+        """What a plain term comes to; None where it is no number."""
+        try:
+            value = self.machine.with_directions(0).term(plain, env)
+        except PottoError:
+            return None
+        return value.v if isinstance(value, Cell) else None
+
+
+class _Sampled:
+    """What plain terms are for the first member of a batch, or nan."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.first = {n: map_arrays(still(v), lambda a: float(a.flat[0])) for n, v in problem.env.items()}
+        self.point = {n: v.v for n, v in self.first.items() if isinstance(v, Cell) and isinstance(v.v, float)}
+        self.known: dict[Term, float] = {}
+
+    def __call__(self, plain: Term) -> float:
+        found = sample_value(plain, self.point, self.known)
+        if found == found or not plain.free <= self.first.keys():
+            return found
+        value = self.problem.number(plain, {name: self.first[name] for name in plain.free})
+        return value if isinstance(value, float) else math.nan

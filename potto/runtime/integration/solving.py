@@ -38,7 +38,6 @@ from potto.runtime.integration.elimination import ACCURATE, WORTH, step_by_step
 from potto.runtime.integration.folds import beside_another
 from potto.runtime.integration.members import Ways, by_members
 from potto.runtime.integration.one_sided import beside_axes, beside_folds, from_both_sides, one_direction
-from potto.runtime.integration.plans import link
 from potto.runtime.integration.problem import Problem
 from potto.runtime.integration.quadrature import in_parts, iterated, within
 
@@ -65,10 +64,9 @@ def solve(problem: Problem) -> Sums:
 
 def by_elimination(problem: Problem) -> Sums | None:
     """One variable after the other, where each hands on one number."""
-    machine, term, linked = problem.machine, problem.term, problem.linked
-    if machine.settings.method in ("mc", "qmc") or not many(machine, term, linked):
+    if problem.machine.settings.method in ("mc", "qmc") or not many(problem):
         return None
-    return step_by_step(problem, WORTH if _too_many(problem) else ACCURATE)
+    return step_by_step(problem, WORTH if too_many(problem) else ACCURATE)
 
 
 def by_samples(problem: Problem) -> Sums | None:
@@ -76,7 +74,7 @@ def by_samples(problem: Problem) -> Sums | None:
     from potto.integrate.montecarlo.sampling import sample
 
     method = problem.machine.settings.method
-    if placed_along(problem.term) is not None or (method not in ("mc", "qmc") and not _too_many(problem)):
+    if placed_along(problem.term) is not None or (method not in ("mc", "qmc") and not too_many(problem)):
         return None
     plan = problem.plan()
     sums = counted(problem, plan, sample(plan, problem.machine, problem.env, problem.batch, method), drawn=True)
@@ -90,7 +88,7 @@ def as_a_batch(problem: Problem) -> Sums | None:
     if problem.batch == 1:
         return None
     ways = Ways(
-        orders=lambda: preferred(problem.machine, problem.term, problem.linked),
+        orders=lambda: preferred(problem),
         whole=lambda order, part: in_parts(part.plan(order), part.machine, part.env, part.batch),
         settled=lambda order, part, sums: improved(part, order, counted(part, part.plan(order), sums), TOGETHER),
         directions=one_by_one,
@@ -105,9 +103,9 @@ def along_cuts(problem: Problem) -> Sums:
     machine, env, batch, events = problem.machine, problem.env, problem.batch, problem.events
     machine.record.methods.add("quadrature")
     tried = False
-    for order, most in trials(machine, problem.term, problem.linked, problem.outermost):
+    for order, most in trials(problem):
         events.forget(Degenerate)
-        if most is None and tried and batch == 1 and passes_on(machine, problem.term):
+        if most is None and tried and batch == 1 and passes_on(problem):
             eliminated = step_by_step(problem, ACCURATE)
             if eliminated is not None:
                 return eliminated
@@ -133,9 +131,8 @@ def _along_axes(problem: Problem, plan: Plan, sums: Sums) -> Sums:
         return one_by_one(problem)
     if problem.outermost:
         variable = min(event.variable for event, _ in events.every(Degenerate))
-        resting = link({n: still(v) for n, v in problem.env.items()})
-        quiet = replace(problem, machine=machine.with_directions(0), linked=resting, outermost=False)
-        values = solve(quiet)
+        resting = {n: still(v) for n, v in problem.env.items()}
+        values = solve(problem.at(resting, machine=machine.with_directions(0), outermost=False))
         sums = replace(sums, v=values.v, e=values.e)
         if beside_axes(problem, plan, sums, variable, partial(_beside, problem)):
             return unbounded(problem, sums)
@@ -146,16 +143,12 @@ def _along_axes(problem: Problem, plan: Plan, sums: Sums) -> Sums:
 METHODS: tuple[Method, ...] = (by_elimination, by_samples, as_a_batch, along_cuts)
 
 
-def _too_many(problem: Problem) -> bool:
-    return problem.machine.settings.method == "auto" and too_many(problem.machine, problem.term, problem.linked)
-
-
 def one_by_one(problem: Problem) -> Sums:
     """The sums with each direction by itself: what runs along one variable may not move in it."""
     parts = []
     for d in range(problem.machine.directions):
-        alone = link({n: one_direction(v, d) for n, v in problem.env.items()})
-        parts.append(solve(replace(problem, machine=problem.machine.with_directions(1), linked=alone, outermost=True)))
+        alone = {n: one_direction(v, d) for n, v in problem.env.items()}
+        parts.append(solve(problem.at(alone, machine=problem.machine.with_directions(1), outermost=True)))
     t, et = (np.concatenate([getattr(part, name) for part in parts], axis=1) for name in ("t", "et"))
     return Sums(parts[0].v, parts[0].e, t, et)
 
@@ -245,7 +238,7 @@ def in_another_order(problem: Problem, order: Integral, sums: Sums) -> Sums:
     if problem.events.every(Shortfall) or not spoilt.any() or spoilt.sum() > MOST_SPOILT:
         return sums
     index = np.nonzero(spoilt)[0]
-    few = replace(problem, linked=problem.picked(index), batch=index.size)
+    few = problem.picked(index)
     for other in itertools.islice(orders(order), 1, None):
         part = few.apart()
         found = iterated(problem.plan(other), part.machine, part.env, index.size)
