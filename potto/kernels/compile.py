@@ -60,7 +60,7 @@ class Runtime(Protocol):
     def lazy(self, mask: Any, term: If | Branch, env: dict[str, Value], traces: tuple[Any, Any]) -> Value: ...
     def falls(self, surface: Any, strict: bool) -> Any: ...
     def project(self, value: Value, index: int) -> Value: ...
-    def part(self, term: Term, env: dict[str, Value]) -> Value: ...
+    def term(self, term: Term, env: dict[str, Value]) -> Value: ...
     def fail(self, term: Hole | Delta) -> Value: ...
 
 
@@ -347,24 +347,15 @@ class _Compiler:
         return Dynamic(name, self.rt.inexact(term), (False,) * self.directions)
 
     def derived(self, term: Deriv) -> Known:
-        function = self.known(term.function) if term.function in self.values else self.function(term.function)
+        """The layout leaves out the function under a `Deriv`, since its sites are not those of a call."""
+        inner = term.function
+        function = self.values.get(inner)
+        if function is None and isinstance(inner, Lam | Global | Var | Deriv):
+            function = self.emit(inner)
+        elif function is None:
+            env, known = self.environment(inner.free)
+            function = self.dynamic(f"rt.term({self.keep(inner)}, {env})", True, known)
         return self.dynamic(f"rt.derived({self.pack(function)})", _inexact(function), (function,))
-
-    def function(self, term: Term) -> Known:
-        """The function under a `Deriv`, which the layout leaves out since its sites are not those of a call."""
-        match term:
-            case Lam():
-                return self.closure(term)
-            case Global():
-                return self.global_(term)
-            case Var():
-                return self.env[term.name]
-            case Deriv():
-                inner = self.function(term.function)
-                return self.dynamic(f"rt.derived({self.pack(inner)})", _inexact(inner), (inner,))
-            case _:
-                part_env, known = self.environment(term.free)
-                return self.dynamic(f"rt.part({self.keep(term)}, {part_env})", True, known)
 
     def integral(self, term: Integral) -> Known:
         env, known = self.environment(term.free)

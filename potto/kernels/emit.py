@@ -11,7 +11,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, reduce
 
 from potto.calculus.differentiation.derivative import partial
 from potto.core.terms import Branch, Const, If, Prim, Term, Var, postorder, var
@@ -21,6 +21,7 @@ from potto.primitives.walking import formula_of
 
 ZERO = "0.0"
 ONE = "1.0"
+LONG = 24  # summands or factors on a line
 COMPARISONS = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!="}
 
 
@@ -118,14 +119,18 @@ class Lines:
         return "*".join(factors) if factors else ONE
 
     def total(self, terms: Sequence[str]) -> str | None:
-        """A variable that holds the sum; long sums are cut into lines, which Python's parser prefers."""
+        """A variable that holds the sum."""
         if not terms:
             return None
         if len(terms) == 1:
             return terms[0] if terms[0].isidentifier() or terms[0] == ONE else self.let(terms[0], "t")
-        name = self.let(" + ".join(terms[:24]), "t")
-        for start in range(24, len(terms), 24):
-            name = self.let(" + ".join([name, *terms[start : start + 24]]), "t")
+        return self.joined(" + ", terms, "t")
+
+    def joined(self, sign: str, parts: Sequence[str], letter: str) -> str:
+        """A variable that holds a sum or product; long ones are cut into lines, which Python's parser prefers."""
+        name = self.let(sign.join(parts[:LONG]), letter)
+        for start in range(LONG, len(parts), LONG):
+            name = self.let(sign.join([name, *parts[start : start + LONG]]), letter)
         return name
 
     # Builtins
@@ -147,12 +152,8 @@ class Lines:
         if op == "mul":
             return self.mul(args)
         if op in ("min", "max") and len(args) > 2:
-            result = args[0]
-            for arg in args[1:]:
-                result = self.apply(op, (result, arg))
-            return result
-        value = self.value(op, args)
-        return self.chain(op, args, value)
+            return reduce(lambda result, arg: self.apply(op, (result, arg)), args)
+        return self.chain(op, args, self.value(op, args))
 
     def value(self, op: str, args: Sequence[Scalar]) -> str:
         a = [x.v for x in args]
@@ -182,33 +183,12 @@ class Lines:
         return self.rounded(Scalar(v, e, t, et), "add", args)
 
     def mul(self, args: Sequence[Scalar]) -> Scalar:
-        result = args[0]
         if all(a.plain for a in args) and not self.rounding:
-            return self.plain(self.let("*".join(a.v for a in args[:24]))) if len(args) <= 24 else self.mul_folded(args)
+            return self.plain(self.joined("*", [a.v for a in args], "v"))
+        result = args[0]
         for arg in args[1:]:
-            result = self.times(result, arg)
+            result = self.chain("mul", (result, arg), self.let(f"{result.v}*{arg.v}"))
         return result
-
-    def mul_folded(self, args: Sequence[Scalar]) -> Scalar:
-        name = args[0].v
-        for arg in args[1:]:
-            name = self.let(f"{name}*{arg.v}")
-        return self.plain(name)
-
-    def times(self, a: Scalar, b: Scalar) -> Scalar:
-        v = self.let(f"{a.v}*{b.v}")
-        t, et = [], []
-        for d in range(self.directions):
-            terms = [self.product(p, q) for p, q in ((a.v, b.t[d]), (b.v, a.t[d])) if q]
-            t.append(self.total(terms))
-            bounds = [
-                f"abs({self.product(p, q)})"
-                for p, q in ((a.v, b.et[d]), (b.v, a.et[d]), (a.t[d], b.e), (b.t[d], a.e))
-                if p and q
-            ]
-            et.append(self.total(bounds))
-        e = self.total([f"abs({p}*{q})" for p, q in ((a.v, b.e), (b.v, a.e)) if q])
-        return self.rounded(Scalar(v, e, tuple(t), tuple(et)), "mul", (a, b))
 
     def chain(self, op: str, args: Sequence[Scalar], v: str) -> Scalar:
         """The chain rule by the registry's partials, for arguments that move or are not exact."""

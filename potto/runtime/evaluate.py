@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,7 +21,7 @@ from potto.core.terms import Integral, Term
 from potto.diagnostics import PottoError
 from potto.integrate.events import INFINITE, ROUGH, Shortfall
 from potto.kernels import errors
-from potto.kernels.cells import Cell, Value
+from potto.kernels.cells import Cell, Number, Value, all_cells
 from potto.kernels.making import counts
 from potto.projects.settings import DEFAULTS, Settings
 from potto.runtime.answers.convergence import CANCELS, Shortfalls, converged_members, members_of, merged, missed
@@ -104,17 +106,14 @@ class Clock:
     seconds = 0.0
 
     def __enter__(self) -> Clock:
-        self.start = time.perf_counter()
-        self.compiled = counts.compiled
-        self.reused = counts.reused
-        self.spent = counts.seconds
+        self.start, self.before = time.perf_counter(), replace(counts)
         return self
 
     def __exit__(self, *exc: object) -> None:
+        now, before = counts, self.before
         self.seconds = time.perf_counter() - self.start
-        self.compiled = counts.compiled - self.compiled
-        self.reused = counts.reused - self.reused
-        self.spent = counts.seconds - self.spent
+        self.compiled, self.reused = now.compiled - before.compiled, now.reused - before.reused
+        self.spent = now.seconds - before.seconds
 
 
 def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
@@ -128,41 +127,33 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
     }
     if record.costs is not None:
         stats |= record.costs.told()
-    notes = tuple(_notes(record))
-    common = {
-        "evals": record.evaluations,
-        "seconds": clock.seconds,
-        "compile_seconds": clock.spent,
-        "method": method,
-        "notes": notes,
-        "stats": stats,
-    }
+    answer = partial(
+        Estimate, evals=record.evaluations, seconds=clock.seconds, compile_seconds=clock.spent, method=method,
+        notes=tuple(_notes(record)), stats=stats,
+    )  # fmt: skip
     if isinstance(value, Closure):
         kind = "derivative of a function" if isinstance(value, Derivative) else "function"
-        return Estimate(None, None, text=f"<{kind}>", **common)  # type: ignore[arg-type]
+        return answer(None, None, text=f"<{kind}>")
     if isinstance(value, list):
         parts = [report(item, machine, clock) for item in value]
         missing: Shortfalls = {}
         for part in parts:
             merged(missing, part.shortfalls)
-        return Estimate([p.value for p in parts], [p.error for p in parts], converged=not missing,
-                        shortfalls=missing, **common)  # type: ignore[arg-type]  # fmt: skip
-    numbers, bounds = numbers_of(value), bounds_of(value)
-    tangents, tangent_bounds = tangents_of(value)
-    flat = _flat(numbers, bounds)
-    missing = _missing([*flat, *_flat(tangents, tangent_bounds)], machine)
-    arrays = [np.shape(number) for number, _ in flat if number.__class__ is not float]
-    shape = np.broadcast_shapes(*arrays) if arrays else ()
-    return Estimate(
-        numbers,
-        bounds,
-        tangents,
-        tangent_bounds,
-        converged=not missing,
+        values, off = [p.value for p in parts], [p.error for p in parts]
+        return answer(values, off, converged=not missing, shortfalls=missing)
+    numbers, bounds = told(value, lambda cell: cell.v), told(value, lambda cell: cell.e)
+    tangents = tangent_bounds = None
+    if any(cell.t for cell in all_cells(value)):
+        tangents = told(value, lambda cell: cell.t[0] if cell.t else None)
+        tangent_bounds = told(value, lambda cell: cell.et[0] if cell.t else None)
+    shown = _flat(numbers, bounds)
+    missing = _missing([*shown, *_flat(tangents, tangent_bounds)], machine)
+    shape = np.broadcast_shapes(*(np.shape(number) for number, _ in shown))
+    return answer(
+        numbers, bounds, tangents, tangent_bounds, converged=not missing,
         shortfalls={why: members_of(where, shape) if shape else True for why, where in missing.items()},
         member_converged=converged_members(missing, shape) if shape else None,
-        **common,  # type: ignore[arg-type]
-    )
+    )  # fmt: skip
 
 
 def _missing(flat: list[tuple[Any, Any]], machine: Machine) -> Shortfalls:
@@ -198,36 +189,14 @@ def _notes(record: Record) -> list[OneSided]:
     return out
 
 
-def numbers_of(value: Value) -> Any:
+def told(value: Value, part: Callable[[Cell], Number | None]) -> Any:
+    """One part of all numbers, in the form of the value; 0 where it is missing."""
     if isinstance(value, Cell):
-        return value.v if isinstance(value.v, np.ndarray) else float(value.v)
+        x = part(value)
+        return x if isinstance(x, np.ndarray) else 0.0 if x is None else float(x)
     if isinstance(value, tuple | list):
-        return type(value)(map(numbers_of, value))
+        return type(value)([told(item, part) for item in value])
     raise errors.not_a_number(value)
-
-
-def bounds_of(value: Value) -> Any:
-    if isinstance(value, Cell):
-        e = value.e
-        return 0.0 if e is None else (e if isinstance(e, np.ndarray) else float(e))
-    if isinstance(value, tuple | list):
-        return type(value)(map(bounds_of, value))
-    raise errors.not_a_number(value)
-
-
-def tangents_of(value: Value) -> tuple[Any, Any]:
-    """The tangents in the one direction that a cell carries; None, None for a plain value."""
-    if isinstance(value, Cell):
-        if not value.t:
-            return None, None
-        t, et = value.t[0], value.et[0]
-        return (0.0 if t is None else t), (0.0 if et is None else et)
-    if isinstance(value, tuple):
-        pairs = [tangents_of(v) for v in value]
-        if all(p[0] is None for p in pairs):
-            return None, None
-        return tuple(p[0] for p in pairs), tuple(p[1] for p in pairs)
-    return None, None
 
 
 def _flat(numbers: Any, bounds: Any) -> list[tuple[Any, Any]]:

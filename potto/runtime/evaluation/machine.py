@@ -235,9 +235,6 @@ class Machine:
     def term(self, term: Term, env: dict[str, Value]) -> Value:
         return self.evaluate(function_of(term), env, None)
 
-    def part(self, term: Term, env: dict[str, Value]) -> Value:
-        return self.term(term, env)
-
     # Definitions and functions
 
     def inexact(self, term: Term) -> bool:

@@ -18,7 +18,7 @@ from potto.calculus.inlining.alike import Alike, Leaf, alike
 from potto.core.terms import Const, Integral, Lam, Term, Var
 from potto.diagnostics import PottoError
 from potto.kernels import errors
-from potto.kernels.cells import Array, Bools, Cell, Number, Value, all_arrays, map_arrays, pad
+from potto.kernels.cells import Array, Bools, Cell, Number, Value, all_arrays, combined, map_arrays, pad
 from potto.kernels.whole import ROUNDING, UNIT_ROUNDOFF
 from potto.runtime.answers.convergence import widest
 from potto.runtime.evaluation.machine import Machine
@@ -180,11 +180,11 @@ def _column(
         return map_arrays(_narrowed(env[column], slots[0], width), lambda a: a[..., None])
     leaves = (column,) * len(slots) if isinstance(column, str) else column
     values = [Cell(x.value) if isinstance(x, Const) else env[x if isinstance(x, str) else x.name] for x in leaves]
-    return _stacked([_narrowed(value, own, width) for value, own in zip(values, slots, strict=True)])
+    return combined(_stacked, *(_narrowed(value, own, width) for value, own in zip(values, slots, strict=True)))
 
 
 def _narrowed(value: Value, slots: Slots, width: int) -> Value:
-    """A value with its tangents in some directions alone."""
+    """A value with its tangents in some directions alone; a function keeps all."""
     if isinstance(value, tuple):
         return tuple(_narrowed(item, slots, width) for item in value)
     if not isinstance(value, Cell):
@@ -194,23 +194,9 @@ def _narrowed(value: Value, slots: Slots, width: int) -> Value:
     return Cell(value.v, value.e, t, et)
 
 
-def _stacked(values: Sequence[Value]) -> Value:
-    """Values that are built alike as one, along one more axis."""
-    if isinstance(values[0], tuple):
-        return tuple(map(_stacked, zip(*values, strict=True)))
-    cells = [value for value in values if isinstance(value, Cell)]
-    t, et = (tuple(map(_along, zip(*(getattr(cell, name) for cell in cells)))) for name in ("t", "et"))
-    v = _along([cell.v for cell in cells])
-    assert v is not None
-    return Cell(v, _along([cell.e for cell in cells]), t, et)
-
-
-def _along(parts: Sequence[Number | None]) -> Number | None:
-    if all(x is None for x in parts):
-        return None
-    given = [0.0 if x is None else x for x in parts]
-    batches = any(isinstance(x, np.ndarray) for x in given)
-    return np.stack(np.broadcast_arrays(*given), axis=-1) if batches else np.array(given)
+def _stacked(*parts: Number) -> Number:
+    """Numbers along one more axis."""
+    return np.stack(np.broadcast_arrays(*parts), axis=-1)
 
 
 # Sums
