@@ -17,8 +17,8 @@ import numpy as np
 from potto.core.terms import Const, Term, children
 from potto.integrate.fixed.a_priori import CLEAR, Path, Straight
 from potto.integrate.fixed.moving_sums import evaluated
-from potto.integrate.pieces import Evaluator
-from potto.kernels.cells import Array, Bools, Cell, Ints, Number, Value, map_arrays
+from potto.integrate.pieces import Evaluator, gather
+from potto.kernels.cells import Array, Bools, Cell, Ints, Number, Value
 
 MOST_SHAPES = 64
 
@@ -58,7 +58,7 @@ class _Search:
         self.plain[members[~fine]] = False
         for code in np.unique(codes[fine]):
             index, rows = np.nonzero(fine & (codes == code))[0], rows_of(int(code), len(places))
-            here = {n: map_arrays(v, lambda a, index=index: a[index]) for n, v in env.items()}
+            here = gather(env, index)
             ends = places[:, index]
             for low, high in itertools.pairwise(rows):
                 here[self.plan.variables[i]] = Cell(0.5 * (ends[low] + ends[high]))

@@ -8,13 +8,16 @@ a gap between the sides that does not shrink with the step (a kink) speak agains
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
-from potto.integrate.pieces import Sums, gather, still
+from potto.core.terms import Integral
+from potto.integrate.events import OneSidedDerivatives
+from potto.integrate.pieces import Sums, still
 from potto.kernels.cells import Array, Value
-from potto.runtime.integration.one_sided import Evaluated, moved, moving
+from potto.runtime.integration.one_sided import moved, moving
 from potto.runtime.integration.problem import Problem
 
 ROUGH = 1e-6  # from which relative error on another way is looked for
@@ -27,33 +30,31 @@ SURE = 4.0  # times what two estimates differ by
 CANCELLED = 1e-9  # the part of what was added up that a derivative may be uncertain by: a zero that is known for one
 
 
-def by_differences(problem: Problem, sums: Sums, evaluated: Evaluated) -> None:
-    """Put derivatives by differences where those of the sums have no digits, if differences have more.
-
-    evaluated: the integral for other parameters, of one member, without tangents.
-    """
+def by_differences(problem: Problem, order: Integral, sums: Sums) -> Sums:
+    """The sums with derivatives by differences where their own have no digits and values have many."""
     machine = problem.machine
-    if problem.batch > FEW or machine.exhausted():
-        return
+    if problem.batch > FEW or machine.exhausted() or machine.side or problem.events.every(OneSidedDerivatives):
+        return sums
     rough = ~(sums.et <= ROUGH * np.abs(sums.t)) & np.isfinite(sums.v)[:, None] & ~(sums.et <= machine.atol)
     if sums.gross is not None:
         rough &= ~(sums.et <= CANCELLED * np.where(np.isfinite(sums.gross[1]), sums.gross[1], 0.0))
     for member in map(int, np.nonzero(rough.any(axis=(0, 1)))[0]):
-        env = gather(problem.env, member)
+        one = replace(problem, machine=machine.with_directions(0)).member(member)
         for d in np.nonzero(rough[:, :, member].any(axis=0))[0]:
-            step = min(_reaches(env, int(d)), default=0.0) * REACH / 4
+            step = min(_reaches(one.env, int(d)), default=0.0) * REACH / 4
             if not 0 < step < np.inf:
                 continue
             noise = 2 * np.abs(WEIGHTS).sum() / (step / 2) * sums.e[:, member]
             if (sums.et[:, d, member] <= noise).all():
                 continue  # differences of values have no more digits
-            found = _derivative(env, int(d), step, evaluated)
+            found = _derivative(one.env, int(d), step, one.beside)
             if found is None:
                 continue
             value, off = found
             t, et = sums.t[:, d, member], sums.et[:, d, member]
             better = np.isfinite(off) & ~(et <= off) & np.isfinite(value)
             t[:], et[:] = np.where(better, value, t), np.where(better, off, et)
+    return sums
 
 
 def _reaches(env: dict[str, Value], d: int) -> Iterator[float]:
@@ -65,9 +66,12 @@ def _reaches(env: dict[str, Value], d: int) -> Iterator[float]:
 
 
 def _derivative(
-    env: dict[str, Value], d: int, step: float, evaluated: Evaluated
+    env: dict[str, Value], d: int, step: float, evaluated: Callable[[dict[str, Value]], Sums]
 ) -> tuple[Array, Array] | None:
-    """The derivative of all components, and how far off it may be; None where values are missing or there is a kink."""
+    """The derivative of all components, and how far off it may be; None where values are missing or there is a kink.
+
+    evaluated: the integral at other parameters.
+    """
 
     def at(h: float) -> tuple[Array, Array]:
         found = evaluated({n: still(moved(v, h, d)) for n, v in env.items()})

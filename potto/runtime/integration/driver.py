@@ -82,7 +82,7 @@ def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermos
     record.integrals += 1
     if machine.overdrawn() and not outermost:
         return given_up(machine, shape)
-    problem = Problem(machine.apart(), term, *linked(flat), batch, outermost)
+    problem = Problem(machine.apart(), term, *linked(flat), solve, batch, outermost)
     sums = poisoned(_grouped(problem, flat), problem.env)
     if not outermost:
         for event, _ in problem.events:

@@ -5,12 +5,13 @@ Owns `step_by_step`.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from potto.integrate.elimination.recursion import Eliminated, one_by_one
 from potto.integrate.events import Fold
 from potto.integrate.pieces import Sums
-from potto.kernels.cells import Value
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.integration.one_sided import beside_folds
 from potto.runtime.integration.problem import Problem
@@ -26,7 +27,7 @@ def step_by_step(problem: Problem, limit: float) -> Sums | None:
         return None
     rows = []
     for i in range(problem.batch):
-        alone = problem.picked(np.array([i])).apart()
+        alone = problem.member(i)
         row = _member(known, alone)
         if row is None or alone.events or not accurate(row, max(limit, alone.machine.rtol), alone.machine):
             return None
@@ -38,8 +39,7 @@ def step_by_step(problem: Problem, limit: float) -> Sums | None:
 def _member(known: Eliminated, problem: Problem) -> Sums | None:
     """One integral, looked at from both sides where a surface folds in the outermost variable."""
 
-    def evaluated(env: dict[str, Value]) -> Sums:
-        there = problem.moved(env)
+    def tabled(there: Problem) -> Sums:
         found = one_by_one(known, there.machine, there.env)
         if found is None:
             raise _NotEvaluated
@@ -50,7 +50,7 @@ def _member(known: Eliminated, problem: Problem) -> Sums | None:
     if row is None or not folds or any(fold.number for fold, _ in folds):
         return row
     try:
-        beside_folds(problem, known.plans[0], row, evaluated)
+        beside_folds(replace(problem, solver=tabled), known.plans[0], row)
     except _NotEvaluated:
         return None
     return row

@@ -1,18 +1,18 @@
 """Derivatives that are not the same on the two sides of the parameters.
 
-Owns `from_both_sides`, `beside_folds`, `beside_axes`, `one_direction` and `moved`. What surfaces on bounds and on one
-another contribute is known on either side (`integrate/degenerate/coincidences`). Where sections of a surface appear
-or merge just at the parameters they move infinitely fast, and nothing at this place tells the derivative: of [x^2 < t]
-at t = 0 it is 0 on one side and infinite on the other, of [x^2 + y^2 < t] 0 and pi. It is then looked at beside the
-parameters, in three steps towards them; and so it is where surfaces run along every variable, and have sections along
-none.
+Owns `on_both_sides`, `at_folds`, `beside_folds`, `beside_axes`, `one_direction`, `moving` and `moved`. What surfaces on
+bounds and on one another contribute is known on either side (`integrate/degenerate/coincidences`). Where sections of a
+surface appear or merge just at the parameters they move infinitely fast, and nothing at this place tells the
+derivative: of [x^2 < t] at t = 0 it is 0 on one side and infinite on the other, of [x^2 + y^2 < t] 0 and pi. It is then
+looked at beside the parameters, in three steps towards them; and so it is where surfaces run along every variable, and
+have sections along none.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +22,7 @@ from potto.integrate.decomposition.cuts import frame_rows
 from potto.integrate.decomposition.meetings import Row
 from potto.integrate.decomposition.sections import searched_rows
 from potto.integrate.events import BOUNDLESS, INNER, Degenerate, Fold, OneSidedDerivatives, TwoSided
-from potto.integrate.pieces import Sums, gather, still
+from potto.integrate.pieces import Sums, still
 from potto.integrate.plan import Plan
 from potto.kernels.cells import Array, Cell, Value, all_cells, map_cells
 from potto.runtime.evaluation.machine import Machine
@@ -30,8 +30,6 @@ from potto.runtime.integration.choices import orders
 from potto.runtime.integration.problem import Problem
 from potto.runtime.integration.quadrature import iterated
 
-# The integral of one member at other parameters.
-Evaluated = Callable[[dict[str, Value]], Sums]
 # The parameters' steps that are tried, and how far apart what folds may be after one, as a part of the range.
 STEPS = 2.0 ** np.arange(-1000.0, 1001.0, 4.0)
 APART = 2.0**-8
@@ -44,11 +42,15 @@ TOGETHER = 1e-9
 # The part of a derivative, or how many errors of the value, its error may be that no other order is tried.
 ROUGH, ROUNDED = 1e-9, 1e4
 MOST_MEMBERS = 16  # of a batch that are looked at
+# Member, direction, the derivatives before and behind the parameters, of all components, and how far off each may be.
+Sides = tuple[int, int, Array, Array, tuple[Array, Array]]
 
 
-def from_both_sides(problem: Problem, order: Integral, sums: Sums) -> Sums:
+def on_both_sides(problem: Problem, order: Integral, sums: Sums) -> Sums:
     """Note the one-sided derivatives of an integral in which a part has two; where the whole has one, that is it."""
     causes, machine = problem.events.every(TwoSided), problem.machine
+    if not causes or machine.side:
+        return sums
     problem.events.forget(TwoSided)
     sides = [_one_side(problem, order, side) for side in (-1, 1)]
     backward, forward = (np.where(np.isfinite(part.et), part.t, np.nan) for part, _ in sides)
@@ -84,16 +86,23 @@ def _one_side(problem: Problem, order: Integral, side: int) -> tuple[Sums, bool]
     return found, turned
 
 
-def beside_folds(problem: Problem, plan: Plan, sums: Sums, evaluated: Evaluated) -> None:
+def at_folds(problem: Problem, order: Integral, sums: Sums) -> Sums:
+    """With the derivatives where sections appear or merge just at the parameters."""
+    if problem.events.every(Fold):
+        beside_folds(problem, problem.plan(order), sums)
+    return sums
+
+
+def beside_folds(problem: Problem, plan: Plan, sums: Sums) -> None:
     """Put the one-sided derivatives of integrals at whose parameters a surface folds in their place, or note both.
 
-    evaluated: the integral for other parameters, of one member. What was noted of other surfaces lacks what folds.
+    What was noted of other surfaces lacks what folds.
     """
     machine, events = problem.machine, problem.events
     found = [
         (fold.cause, side)
         for fold, _ in events.every(Fold)
-        for side in _sides(problem, plan, fold.owner or range(problem.batch), fold, evaluated)
+        for side in _sides(problem, plan, fold.owner or range(problem.batch), fold)
     ]
     for cause, (member, d, backward, forward, off) in found:
         t, et = sums.t[:, d, member], sums.et[:, d, member]
@@ -113,13 +122,13 @@ def beside_folds(problem: Problem, plan: Plan, sums: Sums, evaluated: Evaluated)
     events.forget(Fold)
 
 
-def beside_axes(problem: Problem, plan: Plan, sums: Sums, variable: str, evaluated: Evaluated) -> bool:
+def beside_axes(problem: Problem, plan: Plan, sums: Sums, variable: str) -> bool:
     """The same where surfaces run along `variable`, and every other one. Whether all derivatives are known then."""
     machine, batch = problem.machine, problem.batch
     if batch > MOST_MEMBERS:
         return False
     problem.events.forget(Degenerate)
-    found = list(_sides(problem, plan, range(batch), None, evaluated))
+    found = list(_sides(problem, plan, range(batch), None))
     resting = sum(not any(moving(v, d) for v in problem.env.values()) for d in range(machine.directions))
     if len(found) + batch * resting < batch * machine.directions:
         return False
@@ -151,50 +160,40 @@ def _same(backward: Array, forward: Array, off: Array) -> bool:
     return bool((near | (backward == forward)).all())
 
 
-def _sides(
-    problem: Problem, plan: Plan, members: Sequence[int], where: Fold | None, evaluated: Evaluated
-) -> Iterator[tuple[int, int, Array, Array, tuple[Array, Array]]]:  # fmt: skip
-    """Member, direction, the derivatives before and behind the parameters, of all components, and how far off each."""
+def _sides(problem: Problem, plan: Plan, members: Sequence[int], where: Fold | None) -> Iterator[Sides]:
+    """What is known of each member and direction in which anything moves."""
     for member in members[:MOST_MEMBERS]:
-        env = gather(problem.env, member)
+        one = problem.member(member)
         for d in range(problem.machine.directions):
-            sides = _both(problem.machine.apart(), plan, env, d, where, evaluated)
-            if sides is not None:
-                yield (member, d, *sides)
+            step = _step(one, plan, d, where)
+            if step is not None:
+                (backward, before), (forward, behind) = (_side(one, d, sign * step) for sign in (-1.0, 1.0))
+                yield member, d, backward, forward, (before, behind)
 
 
-def _both(
-    machine: Machine, plan: Plan, env: dict[str, Value], d: int, where: Fold | None, evaluated: Evaluated
-) -> tuple[Array, Array, tuple[Array, Array]] | None:  # fmt: skip
-    """The derivatives before and behind the parameters, of all components, and how far off each may be; None if nothing
-    moves in this direction."""
-    step = _step(machine, plan, env, d, where)
-    if step is None:
-        return None
-    sides, off = [], []
-    for sign in (-1.0, 1.0):
-        steps = [sign * step * CLOSER**i for i in range(3)]
-        found = [evaluated({n: moved(v, h, d) for n, v in env.items()}) for h in steps]
-        values = [np.where(np.isfinite(part.et[:, d, 0]), part.t[:, d, 0], np.nan) for part in found]
-        noise = np.sum([part.et[:, d, 0] for part in found], axis=0)
-        limits, missed = np.array([_limit(*three) for three in zip(*values, noise, strict=True)]).T
-        sides.append(limits)
-        off.append(np.where(np.isfinite(limits), missed + found[2].et[:, d, 0], 0.0))
-    return sides[0], sides[1], (off[0], off[1])
+def _side(problem: Problem, d: int, step: float) -> tuple[Array, Array]:
+    """The derivative on the side of the parameters on which a step is, of all components, and how far off it may be."""
+    steps = [step * CLOSER**i for i in range(3)]
+    found = [problem.beside({n: moved(v, h, d) for n, v in problem.env.items()}) for h in steps]
+    values = [np.where(np.isfinite(part.et[:, d, 0]), part.t[:, d, 0], np.nan) for part in found]
+    noise = np.sum([part.et[:, d, 0] for part in found], axis=0)
+    limits, missed = np.array([_limit(*three) for three in zip(*values, noise, strict=True)]).T
+    return limits, np.where(np.isfinite(limits), missed + found[2].et[:, d, 0], 0.0)
 
 
-def _step(machine: Machine, plan: Plan, env: dict[str, Value], d: int, where: Fold | None) -> float | None:
+def _step(problem: Problem, plan: Plan, d: int, where: Fold | None) -> float | None:
     """The largest step that moves the roots that fold, or all roots, by a small part of the range, either way.
 
     Where nobody knows the roots, since an integral further in has them or they have no closed form, a small part of the
     parameters.
     """
+    env, quiet = problem.env, problem.machine.with_directions(0)
     if where is not None and (where.number == INNER or _searched(plan, where)):
         sizes = [float(np.abs(cell.v)) for value in env.values() for cell in moving(value, d)]
         return APART**2 * max([1.0, *sizes]) if sizes else None
     both = np.concatenate(([0.0], STEPS, -STEPS))
     here = {n: still(moved(v, both, d)) for n, v in env.items()}
-    quiet, size = machine.with_directions(0), both.size
+    size = both.size
     outer = () if where is None else where.outer
     for number, level in enumerate(plan.levels[: 1 + (0 if where is None else where.number)]):
         values = quiet.evaluate(level.frame, {n: here[n] for n in level.frame.params}, None)

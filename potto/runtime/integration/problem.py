@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import threading
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -22,7 +22,7 @@ from potto.core.terms import Deriv, Integral, Lam, Term, Var, deriv, substitute,
 from potto.diagnostics import PottoError
 from potto.integrate.elimination.recursion import Eliminated, eliminated
 from potto.integrate.events import Events
-from potto.integrate.pieces import still
+from potto.integrate.pieces import Sums, still
 from potto.integrate.plan import Plan, make
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays
 from potto.kernels.making import making
@@ -86,13 +86,14 @@ class Mixed(Exception):
 class Problem:
     """An integral for a batch of parameters; `outermost` where no other integral asks for it.
 
-    machine: what evaluates, and notes what is met. functions, env: see `linked`.
+    machine: what evaluates, and notes what is met. functions, env: see `linked`. solver: what solves problems like it.
     """
 
     machine: Machine
     term: Integral
     functions: Functions
     env: dict[str, Value]
+    solver: Callable[[Problem], Sums]
     batch: int = 1
     outermost: bool = False
 
@@ -127,9 +128,13 @@ class Problem:
         env = {name: map_arrays(value, part) for name, value in self.env.items()}
         return replace(self, env=env, batch=index.size)
 
-    def moved(self, env: dict[str, Value]) -> Problem:
-        """One member at other parameters; what is met there is forgotten."""
-        return self.at(env, machine=self.machine.apart(), batch=1, outermost=False)
+    def member(self, number: int) -> Problem:
+        """The problem of one member by itself, apart."""
+        return self.picked(np.array([number])).apart()
+
+    def beside(self, env: dict[str, Value]) -> Sums:
+        """What one member comes to at other parameters; what is met there is forgotten."""
+        return self.solver(self.at(env, machine=self.machine.apart(), batch=1, outermost=False))
 
     # What is known before any number
 

@@ -6,10 +6,8 @@ an answer, and what was met on the way to it, to one that is no worse; each says
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -20,34 +18,24 @@ from potto.integrate.events import (
     TOO_MANY_CASES,
     UNCOUNTED_JUMP,
     Degenerate,
-    Fold,
-    OneSidedDerivatives,
     Shortfall,
-    TwoSided,
-    Unsearched,
 )
 from potto.integrate.fixed.a_priori import certain
 from potto.integrate.pieces import Sums, still
 from potto.integrate.plan import Plan
-from potto.kernels.cells import Ints, Value
+from potto.kernels.cells import Ints
 from potto.runtime.answers.convergence import missing
-from potto.runtime.integration.choices import many, orders, passes_on, preferred, too_many, trials
-from potto.runtime.integration.coarser import by_less
+from potto.runtime.integration.choices import many, passes_on, preferred, too_many, trials
 from potto.runtime.integration.differences import by_differences
 from potto.runtime.integration.elimination import ACCURATE, WORTH, step_by_step
-from potto.runtime.integration.folds import beside_another
 from potto.runtime.integration.members import Ways, by_members
-from potto.runtime.integration.one_sided import beside_axes, beside_folds, from_both_sides, one_direction
+from potto.runtime.integration.one_sided import at_folds, beside_axes, on_both_sides, one_direction
 from potto.runtime.integration.problem import Problem
-from potto.runtime.integration.quadrature import in_parts, iterated, within
+from potto.runtime.integration.quadrature import in_parts, within
+from potto.runtime.integration.second_looks import beside_another, by_less, in_another_order
 
 Method = Callable[[Problem], Sums | None]
 Improver = Callable[[Problem, Integral, Sums], Sums]
-
-# From how many errors of the value on an error of a derivative is looked at again from another side, and for how many
-# members at most.
-STEEP = 1e3
-MOST_SPOILT = 256
 
 
 def solve(problem: Problem) -> Sums:
@@ -134,7 +122,7 @@ def _along_axes(problem: Problem, plan: Plan, sums: Sums) -> Sums:
         resting = {n: still(v) for n, v in problem.env.items()}
         values = solve(problem.at(resting, machine=machine.with_directions(0), outermost=False))
         sums = replace(sums, v=values.v, e=values.e)
-        if beside_axes(problem, plan, sums, variable, partial(_beside, problem)):
+        if beside_axes(problem, plan, sums, variable):
             return unbounded(problem, sums)
     machine.note(ALONG_AXES)
     return replace(sums, et=np.full_like(sums.et, np.inf))
@@ -151,10 +139,6 @@ def one_by_one(problem: Problem) -> Sums:
         parts.append(solve(problem.at(alone, machine=problem.machine.with_directions(1), outermost=True)))
     t, et = (np.concatenate([getattr(part, name) for part in parts], axis=1) for name in ("t", "et"))
     return Sums(parts[0].v, parts[0].e, t, et)
-
-
-def _beside(problem: Problem, env: dict[str, Value]) -> Sums:
-    return solve(problem.moved(env))
 
 
 # What of an answer is known
@@ -199,64 +183,6 @@ def improved(problem: Problem, order: Integral, sums: Sums, improvers: Sequence[
     return sums
 
 
-def with_fewer_digits(problem: Problem, order: Integral, sums: Sums) -> Sums:
-    """Where the budget ran out."""
-    return by_less(problem, problem.plan(order), sums)
-
-
-def beside_folds_unseen(problem: Problem, order: Integral, sums: Sums) -> Sums:
-    """Where a surface is searched for, and it could not be searched for where it folds."""
-    plan = problem.plan(order)
-    if plan.folds or problem.events.every(Unsearched):
-        return beside_another(problem, order, sums)
-    return sums
-
-
-def on_both_sides(problem: Problem, order: Integral, sums: Sums) -> Sums:
-    """Where parts have two derivatives."""
-    if not problem.events.every(TwoSided) or problem.machine.side:
-        return sums
-    return from_both_sides(problem, order, sums)
-
-
-def at_folds(problem: Problem, order: Integral, sums: Sums) -> Sums:
-    """Where sections appear or merge just at the parameters."""
-    if problem.events.every(Fold):
-        beside_folds(problem, problem.plan(order), sums, partial(_beside, problem))
-    return sums
-
-
-def in_another_order(problem: Problem, order: Integral, sums: Sums) -> Sums:
-    """The better, member by member, of sums and of those with another variable innermost, where rounding spoilt a few.
-
-    A surface that is all but parallel to the innermost variable has a section in it that is steep, so that a rounded
-    node further out misplaces it; along another variable it is flat.
-    """
-    machine = problem.machine
-    spoilt = ((sums.et > machine.rtol * np.abs(sums.t)) & (sums.et > STEEP * sums.e[:, None])).any(axis=(0, 1))
-    spoilt &= ~np.isinf(sums.et).any(axis=(0, 1))
-    if problem.events.every(Shortfall) or not spoilt.any() or spoilt.sum() > MOST_SPOILT:
-        return sums
-    index = np.nonzero(spoilt)[0]
-    few = problem.picked(index)
-    for other in itertools.islice(orders(order), 1, None):
-        part = few.apart()
-        found = iterated(problem.plan(other), part.machine, part.env, index.size)
-        better = (found.et < sums.et[:, :, index]) & ~part.events.touched(index.size)
-        sums.t[:, :, index] = np.where(better, found.t, sums.t[:, :, index])
-        sums.et[:, :, index] = np.where(better, found.et, sums.et[:, :, index])
-    return sums
-
-
-def by_values(problem: Problem, order: Integral, sums: Sums) -> Sums:
-    """Where derivatives have few digits and values many."""
-    machine = problem.machine
-    if machine.directions and not machine.side and not problem.events.every(OneSidedDerivatives):
-        quiet = replace(problem, machine=machine.with_directions(0))
-        by_differences(problem, sums, partial(_beside, quiet))
-    return sums
-
-
-ALONE = (with_fewer_digits, beside_folds_unseen, on_both_sides, at_folds, in_another_order, by_values)
-TOGETHER = (beside_folds_unseen, on_both_sides, in_another_order)
-INSIDE = (beside_folds_unseen,)
+ALONE = (by_less, beside_another, on_both_sides, at_folds, in_another_order, by_differences)
+TOGETHER = (beside_another, on_both_sides, in_another_order)
+INSIDE = (beside_another,)

@@ -1,0 +1,110 @@
+"""Integrals looked at a second time: with less asked for, with other nodes, with another variable innermost.
+
+Owns the improvers `by_less`, `beside_another` and `in_another_order`.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from potto.core.terms import Integral
+from potto.integrate.events import Degenerate, Fold, Shortfall, TwoSided, Unsearched
+from potto.integrate.pieces import Sums
+from potto.kernels.cells import Array
+from potto.runtime.integration.choices import TRIAL, orders
+from potto.runtime.integration.problem import Problem
+from potto.runtime.integration.quadrature import in_parts, iterated, within
+
+ENOUGH = 1e-3  # a relative error from which on it is tried with less
+TOLERANCES = (1e-6, 1e-3)  # that are asked for instead, one after the other, until one is reached
+EXTRA = 0.125  # the part of the budget that each may take beyond it
+OTHER_NODES = 14  # in other places than those of the first time
+# From how many errors of the value on an error of a derivative is looked at again from another side, and for how many
+# members at most.
+STEEP = 1e3
+MOST_SPOILT = 256
+
+
+def by_less(problem: Problem, order: Integral, sums: Sums) -> Sums:
+    """The sums, or better ones that were found by asking for less, where the budget ran out with few digits.
+
+    Refinement that runs out of evaluations has spent them where it then stood, and left the rest as it was. Asked for
+    less accuracy it does reach the end, at a small part of the cost. So asking for more never gives less.
+    Not where the integrand calls for integrals, which would go far beyond any budget once more.
+    """
+    machine, plan = problem.machine, problem.plan(order)
+    if not machine.exhausted() or (sums.e <= ENOUGH * np.abs(sums.v)).all() or machine.inexact(plan.term.body):
+        return sums
+    for rtol in TOLERANCES:
+        most = math.ceil(machine.record.spent + EXTRA * machine.settings.max_evals)
+        settings = replace(machine.settings, rtol=max(rtol, machine.rtol), max_evals=most)
+        loose = replace(machine.apart(), settings=settings)
+        other = in_parts(plan, loose, problem.env, problem.batch)
+        met = loose.events.touched(problem.batch, TwoSided, Fold, Degenerate).any()
+        if (other.e < sums.e).all() and (other.et <= sums.et).all() and not met:
+            sums = other
+        if (sums.e <= rtol * np.abs(sums.v)).all():
+            break
+    return sums
+
+
+def beside_another(problem: Problem, order: Integral, sums: Sums) -> Sums:
+    """The sums with errors as wide as another order of the variables, or other nodes, lead elsewhere.
+
+    Where a surface that is searched for folds, or could not be searched for, the variables further out are not cut
+    there, and refinement may miss it.
+    """
+    plan = problem.plan(order)
+    if not plan.folds and not problem.events.every(Unsearched):
+        return sums
+    other = _within_a_trial(problem, order)
+    if other is None:
+        other = iterated(plan, problem.machine.apart(), problem.env, problem.batch, OTHER_NODES)
+    return replace(
+        sums,
+        e=_covering(sums.v - other.v, sums.e, other.e),
+        et=_covering(sums.t - other.t, sums.et, other.et),
+    )
+
+
+def _covering(gap: Array, own: Array, others: Array) -> Array:
+    """Errors that cover what two answers differ by more than they admit."""
+    gap = np.abs(gap)
+    return np.where(gap > own + others, np.maximum(own, 2 * gap), own)
+
+
+def _within_a_trial(problem: Problem, order: Integral) -> Sums | None:
+    """The sums with another variable innermost; None where that tells nothing, or costs too much."""
+    for turned in itertools.islice(orders(order), 1, None):
+        part = problem.apart()
+        other = within(TRIAL, part.plan(turned), part.machine, part.env, part.batch)
+        known = other is not None and np.isfinite(other.e).all() and np.isfinite(other.et).all()
+        if known and not part.events.every(Degenerate):
+            return other
+    return None
+
+
+def in_another_order(problem: Problem, order: Integral, sums: Sums) -> Sums:
+    """The better, member by member, of sums and of those with another variable innermost, where rounding spoilt a few.
+
+    A surface that is all but parallel to the innermost variable has a section in it that is steep, so that a rounded
+    node further out misplaces it; along another variable it is flat.
+    """
+    machine = problem.machine
+    spoilt = ((sums.et > machine.rtol * np.abs(sums.t)) & (sums.et > STEEP * sums.e[:, None])).any(axis=(0, 1))
+    spoilt &= ~np.isinf(sums.et).any(axis=(0, 1))
+    if problem.events.every(Shortfall) or not spoilt.any() or spoilt.sum() > MOST_SPOILT:
+        return sums
+    index = np.nonzero(spoilt)[0]
+    few = problem.picked(index)
+    for other in itertools.islice(orders(order), 1, None):
+        part = few.apart()
+        found = iterated(problem.plan(other), part.machine, part.env, index.size)
+        better = (found.et < sums.et[:, :, index]) & ~part.events.touched(index.size)
+        sums.t[:, :, index] = np.where(better, found.t, sums.t[:, :, index])
+        sums.et[:, :, index] = np.where(better, found.et, sums.et[:, :, index])
+    return sums
