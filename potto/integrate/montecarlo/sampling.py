@@ -33,7 +33,7 @@ from potto.integrate.montecarlo.rare_events import (
 )
 from potto.integrate.montecarlo.replicates import Moments, Replicates, added
 from potto.integrate.montecarlo.surface_terms import Surface, factors
-from potto.integrate.pieces import Sums, components, still
+from potto.integrate.pieces import Sums, spread, still
 from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.sobol import MOST, Sobol
@@ -333,17 +333,14 @@ class _Run:
         k, body = self.machine.directions, self.plan.body
         self.machine.count(n)
         value = self.machine.evaluate(body, {p: point.env[p] for p in body.params}, self.plan.trace(sides))
-        cells = components(value)
-        f, e = (np.stack([_full(x, n) for x in part]) for part in ([c.v for c in cells], [c.e for c in cells]))
-        ft, et = np.zeros((2, len(cells), k, n))
-        for i, cell in enumerate(cells):
-            for d in range(k):
-                ft[i, d] = 0.0 if not cell.t or cell.t[d] is None else cell.t[d]
-                et[i, d] = 0.0 if not cell.et or cell.et[d] is None else cell.et[d]
+        f, _, ft, e, et = spread(value, (n,), k, False)
+        m = f.shape[0]
+        ft, e = np.zeros((m, k, n)) if ft is None else ft, np.zeros((m, n)) if e is None else e
+        et = np.zeros((m, k, n)) if et is None else et[:, :k]
         bad = np.nonzero(np.isnan(f).any(axis=0))[0]
         if bad.size:
             zero = guarded_samples(self.plan, point.env, sides, bad, self.machine)
-            f, ft[:, :, bad] = f.copy(), np.nan
+            ft[:, :, bad] = np.nan
             for part in (f, ft, et):
                 part[..., bad[zero]] = 0.0
         return self.weighted(Sums(f, e, ft, et), point.volume, n)

@@ -1,16 +1,16 @@
 """A batch of integrals in which each member gets the answer, the cost and the reasons that it gets by itself.
 
-Owns `by_members` and `Whole`. A batch is integrated at once. Members that meet something (a surface that runs
-along a variable, roots that merge, a bound that rounding hides, a budget that is spent) are taken out, since what
-helps them costs the others time and tells nothing of them: those that another order of the variables may help are
-done so together, those with two sides together, those that no order helps in each direction by itself, all others one
-by one.
+Owns `by_members`, `one_by_one` and `Whole`. A batch is integrated at once. Members that meet something (a surface that
+runs along a variable, roots that merge, a bound that rounding hides, a budget that is spent) are taken out, since what
+helps them costs the others time and tells nothing of them: those that another order of the variables may help are done
+so together, those with two sides together, those that no order helps in each direction by itself, all others one by
+one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,7 +18,11 @@ from potto.core.terms import Integral
 from potto.integrate.events import Degenerate, Events, Fold, Shortfall, TwoSided, Unsearched
 from potto.integrate.pieces import Sums
 from potto.kernels.cells import Array, Bools, Ints
+from potto.runtime.answers.convergence import missing
+from potto.runtime.integration.choices import preferred
+from potto.runtime.integration.one_sided import one_direction
 from potto.runtime.integration.problem import Problem
+from potto.runtime.integration.quadrature import in_parts
 
 # Up to how many members are done one by one from the start: together they are no faster.
 FEW_MEMBERS = 10
@@ -28,20 +32,8 @@ MOST_UNKNOWN = 64
 MOST_ROUGH = 256
 NOBODY: Ints = np.zeros(0, dtype=np.int64)
 
-
-@dataclass(frozen=True)
-class Ways:
-    """How integrals are done. orders: the integral with its variables in other orders, the best first.
-
-    whole: members together; settled: what is still to be done for members with plain sums, or with two sides;
-    directions: members with each direction by itself; single: one member, with everything that there is for it.
-    """
-
-    orders: Callable[[], Iterable[Integral]]
-    whole: Callable[[Integral, Problem], Sums]
-    settled: Callable[[Integral, Problem, Sums], Sums]
-    directions: Callable[[Problem], Sums]
-    single: Callable[[Problem], Sums]
+# What is still to be done for members with plain sums, or with two sides, in an order of the variables.
+Settled = Callable[[Problem, Integral, Sums], Sums]
 
 
 class Whole:
@@ -60,56 +52,61 @@ class Whole:
         return Sums.joined([replace(part, gross=added_up(part)) for _, part in self.parts]).pick(order)
 
 
-@dataclass(frozen=True)
-class Part:
-    """Members of a batch that are done together, `todo` of them, and where what they come to and have met goes."""
-
-    found: Whole
-    events: Events
-    todo: Ints
-
-    def put(self, index: Ints, sums: Sums, met: Events) -> None:
-        self.events.take(met, self.todo[index])
-        self.found.put(self.todo[index], sums)
-
-
 def added_up(sums: Sums) -> Array:
     """What is added up for each without regard to sign, at the least what it comes to."""
     most = np.stack((np.abs(sums.v).max(axis=0), np.abs(sums.t).max(axis=(0, 1), initial=0.0)))
     return most if sums.gross is None else np.maximum(most, sums.gross)
 
 
-def by_members(problem: Problem, ways: Ways, bad: Callable[[Sums], Bools]) -> Sums:
-    """The sums of a batch. bad: the members that are not as accurate as was asked for."""
+def by_members(problem: Problem, settled: Settled) -> Sums:
+    """The sums of a batch."""
     found = Whole()
     everybody = np.arange(problem.batch)
-    alone = [everybody] if problem.batch <= FEW_MEMBERS else _together(problem, everybody, ways, bad, found)
+    alone = [everybody] if problem.batch <= FEW_MEMBERS else _together(problem, everybody, settled, found)
     for i in map(int, np.concatenate(alone)):
         one = np.array([i])
         with problem.among(one) as single:
-            found.put(one, ways.single(single))
+            found.put(one, single.solver(single))
         problem.events.take(single.events, one)
     return found.sums
 
 
-def _together(problem: Problem, todo: Ints, ways: Ways, bad: Callable[[Sums], Bools], found: Whole) -> list[Ints]:
+def one_by_one(problem: Problem) -> Sums:
+    """The sums with each direction by itself: what runs along one variable may not move in it."""
+    parts = []
+    for d in range(problem.machine.directions):
+        env = {n: one_direction(v, d) for n, v in problem.env.items()}
+        parts.append(problem.solver(problem.at(env, machine=problem.machine.with_directions(1), outermost=True)))
+    t, et = (np.concatenate([getattr(part, name) for part in parts], axis=1) for name in ("t", "et"))
+    return Sums(parts[0].v, parts[0].e, t, et)
+
+
+def _together(problem: Problem, todo: Ints, settled: Settled, found: Whole) -> list[Ints]:
     """Put what can be done together; what is left is to be done one by one."""
     alone = [NOBODY]
-    for order in ways.orders():
+    for order in preferred(problem):
         with problem.among(todo) as here:
-            sums = ways.whole(order, here)
+            sums = in_parts(here.plan(order), here.machine, here.env, here.batch)
         kinds = _kinds(here.events, todo.size)
         if kinds is None and todo.size > MOST_UNKNOWN:
             for half in np.array_split(todo, 2):
-                alone += _together(problem, half, ways, bad, found)
+                alone += _together(problem, half, settled, found)
             return alone
         if kinds is None:
             return [*alone, todo]
         turned, trouble, sided = kinds
         for group in (np.nonzero(~(turned | trouble | sided))[0], np.nonzero(sided)[0]):
             if group.size:
-                rough = _settle(order, here, group, ways, bad, sums, Part(found, problem.events, todo))
-                alone.append(rough)
+                with here.among(group) as part:
+                    part.events.take(here.events.of(group, TwoSided), np.arange(group.size))
+                    own = settled(part, order, sums.pick(group))
+                rough = missing(problem.term, own, problem.machine.settings)
+                if rough.sum() > MOST_ROUGH:
+                    rough[:] = False
+                keep = np.nonzero(~rough)[0]
+                problem.events.take(part.events.of(keep), todo[group[keep]])
+                found.put(todo[group[keep]], own.pick(keep))
+                alone.append(todo[group[rough]])
         alone.append(todo[trouble])
         todo = todo[turned]
         if not todo.size:
@@ -117,7 +114,7 @@ def _together(problem: Problem, todo: Ints, ways: Ways, bad: Callable[[Sums], Bo
     if problem.machine.directions < 2 or todo.size <= FEW_MEMBERS:
         return [*alone, todo]
     with problem.among(todo) as here:
-        found.put(todo, ways.directions(here))
+        found.put(todo, one_by_one(here))
     problem.events.take(here.events, todo)
     return alone
 
@@ -130,18 +127,3 @@ def _kinds(events: Events, size: int) -> tuple[Bools, Bools, Bools] | None:
     turned = events.touched(size, Degenerate)
     trouble = events.touched(size, Shortfall, Unsearched, Fold) & ~turned
     return turned, trouble, events.touched(size, TwoSided) & ~turned & ~trouble
-
-
-def _settle(
-    order: Integral, here: Problem, group: Ints, ways: Ways, bad: Callable[[Sums], Bools], sums: Sums, into: Part
-) -> Ints:
-    """Put what some of the members come to, and return those that are not accurate enough."""
-    with here.among(group) as part:
-        part.events.take(here.events.of(group, TwoSided), np.arange(group.size))
-        settled = ways.settled(order, part, sums.pick(group))
-    rough = bad(settled)
-    if rough.sum() > MOST_ROUGH:
-        rough[:] = False
-    keep = np.nonzero(~rough)[0]
-    into.put(group[keep], settled.pick(keep), part.events.of(keep))
-    return into.todo[group[rough]]

@@ -24,14 +24,13 @@ from potto.integrate.fixed.a_priori import certain
 from potto.integrate.pieces import Sums, still
 from potto.integrate.plan import Plan
 from potto.kernels.cells import Ints
-from potto.runtime.answers.convergence import missing
-from potto.runtime.integration.choices import many, passes_on, preferred, too_many, trials
+from potto.runtime.integration.choices import many, passes_on, too_many, trials
 from potto.runtime.integration.differences import by_differences
 from potto.runtime.integration.elimination import ACCURATE, WORTH, step_by_step
-from potto.runtime.integration.members import Ways, by_members
-from potto.runtime.integration.one_sided import at_folds, beside_axes, on_both_sides, one_direction
+from potto.runtime.integration.members import by_members, one_by_one
+from potto.runtime.integration.one_sided import at_folds, beside_axes, on_both_sides
 from potto.runtime.integration.problem import Problem
-from potto.runtime.integration.quadrature import in_parts, within
+from potto.runtime.integration.quadrature import within
 from potto.runtime.integration.second_looks import beside_another, by_less, in_another_order
 
 Method = Callable[[Problem], Sums | None]
@@ -75,15 +74,12 @@ def as_a_batch(problem: Problem) -> Sums | None:
     """Many members together, and one by one where they meet something."""
     if problem.batch == 1:
         return None
-    ways = Ways(
-        orders=lambda: preferred(problem),
-        whole=lambda order, part: in_parts(part.plan(order), part.machine, part.env, part.batch),
-        settled=lambda order, part, sums: improved(part, order, counted(part, part.plan(order), sums), TOGETHER),
-        directions=one_by_one,
-        single=solve,
-    )
     problem.machine.record.methods.add("quadrature")
-    return by_members(problem, ways, lambda sums: missing(problem.term, sums, problem.machine.settings))
+    return by_members(problem, _settled)
+
+
+def _settled(part: Problem, order: Integral, sums: Sums) -> Sums:
+    return improved(part, order, counted(part, part.plan(order), sums), TOGETHER)
 
 
 def along_cuts(problem: Problem) -> Sums:
@@ -129,16 +125,6 @@ def _along_axes(problem: Problem, plan: Plan, sums: Sums) -> Sums:
 
 
 METHODS: tuple[Method, ...] = (by_elimination, by_samples, as_a_batch, along_cuts)
-
-
-def one_by_one(problem: Problem) -> Sums:
-    """The sums with each direction by itself: what runs along one variable may not move in it."""
-    parts = []
-    for d in range(problem.machine.directions):
-        alone = {n: one_direction(v, d) for n, v in problem.env.items()}
-        parts.append(solve(problem.at(alone, machine=problem.machine.with_directions(1), outermost=True)))
-    t, et = (np.concatenate([getattr(part, name) for part in parts], axis=1) for name in ("t", "et"))
-    return Sums(parts[0].v, parts[0].e, t, et)
 
 
 # What of an answer is known
