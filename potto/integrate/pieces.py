@@ -16,7 +16,7 @@ from potto.integrate.costs import Costs
 from potto.integrate.events import Event, Events, Members
 from potto.integrate.rules import substitution
 from potto.integrate.rules.gauss import gauss, leaning
-from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Trace, Value, map_arrays, map_cells
+from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Number, Trace, Value, map_arrays, map_cells
 from potto.kernels.errors import not_a_number
 
 STRAY = 8
@@ -75,6 +75,15 @@ class Sums:
         gross, common = (None if x is None else x[..., index] for x in (self.gross, self.common))
         v, e, t, et = (x[..., index] for x in (self.v, self.e, self.t, self.et))
         return Sums(v, e, t, et, gross=gross, common=common)
+
+    def cells(self, shape: tuple[int, ...]) -> list[Cell]:
+        """The components as numbers over a batch of this shape."""
+
+        def part(x: Array) -> Number:
+            return x.reshape(shape) if shape else float(x[0])
+
+        parts = zip(self.v, self.e, self.t, self.et, strict=True)
+        return [Cell(part(v), part(e), tuple(map(part, t)), tuple(map(part, et))) for v, e, t, et in parts]
 
     @staticmethod
     def joined(parts: Sequence[Sums]) -> Sums:

@@ -177,7 +177,7 @@ def one_by_one(known: Eliminated, machine: Any, env: dict[str, Value]) -> Sums |
         below = further
         if step.state is None:
             sums = _Tabled(plan, fine, START_ORDER, tracked=True, further=below).run(0, env, 1, {}, fine)
-            further = _cell(sums)
+            (further,) = sums.cells(())
             if isinstance(below, Table) and not below.seen:
                 return None
             continue
@@ -246,8 +246,3 @@ def _span(step: Step, passed: Term, box: dict[str, tuple[float, float]]) -> tupl
         return found.lo, found.hi
     ends = [range_of(simplify(substitute(passed, {step.variable: end})), box) for end in (step.lo, step.hi)]
     return max(found.lo, min(end.lo for end in ends)), min(found.hi, max(end.hi for end in ends))
-
-
-def _cell(sums: Sums) -> Cell:
-    return Cell(float(sums.v[0, 0]), float(sums.e[0, 0]), tuple(map(float, sums.t[0, :, 0])),
-                tuple(map(float, sums.et[0, :, 0])))  # fmt: skip

@@ -17,14 +17,14 @@ from typing import Any
 
 import numpy as np
 
-from potto.core.terms import function_of, mul, var
+from potto.core.terms import Term, function_of, mul, var
 from potto.integrate.decomposition.cuts import frame_rows
 from potto.integrate.decomposition.meetings import as_array
 from potto.integrate.levels import LevelPlan
 from potto.integrate.pieces import still
 from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import EPS
-from potto.kernels.cells import Array, Cell, Number, Value, map_arrays, pad
+from potto.kernels.cells import Array, Bools, Cell, Number, Value, map_arrays, pad
 
 PRODUCT = function_of(mul(var("a"), var("b")))
 
@@ -101,6 +101,12 @@ class Chart:
         inside = (cuts > 0) & (cuts < 1)
         ends = np.concatenate((np.zeros((1, u.size)), np.where(inside, cuts, 1.0), np.ones((1, u.size))))
         return crowd(np.sort(ends, axis=0), self.share, u)
+
+    def above(self, surface: Term, env: dict[str, Value], n: int) -> Bools:
+        """The points at which a surface is not negative."""
+        function = function_of(surface)
+        here = {name: still(env[name]) for name in function.params}
+        return as_array(self.machine.with_directions(0).evaluate(function, here, None).v, n) >= 0
 
     def bounds(self, level: LevelPlan, env: dict[str, Value], machine: Any) -> tuple[Cell, Cell]:
         values = machine.evaluate(level.bounds, {p: env[p] for p in level.bounds.params}, None)

@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 
-from potto.core.terms import function_of
 from potto.integrate.adaptive.iterated import Iteration
 from potto.integrate.degenerate.undefined import guarded_samples
 from potto.integrate.events import BUDGET_SPENT, NO_SAMPLE
@@ -33,7 +32,7 @@ from potto.integrate.montecarlo.rare_events import (
 )
 from potto.integrate.montecarlo.replicates import Moments, Replicates, added
 from potto.integrate.montecarlo.surface_terms import Surface, factors
-from potto.integrate.pieces import Sums, spread, still
+from potto.integrate.pieces import Sums, spread
 from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.sobol import MOST, Sobol
@@ -322,10 +321,7 @@ class _Run:
         sides: dict[int, Mask] = {}
         for level in self.plan.levels[: self.drawn]:
             for group in wanted.intersection(level.decided):
-                function = function_of(self.plan.groups[group].cut.surface)
-                env = {p: still(point.env[p]) for p in function.params}
-                value = self.machine.with_directions(0).evaluate(function, env, None)
-                sides[group] = np.broadcast_to(np.asarray(value.v) >= 0, (n,))
+                sides[group] = self.chart.above(self.plan.groups[group].cut.surface, point.env, n)
         return sides
 
     def body(self, point: Point, sides: dict[int, Mask], n: int) -> Sums:

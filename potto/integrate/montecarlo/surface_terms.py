@@ -294,12 +294,7 @@ class Surface:
         """The sides of what the surface decides, just above it."""
         sides: dict[int, Mask] = {}
         for group, way in self.forces:
-            side = np.ones(n, dtype=bool)
-            if way is not None:
-                function = function_of(way)
-                env = {p: point.env[p] for p in function.params}
-                side = as_array(self.machine.with_directions(0).evaluate(function, env, None).v, n) >= 0
-            sides[group] = side
+            sides[group] = np.ones(n, dtype=bool) if way is None else self.chart.above(way, point.env, n)
         return sides
 
     def beside(

@@ -19,7 +19,7 @@ from potto.diagnostics import PottoError
 from potto.integrate.events import BUDGET_SPENT
 from potto.integrate.pieces import Sums, gather, still
 from potto.kernels import errors
-from potto.kernels.cells import Array, Cell, Ints, Number, Value, all_arrays, map_arrays, pad
+from potto.kernels.cells import Cell, Ints, Value, all_arrays, map_arrays, pad
 from potto.kernels.making import making
 from potto.runtime.answers.convergence import allowance, widest
 from potto.runtime.evaluation.directional import stepped
@@ -158,14 +158,5 @@ def poisoned(sums: Sums, env: dict[str, Value]) -> Sums:
 
 
 def _shaped(sums: Sums, shape: tuple[int, ...]) -> Value:
-    def part(x: Array) -> Number:
-        return x.reshape(shape) if shape else float(x[0])
-
-    def cell(c: int) -> Cell:
-        t = tuple(part(sums.t[c, d]) for d in range(sums.t.shape[1]))
-        et = tuple(part(sums.et[c, d]) for d in range(sums.et.shape[1]))
-        return Cell(part(sums.v[c]), part(sums.e[c]), t, et)
-
-    if sums.v.shape[0] == 1:
-        return cell(0)
-    return tuple(cell(c) for c in range(sums.v.shape[0]))
+    cells = sums.cells(shape)
+    return cells[0] if len(cells) == 1 else tuple(cells)

@@ -7,6 +7,7 @@ conditions added up at a cost proportional to n. Owns `held` too: deltas that st
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 
 from potto.calculus.decomposition.joined import joined
@@ -104,14 +105,19 @@ def placed(term: Integral, reach: Reach, shapes: Shapes, again: bool) -> Term:
     counted = _counted(term, reach, shapes, again)
     if not isinstance(counted, Integral):
         return counted
-    term, nodes = counted, postorder(counted)
+    term = counted
     if not any(isinstance(n, Delta) and any(isinstance(g, Global | App) for g in postorder(*n.coordinates))
-               for n in nodes):  # fmt: skip
+               for n in postorder(term)):  # fmt: skip
         return term
+    return _with_deltas(term, lambda delta: expanded(delta, reach.resolve))
+
+
+def _with_deltas(term: Integral, change: Callable[[Delta], Term]) -> Term:
+    """The integral with its deltas changed, those further in first."""
     memo: dict[Term, Term] = {}
-    for node in nodes:
-        new = rebuild(node, tuple(memo[c] for c in children(node)))
-        memo[node] = expanded(new, reach.resolve) if isinstance(new, Delta) else new
+    for node in postorder(term):
+        new = rebuild(node, tuple(memo[child] for child in children(node)))
+        memo[node] = change(new) if isinstance(new, Delta) else new
     return memo[term]
 
 
@@ -236,11 +242,7 @@ def held(term: Integral) -> tuple[Integral, tuple[tuple[str, str], ...]]:
     bound = {name for node in postorder(term) if isinstance(node, Integral) for name in node.variables}
     names = sorted({name for node in deltas for name in node.coordinates[0].free} - bound)
     renamed = {name: var(f"{name}@still") for name in names}
-    memo: dict[Term, Term] = {}
-    for node in postorder(term):
-        new = rebuild(node, tuple(memo[child] for child in children(node)))
-        memo[node] = substitute(new, renamed) if isinstance(new, Delta) else new
-    result = memo[term]
+    result = _with_deltas(term, lambda delta: substitute(delta, renamed))
     assert isinstance(result, Integral)
     return result, tuple((name, f"{name}@still") for name in names)
 
