@@ -263,6 +263,11 @@ def integral(
     return make(Integral, free, variables, bounds, body, hints)
 
 
+def with_integrand(term: Integral, body: Term) -> Integral:
+    """The integral of something else over the same domain."""
+    return integral(term.variables, term.bounds, body, term.hints)
+
+
 def delta(coordinates: tuple[Term, ...]) -> Delta:
     return make(Delta, union_of(coordinates), coordinates)
 

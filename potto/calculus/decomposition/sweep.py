@@ -166,7 +166,7 @@ def outer_findings(term: Integral, resolve: Resolve, decide: Decide) -> tuple[Fi
     inner = set(term.variables)
     bounds = (f for pair in term.bounds for bound in pair for f in findings(bound, resolve, decide))
     jumps = tuple(
-        Finding("jump", f.surface, (), f.strict, f.coordinates, f.calls)
+        Finding("jump", f.surface, (), f.strict)
         for f in (*found, *bounds)
         if f.kind == "jump" and not f.surface.free & inner
     )

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from potto.calculus.algebra.radicals import NAN
 from potto.calculus.algebra.ranges import range_of
 from potto.calculus.algebra.rational_form import is_zero
-from potto.calculus.differentiation.derivative import partial, zero_like
+from potto.calculus.differentiation.derivative import partial, total, vanishes, zero_like
 from potto.calculus.solving.pivots import NoClosedForm as NoClosedForm
 from potto.calculus.solving.pivots import Root, chosen, conjunction, pivots
 from potto.calculus.solving.solve import factors
@@ -62,6 +62,7 @@ from potto.core.terms import (
     transform,
     tuple_,
     var,
+    with_integrand,
 )
 
 Rate = Callable[[Term], Term]
@@ -100,7 +101,7 @@ def _over_level_set(node: Integral, surface: Term, members: Sequence[Branch], ra
     """The jump at a surface, integrated over it."""
     item = _jump_at(node.body, surface, [(b, _side(b.surface, surface, node.variables)) for b in members], rate)
     if item is not None:
-        yield integral(node.variables, node.bounds, item.contribution, node.hints)
+        yield with_integrand(node, item.contribution)
 
 
 def _side(product: Term, factor: Term, variables: Iterable[str]) -> Term:
@@ -250,32 +251,12 @@ def remaining(node: Integral, name: str, at: Term, body: Term) -> Term:
     return integral(tuple(names), tuple(bounds), body, tuple(hints)) if names else body
 
 
-def vanishes(term: Term) -> bool:
-    """Whether a number, or each of a tuple, is 0 on all sides of what it depends on."""
-    match term:
-        case Tuple(items=parts):
-            return all(map(vanishes, parts))
-        case Branch(then=then, orelse=orelse) | If(then=then, orelse=orelse):
-            return vanishes(then) and vanishes(orelse)
-        case _:
-            return term is ZERO
-
-
-def total(parts: Sequence[Term], zero: Term) -> Term:
-    """The sum of numbers, or of tuples shaped like `zero`."""
-    if len(parts) <= 1:
-        return parts[0] if parts else zero
-    if isinstance(zero, Tuple):
-        return tuple_(total([proj(p, i) for p in parts], item) for i, item in enumerate(zero.items))
-    return add(*parts)
-
-
 def difference(a: Term, b: Term) -> Term:
     """a - b, for numbers and for tuples."""
     zero = zero_like(a)
     if isinstance(zero, Tuple):
         return tuple_(difference(proj(a, i), proj(b, i)) for i in range(len(zero.items)))
-    return sub(a, b)
+    return ZERO if a is b else sub(a, b)
 
 
 def scaled(value: Term, factor: Term) -> Term:

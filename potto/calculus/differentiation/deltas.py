@@ -1,8 +1,8 @@
 """Dirac deltas, integrated out.
 
-Owns `without_deltas`: the integral of f delta(psi) over v is the sum of f/|dpsi/dv| over the roots of psi in v that
-lie between the bounds. Where the roots have no closed form the integral is one over a level set, and stays
-(`level_sets`). A delta met twice on one surface has no meaning: that is an error, not a number.
+Owns `without_deltas` and `without_leftovers`: the integral of f delta(psi) over v is the sum of f/|dpsi/dv| over the
+roots of psi in v that lie between the bounds. Where the roots have no closed form the integral is one over a level
+set, and stays (`level_sets`). A delta met twice on one surface has no meaning: that is an error, not a number.
 """
 
 from __future__ import annotations
@@ -11,22 +11,23 @@ from potto.calculus.algebra.radicals import quotient
 from potto.calculus.algebra.ranges import range_of
 from potto.calculus.algebra.rational_form import is_zero
 from potto.calculus.differentiation import level_sets
-from potto.calculus.differentiation.boundary_terms import between, remaining, scaled, total, vanishes
-from potto.calculus.differentiation.derivative import partial, zero_like
+from potto.calculus.differentiation.boundary_terms import between, remaining, scaled
+from potto.calculus.differentiation.derivative import partial, total, vanishes, zero_like
 from potto.calculus.solving.pivots import NoClosedForm, Root, chosen, pivots
 from potto.calculus.surfaces.branch_assignment import branches_of, flipping, forced, unguarded
 from potto.core.printer import format_term
 from potto.core.simplify import normalized_surface
 from potto.core.terms import (
     ONE,
+    ZERO,
     Branch,
     Delta,
     Integral,
     Sum,
     Term,
     Tuple,
+    children,
     delta,
-    integral,
     neg,
     postorder,
     prim,
@@ -34,6 +35,7 @@ from potto.core.terms import (
     sum_,
     transform,
     tuple_,
+    with_integrand,
 )
 from potto.diagnostics import PottoError, declare
 from potto.source import Span
@@ -50,7 +52,7 @@ def without_deltas(node: Integral, folding: bool = False) -> Term:
         return node
     body = _inner_first(node.body, folding)
     if body is not node.body:
-        node = integral(node.variables, node.bounds, body, node.hints)
+        node = with_integrand(node, body)
     parts: list[Term] = []
     waiting: list[Term] = [node]
     for _ in range(_MOST):
@@ -63,6 +65,16 @@ def without_deltas(node: Integral, folding: bool = False) -> Term:
         else:
             waiting.extend(found)
     return total(parts + waiting, zero_like(node.body))
+
+
+def without_leftovers(term: Term) -> Term:
+    """Deltas that are left outside of level sets vary with no variable of integration: they stand for a jump that
+    nothing sweeps."""
+
+    def below(node: Term) -> tuple[Term, ...]:
+        return () if isinstance(node, Integral) and level_sets.level_set(node) is not None else children(node)
+
+    return transform(term, lambda _, new: ZERO if isinstance(new, Delta) else new, below)
 
 
 def _inner_first(body: Term, folding: bool) -> Term:
@@ -83,7 +95,9 @@ def _next(node: Integral, folding: bool) -> list[Term] | None:
         if parts is None:
             raise _product(what)
         factor, rest = parts
-        alone = [] if vanishes(rest) else [integral(node.variables, node.bounds, rest, node.hints)]
+        alone = [] if vanishes(rest) else [with_integrand(node, rest)]
+        if level_sets.is_steep(what):
+            return [*alone, *level_sets.by_parts(node, what, factor)]
         try:
             return [*alone, *_eliminated(node, what, factor, folding)]
         except NoClosedForm as problem:
@@ -91,7 +105,7 @@ def _next(node: Integral, folding: bool) -> list[Term] | None:
             _check_apart(factor, what)
         if alone:
             body = scaled(factor, delta(what.coordinates[:1]))
-            return [*alone, integral(node.variables, node.bounds, body, node.hints)]
+            return [*alone, with_integrand(node, body)]
     if reason is None or level_sets.level_set(node) is not None:
         return None
     raise NoClosedForm(f"two surfaces meet, neither of which can be solved for a variable: {reason}")
@@ -105,9 +119,9 @@ def _summed(node: Integral, item: Sum, folding: bool) -> list[Term]:
     if (item.lo.free | item.hi.free) & frozenset(node.variables):
         raise NoClosedForm("how many deltas there are varies with a variable of integration")
     factor, rest = parts
-    each = integral(node.variables, node.bounds, _times(factor, item.body), node.hints)
+    each = with_integrand(node, _times(factor, item.body))
     whole = sum_(item.variable, item.lo, item.hi, without_deltas(each, folding))
-    return [whole] if vanishes(rest) else [whole, integral(node.variables, node.bounds, rest, node.hints)]
+    return [whole] if vanishes(rest) else [whole, with_integrand(node, rest)]
 
 
 def _times(factor: Term, value: Term) -> Term:

@@ -48,6 +48,7 @@ from potto.core.terms import (
     sum_,
     tuple_,
     var,
+    with_integrand,
 )
 from potto.primitives import PRIMITIVES
 
@@ -263,14 +264,14 @@ def _integral(node: Integral, name: str) -> Term:
     parts: list[Term] = []
     if name in apart.body.free:
         inside = partial(apart.body, name)
-        if not _vanishes(inside):
-            parts.append(integral(apart.variables, apart.bounds, inside, apart.hints))
+        if not vanishes(inside):
+            parts.append(with_integrand(apart, inside))
     for level, (lo, hi) in enumerate(apart.bounds):
         if name in hi.free:
             parts.append(_at_bound(apart, level, hi, partial(hi, name)))
         if name in lo.free:
             parts.append(_at_bound(apart, level, lo, neg(partial(lo, name))))
-    return _total(parts, zero_like(apart.body))
+    return total(parts, zero_like(apart.body))
 
 
 def _at_bound(node: Integral, level: int, bound: Term, rate: Term) -> Term:
@@ -303,8 +304,24 @@ def _check_still(node: Integral, name: str) -> None:
 # Tuples: an integral or a sum may have a tuple for its body
 
 
-def _vanishes(term: Term) -> bool:
-    return all(map(_vanishes, term.items)) if isinstance(term, Tuple) else term is ZERO
+def vanishes(term: Term) -> bool:
+    """Whether a number, or each of a tuple, is 0 on all sides of what it depends on."""
+    match term:
+        case Tuple(items=parts):
+            return all(map(vanishes, parts))
+        case Branch(then=then, orelse=orelse) | If(then=then, orelse=orelse):
+            return vanishes(then) and vanishes(orelse)
+        case _:
+            return term is ZERO
+
+
+def total(parts: Sequence[Term], zero: Term) -> Term:
+    """The sum of numbers, or of tuples shaped like `zero`."""
+    if len(parts) <= 1:
+        return parts[0] if parts else zero
+    if isinstance(zero, Tuple):
+        return tuple_(total([proj(p, i) for p in parts], item) for i, item in enumerate(zero.items))
+    return add(*parts)
 
 
 def _scaled(term: Term, factor: Term, zero: Term) -> Term:
@@ -312,12 +329,3 @@ def _scaled(term: Term, factor: Term, zero: Term) -> Term:
     if isinstance(zero, Tuple):
         return tuple_(_scaled(proj(term, i), factor, item) for i, item in enumerate(zero.items))
     return mul(factor, term)
-
-
-def _total(parts: list[Term], zero: Term) -> Term:
-    """The sum of numbers, or of tuples shaped like `zero`."""
-    if len(parts) <= 1:
-        return parts[0] if parts else zero
-    if isinstance(zero, Tuple):
-        return tuple_(_total([proj(part, i) for part in parts], item) for i, item in enumerate(zero.items))
-    return add(*parts)

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from potto.calculus.differentiation.boundary_terms import at_bounds, at_surfaces, jumps, scaled, total, vanishes
-from potto.calculus.differentiation.deltas import without_deltas
-from potto.calculus.differentiation.derivative import NotSmooth, partial, zero_like
-from potto.calculus.differentiation.level_sets import level_set, transported
+from potto.calculus.differentiation.boundary_terms import at_bounds, at_surfaces, jumps, scaled
+from potto.calculus.differentiation.deltas import without_deltas, without_leftovers
+from potto.calculus.differentiation.derivative import NotSmooth, partial, total, vanishes, zero_like
+from potto.calculus.differentiation.level_sets import level_set, steep, transported
 from potto.calculus.inlining.expand import Resolve, expanded, known_function
 from potto.calculus.surfaces.case_split import resolved
 from potto.calculus.surfaces.trace import spine
@@ -41,21 +41,22 @@ from potto.core.terms import (
     app,
     branch,
     children,
+    delta,
     deriv,
     fresh,
     if_,
-    integral,
     lam,
     list_of,
+    mul,
     postorder,
     postorder_by,
     proj,
     rebuild,
     substitute,
     sum_,
-    transform,
     tuple_,
     var,
+    with_integrand,
 )
 from potto.primitives import PRIMITIVES
 
@@ -95,7 +96,6 @@ class Differentiator:
 
     folding: closed forms are wanted, also of roots that merge.
     """
-
 
     def __init__(
         self, resolve: Resolve, singular: bool = False, pairs: Callable[[Term, Term], Term] | None = None,
@@ -228,7 +228,10 @@ class _Pass:
             case Integral():
                 return self.integral(node)
             case Delta() if self.owner.singular and any(self.found[p][1] is not ZERO for p in parts):
-                raise NotSmooth("a delta moves")
+                if len(parts) > 1:
+                    raise NotSmooth("a delta moves")
+                surface, speed = self.found[parts[0]]
+                return delta((surface,)), mul(speed, steep(surface))
             case Const() | Global() | Lam() | Deriv() | Hole():
                 return node, ZERO
             case _:
@@ -330,14 +333,9 @@ class _Pass:
         return made
 
     def parameter(
-        self,
-        param: str,
-        is_function: bool,
-        taken: set[str],
-        values: dict[str, Term],
-        tangents: dict[str, Term],
-        functions: dict[str, Term],
-    ) -> str:
+        self, param: str, is_function: bool, taken: set[str],
+        values: dict[str, Term], tangents: dict[str, Term], functions: dict[str, Term],
+    ) -> str:  # fmt: skip
         """The name of a parameter's dual; what the parameter and its tangent are in terms of it."""
         name = fresh(f"d{param}", taken)
         taken.add(name)
@@ -372,7 +370,7 @@ class _Pass:
         whole = resolved(self.owner.carried_out(node))
         if not isinstance(whole, Integral):
             return _Pass(self.owner, self.tangents).run(whole)
-        plain = _without(without_deltas(whole, self.owner.folding))
+        plain = without_leftovers(without_deltas(whole, self.owner.folding))
         if not isinstance(plain, Integral):
             return _Pass(self.owner, self.tangents).run(plain)
         moving = {n: t for n, t in self.tangents.items() if n not in plain.variables}
@@ -390,23 +388,8 @@ class _Pass:
         if over is not None:
             found = over.standing(plain, rate) if self.owner.frozen else transported(plain, over, rate, slope)
             return plain, total(found, zero_like(plain.body))
-        parts = [_over(plain, rate(plain.body))]
+        inside = rate(plain.body)
+        parts: list[Term] = [] if vanishes(inside) else [with_integrand(plain, inside)]
         if not self.owner.frozen:
             parts += [*at_bounds(plain, rate), *at_surfaces(plain, frozenset(moving), rate, self.owner.folding)]
         return plain, total([p for p in parts if p is not ZERO], zero_like(plain.body))
-
-
-def _without(term: Term) -> Term:
-    """Deltas that are left outside of level sets vary with no variable of integration: they stand for a jump that
-    nothing sweeps."""
-
-    def below(node: Term) -> tuple[Term, ...]:
-        return () if isinstance(node, Integral) and level_set(node) is not None else children(node)
-
-    return transform(term, lambda _, new: ZERO if isinstance(new, Delta) else new, below)
-
-
-def _over(node: Integral, body: Term) -> Term:
-    if vanishes(body):
-        return ZERO
-    return integral(node.variables, node.bounds, body, node.hints)

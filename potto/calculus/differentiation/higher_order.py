@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from potto.calculus.differentiation.derivative import NotSmooth, partial
+from potto.calculus.differentiation.derivative import NotSmooth
 from potto.calculus.differentiation.dual import Differentiator, heads_of
+from potto.calculus.differentiation.level_sets import coefficient
 from potto.calculus.inlining.expand import Resolve, named
 from potto.calculus.solving.pivots import NoClosedForm
 from potto.core.terms import (
@@ -20,11 +21,9 @@ from potto.core.terms import (
     Lam,
     Term,
     app,
-    fresh,
     lam,
     mul,
     postorder,
-    replaced,
     var,
 )
 from potto.diagnostics import PottoError
@@ -62,10 +61,8 @@ def first_derivative(term: Term, resolve: Resolve) -> Term:
 def moving_deltas(node: Integral, rate: Callable[[Term], Term]) -> list[Term]:
     """What deltas in an integrand give when they move: their factor, their speed and the derivative of delta."""
     found: list[Term] = []
-    hidden = fresh("spike", {name for inner in postorder(node.body) for name in inner.free})
     for spike in [inner for inner in postorder(node.body) if isinstance(inner, Delta)]:
-        speed = rate(spike.coordinates[0])
-        if speed is not ZERO:
-            steep = app(var("delta'"), (spike.coordinates[0],))
-            found.append(mul(partial(replaced(node.body, {spike: var(hidden)}), hidden), speed, steep))
+        speed, parts = rate(spike.coordinates[0]), coefficient(node.body, spike)
+        if speed is not ZERO and parts is not None:
+            found.append(mul(parts[0], speed, app(var("delta'"), (spike.coordinates[0],))))
     return found

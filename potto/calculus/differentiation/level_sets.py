@@ -20,8 +20,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from potto.calculus.algebra.ranges import range_of
-from potto.calculus.differentiation.boundary_terms import Rate, finite, jumps, remaining, scaled, total, vanishes
-from potto.calculus.differentiation.derivative import NotSmooth, partial, zero_like
+from potto.calculus.differentiation.boundary_terms import Rate, finite, jumps, remaining, scaled
+from potto.calculus.differentiation.derivative import NotSmooth, partial, total, vanishes, zero_like
 from potto.calculus.solving.enclosable import searchable
 from potto.calculus.solving.pivots import NoClosedForm
 from potto.calculus.solving.solve import Sections, sections
@@ -48,6 +48,7 @@ from potto.core.terms import (
     sub,
     substitute,
     var,
+    with_integrand,
 )
 
 Slope = Callable[[Term, str], Term]
@@ -77,7 +78,16 @@ class LevelSet:
     def standing(self, node: Integral, rate: Rate) -> list[Term]:
         """The derivative of the integral where the level set stands still."""
         moved = rate(self.factor)
-        return [] if vanishes(moved) else [_over(node, scaled(moved, delta((self.surface,))))]
+        return [] if vanishes(moved) else [with_integrand(node, scaled(moved, delta((self.surface,))))]
+
+
+def steep(surface: Term) -> Delta:
+    """The derivative of the delta of a surface."""
+    return delta((surface, ZERO))
+
+
+def is_steep(what: Delta) -> bool:
+    return what.coordinates[1:] == (ZERO,)
 
 
 def _squared(slopes: list[Term]) -> Term:
@@ -111,7 +121,7 @@ def coefficient(body: Term, what: Term) -> tuple[Term, Term] | None:
 def level_set(node: Integral) -> LevelSet | None:
     """What an integral is made of whose integrand is something times one delta."""
     found = deltas_over(node)
-    if len(found) != 1:
+    if len(found) != 1 or is_steep(found[0]):
         return None
     try:
         parts = coefficient(node.body, found[0])
@@ -139,7 +149,7 @@ def spread(node: Integral, known: LevelSet) -> list[Integral]:
         inner = level_set(way)
         assert inner is not None
         body = scaled(inner.factor, delta((known.surface, ONE, *map(var, (name, *others)))))
-        marked.append(_over(way, body))
+        marked.append(with_integrand(way, body))
     return marked
 
 
@@ -192,12 +202,24 @@ def transported(node: Integral, known: LevelSet, rate: Rate, slope: Slope) -> li
     here = delta((surface,))
     inside = [rate(factor), *(_negative(slope(scaled(factor, v), name)) for name, v in velocity.items())]
     whole = total([part for part in inside if not vanishes(part)], zero_like(factor))
-    found: list[Term] = [] if vanishes(whole) else [_over(node, scaled(whole, here))]
+    found: list[Term] = [] if vanishes(whole) else [with_integrand(node, scaled(whole, here))]
     for item in jumps(factor, node.variables, swept):
-        found.append(_over(node, scaled(item.contribution, here)))
+        found.append(with_integrand(node, scaled(item.contribution, here)))
     if len(node.variables) > 1:
         found += _at_bounds(node, scaled(factor, here), swept, velocity)
     return found
+
+
+def by_parts(node: Integral, what: Delta, factor: Term) -> list[Term]:
+    """The integral of a factor times the derivative of a delta: how that of f delta(psi + s) moves with s."""
+    step = fresh("step", {n for t in postorder(node) for n in t.free} | set(node.variables))
+    surface = add(what.coordinates[0], var(step))
+
+    def rate(term: Term) -> Term:
+        return partial(term, step)
+
+    moved = transported(node, LevelSet(factor, surface), rate, partial)
+    return [substitute(term, {step: ZERO}) for term in moved]
 
 
 def _negative(term: Term) -> Term:
@@ -212,10 +234,6 @@ def _at_bounds(node: Integral, body: Term, swept: Rate, velocity: Mapping[str, T
             if finite(bound) and crossing is not ZERO:
                 gain = substitute(scaled(body, mul(sign, crossing)), {name: bound})
                 yield remaining(node, name, bound, gain)
-
-
-def _over(node: Integral, body: Term) -> Integral:
-    return integral(node.variables, node.bounds, body, node.hints)
 
 
 @lru_cache(maxsize=4096)

@@ -10,6 +10,7 @@ from collections.abc import Iterable
 
 from potto.calculus.inlining.currying import fitted, sizes_of, uncurry
 from potto.calculus.surfaces.discontinuities import Resolve, underlying
+from potto.calculus.surfaces.trace import spine
 from potto.core.terms import App, Global, If, Lam, Prim, Sum, Term, postorder
 
 
@@ -70,11 +71,7 @@ def _names(
 
 def _given(call: App, known: dict[Lam, frozenset[str]], resolve: Resolve) -> set[str]:
     """The names in the arguments of a call that decide something in the function."""
-    groups: list[tuple[Term, ...]] = []
-    head: Term = call
-    while isinstance(head, App):
-        groups.insert(0, head.args)
-        head = head.function
+    head, groups = spine(call)
     function, _ = underlying(head, resolve)
     if function is None:
         return set(call.free)

@@ -21,9 +21,12 @@ DEEPEST = 60  # calls inside calls
 MOST_NAMES = 100  # that a definition may lead through
 
 
-def expanded(term: Term, resolve: Resolve, derive: Derive | None = None) -> Term:
-    """The term with calls of known functions carried out; of derivatives too, if it is said how."""
-    return Expansion(resolve, derive).of(term)
+def expanded(term: Term, resolve: Resolve, derive: Derive | None = None, rounds: int = 1) -> Term:
+    """The term with calls of known functions carried out; of derivatives too, if it is said how.
+
+    rounds: how many calls of a recursion are carried out inside each other.
+    """
+    return Expansion(resolve, derive, rounds).of(term)
 
 
 class Calls:
@@ -49,13 +52,14 @@ class Calls:
 class Expansion:
     """Calls carried out in one term or several, each call with the same arguments once.
 
-    A call of a definition inside itself stays a call: how deep it goes is decided by values. Binders that get inside of
-    each other have names of their own.
+    A call of a definition inside itself stays a call after some rounds: how deep it goes is decided by values. Binders
+    that get inside of each other have names of their own.
     """
 
-    def __init__(self, resolve: Resolve, derive: Derive | None = None) -> None:
+    def __init__(self, resolve: Resolve, derive: Derive | None = None, rounds: int = 1) -> None:
         self.resolve = resolve
         self.derive = derive
+        self.rounds = rounds
         self.calls = Calls()
         self.bound: Bound = {}
 
@@ -77,7 +81,7 @@ class Expansion:
         named = head
         while isinstance(named, Deriv):
             named = named.function
-        if named in path or len(path) > DEEPEST:
+        if path.count(named) >= self.rounds or len(path) > DEEPEST:
             return call
         function = known_function(head, self.resolve, self.derive)
         if function is None:

@@ -16,13 +16,13 @@ from potto.core.terms import (
     bound_names,
     branch,
     children,
-    integral,
     mul,
     neg,
     postorder,
     postorder_by,
     replaced,
     transform,
+    with_integrand,
 )
 from potto.primitives import PRIMITIVES
 
@@ -38,7 +38,7 @@ def cased(term: Integral) -> Integral:
     def change(node: Term, new: Term) -> Term:
         return _apart(new, MOST) if isinstance(node, Branch) and _changes(node) else new
 
-    return integral(term.variables, term.bounds, transform(term.body, change), term.hints)
+    return with_integrand(term, transform(term.body, change))
 
 
 def resolved(term: Term) -> Term:
@@ -62,8 +62,9 @@ def unnested(term: Integral) -> Integral:
 
 
 def _by_factors(term: Integral) -> Integral:
-    body = transform(term.body, lambda _, new: _split(new, MOST) if isinstance(new, Branch) else new)
-    return integral(term.variables, term.bounds, body, term.hints)
+    return with_integrand(
+        term, transform(term.body, lambda _, new: _split(new, MOST) if isinstance(new, Branch) else new)
+    )
 
 
 def _split(node: Term, most: int) -> Term:

@@ -16,12 +16,12 @@ from typing import Literal
 from potto.calculus.algebra.ranges import nonnegative
 from potto.calculus.decomposition.critical import Critical
 from potto.calculus.inlining.currying import arguments_of, groups_of, sizes_of, uncurry
+from potto.calculus.inlining.expand import expanded
 from potto.calculus.surfaces.nested_brackets import BINDERS, pieces
 from potto.calculus.surfaces.trace import CallSite, Part, Side, layout, spine
 from potto.core.terms import (
     App,
     Const,
-    Delta,
     Deriv,
     If,
     Integral,
@@ -31,17 +31,17 @@ from potto.core.terms import (
     Sum,
     Term,
     Tuple,
+    Var,
     const,
     outside,
     postorder,
     proj,
     substitute,
-    transform,
 )  # fmt: skip
 from potto.primitives import PRIMITIVES
 
 DEEPEST = 2000
-_DEEPEST_SURFACE = 12
+ROUNDS = 12  # of a recursion that are carried out in a surface
 
 Kind = Literal["jump", "kink", "edge", "center", "critical"]
 # Where a part of the program gets its functions from: a Lam for the head of a call, or None if it is not known here.
@@ -58,15 +58,12 @@ class Finding:
         center, around which a smooth term may be concentrated (x - m in exp(-(x - m)^2), u in 1/(1 + exp(u))), or a
         critical place of an integral: of `surface` and others, somewhere inside.
     path: for a jump, the sites of the trace that lead to the branch.
-    calls: the calls on that path, for messages.
     """
 
     kind: Kind
     surface: Term
     path: tuple[int, ...] = ()
     strict: bool = False
-    coordinates: tuple[Term, ...] = ()
-    calls: tuple[App, ...] = ()
     critical: Critical | None = None
 
 
@@ -92,7 +89,7 @@ def underlying(head: Term, resolve: Resolve) -> tuple[Lam | None, int]:
 
 def findings(term: Term, resolve: Resolve, decide: Decide = undecided) -> tuple[Finding, ...]:
     """All surfaces of a term, jumps with the trace that forces them. Raises TooDeep."""
-    searched = _Search(resolve, decide).term(term, {}, (), (), 0)
+    searched = _Search(resolve, decide).term(term, {}, (), 0)
     found = tuple(_carried_out(f, resolve) for f in searched)
     ends = {end: None for f in found if f.kind == "jump" for end in _ends_of_domain(f.surface)}
     return (*found, *(Finding("kink", end) for end in ends))
@@ -114,30 +111,19 @@ def _ends_of_domain(surface: Term) -> Iterator[Term]:
 def _carried_out(f: Finding, resolve: Resolve) -> Finding:
     critical = f.critical
     if critical is not None:
-        critical = critical.mapped(lambda equation: carried_out(equation, resolve))
-    return replace(f, surface=carried_out(f.surface, resolve), critical=critical)
+        critical = critical.mapped(lambda equation: carried_out(equation, resolve, ROUNDS))
+    return replace(f, surface=carried_out(f.surface, resolve, ROUNDS), critical=critical)
 
 
-def carried_out(surface: Term, resolve: Resolve, depth: int = 0) -> Term:
-    """A surface with the calls in it replaced by what they give, as far as `resolve` knows: then it can be solved.
-
-    A recursion stays a call after a few rounds.
-    """
-    if depth > _DEEPEST_SURFACE or not any(isinstance(node, App) for node in postorder(surface)):
-        return surface
-    return transform(surface, lambda _, new: _result(new, resolve, depth) if isinstance(new, App) else new)
-
-
-def _result(call: App, resolve: Resolve, depth: int) -> Term:
-    head, groups = spine(call)
-    function = head if isinstance(head, Lam) else None if isinstance(head, Deriv) else resolve(head)
-    if not isinstance(function, Lam):
-        return call
-    params, body = uncurry(function, sizes_of(groups))
-    args = arguments_of(function, groups)
-    if len(args) != len(params):
-        return call
-    return carried_out(substitute(body, dict(zip(params, args, strict=True))), resolve, depth + 1)
+def carried_out(term: Term, resolve: Resolve, rounds: int = 1) -> Term:
+    """A term with the calls in it replaced by what they give, as far as `resolve` knows, also of functions that are
+    parameters: then it can be solved. A recursion stays a call after some rounds."""
+    nodes = postorder(term)
+    if not any(isinstance(node, App) for node in nodes):
+        return term
+    known = {node.name: resolve(node) for node in nodes if isinstance(node, Var)}
+    passed: dict[str, Term] = {name: function for name, function in known.items() if isinstance(function, Lam)}
+    return expanded(substitute(term, passed), resolve, rounds=rounds)
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,9 +131,7 @@ class _Search:
     resolve: Resolve
     decide: Decide
 
-    def term(
-        self, term: Term, mapping: dict[str, Term], path: tuple[int, ...], calls: tuple[App, ...], depth: int
-    ) -> Iterator[Finding]:
+    def term(self, term: Term, mapping: dict[str, Term], path: tuple[int, ...], depth: int) -> Iterator[Finding]:
         if depth > DEEPEST:
             raise TooDeep
         shape = layout(term)
@@ -160,12 +144,11 @@ class _Search:
             here = (*path, number)
             match site:
                 case Side(branch=branch):
-                    coordinates = tuple(substitute(c, mapping) for c in branch.coordinates)
-                    yield Finding("jump", coordinates[0], here, branch.strict, coordinates, calls)
+                    yield Finding("jump", substitute(branch.surface, mapping), here, branch.strict)
                 case Part():
-                    yield from self.part(site, mapping, here, calls, depth)
+                    yield from self.part(site, mapping, here, depth)
                 case CallSite():
-                    yield from self.call(site, mapping, here, calls, depth)
+                    yield from self.call(site, mapping, here, depth)
 
     def builtin(self, node: Prim, mapping: dict[str, Term]) -> Iterator[Finding]:
         entry = PRIMITIVES[node.op]
@@ -183,11 +166,7 @@ class _Search:
 
     def pieces(self, surface: Term, mapping: dict[str, Term]) -> Iterator[Term]:
         """What a surface is on either side of the conditions inside of it, also of those that calls lead to."""
-        surface = substitute(surface, mapping)
-        if any(isinstance(part, App) for part in postorder(surface)):
-            from potto.calculus.inlining.expand import expanded
-
-            surface = expanded(surface, self.resolve)
+        surface = carried_out(substitute(surface, mapping), self.resolve)
         return (piece for piece in pieces(surface) if piece.free)
 
     def nested(self, node: Integral, mapping: dict[str, Term]) -> Iterator[Finding]:
@@ -197,9 +176,7 @@ class _Search:
         assert isinstance(inner, Integral)
         yield from outer_findings(inner, self.resolve, self.decide)
 
-    def part(
-        self, site: Part, mapping: dict[str, Term], path: tuple[int, ...], calls: tuple[App, ...], depth: int
-    ) -> Iterator[Finding]:
+    def part(self, site: Part, mapping: dict[str, Term], path: tuple[int, ...], depth: int) -> Iterator[Finding]:
         owner = site.owner
         if isinstance(owner, If):
             outcome = self.decide(substitute(owner.condition, mapping))
@@ -211,13 +188,11 @@ class _Search:
                 return
             for number in range(int(lo), int(hi) + 1):
                 inner = {**mapping, owner.variable: const(number)}
-                yield from self.term(owner.body, inner, (*path, number - int(lo)), calls, depth + 1)
+                yield from self.term(owner.body, inner, (*path, number - int(lo)), depth + 1)
             return
-        yield from self.term(site.body.body, mapping, path, calls, depth + 1)
+        yield from self.term(site.body.body, mapping, path, depth + 1)
 
-    def call(
-        self, site: CallSite, mapping: dict[str, Term], path: tuple[int, ...], calls: tuple[App, ...], depth: int
-    ) -> Iterator[Finding]:
+    def call(self, site: CallSite, mapping: dict[str, Term], path: tuple[int, ...], depth: int) -> Iterator[Finding]:
         found = self.called(substitute(site.head, mapping))
         if found is None:
             return
@@ -229,7 +204,7 @@ class _Search:
             return
         for _ in range(order):
             args = tuple(map(_primal, args))
-        yield from self.term(body, dict(zip(params, args, strict=True)), path, (*calls, site.call), depth + 1)
+        yield from self.term(body, dict(zip(params, args, strict=True)), path, depth + 1)
 
     def called(self, head: Term) -> tuple[Lam, tuple[tuple[Term, ...], ...], int] | None:
         """What stands at the head of a call: the function, what it was given before, how many derivatives are taken.
@@ -293,28 +268,3 @@ def _primal(arg: Term) -> Term:
     if isinstance(arg, (Lam, Const)):
         return arg
     return proj(arg, 0) if isinstance(arg, (Proj, App)) else arg
-
-
-@dataclass(frozen=True, slots=True)
-class Condition:
-    """A branch or a delta under an integral: the integral, the coordinates as its variables see them, the calls."""
-
-    integral: Integral
-    coordinates: tuple[Term, ...]
-    strict: bool
-    calls: tuple[App, ...]
-
-
-def conditions(term: Term, resolve: Resolve) -> tuple[Condition, ...]:
-    """The diffeomorphisms under each integral of a term (deltas too), through the calls that `resolve` knows."""
-    out: list[Condition] = []
-    for node in postorder(term):
-        if not isinstance(node, Integral):
-            continue
-        for found in findings(node.body, resolve):
-            if found.kind == "jump" and found.surface.free & set(node.variables):
-                out.append(Condition(node, found.coordinates, found.strict, found.calls))
-        for inner in postorder(node.body):
-            if isinstance(inner, Delta) and inner.free & set(node.variables):
-                out.append(Condition(node, inner.coordinates, False, ()))
-    return tuple(out)

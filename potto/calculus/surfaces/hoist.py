@@ -10,25 +10,22 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from potto.calculus.inlining.expand import expanded
-from potto.calculus.surfaces.discontinuities import Finding, Resolve, findings
+from potto.calculus.surfaces.discontinuities import Finding, Resolve, carried_out, findings
 from potto.core.terms import (
-    App,
     Branch,
     Integral,
     Prim,
     Sum,
     Term,
-    Var,
     add,
     bound_names,
     branch,
     integral,
     neg,
     postorder,
-    substitute,
     sum_,
     transform,
+    with_integrand,
 )
 
 MOST = 6  # branches taken out of one integral: each doubles the integrals that there are
@@ -49,9 +46,8 @@ def hoisted(term: Integral, resolve: Resolve) -> Integral:
     """
     term = _split_at_bounds(term, resolve)
     body = _taken_out(term.body)
-    if any(isinstance(node, App) for node in postorder(body)):
-        body = _taken_out(_carried_out(body, resolve))
-    return integral(term.variables, term.bounds, body, term.hints)
+    known = carried_out(body, resolve)
+    return with_integrand(term, body if known is body else _taken_out(known))
 
 
 def _split_at_bounds(term: Integral, resolve: Resolve) -> Integral:
@@ -72,18 +68,6 @@ def jumps_in(bound: Term, variables: Iterable[str], resolve: Resolve) -> bool:
     return any(f.kind == "jump" and f.surface.free & names for f in findings(bound, resolve))
 
 
-def _carried_out(body: Term, resolve: Resolve) -> Term:
-    """The calls of functions that are known, in place of each its value."""
-    passed: dict[str, Term] = {}
-    for node in postorder(body):
-        if isinstance(node, Var):
-            known = resolve(node)
-            if known is not None:
-                passed[node.name] = known
-
-    return expanded(substitute(body, passed), resolve)
-
-
 def _taken_out(body: Term) -> Term:
     return transform(body, lambda _, new: _outside(new) if isinstance(new, Integral) else new)
 
@@ -94,21 +78,17 @@ def _outside(term: Integral) -> Term:
         return term
     body, inside = term.body, _names(term)
     if isinstance(body, Sum) and body.variable not in term.free and not inside & (body.lo.free | body.hi.free):
-        return sum_(body.variable, body.lo, body.hi, _outside(_over(term, body.body)))
+        return sum_(body.variable, body.lo, body.hi, _outside(with_integrand(term, body.body)))
     found = [
         node
         for node in reversed(postorder(term))
         if isinstance(node, Branch) and node.surface.free and not inside & node.surface.free
     ]
     if found and isinstance(body, Prim) and body.op == "add":
-        return add(*(_outside(_over(term, arg)) for arg in body.args))
+        return add(*(_outside(with_integrand(term, arg)) for arg in body.args))
     if found and isinstance(body, Prim) and body.op == "neg":
-        return neg(_outside(_over(term, body.args[0])))
+        return neg(_outside(with_integrand(term, body.args[0])))
     return _chosen(term, found[:MOST])
-
-
-def _over(term: Integral, body: Term) -> Integral:
-    return integral(term.variables, term.bounds, body, term.hints)
 
 
 def _names(term: Term) -> set[str]:
@@ -140,5 +120,3 @@ def _with(term: Term, decided: Branch, side: bool) -> Term:
         return new
 
     return transform(term, change)
-
-

@@ -30,11 +30,11 @@ from potto.core.terms import (
     branch,
     children,
     const,
-    integral,
     outside,
     postorder_by,
     proj,
     rebuild,
+    with_integrand,
 )
 
 MOST_CASES = 400  # decisions of one tree; what is beyond it is not taken apart
@@ -88,7 +88,7 @@ def _of_integral(
         trees = _Trees(body, forms, region)
         body = trees.apart(body)
         premises |= dict.fromkeys((*ordered, *trees.premises))
-    return integral(term.variables, term.bounds, body, term.hints)
+    return with_integrand(term, body)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from potto.calculus.differentiation.deltas import PRODUCT_OF_DELTAS
-from potto.calculus.differentiation.tangents import Shape
 from potto.calculus.inlining.currying import sizes_of, uncurry
 from potto.calculus.surfaces.branch_cuts import opened
 from potto.core.terms import Branch, Deriv, Global, Hole, If, Integral, Lam, Sum, Term, function_of, lam, postorder
@@ -76,7 +75,7 @@ class Linker:
         self.exactness: dict[Term, bool] = {}
         self.reach = Reach(lambda name: self.term(name.module, name.name))
         self.alike: dict[Any, Any] = {}
-        self.placed: dict[tuple[Integral, tuple[Shape, ...], bool], Term] = {}
+        self.placed: dict[tuple[Integral, bool], Integral] = {}
         self.constants: dict[tuple[str, str, Settings], Value] = {}
         self.duals: dict[tuple[Lam, bool], Lam] = {}
         self.reaches: dict[tuple[Term, ...], tuple[tuple[str, str, bytes], ...]] = {}

@@ -22,11 +22,11 @@ from potto.kernels import errors
 from potto.kernels.cells import Cell, Ints, Value, all_arrays, map_arrays, pad
 from potto.kernels.making import making
 from potto.runtime.answers.convergence import allowance, widest
-from potto.runtime.evaluation.directional import stepped
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.integration.members import Whole
-from potto.runtime.integration.preparation import filled, held, placed, prepared, shape_of
+from potto.runtime.integration.preparation import filled, held, placed, prepared
 from potto.runtime.integration.problem import Mixed, Problem, linked
+from potto.runtime.integration.rims import note_rims
 from potto.runtime.integration.solving import solve
 
 
@@ -34,15 +34,12 @@ def integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
     """The value of an integral in an environment whose numbers may be batches of any shape: made ready, and solved."""
     linker = machine.linker
     term, env = filled(term, env, linker.reach)
-    names = term.free
-    key = (term, tuple([shape_of(env[name]) for name in names]), machine.directions > 0)
+    derived = linker.reach.deltas(term.body)
+    key = (term, machine.directions > 0)
     known = linker.placed.get(key)
     if known is None:
-        shapes = dict(zip(names, key[1]))
         with making:
-            known = linker.placed[key] = placed(term, linker.reach, shapes.get, machine.directions > 0)
-    if not isinstance(known, Integral):
-        return stepped(machine, known, {n: env[n] for n in known.free})
+            known = linker.placed[key] = placed(term, linker.reach, machine.directions > 0)
     term = known
     if machine.frozen:
         term, stopped = held(term)
@@ -50,6 +47,8 @@ def integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
     with making:
         ready = prepared(term, linker.reach)
     if ready is not term:
+        if derived and not machine.directions:
+            note_rims(machine, term, env)
         return machine.evaluate(function_of(ready), {n: env[n] for n in ready.free}, None)
     return integrate(machine, term, env)
 

@@ -11,13 +11,10 @@ from collections.abc import Callable
 from functools import lru_cache
 
 from potto.calculus.decomposition.joined import joined
-from potto.calculus.differentiation.boundary_terms import total
 from potto.calculus.differentiation.deltas import without_deltas
-from potto.calculus.differentiation.derivative import NotSmooth, zero_like
-from potto.calculus.differentiation.directional import shifted
+from potto.calculus.differentiation.derivative import NotSmooth, total, zero_like
 from potto.calculus.differentiation.dual import Differentiator
 from potto.calculus.differentiation.level_sets import level_set, placed_along, spread
-from potto.calculus.differentiation.tangents import FUNCTION, NotShifted, Shape, Shapes
 from potto.calculus.inlining.expand import expanded
 from potto.calculus.solving.pivots import NoClosedForm
 from potto.calculus.surfaces.lifted import closed_value, lifted
@@ -37,16 +34,16 @@ from potto.core.terms import (
     add,
     children,
     deriv,
-    integral,
     postorder,
     rebuild,
     substitute,
     sum_,
     var,
+    with_integrand,
 )
 from potto.diagnostics import PottoError, declare
 from potto.kernels import errors
-from potto.kernels.cells import Cell, Value
+from potto.kernels.cells import Value
 from potto.runtime.evaluation.functions import Closure, Derivative
 from potto.runtime.evaluation.reach import Reach
 
@@ -72,12 +69,12 @@ def prepared(term: Integral, reach: Reach) -> Term:
         return term
     body = term.body
     if isinstance(body, Sum) and not (body.lo.free | body.hi.free) & set(term.variables):
-        return sum_(body.variable, body.lo, body.hi, _over(term, body.body))
+        return sum_(body.variable, body.lo, body.hi, with_integrand(term, body.body))
     if isinstance(body, Prim) and body.op in ("neg", "mul", "div"):
         varying = [arg for arg in body.args if arg.free.intersection(term.variables)]
         if len(varying) != 1 or (body.op == "div" and varying[0] is not body.args[0]):
             return term
-        inner = _over(term, varying[0])
+        inner = with_integrand(term, varying[0])
         ready = prepared(inner, reach)
         return term if ready is inner else rebuild(body, tuple(ready if a in varying else a for a in body.args))
     if isinstance(body, Prim) and body.op == "add":
@@ -94,31 +91,30 @@ def _spread(term: Term) -> Term:
     return total(spread(term, known), zero_like(term.body))
 
 
-def placed(term: Integral, reach: Reach, shapes: Shapes, again: bool) -> Term:
+def placed(term: Integral, reach: Reach, again: bool) -> Integral:
     """The integral with the calls of definitions that place its deltas carried out: `delta(cond (x, y) c)`. Of a
     derivative under it, of a function that jumps, the deltas count (`_counted`).
 
-    shapes: how the values of free variables are built. again: whether it is to be differentiated.
+    again: whether it is to be differentiated.
     Integrals inside that can be joined with it are. Raises PottoError.
     """
     term = _opened(joined(term, reach.resolve), reach)
-    counted = _counted(term, reach, shapes, again)
-    if not isinstance(counted, Integral):
-        return counted
-    term = counted
+    term = _counted(term, reach, again)
     if not any(isinstance(n, Delta) and any(isinstance(g, Global | App) for g in postorder(*n.coordinates))
                for n in postorder(term)):  # fmt: skip
         return term
     return _with_deltas(term, lambda delta: expanded(delta, reach.resolve))
 
 
-def _with_deltas(term: Integral, change: Callable[[Delta], Term]) -> Term:
+def _with_deltas(term: Integral, change: Callable[[Delta], Term]) -> Integral:
     """The integral with its deltas changed, those further in first."""
     memo: dict[Term, Term] = {}
     for node in postorder(term):
         new = rebuild(node, tuple(memo[child] for child in children(node)))
         memo[node] = change(new) if isinstance(new, Delta) else new
-    return memo[term]
+    found = memo[term]
+    assert isinstance(found, Integral)
+    return found
 
 
 def _opened(term: Integral, reach: Reach) -> Integral:
@@ -126,7 +122,7 @@ def _opened(term: Integral, reach: Reach) -> Integral:
     calls = [node for node in postorder(term.body) if isinstance(node, App)]
     if not any(reach.spikes(call.function) for call in calls):
         return term
-    return _over(term, expanded(term.body, lambda g: reach.resolve(g) if reach.spikes(g) else None))
+    return with_integrand(term, expanded(term.body, lambda g: reach.resolve(g) if reach.spikes(g) else None))
 
 
 def filled(term: Integral, env: dict[str, Value], reach: Reach) -> tuple[Integral, dict[str, Value]]:
@@ -179,57 +175,33 @@ def _matters(function: Closure, reach: Reach) -> bool:
     return any(_matters(value, reach) for value in primal.captured.values() if isinstance(value, Closure))
 
 
-def shape_of(value: Value) -> Shape:
-    """How a value is built: None is a number, FUNCTION a function, a tuple has the shapes of its items."""
-    if isinstance(value, tuple):
-        return tuple(map(shape_of, value))
-    return None if isinstance(value, Cell) else FUNCTION
-
-
-def _counted(term: Integral, reach: Reach, shapes: Shapes, again: bool) -> Term:
-    """An equal term in which no tangent has a delta that points don't see.
+def _counted(term: Integral, reach: Reach, again: bool) -> Integral:
+    """An equal term in which no tangent has a delta that points don't see: with derivatives carried out.
 
     Kernels carry the tangents of derivatives from point to point, where a delta is nowhere: `D Real[x]` is
-    `(Real[x], Dist[x])` for what jumps. Where every jump has a closed form the deltas are written out; else the
-    integral is itself taken as a derivative (`shifted`), by numbers. For one that is to be differentiated once more
-    closed forms go first.
+    `(Real[x], Dist[x])` for what jumps. If that brings no deltas over variables of integration, the term is as it was,
+    unless it is to be differentiated `again`: it shows where the tangents jump. Raises PottoError.
     """
     if not reach.deltas(term.body):
         return term
-    by_numbers = Integral in reach.derived(term.body)
-    if again or not by_numbers:
-        spelled = _with_spikes(term, reach, again)
-        if spelled is not None:
-            return spelled
-    try:
-        found = shifted(term, reach.resolve, reach.deltas, shapes)
-    except NotShifted as problem:
-        if by_numbers and not again:
-            spelled = _with_spikes(term, reach, False)
-            if spelled is not None:
-                return spelled
-        raise PottoError([NOT_COUNTED(
-            errors.NOWHERE, f"the deltas of a derivative under this integral were not found: {problem}",
-            help="differentiate the integral as a whole",
-        )]) from None  # fmt: skip
-    return term if found is None else found
-
-
-def _with_spikes(term: Integral, reach: Reach, anyway: bool) -> Integral | None:
-    """The integrand with derivatives carried out; as it was if that brings no deltas over variables of integration,
-    unless that is wanted `anyway`: it shows where the tangents jump. None where some derivative has no closed form, or
-    is of what is not known."""
     try:
         body = Differentiator(reach.resolve).carried_out(term.body)
-    except (NoClosedForm, NotSmooth, PottoError):
-        return None
+    except (NoClosedForm, NotSmooth) as problem:
+        raise _not_found(str(problem)) from None
     variables = frozenset(term.variables)
-    calls = (node for node in postorder(body) if isinstance(node, App) and node.free & variables)
+    calls = [node for node in postorder(body) if isinstance(node, App) and node.free & variables]
     if any(reach.deltas(call.function) for call in calls):
-        return None
+        raise _not_found("what is derived is out of sight")
     before = {node for node in postorder(term.body) if isinstance(node, Delta)}
     found = any(isinstance(n, Delta) and n not in before and n.coordinates[0].free & variables for n in postorder(body))
-    return _over(term, body) if found or anyway else term
+    return with_integrand(term, body) if found or again else term
+
+
+def _not_found(reason: str) -> PottoError:
+    return PottoError([NOT_COUNTED(
+        errors.NOWHERE, f"the deltas of a derivative under this integral were not found: {reason}",
+        help="differentiate the integral as a whole",
+    )])  # fmt: skip
 
 
 @lru_cache(maxsize=1024)
@@ -247,10 +219,6 @@ def held(term: Integral) -> tuple[Integral, tuple[tuple[str, str], ...]]:
     return result, tuple((name, f"{name}@still") for name in names)
 
 
-def _over(term: Integral, body: Term) -> Integral:
-    return integral(term.variables, term.bounds, body, term.hints)
-
-
 def _apart(term: Integral, body: Prim, reach: Reach) -> Term:
     """Summands with surfaces of their own integrated by themselves, the others together."""
     counts = [_branches(arg, frozenset(term.variables), reach) for arg in body.args]
@@ -260,8 +228,8 @@ def _apart(term: Integral, body: Prim, reach: Reach) -> Term:
     rest = [arg for arg, count in zip(body.args, counts, strict=True) if count or isinstance(arg, Sum)]
     if len(rest) + bool(smooth) < 2:
         return term
-    parts: list[Term] = [_over(term, add(*smooth))] if smooth else []
-    return add(*parts, *(_over(term, arg) for arg in rest))
+    parts: list[Term] = [with_integrand(term, add(*smooth))] if smooth else []
+    return add(*parts, *(with_integrand(term, arg) for arg in rest))
 
 
 def _branches(term: Term, variables: frozenset[str], reach: Reach) -> int:

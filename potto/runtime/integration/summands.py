@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from potto.calculus.differentiation.tangents import FUNCTION
 from potto.calculus.inlining.alike import Alike, Leaf, alike
 from potto.core.terms import Const, Integral, Lam, Term, Var
 from potto.diagnostics import PottoError
@@ -23,11 +22,13 @@ from potto.kernels.whole import ROUNDING, UNIT_ROUNDOFF
 from potto.runtime.answers.convergence import widest
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.sums import CHUNK
-from potto.runtime.integration.preparation import shape_of
 
 Slots = tuple[int, ...]  # the directions in which a member moves
 SAMPLED = ("mc", "qmc")  # methods whose errors are no less for one summand than for many
 SUM = 8 * UNIT_ROUNDOFF  # what numpy's pairwise sums round off, as a part of all magnitudes, as in `sums`
+
+
+FUNCTION = "function"
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ def _single(machine: Machine, term: Term, env: dict[str, Value]) -> Value:
 
 def _grouped(machine: Machine, terms: tuple[Term, ...], env: dict[str, Value]) -> Grouped:
     """The summands by what is alike of them, for values built as these are; found once."""
-    kinds = tuple((name, shape_of(value)) for name, value in env.items())
+    kinds = tuple((name, _shape(value)) for name, value in env.items())
     known = machine.linker.alike.get((terms, kinds))
     if known is None:
         numbers = {name: shape for name, shape in kinds if FUNCTION not in _flat(shape)}
@@ -79,6 +80,13 @@ def _grouped(machine: Machine, terms: tuple[Term, ...], env: dict[str, Value]) -
         batches = tuple((_batch(group), frozenset().union(*(terms[p].free for p in group.places))) for group in groups)
         known = machine.linker.alike[terms, kinds] = Grouped(batches, tuple(alone))
     return known
+
+
+def _shape(value: Value) -> object:
+    """How a value is built: None is a number, FUNCTION a function, a tuple has the shapes of its items."""
+    if isinstance(value, tuple):
+        return tuple(map(_shape, value))
+    return None if isinstance(value, Cell) else FUNCTION
 
 
 def _flat(shape: object) -> tuple[object, ...]:
