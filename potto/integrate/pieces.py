@@ -12,6 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from potto.core.terms import Lam
+from potto.integrate.columns import Columns, joined
 from potto.integrate.costs import Costs
 from potto.integrate.events import Event, Events, Members
 from potto.integrate.rules import substitution
@@ -55,7 +56,7 @@ class Evaluator(Protocol):
 
 
 @dataclass
-class Sums:
+class Sums(Columns):
     """Integrals of a batch: value (m, B) and tangents (m, k, B) with their error bounds; m components.
 
     gross: (2, B) the most that is added up for each without regard to sign, for values and for tangents; None where
@@ -70,11 +71,34 @@ class Sums:
     gross: Array | None = field(default=None, kw_only=True)
     common: Array | None = field(default=None, kw_only=True)
 
-    def pick(self, index: Any) -> Sums:
-        """Some members of the batch."""
-        gross, common = (None if x is None else x[..., index] for x in (self.gross, self.common))
-        v, e, t, et = (x[..., index] for x in (self.v, self.e, self.t, self.et))
-        return Sums(v, e, t, et, gross=gross, common=common)
+    @staticmethod
+    def zeros(m: int, k: int, batch: int) -> Sums:
+        """Integrals over nothing."""
+        v, e = np.zeros((2, m, batch))
+        t, et = np.zeros((2, m, k, batch))
+        return Sums(v, e, t, et, gross=np.zeros((2, batch)))
+
+    def channels(self) -> tuple[Array, Array]:
+        """Values, then tangents, (m, 1 + k, B), and their errors."""
+        v, e = self.v[:, None], self.e[:, None]
+        return np.concatenate((v, self.t), axis=1), np.concatenate((e, self.et), axis=1)
+
+    def widened(self, m: int) -> Sums:
+        """The same of m components: sums over nothing at all don't know how many there are."""
+        missing = m - self.v.shape[0]
+        if missing <= 0:
+            return self
+        parts = (np.concatenate([x] + [x[:1]] * missing) for x in (self.v, self.e, self.t, self.et))
+        return Sums(*parts, gross=self.gross)
+
+    def lose(self, members: Any) -> None:
+        """Some of the integrals have no value."""
+        self.v[:, members] = self.t[:, :, members] = np.nan
+        self.unknown(members)
+
+    def unknown(self, members: Any) -> None:
+        """Nothing is known of how far off some of the integrals are."""
+        self.e[:, members] = self.et[:, :, members] = np.inf
 
     def cells(self, shape: tuple[int, ...]) -> list[Cell]:
         """The components as numbers over a batch of this shape."""
@@ -89,14 +113,7 @@ class Sums:
     def joined(parts: Sequence[Sums]) -> Sums:
         """Batches one after the other; one component may stand for all, where nothing is integrated."""
         m = max(part.v.shape[0] for part in parts)
-
-        def rows(name: str) -> Array:
-            found = (getattr(part, name) for part in parts)
-            return np.concatenate([np.broadcast_to(x, (m, *x.shape[1:])) for x in found], axis=-1)
-
-        gross = [part.gross for part in parts if part.gross is not None]
-        known = np.concatenate(gross, axis=-1) if len(gross) == len(parts) else None
-        return Sums(rows("v"), rows("e"), rows("t"), rows("et"), gross=known)
+        return joined([part.widened(m) for part in parts])
 
 
 @dataclass(frozen=True)
@@ -116,7 +133,7 @@ class Crossing:
 
 
 @dataclass
-class Pieces:
+class Pieces(Columns):
     """Pieces of segments under refinement, and what is known of each: integrals and errors per channel (C, P).
 
     lean: -p or p where a singularity sits at the left or right end, and powers of p would grade it.
@@ -171,15 +188,10 @@ class Pieces:
             getattr(self, name)[:, at] = getattr(again, name)
 
     def pick(self, index: Any) -> Pieces:
-        self.settled()
-        return Pieces(self.segment[index], self.u0[index], self.u1[index], self.end[index],
-                      self.integral[:, index], self.error[:, index], self.floor[:, index],
-                      self.size[:, index], self.most[:, index],
-                      self.ends[:, index], self.tail[:, index], self.lean[index],
-                      self.excess[index], self.stuck[index])  # fmt: skip
+        return Columns.pick(self.settled(), index)
 
     def join(self, other: Pieces) -> Pieces:
-        return joined([self, other])
+        return all_of([self, other])
 
 
 def _power(heights: Array, lean: Ints, end: Ints) -> Ints:
@@ -196,15 +208,8 @@ def _power(heights: Array, lean: Ints, end: Ints) -> Ints:
     return np.where(steep, np.rint(wanted), substitution.GRADE).astype(np.int64)
 
 
-def joined(parts: list[Pieces]) -> Pieces:
-    """Pieces put together; one copy for any number of parts."""
-    if len(parts) == 1:
-        return parts[0]
-    parts = [p.settled() for p in parts]
-    names = ("segment", "u0", "u1", "end", "integral", "error", "floor", "size", "most", "ends", "tail", "lean",
-             "excess", "stuck")  # fmt: skip
-    axes = (0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0)
-    return Pieces(*(np.concatenate([getattr(p, n) for p in parts], axis=a) for n, a in zip(names, axes, strict=True)))
+def all_of(parts: list[Pieces]) -> Pieces:
+    return parts[0] if len(parts) == 1 else joined([part.settled() for part in parts])
 
 
 @dataclass(frozen=True)
@@ -257,28 +262,16 @@ def take(mask: Mask, index: Ints) -> Mask:
     return mask[index] if isinstance(mask, np.ndarray) else mask
 
 
-def spread(
-    value: Value, shape: tuple[int, ...], k: int, moving: bool
-) -> tuple[Array, Any, Any, Array | None, Array | None]:
-    """The parts of an integrand's value as full arrays, components first."""
+def dense(value: Value, k: int, shape: tuple[int, ...]) -> tuple[Array, Array | None]:
+    """The value of an integrand and k tangents as one array (m, 1 + k, *shape); how far off they are, None for 0."""
     cells = components(value)
-    m = len(cells)
-    f = np.empty((m, *shape))
-    fx = np.zeros((m, *shape)) if moving else None
-    ft = np.zeros((m, k, *shape)) if k else None
-    inexact = any(c.e is not None for c in cells)
-    e = np.zeros((m, *shape)) if inexact else None
-    et = np.zeros((m, k + 1, *shape)) if inexact and k else None
-    for i, c in enumerate(cells):
-        f[i] = c.v
-        if fx is not None and c.t and c.t[k] is not None:
-            fx[i] = c.t[k]
-        if e is not None and c.e is not None:
-            e[i] = c.e
-        for d, t in enumerate(c.t[:k]):
-            if ft is not None and t is not None:
-                ft[i, d] = t
-        for d, bound in enumerate(c.et[: k + 1]):
-            if et is not None and bound is not None:
-                et[i, d] = bound
-    return f, fx, ft, e, et
+    numbers = np.zeros((len(cells), 1 + k, *shape))
+    inexact = any(cell.e is not None or any(et is not None for et in cell.et) for cell in cells)
+    errors = np.zeros(numbers.shape) if inexact else None
+    for i, cell in enumerate(cells):
+        for row, (x, e) in enumerate(zip((cell.v, *cell.t[:k]), (cell.e, *cell.et[:k]), strict=True)):
+            if x is not None:
+                numbers[i, row] = x
+            if e is not None and errors is not None:
+                errors[i, row] = e
+    return numbers, errors

@@ -117,12 +117,13 @@ def _without_end(work: PanelBatch, index: Ints, high: bool) -> list[Array]:
     least = np.maximum(STEPS_OFF * EPS * np.abs(end), LEAST * reach)
     x = end + (-1 if high else 1) * NEAREST * reach * (least / (NEAREST * reach)) ** np.linspace(0, 1, LOOKS)
     u = np.abs(x - end)
-    f, fx, ft, *_ = work.integrand(index, x)
+    numbers, _, _ = work.integrand(index, x)
     label = 1 - u / reach if high else u / reach
     signs = []
     for d in range(work.k):
         v, dv = substitution.velocity(seg, label, d)
-        forms = [ft[:, d]] if fx is None else [ft[:, d], ft[:, d] + fx * v + f * dv]
+        fixed = numbers[:, 1 + d]
+        forms = [fixed, fixed + numbers[:, 1 + work.k] * v + numbers[:, 0] * dv] if work.moving else [fixed]
         with np.errstate(all="ignore"):
             power = [np.log(np.abs(g[..., 1:] / g[..., :-1])) / np.log(u[:, :-1] / u[:, 1:]) for g in forms]
             off = POWER + 4 * EPS * np.abs(end) / u[:, 1:]

@@ -29,7 +29,7 @@ from potto.integrate.events import UNSEEN_MEETING, sides_hidden
 from potto.integrate.levels import LevelPlan
 from potto.integrate.panels.magnitude import Extent
 from potto.integrate.panels.panel_batch import PanelBatch
-from potto.integrate.pieces import Evaluator, Sums, components, take
+from potto.integrate.pieces import Evaluator, Sums, dense, take
 from potto.integrate.plan import Plan
 from potto.integrate.rules.substitution import Segments
 from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value
@@ -107,7 +107,7 @@ class Iteration:
             count_narrow(scene, seg, settled.sides, settled.doubtful, sums)
         if settled.unsure is not None and not number:  # single nodes of variables further out may lie on a surface
             machine.note(sides_hidden(level.variable), work.below(settled.unsure))
-            sums.e[:, settled.unsure] = sums.et[:, :, settled.unsure] = np.inf
+            sums.unknown(settled.unsure)
         if cuts.lost is not None:
             sums.e += cuts.lost
             sums.et += cuts.lost
@@ -115,8 +115,7 @@ class Iteration:
         sums.t *= cuts.sign
         for gone in (cuts.bound_nan, lost):
             if gone is not None:
-                sums.v[:, gone] = sums.t[:, :, gone] = np.nan
-                sums.e[:, gone] = sums.et[:, :, gone] = np.inf
+                sums.lose(gone)
         return sums
 
     def count_events(self, scene: Scene, cuts: Cuts, sums: Sums) -> None:
@@ -264,10 +263,5 @@ class Iteration:
             sums = self.run(number + 1, env, batch, sides, machine, root)
             return sums.v, sums.e
         machine.count(batch)
-        value = self.body(env, sides, machine.tracking())
-        cells = components(value)
-        values, errors = np.empty((len(cells), batch)), np.zeros((len(cells), batch))
-        for i, cell in enumerate(cells):
-            values[i] = cell.v
-            errors[i] = 0.0 if cell.e is None else cell.e
-        return values, errors
+        numbers, errors = dense(self.body(env, sides, machine.tracking()), 0, (batch,))
+        return numbers[:, 0], np.zeros((numbers.shape[0], batch)) if errors is None else errors[:, 0]

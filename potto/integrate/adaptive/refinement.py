@@ -1,8 +1,9 @@
-"""Which pieces are not accurate enough, and which are as accurate as they can be.
+"""How far off pieces may be, which are not accurate enough, and which are as accurate as they can be.
 
-Owns `too_coarse`, `stragglers`, `missed_peak` and `doubtful`. A piece is refined until its error is a small enough part
-of what it is added to, or until what is left of it is rounding. Estimates see only what the nodes see, so the ends of
-segments and the agreement of two forms of each derivative are looked at besides.
+Owns `Tally`, `filled`, `too_coarse`, `stragglers`, `missed_peak` and `doubtful`. A piece is refined until its error is
+a small enough part of what it is added to, or until what is left of it is rounding. Where an integrand takes up little
+of its range, nodes that hardly count need less accuracy. Estimates see only what the nodes see, so the ends of segments
+and the agreement of two forms of each derivative are looked at besides.
 """
 
 from __future__ import annotations
@@ -11,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from potto.integrate.adaptive.error_budget import Tally
 from potto.integrate.adaptive.reynolds import Totals
 from potto.integrate.events import LATE
+from potto.integrate.panels.iterated import siblings
 from potto.integrate.panels.panel_batch import PanelBatch
 from potto.integrate.pieces import Ends, Pieces
 from potto.integrate.rules import substitution
-from potto.kernels.cells import Array, Bools
+from potto.kernels.cells import Array, Bools, Ints
 
 # How much larger than at the nodes an integrand must be at an end of a segment to be taken for a peak.
 PEAK = 8.0
@@ -30,6 +31,70 @@ STUCK = 0.35
 NOISE = (1e-12, 1e-9)
 # Members that take longer than the others are left to be done by themselves if they are one in so many.
 STRAGGLERS = 16
+LEAST = 1e-6  # the relative accuracy that is asked of every node
+
+
+class Tally:
+    """Running totals per integral, by which tolerances are measured: (m * (1 + k), B), and how many pieces there are.
+
+    gross: what the pieces amount to without regard to sign, which is what rounding is measured by: (B,).
+
+    For the outermost variable the magnitude of the result counts; further in, where results are added up once more,
+    the largest magnitude of what is added up, among all that go into the same answer.
+    """
+
+    def __init__(self, work: PanelBatch, p: Pieces) -> None:
+        self.count: Ints = np.zeros(work.batch, dtype=np.int64)
+        self.gross: Array = np.zeros(work.batch)
+        self.total: Array = np.zeros((work.width * (1 + work.k), work.batch))
+        self.scale: Array | None = None
+        self.add(work, p, 1)
+
+    def add(self, work: PanelBatch, p: Pieces, sign: int) -> None:
+        """Count pieces, or (-1) take them out again."""
+        owner, x = work.seg.owner[p.segment], p.size if work.number else p.integral
+        self.count += sign * np.bincount(owner, minlength=work.batch)
+        self.gross += np.bincount(owner, sign * p.size.max(axis=0), minlength=work.batch)
+        rows = x.reshape(work.width, -1, owner.size)[:, : 1 + work.k].reshape(-1, owner.size)
+        for total, row in zip(self.total, rows, strict=True):
+            total += np.bincount(owner, sign * row, minlength=work.batch)
+        self.scale = None
+
+    def replace(self, work: PanelBatch, old: Pieces, new: Pieces) -> None:
+        self.add(work, old, -1)
+        self.add(work, new, 1)
+
+    def whole(self, work: PanelBatch) -> Array:
+        """The size of the answer that each of these integrals goes into, values and tangents together: (B,)."""
+        largest = np.abs(self.total).max(axis=0)
+        return siblings(largest, work.root) if work.number else largest
+
+    def shares(self, work: PanelBatch, owner: Ints) -> Array:
+        """The error that one piece of each of these integrals may have: (m * (1 + k), P)."""
+        if self.scale is None:
+            scale = np.abs(self.total)
+            if work.number:
+                scale = np.stack([siblings(row, work.root) for row in scale])
+            self.scale = np.maximum(work.machine.atol, work.machine.rtol * scale)
+        shares: Array = self.scale[:, owner] / (2 * self.count[owner])
+        if work.slack is not None:  # what is not resolved at all says nothing of its error
+            most = np.maximum(1.0, LEAST / work.machine.rtol)
+            shares = shares * np.minimum(work.slack[owner], most)
+        return shares
+
+
+def filled(work: PanelBatch, p: Pieces) -> Array:
+    """Which part of its range each integrand of a batch takes up, at the least: its mean over its largest, (B,)."""
+    owner, length = work.seg.owner[p.segment], (work.seg.b - work.seg.a)[p.segment] * (p.u1 - p.u0)
+    reach = np.bincount(owner, length, minlength=work.batch)
+    share = np.ones(work.batch)
+    for row in p.size.reshape(work.width, -1, owner.size)[:, : 1 + work.k].reshape(-1, owner.size):
+        most = np.zeros(work.batch)
+        np.maximum.at(most, owner, row / length)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            part = np.bincount(owner, row, minlength=work.batch) / (most * reach)
+        share = np.where(most > 0, np.fmin(share, np.nan_to_num(part)), share)
+    return share
 
 
 def too_coarse(work: PanelBatch, p: Pieces, ends: Any, tally: Tally) -> Any:

@@ -16,13 +16,12 @@ from typing import Any
 import numpy as np
 
 from potto.integrate.adaptive.divergence import endless, given_up
-from potto.integrate.adaptive.error_budget import Tally, filled
-from potto.integrate.adaptive.refinement import doubtful, missed_peak, stragglers, too_coarse
+from potto.integrate.adaptive.refinement import Tally, doubtful, filled, missed_peak, stragglers, too_coarse
 from potto.integrate.adaptive.reynolds import Totals, sums, totals
 from potto.integrate.degenerate.degeneracies import steps_at_cuts
 from potto.integrate.events import BUDGET_SPENT
 from potto.integrate.panels.panel_batch import PanelBatch
-from potto.integrate.pieces import Ends, Pieces, Sums, joined
+from potto.integrate.pieces import Ends, Pieces, Sums, all_of
 
 MOST_HALVINGS = 64
 # Nodes for pieces that were too coarse: first more of them on the same piece, then on halves.
@@ -37,9 +36,7 @@ LONG = 8  # after how many halvings it is looked for members that take longer th
 def integrated(work: PanelBatch) -> Sums:
     count = work.seg.a.size
     if count == 0:
-        shape = (1, work.batch)
-        t, et = np.zeros((2, 1, work.k, work.batch))
-        return Sums(np.zeros(shape), np.zeros(shape), t, et, gross=np.zeros((2, work.batch)))
+        return Sums.zeros(1, work.k, work.batch)
     zero, one = np.zeros(count), np.ones(count)
     ends = work.ends = work.end_values()
     whole = Pieces(np.arange(count), zero, one, np.zeros(count, dtype=np.int64))
@@ -118,7 +115,7 @@ def refine(work: PanelBatch, fresh: Pieces, ends: Any, tally: Tally) -> Pieces:
         if later.segment.size:
             fresh = fresh.join(later)
     accepted.append(fresh)
-    return joined(accepted)
+    return all_of(accepted)
 
 
 def replaced(work: PanelBatch, old: Pieces, new: Pieces, order: int, tally: Tally) -> Pieces:

@@ -54,7 +54,7 @@ def over_roots(
         _note(over, level.variable, owner, inside & folded, unsure, batch, machine)
         bad[owner[inside & folded]] = True
     if bad.any():
-        sums.e[:, bad] = sums.et[:, :, bad] = np.inf
+        sums.unknown(bad)
     return sums
 
 
@@ -107,13 +107,9 @@ def _added(cells: list[Cell], owner: Ints, inside: Bools, unsure: Bools, batch: 
         return np.where(where, 0.0 if part is None else np.asarray(part), 0.0)
 
     either = inside | unsure
-    sums = Sums(
-        each([full(c.v, inside) for c in cells]),
-        each([full(c.e, either) + np.abs(full(c.v, unsure)) for c in cells]),
-        np.zeros((len(cells), k, batch)),
-        np.zeros((len(cells), k, batch)),
-        gross=np.zeros((2, batch)),
-    )
+    sums = Sums.zeros(len(cells), k, batch)
+    sums.v[:] = each([full(c.v, inside) for c in cells])
+    sums.e[:] = each([full(c.e, either) + np.abs(full(c.v, unsure)) for c in cells])
     assert sums.gross is not None
     sums.gross[0] = each([np.abs(full(c.v, inside)) for c in cells]).max(axis=0)
     for d in range(k):

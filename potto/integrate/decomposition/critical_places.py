@@ -17,6 +17,7 @@ import numpy as np
 
 from potto.calculus.decomposition.critical import Critical, slopes_of
 from potto.core.terms import Term, function_of, tuple_
+from potto.integrate.columns import side_by_side
 from potto.integrate.decomposition.meetings import SEARCHED, Row, as_array, tangents
 from potto.integrate.decomposition.root_isolation import between, flat
 from potto.integrate.events import Unsearched
@@ -32,7 +33,6 @@ FEW = 256  # boxes up to which all sides of one are halved at once
 FINEST = 2.0**-40  # of the range: a box so narrow along the variable that is cut is not looked at more closely
 INFLATED = 0.1  # by how much a box is larger on which a solution is looked for: it may lie on the edge of one
 SAME = 2.0**-44  # of the range: solutions no farther apart are one
-SHRUNK = 0.7  # of a side: what a step leaves no larger is not halved
 POLISH, STUCK = 12, 0.9  # steps at most; the part of each of its sides that the last one leaves of a box
 BEYOND = 0.125  # how far beyond its range a turning place is looked for, which the map of nodes takes care of
 
@@ -258,18 +258,7 @@ def _as_rows(
     new: Any = np.ones(owner.size, dtype=bool)
     new[1:] = (owner[1:] != owner[:-1]) | apart
     owner, places, width = owner[new], places[new], width[new]
-    count = np.bincount(owner, minlength=batch)
-    slots = int(count.max(initial=0))
-    at = np.arange(owner.size) - (np.cumsum(count) - count)[owner], owner
-
-    def padded(values: Array, gap: float) -> Array:
-        rows = np.full((slots, batch), gap)
-        rows[at] = values
-        return rows
-
-    x, off = padded(places, np.nan), padded(width + SEARCHED * EPS * np.abs(places), np.nan)
-    t, et = ([padded(speed[order][new], 0.0) for speed in of] for of in speeds)
-    return [
-        Row(x[i], tuple(speed[i] for speed in t), -1, system.turning, off[i], tuple(doubt[i] for doubt in et))
-        for i in range(slots)
-    ]
+    off = width + SEARCHED * EPS * np.abs(places)
+    x, off = side_by_side(owner, np.stack((places, off)), batch)
+    t, et = (side_by_side(owner, of[:, order][:, new], batch, 0.0) for of in speeds)
+    return [Row(x[i], tuple(t[:, i]), -1, system.turning, off[i], tuple(et[:, i])) for i in range(x.shape[0])]

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from potto.integrate.columns import Columns
 from potto.integrate.levels import LevelPlan
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Bools, Ints
@@ -36,7 +37,7 @@ class Row:
 
 
 @dataclass
-class Edge:
+class Edge(Columns):
     """A surface that lies on a bound, for some of the batch: `owner` (m,), at the upper bound or not, its speeds."""
 
     cut: int
@@ -46,13 +47,10 @@ class Edge:
     root_t: Array
     bound_t: Array
 
-    def pick(self, index: Any) -> Edge:
-        return Edge(self.cut, self.owner[index], self.upper, self.x[index], self.root_t[:, index],
-                    self.bound_t[:, index])  # fmt: skip
 
 
 @dataclass
-class Meeting:
+class Meeting(Columns):
     """Jumps at one place that move apart, for some of the batch: `owner` (B,), place (B,), speeds (n, k, B).
 
     merged_t: the speed with which all of them were integrated, (k, B).
@@ -64,12 +62,10 @@ class Meeting:
     speeds: Array
     merged_t: Array
 
-    def pick(self, index: Any) -> Meeting:
-        return Meeting(self.cuts, self.owner[index], self.x[index], self.speeds[:, :, index], self.merged_t[:, index])
 
 
 @dataclass
-class Sliver:
+class Sliver(Columns):
     """Jumps that rounding does not tell apart, from one another or from a bound, for some of the batch.
 
     `owner` (m,), place (m,), width (m,): how far apart they may be all the same; speed (m,): that of the fastest, over
@@ -85,9 +81,6 @@ class Sliver:
     upper: bool
     passes: Array
 
-    def pick(self, index: Any) -> Sliver:
-        return Sliver(self.cuts, self.owner[index], self.x[index], self.width[index], self.speed[index], self.upper,
-                      self.passes[:, index])  # fmt: skip
 
 
 @dataclass

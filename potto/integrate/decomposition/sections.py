@@ -8,20 +8,22 @@ crossing it. Each is polished; how a root moves follows from the surface's own d
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from potto.calculus.solving.enclosable import slope_of
 from potto.core.terms import Lam, Term, function_of
+from potto.integrate.columns import side_by_side
 from potto.integrate.decomposition.meetings import SEARCHED, Row, as_array
-from potto.integrate.decomposition.root_isolation import between, isolated
+from potto.integrate.decomposition.root_isolation import at_label, between, isolated
 from potto.integrate.events import ROOTS_NOT_SEPARATED, TOO_MANY_ROOTS, Unsearched
 from potto.integrate.levels import LevelPlan
 from potto.integrate.pieces import still
 from potto.integrate.rules.gauss import EPS
-from potto.kernels.cells import Array, Cell, Ints, Value, map_arrays, pad
+from potto.kernels.cells import Array, Bools, Cell, Ints, Value, pad
 
 GRID = 64
 MOST_IN_FAMILY = 100_000
@@ -38,9 +40,10 @@ def searched_rows(level: LevelPlan, env: dict[str, Value], lo: Cell, hi: Cell, b
     rows: list[Row] = []
     for number, family in level.families:
         rows += _family(level, number, family, env, lo, hi, batch, machine)
+    low, high = as_array(np.minimum(lo.v, hi.v), batch), as_array(np.maximum(lo.v, hi.v), batch)
     for cut in level.searched:
-        number = level.level.cuts.index(cut)
-        rows += _search(level, number, cut.surface, env, lo, hi, batch, machine)
+        along = _Along(level.level.cuts.index(cut), cut.decides, cut.surface, level.variable, env, machine)
+        rows += along.searched(low, high)
     return rows
 
 
@@ -90,225 +93,196 @@ def _family(
     return rows
 
 
-def _search(
-    level: LevelPlan, cut: int, surface: Term, env: dict[str, Value], lo: Cell, hi: Cell, batch: int, machine: Any
-) -> list[Row]:
-    variable = level.variable
-    low, high = as_array(np.minimum(lo.v, hi.v), batch), as_array(np.maximum(lo.v, hi.v), batch)
-    function = function_of(surface)
-    slope = slope_of(surface, variable)
-    hidden: list[Row] = []
-    if slope is None:
-        a, b = _on_a_grid(function, variable, env, low, high, machine)
-    else:
-        brackets = isolated(surface, slope, variable, env, low, high, level.level.cuts[cut].decides)
-        most = brackets.owner.size if level.level.cuts[cut].decides else MOST_KINKS * batch
-        if level.level.cuts[cut].decides and not brackets.complete:
-            machine.note(ROOTS_NOT_SEPARATED)
-        elif not brackets.complete or brackets.owner.size > most:
-            machine.note(Unsearched(variable))
-        few = slice(most)  # those that are farthest apart are found first
-        a, b = _padded(brackets.owner[few], brackets.a[few], brackets.b[few], batch)
-        for start, end in zip(*(x.T for x in _padded(*brackets.hidden, batch)), strict=True):
-            row = _moving(cut, function, variable, env, 0.5 * (start + end), end - start, machine)
-            hidden.append(replace(row, e=row.e + (end - start), hides=end - start))
-    roots, within = _polished(function, variable, env, a, b, machine)
-    columns = zip(roots.T, within.T, strict=True)
-    rows = [*(_moving(cut, function, variable, env, root, wide, machine) for root, wide in columns), *hidden]
-    return rows + _at_places(cut, function, variable, env, low, low == high, machine)
+@dataclass(frozen=True)
+class _Along:
+    """A surface along one variable, for a batch: the number of its cut, and whether something jumps there.
 
-
-def _at_places(
-    cut: int, function: Lam, variable: str, env: dict[str, Value], x: Array, empty: Array, machine: Any
-) -> list[Row]:
-    """The places that empty ranges are, where the surface is 0 there: nothing else can be searched for in them."""
-    if not empty.any():
-        return []
-    here = {**{n: still(v) for n, v in env.items()}, variable: Cell(x)}
-    at = _call(function, here, machine.tracking().with_directions(0))
-    zero: Any = np.abs(at.v) <= (0.0 if at.e is None else at.e)
-    on = empty & zero
-    there = np.where(on, x, np.nan)
-    return [_moving(cut, function, variable, env, there, np.zeros(x.size), machine)] if on.any() else []
-
-
-def _padded(owner: Ints, a: Array, b: Array, batch: int) -> tuple[Array, Array]:
-    """Stretches as rows, one for each member, in order and padded with nan."""
-    order = np.lexsort((a, owner))
-    owner = owner[order]
-    count = np.bincount(owner, minlength=batch)
-    slot = np.arange(owner.size) - (np.cumsum(count) - count)[owner]
-    first, last = np.full((2, batch, int(count.max(initial=0))), np.nan)
-    first[owner, slot], last[owner, slot] = a[order], b[order]
-    return first, last
-
-
-def _on_a_grid(
-    function: Lam, variable: str, env: dict[str, Value], low: Array, high: Array, machine: Any
-) -> tuple[Array, Array]:
-    """Brackets where nothing but values is known of the surface."""
-    columns = _columns(function, env)
-    still = machine.with_directions(0)
-
-    def psi(x: Array) -> Array:
-        value = _call(function, {**columns, variable: Cell(x)}, still).v
-        return np.broadcast_to(value, x.shape)
-
-    x = _grid(low[:, None], high[:, None], np.linspace(0.0, 1.0, GRID + 1)[None, :])
-    return _brackets(psi, x)
-
-
-def _columns(function: Lam, env: dict[str, Value]) -> dict[str, Value]:
-    """The values that a function takes, as columns, and without tangents: duals in tuples, too."""
-    return {n: map_arrays(still(v), lambda a: a[:, None]) for n, v in env.items() if n in function.params}
-
-
-def _grid(low: Array, high: Array, s: Array) -> Array:
-    """Points that run through [low, high], also where an end is infinite."""
-    finite = low + (high - low) * s
-    up = low + s / (1 - s)
-    down = high - (1 - s) / s
-    whole = (2 * s - 1) / (4 * s * (1 - s))
-    x = np.where(np.isinf(high), np.where(np.isinf(low), whole, up), np.where(np.isinf(low), down, finite))
-    return np.where(np.isfinite(x), x, np.nan)
-
-
-def _brackets(psi: Any, x: Array) -> tuple[Array, Array]:
-    """Intervals with a sign change, per batch member and padded with nan; dips towards zero are looked at closer."""
-    y = psi(x)
-    for _ in range(3):
-        inner = np.abs(y[:, 1:-1])
-        dip = (inner < np.abs(y[:, :-2])) & (inner <= np.abs(y[:, 2:])) & (np.sign(y[:, :-2]) == np.sign(y[:, 2:]))
-        dip &= np.sign(y[:, 1:-1]) == np.sign(y[:, 2:])
-        columns = np.nonzero(dip.any(axis=0))[0] + 1
-        if not columns.size:
-            break
-        extra = [x]
-        for s in (0.25, 0.5, 0.75):
-            extra.append(x[:, columns - 1] + s * (x[:, columns] - x[:, columns - 1]))
-            extra.append(x[:, columns] + s * (x[:, columns + 1] - x[:, columns]))
-        x = np.sort(np.concatenate(extra, axis=1), axis=1)
-        y = psi(x)
-    x, y = _to_the_edges(psi, x, y)
-    change = (y[:, :-1] * np.sign(y[:, 1:]) < 0) | ((y[:, :-1] == 0) & (y[:, 1:] != 0))
-    most = int(change.sum(axis=1).max()) if change.size else 0
-    a = np.full((x.shape[0], most), np.nan)
-    b = np.full((x.shape[0], most), np.nan)
-    row, column = np.nonzero(change)
-    slot = (np.cumsum(change, axis=1) - 1)[row, column]
-    a[row, slot], b[row, slot] = x[row, column], x[row, column + 1]
-    return a, b
-
-
-def _to_the_edges(psi: Any, x: Array, y: Array) -> tuple[Array, Array]:
-    """With the last places before those where psi has no value: between these and the grid a sign may change."""
-    defined = ~np.isnan(y)
-    columns = np.nonzero((defined[:, 1:] != defined[:, :-1]).any(axis=0))[0]
-    if not columns.size:
-        return x, y
-    there = np.where(defined[:, columns], x[:, columns], x[:, columns + 1])
-    beyond = np.where(defined[:, columns], x[:, columns + 1], x[:, columns])
-    for _ in range(BISECTIONS):
-        middle = between(there, beyond)
-        inside = ~np.isnan(psi(middle))
-        there, beyond = np.where(inside, middle, there), np.where(inside, beyond, middle)
-    x = np.sort(np.concatenate((x, there), axis=1), axis=1)
-    return x, psi(x)
-
-
-def _polished(
-    function: Lam, variable: str, env: dict[str, Value], a: Array, b: Array, machine: Any
-) -> tuple[Array, Array]:
-    """The roots in brackets (B, r): Newton's steps where they stay inside and shrink, halves elsewhere. And how wide
-    the brackets are in the end, which is all that is known where the sign changes by a jump."""
-    if a.shape[1] == 0:
-        return a, a
-    columns = {n: pad(v, 1) for n, v in _columns(function, env).items()}
-    one = machine.with_directions(1)
-
-    def psi(x: Array) -> tuple[Array, Array]:
-        value = _call(function, {**columns, variable: Cell(x, None, (1.0,))}, one)
-        slope = 0.0 if value.t[0] is None else value.t[0]
-        return np.broadcast_to(value.v, x.shape), np.broadcast_to(slope, x.shape)
-
-    with np.errstate(all="ignore"):
-        left = np.sign(psi(a)[0])
-        right = np.sign(psi(b)[0])
-        left = np.where((left == 0) | np.isnan(left), -right, left)
-        x = between(a, b)
-        for turn in range(BISECTIONS):
-            f, slope = psi(x)
-            below = left * f > 0
-            a, b = np.where(below, x, a), np.where(below, b, x)
-            step = x - f / slope
-            good = (step > a) & (step < b) & (turn % 3 < 2)
-            new = np.where(f == 0, x, np.where(good, step, between(a, b)))
-            still = (np.abs(new - x) <= EPS * np.abs(x)) | np.isnan(x) | (np.abs(b - a) <= EPS * np.abs(x))
-            x = new
-            if still.all():
-                break
-    return x, b - a
-
-
-def _moving(
-    cut: int, function: Lam, variable: str, env: dict[str, Value], root: Array, within: Array, machine: Any
-) -> Row:
-    """The root as a candidate cut: dx = -psi_theta / psi_x; how far it is off is psi's own rounding over psi_x.
-
-    Where psi changes its sign by a jump, or a pole, it is off by no more than the bracket is wide.
+    Places are (B,), or (r, B) for several of each member.
     """
-    k = machine.directions
-    here = {n: pad(v, k + 1) for n, v in env.items()}
-    here[variable] = Cell(root, None, (None,) * k + (1.0,))
-    value = _call(function, here, machine.tracking().with_directions(k + 1))
-    slope = 0.0 if value.t[k] is None else value.t[k]
-    with np.errstate(all="ignore"):
-        rounding, step = 0.0 if value.e is None else value.e, SEARCHED * EPS * np.abs(root)
-        off = (np.abs(value.v) + rounding) / np.abs(slope)
-        jumps = np.abs(value.v) > JUMP * (rounding + step * np.abs(slope))
-        off = np.where(jumps, np.minimum(off, within), off)
-        off = np.where(np.isfinite(off), off, 0.0) + step
-        # What stands still does so also where the surface is flat, and 0/0 would say nothing.
-        t = tuple(None if x is None else np.where(np.asarray(x) == 0, 0.0, -np.asarray(x) / slope) for x in value.t[:k])
-    et = _doubt(function, variable, here, root + off, t, value, machine.with_directions(k + 1)) if k else ()
-    poles = np.isfinite(root) & ~np.isfinite(np.broadcast_to(value.v, root.shape))
-    if k and poles.any():
-        near = _beside_poles(function, variable, here, root, machine.with_directions(k + 1))
-        t = tuple(np.where(poles, x, 0.0 if y is None else y) for x, y in zip(near, t, strict=True))
-    return Row(root, t, cut, False, off, et)
 
+    cut: int
+    decides: bool
+    surface: Term
+    variable: str
+    env: dict[str, Value]
+    machine: Any
 
-def _doubt(
-    function: Lam, variable: str, env: dict[str, Value], beside: Array, t: tuple[Any, ...], value: Cell, machine: Any
-) -> tuple[Any, ...]:
-    """How far off speeds may be, by the rounding of the derivatives that they are made of (`value`), and as the root is
-    not where it should be, but anywhere as far away as `beside`."""
-    k = len(t)
-    off = _call(function, {**env, variable: Cell(beside, None, (None,) * k + (1.0,))}, machine)
-    slope, steep = (0.0 if cell.t[k] is None else np.asarray(cell.t[k]) for cell in (value, off))
-    found: list[Any] = []
-    with np.errstate(all="ignore"):
-        for speed, x, rounded in zip(t, off.t, value.et, strict=False):
-            there = 0.0 if x is None else -np.asarray(x) / steep
-            if speed is None:
-                found.append(None)
-                continue
-            part = sum(0.0 if r is None else r * w for r, w in ((rounded, 1.0), (value.et[k], np.abs(speed))))
-            doubt = np.abs(there - speed) + part / np.abs(slope)
-            found.append(np.where(np.isfinite(doubt), doubt, 0.0))
-    return tuple(found)
+    @cached_property
+    def function(self) -> Lam:
+        return function_of(self.surface)
 
+    @cached_property
+    def still(self) -> dict[str, Value]:
+        """The values that the surface takes, without tangents: duals in tuples, too."""
+        return {n: still(v) for n, v in self.env.items() if n in self.function.params}
 
-def _beside_poles(function: Lam, variable: str, env: dict[str, Value], root: Array, machine: Any) -> list[Array]:
-    """How poles move: like the lines along which psi is constant beside them, in the mean of their two sides."""
-    k = machine.directions - 1
-    found = np.zeros((k, *root.shape))
-    for side in (-BESIDE, BESIDE):
-        at = {**env, variable: Cell(root + side * np.maximum(np.abs(root), BESIDE), None, (None,) * k + (1.0,))}
-        value = _call(function, at, machine)
+    def value(self, x: Array) -> Array:
+        found = _call(self.function, {**self.still, self.variable: Cell(x)}, self.machine.with_directions(0))
+        return np.broadcast_to(found.v, x.shape)
+
+    def searched(self, low: Array, high: Array) -> list[Row]:
+        """Its roots between bounds, which may be infinite."""
+        slope, batch = slope_of(self.surface, self.variable), low.size
+        hidden: list[Row] = []
+        if slope is None:
+            a, b = in_rows(*self.on_a_grid(low, high), batch)
+        else:
+            brackets = isolated(self.surface, slope, self.variable, self.env, low, high, self.decides)
+            most = brackets.owner.size if self.decides else MOST_KINKS * batch
+            if self.decides and not brackets.complete:
+                self.machine.note(ROOTS_NOT_SEPARATED)
+            elif not brackets.complete or brackets.owner.size > most:
+                self.machine.note(Unsearched(self.variable))
+            few = slice(most)  # those that are farthest apart are found first
+            a, b = in_rows(brackets.owner[few], brackets.a[few], brackets.b[few], batch)
+            for start, end in zip(*in_rows(*brackets.hidden, batch), strict=True):
+                row = self.moving(0.5 * (start + end), end - start)
+                hidden.append(replace(row, e=row.e + (end - start), hides=end - start))
+        rows = [self.moving(root, wide) for root, wide in zip(*self.polished(a, b), strict=True)]
+        return rows + hidden + self.at_places(low, low == high)
+
+    def at_places(self, x: Array, empty: Any) -> list[Row]:
+        """The places that empty ranges are, where the surface is 0 there: nothing else can be searched for in them."""
+        if not empty.any():
+            return []
+        tracked = self.machine.tracking().with_directions(0)
+        at = _call(self.function, {**self.still, self.variable: Cell(x)}, tracked)
+        on: Any = empty & (np.abs(at.v) <= (0.0 if at.e is None else at.e))
+        return [self.moving(np.where(on, x, np.nan), np.zeros(x.size))] if on.any() else []
+
+    def on_a_grid(self, low: Array, high: Array) -> tuple[Ints, Array, Array]:
+        """Stretches with a sign change, where nothing but values is known of the surface: whose, from where, to where.
+
+        Dips towards zero are looked at closer.
+        """
+        x = at_label(low, high, np.linspace(0.0, 1.0, GRID + 1)[:, None])
+        x = np.where(np.isfinite(x), x, np.nan)
+        y = self.value(x)
+        for _ in range(3):
+            inner = np.abs(y[1:-1])
+            signs = np.sign(y)
+            same: Bools = (signs[:-2] == signs[2:]) & (signs[1:-1] == signs[2:])
+            dip: Bools = same & (inner < np.abs(y[:-2])) & (inner <= np.abs(y[2:]))
+            at = np.nonzero(dip.any(axis=1))[0] + 1
+            if not at.size:
+                break
+            extra = [x]
+            for s in (0.25, 0.5, 0.75):
+                extra += [x[at - 1] + s * (x[at] - x[at - 1]), x[at] + s * (x[at + 1] - x[at])]
+            x = np.sort(np.concatenate(extra), axis=0)
+            y = self.value(x)
+        x, y = self.to_the_edges(x, y)
+        owner, at = np.nonzero(((y[:-1] * np.sign(y[1:]) < 0) | ((y[:-1] == 0) & (y[1:] != 0))).T)
+        return owner, x[at, owner], x[at + 1, owner]
+
+    def to_the_edges(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """With the last places before those where it has no value: between these and the grid a sign may change."""
+        defined = ~np.isnan(y)
+        at = np.nonzero((defined[1:] != defined[:-1]).any(axis=1))[0]
+        if not at.size:
+            return x, y
+        there = np.where(defined[at], x[at], x[at + 1])
+        beyond = np.where(defined[at], x[at + 1], x[at])
+        for _ in range(BISECTIONS):
+            middle = between(there, beyond)
+            inside = ~np.isnan(self.value(middle))
+            there, beyond = np.where(inside, middle, there), np.where(inside, beyond, middle)
+        x = np.sort(np.concatenate((x, there)), axis=0)
+        return x, self.value(x)
+
+    def polished(self, a: Array, b: Array) -> tuple[Array, Array]:
+        """The roots in brackets (r, B): Newton's steps where they stay inside and shrink, halves elsewhere. And how
+        wide the brackets are in the end, which is all that is known where the sign changes by a jump."""
+        if not a.shape[0]:
+            return a, a
+        env, one = {n: pad(v, 1) for n, v in self.still.items()}, self.machine.with_directions(1)
+
+        def psi(x: Array) -> tuple[Array, Array]:
+            value = _call(self.function, {**env, self.variable: Cell(x, None, (1.0,))}, one)
+            slope = 0.0 if value.t[0] is None else value.t[0]
+            return np.broadcast_to(value.v, x.shape), np.broadcast_to(slope, x.shape)
+
+        with np.errstate(all="ignore"):
+            left = np.sign(psi(a)[0])
+            right = np.sign(psi(b)[0])
+            left = np.where((left == 0) | np.isnan(left), -right, left)
+            x = between(a, b)
+            for turn in range(BISECTIONS):
+                f, slope = psi(x)
+                below = left * f > 0
+                a, b = np.where(below, x, a), np.where(below, b, x)
+                step = x - f / slope
+                good = (step > a) & (step < b) & (turn % 3 < 2)
+                new = np.where(f == 0, x, np.where(good, step, between(a, b)))
+                rests = (np.abs(new - x) <= EPS * np.abs(x)) | np.isnan(x) | (np.abs(b - a) <= EPS * np.abs(x))
+                x = new
+                if rests.all():
+                    break
+        return x, b - a
+
+    def with_slopes(self, x: Array, tracking: bool = False) -> Cell:
+        """The surface at places, with its slope along the variable as the last of its tangents."""
+        k = self.machine.directions
+        machine = self.machine.tracking() if tracking else self.machine
+        here = {n: pad(v, k + 1) for n, v in self.env.items() if n in self.function.params}
+        here[self.variable] = Cell(x, None, (None,) * k + (1.0,))
+        return _call(self.function, here, machine.with_directions(k + 1))
+
+    def moving(self, root: Array, within: Array) -> Row:
+        """The root as a candidate cut: dx = -psi_theta / psi_x; how far it is off is psi's own rounding over psi_x.
+
+        Where psi changes its sign by a jump, or a pole, it is off by no more than the bracket is wide.
+        """
+        k, value = self.machine.directions, self.with_slopes(root, True)
         slope = 0.0 if value.t[k] is None else value.t[k]
-        for d, x in enumerate(value.t[:k]):
-            with np.errstate(all="ignore"):
-                speed = 0.0 if x is None else -np.asarray(x) / slope
-            found[d] += np.where(np.isfinite(speed), speed, 0.0) / 2
-    return list(found)
+        with np.errstate(all="ignore"):
+            rounding, step = 0.0 if value.e is None else value.e, SEARCHED * EPS * np.abs(root)
+            off = (np.abs(value.v) + rounding) / np.abs(slope)
+            jumps = np.abs(value.v) > JUMP * (rounding + step * np.abs(slope))
+            off = np.where(jumps, np.minimum(off, within), off)
+            off = np.where(np.isfinite(off), off, 0.0) + step
+            # What stands still does so also where the surface is flat, and 0/0 would say nothing.
+            t = tuple(None if x is None else np.where(np.asarray(x) == 0, 0.0, -np.asarray(x) / slope)
+                      for x in value.t[:k])  # fmt: skip
+        et = self.doubt(root + off, t, value) if k else ()
+        poles = np.isfinite(root) & ~np.isfinite(np.broadcast_to(value.v, root.shape))
+        if k and poles.any():
+            near = self.beside_poles(root)
+            t = tuple(np.where(poles, x, 0.0 if y is None else y) for x, y in zip(near, t, strict=True))
+        return Row(root, t, self.cut, False, off, et)
+
+    def doubt(self, beside: Array, t: tuple[Any, ...], value: Cell) -> tuple[Any, ...]:
+        """How far off speeds may be, by the rounding of the derivatives that they are made of (`value`), and as the
+        root is not where it should be, but anywhere as far away as `beside`."""
+        k, off = len(t), self.with_slopes(beside)
+        slope, steep = (0.0 if cell.t[k] is None else np.asarray(cell.t[k]) for cell in (value, off))
+        found: list[Any] = []
+        with np.errstate(all="ignore"):
+            for speed, x, rounded in zip(t, off.t, value.et, strict=False):
+                there = 0.0 if x is None else -np.asarray(x) / steep
+                if speed is None:
+                    found.append(None)
+                    continue
+                part = sum(0.0 if r is None else r * w for r, w in ((rounded, 1.0), (value.et[k], np.abs(speed))))
+                doubt = np.abs(there - speed) + part / np.abs(slope)
+                found.append(np.where(np.isfinite(doubt), doubt, 0.0))
+        return tuple(found)
+
+    def beside_poles(self, root: Array) -> list[Array]:
+        """How poles move: like the lines along which psi is constant beside them, in the mean of their two sides."""
+        k = self.machine.directions
+        found = np.zeros((k, *root.shape))
+        for side in (-BESIDE, BESIDE):
+            value = self.with_slopes(root + side * np.maximum(np.abs(root), BESIDE))
+            slope = 0.0 if value.t[k] is None else value.t[k]
+            for d, x in enumerate(value.t[:k]):
+                with np.errstate(all="ignore"):
+                    speed = 0.0 if x is None else -np.asarray(x) / slope
+                found[d] += np.where(np.isfinite(speed), speed, 0.0) / 2
+        return list(found)
+
+
+def in_rows(owner: Ints, a: Array, b: Array, batch: int) -> Array:
+    """Stretches of members in order, as rows with one for each, padded with nan: (2, rows, batch)."""
+    order = np.lexsort((a, owner))
+    return side_by_side(owner[order], np.stack((a, b))[:, order], batch)

@@ -72,24 +72,27 @@ class Scene:
         here, inner = around(self.level, owner, x, above, self.env, self.sides, self.machine, room, hidden)
         _, beyond = around(self.level, owner, x, not above, self.env, self.sides, self.machine, room)
         groups = [group_of(self.level, cut) for cut in cuts]
-        frozen = self.machine.with_directions(0)
         found = []
-        with nullcontext() if self.machine.costs is None else self.machine.costs.apart():
-            for bits in range(1 << len(groups)):
-                flipped = [g for i, g in enumerate(groups) if bits >> i & 1]
-                way = {
-                    g: np.asarray(beyond[g]) if groups.count(g) == 1 else ~np.asarray(inner[g])
-                    for g in flipped
-                    if flipped.count(g) % 2
-                }
-                both = {**inner, **way}
-                f, e = self.parent.inside(self.number, here, owner.size, both, frozen, self.below(owner))
-                for g in hidden.keys() - set(groups):
-                    turned = {**both, g: np.asarray(both[g]) ^ hidden[g]}
-                    other, _ = self.parent.inside(self.number, here, owner.size, turned, frozen, self.below(owner))
-                    e = np.where(other == f, e, np.nan)
-                found.append((f, e))
+        for bits in range(1 << len(groups)):
+            flipped = [g for i, g in enumerate(groups) if bits >> i & 1]
+            way = {
+                g: np.asarray(beyond[g]) if groups.count(g) == 1 else ~np.asarray(inner[g])
+                for g in flipped
+                if flipped.count(g) % 2
+            }
+            both = {**inner, **way}
+            f, e = self.inside(owner, here, both)
+            for g in hidden.keys() - set(groups):
+                other, _ = self.inside(owner, here, {**both, g: np.asarray(both[g]) ^ hidden[g]})
+                e = np.where(other == f, e, np.nan)
+            found.append((f, e))
         return np.stack([f for f, _ in found]), np.stack([e for _, e in found])
+
+    def inside(self, owner: Ints, here: dict[str, Value], sides: dict[int, Mask]) -> tuple[Array, Array]:
+        """F at places of some members, on the sides given, and its errors, (m, B): a check, for which nothing moves."""
+        costs, frozen = self.machine.costs, self.machine.with_directions(0)
+        with nullcontext() if costs is None else costs.apart():
+            return self.parent.inside(self.number, here, owner.size, sides, frozen, self.below(owner))
 
     def as_it_falls(self, owner: Ints, x: Array) -> Array:
         """F at x itself, (m, B): a surface that is 0 there is on the side that its comparison says."""
@@ -99,8 +102,7 @@ class Scene:
             values = zip(self.level.decided, surfaces_at(self.level, here, owner.size, self.machine), strict=True)
             up = [v >= 0 if groups[g].up_at_zero else v > 0 for g, (v, _) in values]
             sides = decided(self.level, sides, up)
-        frozen, root = self.machine.with_directions(0), self.below(owner)
-        return self.parent.inside(self.number, here, owner.size, sides, frozen, root)[0]
+        return self.inside(owner, here, sides)[0]
 
     def surface(self, cut: int) -> Term:
         return self.level.level.cuts[cut].surface

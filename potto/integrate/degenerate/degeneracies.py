@@ -7,16 +7,14 @@ innermost.
 
 from __future__ import annotations
 
-from contextlib import nullcontext
-
 import numpy as np
 
 from potto.integrate.decomposition.cuts import NARROW, Cuts
-from potto.integrate.degenerate.coincidences import Scene, around
+from potto.integrate.degenerate.coincidences import Scene, around, placed
 from potto.integrate.degenerate.faces import THIN, Place, crossing, several
 from potto.integrate.events import Degenerate
 from potto.integrate.panels.panel_batch import PanelBatch
-from potto.integrate.pieces import Crossing, Pieces, gather, still, take
+from potto.integrate.pieces import Crossing, Pieces, take
 from potto.integrate.rules.substitution import Segments
 from potto.kernels.cells import Array, Bools, Cell, Ints, Mask
 
@@ -119,12 +117,7 @@ def brush(scene: Scene, cuts: Cuts) -> None:
 def _inside(scene: Scene, owner: Ints, x: Array, sides: dict[int, Mask]) -> Array:
     """What is further in at several places for each of some members, (m, places, members)."""
     many = np.tile(owner, x.size // owner.size)
-    here = gather({n: still(v) for n, v in scene.env.items()}, many)
-    here[scene.level.variable] = Cell(x)
-    costs = scene.machine.costs
-    with nullcontext() if costs is None else costs.apart():
-        frozen = scene.machine.with_directions(0)
-        values = scene.parent.inside(scene.number, here, many.size, sides, frozen, scene.below(many))[0]
+    values, _ = scene.inside(many, placed(scene.level, many, x, scene.env, {})[0], sides)
     return values.reshape(values.shape[0], -1, owner.size)
 
 
@@ -139,9 +132,8 @@ def _bends(scene: Scene, owner: Ints, x: Array, upper: bool) -> bool:
     further = levels[scene.number + 1]
     if scene.number + 2 < len(levels) or further.searched:
         return False
-    here = gather({n: still(v) for n, v in scene.env.items()}, owner)
     aside = BESIDE[1] * (1 + np.abs(x)) * (-1 if upper else 1)
-    places = ({**here, scene.level.variable: Cell(place)} for place in (x, x + aside))
+    places = (placed(scene.level, owner, place, scene.env, {})[0] for place in (x, x + aside))
     on, inside = (frozen.evaluate(further.frame, {n: at[n] for n in further.frame.params}, None) for at in places)
     assert isinstance(on, tuple) and isinstance(inside, tuple)
     for row, beside in zip(on, inside, strict=True):

@@ -93,7 +93,7 @@ def count_collapsed(scene: Scene, found: list[Collapsed], sums: Sums) -> Sums:
             _unknown(scene, ranges, sums, EMPTY_UNSEEN)
             continue
         f, e = scene.flips(ranges.cuts, ranges.owner, ranges.x, False)
-        sums = _with_components(sums, f.shape[1])
+        sums = sums.widened(f.shape[1])
         folds = len(set(ranges.cuts)) < len(ranges.cuts)  # what that comes to is known from beside the parameters alone
         backward, forward = (np.zeros(1) if folds else _growth(f, ranges, sign) for sign in (-1, 1))
         size, at = np.abs(f).max(axis=0), (slice(None), slice(None), ranges.owner)
@@ -129,15 +129,6 @@ def _growth(f: Array, ranges: Collapsed, sign: int) -> Array:
     stretches = zip(passed, lengths, strict=True)
     grown = [np.where(length > 0, picked(f, which) * length, 0.0) for which, length in stretches]
     return np.asarray(sign * np.where(high < low, -1.0, 1.0) * np.sum(grown, axis=0))
-
-
-def _with_components(sums: Sums, count: int) -> Sums:
-    """Sums over nothing at all don't know how many components there are."""
-    missing = count - sums.v.shape[0]
-    if missing <= 0:
-        return sums
-    parts = (np.concatenate([x] + [x[:1]] * missing) for x in (sums.v, sums.e, sums.t, sums.et))
-    return Sums(*parts, gross=sums.gross)
 
 
 def _note_gross(sums: Sums, owner: Ints, rates: Array) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from contextlib import nullcontext
 
 import numpy as np
 
@@ -51,12 +50,9 @@ def _difference(scene: Scene, seg: Segments, sides: Mapping[int, Mask], groups: 
     x, _, _ = substitution.points(seg.pick(part), np.full((part.size, 1), 0.5))
     here, _ = placed(scene.level, seg.owner[part], x[:, 0], scene.env, {})
     own = {g: take(mask, part) for g, mask in sides.items()}
-    frozen, root = scene.machine.with_directions(0), scene.below(seg.owner[part])
     found = []
-    with nullcontext() if scene.machine.costs is None else scene.machine.costs.apart():
-        for turned in itertools.product((False, True), repeat=len(groups)):
-            flipped = {g: np.logical_not(own[g]) for g, turn in zip(groups, turned, strict=True) if turn}
-            f, _ = scene.parent.inside(scene.number, here, part.size, {**own, **flipped}, frozen, root)
-            found.append(f)
+    for turned in itertools.product((False, True), repeat=len(groups)):
+        flipped = {g: np.logical_not(own[g]) for g, turn in zip(groups, turned, strict=True) if turn}
+        found.append(scene.inside(seg.owner[part], here, {**own, **flipped})[0])
     apart = np.max([np.abs(f - found[0]) for f in found], axis=0)
     return np.where(np.isfinite(apart), apart, np.inf)

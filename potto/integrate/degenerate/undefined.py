@@ -68,8 +68,7 @@ def lost_members(scene: Scene, seg: Segments, undefined: dict[int, Bools], alive
         x, _, _ = substitution.points(seg.pick(part), np.full((part.size, 1), LOOKED_AT[0]))
         here, _ = placed(scene.level, seg.owner[part], x[:, 0], scene.env, {})
         sides = {g: take(mask, seg.owner[part]) for g, mask in scene.sides.items() if g not in gone}
-        frozen, root = scene.machine.with_directions(0), scene.below(seg.owner[part])
-        f, _ = scene.parent.inside(scene.number, here, part.size, sides, frozen, root)
+        f, _ = scene.inside(seg.owner[part], here, sides)
         bad = np.nonzero(np.isnan(f).any(axis=0))[0]
         if bad.size:
             lost.append(seg.owner[part[bad]])

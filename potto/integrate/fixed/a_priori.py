@@ -276,10 +276,8 @@ def certain(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Sums |
         cells, shortest = _cells(plan, machine, env, frame)
     except _NotPlain:
         return None
-    k = machine.directions
     if not cells:
-        v, e, gross = np.zeros((1, 1)), np.zeros((1, 1)), np.zeros((2, 1))
-        return Sums(v, e, np.zeros((1, k, 1)), np.zeros((1, k, 1)), gross=gross)
+        return Sums.zeros(1, machine.directions, 1)
     region = None
     if len(cells) <= MOST_CELLS:
         reach = float(frame[1].v - frame[0].v)

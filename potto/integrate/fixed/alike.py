@@ -21,9 +21,9 @@ import numpy as np
 
 from potto.core.terms import Prim, Term, function_of, postorder, tuple_
 from potto.integrate.fixed.a_priori import Straight
-from potto.integrate.fixed.moving_sums import SUMMED, evaluated
+from potto.integrate.fixed.moving_sums import SUMMED, evaluated, product
 from potto.integrate.fixed.topologies import Uniform, topologies
-from potto.integrate.pieces import Evaluator, Sums, still
+from potto.integrate.pieces import Evaluator, Sums, dense, still
 from potto.integrate.rules.gauss import EPS, analytic_truncation, gauss
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays
 from potto.primitives import PRIMITIVES
@@ -206,12 +206,12 @@ class Rule:
             zip(self.plan.variables, self.plan.frames, self.cell.path, strict=True)
         ):
             values = evaluated(frame, machine, {name: here[name] for name in frame.params})
-            ends, off = _block((values[low], values[high]), k, shape)
-            lo, width = ends[:, 0], ends[:, 1] - ends[:, 0]
-            off = (off + EPS * np.abs(ends)).sum(axis=1)
+            ends, lost = dense((values[low], values[high]), k, shape)
+            lo, width = ends[0], ends[1] - ends[0]
+            off = EPS * np.abs(ends).sum(axis=0) + (0.0 if lost is None else lost.sum(axis=0))
             widths.append((width, off))
             if i:
-                plain &= _clear(values, low, high, ends[0])
+                plain &= _clear(values, low, high, ends[:, 0])
             nodes = np.array([0.0, 1.0]) if corners else self.axis(i)[0][picked[i]]
             at = lo[:, None] + width[:, None] * nodes.reshape(-1, *(1,) * len(shape))
             moves = [values[low].t[d] is not None or values[high].t[d] is not None for d in range(k)]
@@ -222,12 +222,10 @@ class Rule:
             )  # fmt: skip
             shape = at.shape[1:]
         function = function_of(self.cell.face)
-        cell = machine.evaluate(function, {name: here[name] for name in function.params}, None)
-        assert isinstance(cell, Cell)
-        value, off = _block((cell,), k, shape)
+        value, lost = dense(machine.evaluate(function, {name: here[name] for name in function.params}, None), k, shape)
         if machine is not self.machine and not corners:
             plain &= self.clear_of_edges(machine.with_directions(0), here, shape)
-        return Nodes(value[:, 0], off[:, 0], widths, plain)
+        return Nodes(value[0], np.zeros(value[0].shape) if lost is None else lost[0], widths, plain)
 
     def clear_of_edges(self, machine: Evaluator, here: dict[str, Value], shape: tuple[int, ...]) -> Bools:
         """The members on whose cells nothing comes to the edge of where it is analytic, as a root of x does at 0: there
@@ -248,7 +246,7 @@ class Rule:
         volumes = [np.ones((k1, count))]  # of a node of the variables further out, with weights, and of its stretch
         volumes[0][1:] = 0.0
         for i, (width, _) in enumerate(nodes.widths):
-            volumes[i] = _product(volumes[i], width)
+            volumes[i] = product(volumes[i], width)
             weights = (gauss(self.orders[i]).weights * axes[i]).reshape(-1, *(1,) * (width.ndim - 1))
             volumes.append(volumes[i][:, None] * weights)
         truncated = np.zeros((k1, count))
@@ -262,7 +260,7 @@ class Rule:
                 coefficients = rule.transform.T @ flat
                 number = coefficients[:, 0]
                 truncated += analytic_truncation(_summed(np.abs(coefficients), np.abs(volumes[i])))
-            number = _product(number.reshape(width.shape), width)
+            number = product(number.reshape(width.shape), width)
         return number, truncated
 
     def rounded(self, nodes: Nodes, picked: Sequence[Ints]) -> tuple[Array, Array]:
@@ -273,8 +271,8 @@ class Rule:
             speeds = speeds.reshape(-1, *(1,) * (most.ndim - 2))
             most, off = (most * speeds).max(axis=1), (off * speeds).max(axis=1)
             size = np.abs(width)
-            off = _product(off, size) + _product(most, lost)
-            most = _product(most, size)
+            off = product(off, size) + product(most, lost)
+            most = product(most, size)
         return off, most
 
     def good(self, found: Measured) -> Bools:
@@ -302,17 +300,6 @@ def _largest(value: Array) -> Array:
     return np.asarray(np.where(np.isfinite(size), size, 0.0).reshape(-1, value.shape[-1]).max(axis=0))
 
 
-def _block(cells: Sequence[Cell], k: int, shape: tuple[int, ...]) -> tuple[Array, Array]:
-    """The numbers of cells and their errors, (1 + k, cells, *shape) each."""
-    value, off = np.zeros((2, 1 + k, len(cells), *shape))
-    for row, cell in enumerate(cells):
-        for block, parts in ((value, (cell.v, *cell.t)), (off, (cell.e, *cell.et))):
-            for d, part in enumerate(parts):
-                if part is not None:
-                    block[d, row] = part
-    return value, off
-
-
 def _clear(values: Sequence[Cell], low: int, high: int, ends: Array) -> Bools:
     """The members for which a stretch is one at all nodes: its ends in order, no other cut between them."""
     fine = ends[1] > ends[0]
@@ -329,11 +316,4 @@ def _summed(block: Array, volume: Array) -> Array:
     total: Array = np.einsum("knrm,rm->kmn", block, volume[0])
     if k1 > 1:
         total[1:] += np.einsum("nrm,krm->kmn", block[0], volume[1:])
-    return total
-
-
-def _product(block: Array, factor: Array) -> Array:
-    """(f g)' = f' g + f g', for blocks (1 + k, ...)."""
-    total: Array = block * factor[0]
-    total[1:] += block[0] * factor[1:]
     return total

@@ -1,8 +1,9 @@
 """Sums over the nodes of cells whose ends are formulas: values and tangents, with the rounding of both.
 
-Owns `summed`, `Totals` and `evaluated`. Nodes move with the ends of their cells, so that the tangent of the sum is the
-derivative of the integral. Blocks of numbers have values in row 0 and tangents in rows 1 ... k of their first axis; the
-nodes of the variables, (P, n2, n3), are their last axes: P those of the outermost variable, cell after cell.
+Owns `summed`, `product`, `Totals` and `evaluated`. Nodes move with the ends of their cells, so that the tangent of the
+sum is the derivative of the integral. Blocks of numbers have values in row 0 and tangents in rows 1 ... k of their
+first axis; the nodes of the variables, (P, n2, n3), are their last axes: P those of the outermost variable, cell after
+cell.
 """
 
 from __future__ import annotations
@@ -11,7 +12,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -76,7 +76,12 @@ def summed(
             here[name] = here[name].map(_deeper)  # type: ignore[union-attr]
         moves = [any(cell.t[d] is not None for cell in frame) for d in range(machine.directions)]
         here[variable] = _placed(lo, width, off, nodes, i > 0, moves)
-        length, rounded = _times(length, rounded, width, off, i > 1)
+        if length is None or rounded is None:
+            length, rounded = width, off
+        else:
+            if i > 1:
+                length, rounded = _deeper(length), _deeper(rounded)
+            length, rounded = _times(length, rounded, width, off)
         shape = here[variable].v.shape  # type: ignore[union-attr]
     values = _integrand(region.cells, owner, tracked, here, shape)
     if len(variables) > 1:
@@ -134,16 +139,17 @@ def _placed(lo: Array, width: Array, off: Array, nodes: Array, inner: bool, move
     return Cell(at[0], off[0], t, tuple(off[d] if m else None for d, m in enumerate(moves, 1)))
 
 
-def _times(length: Any, rounded: Any, width: Array, off: Array, deeper: bool) -> tuple[Array, Array]:
+def _times(length: Array, rounded: Array, width: Array, off: Array) -> tuple[Array, Array]:
     """The product of the lengths so far with that of one more variable, its tangents, and its rounding."""
-    if length is None:
-        return width, off
-    if deeper:
-        length, rounded = length[..., None], rounded[..., None]
-    product, error = length * width[0], rounded * width[0] + np.abs(length) * off[0]
-    product[1:] += length[0] * width[1:]
-    error[1:] += rounded[0] * np.abs(width[1:]) + np.abs(length[0]) * off[1:]
-    return product, error + 2 * EPS * np.abs(product)
+    found = product(length, width)
+    return found, product(rounded, np.abs(width)) + product(np.abs(length), off) + 2 * EPS * np.abs(found)
+
+
+def product(block: Array, factor: Array) -> Array:
+    """(f g)' = f' g + f g', for blocks (1 + k, ...)."""
+    found: Array = block * factor[0]
+    found[1:] += block[0] * factor[1:]
+    return found
 
 
 def _integrand(

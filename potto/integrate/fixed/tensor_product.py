@@ -16,12 +16,12 @@ from functools import lru_cache
 
 import numpy as np
 
-from potto.calculus.algebra.degree import degree
+from potto.calculus.algebra.degree import degree, plane
 from potto.calculus.solving.enclosable import enclosable
 from potto.calculus.surfaces.discontinuities import Finding
 from potto.core.kinds import union_of
-from potto.core.terms import Integral, Lam, Prim, Term, function_of, postorder, tuple_
-from potto.integrate.pieces import Evaluator, Sums, components, gather, still
+from potto.core.terms import Integral, Lam, Term, function_of, postorder, tuple_
+from potto.integrate.pieces import Evaluator, Sums, dense, gather, still
 from potto.integrate.rules.gauss import EPS, gauss, truncation
 from potto.integrate.rules.intervals import Interval, enclosure
 from potto.kernels.cells import Array, Bools, Cell, Value, map_arrays
@@ -63,7 +63,7 @@ def box_of(term: Integral, found: Iterable[Finding], body: Lam, inlined: Term) -
     if any(isinstance(node, Integral) for node in postorder(term.body)):
         return None
     surfaces = tuple(dict.fromkeys(f.surface for f in found if f.surface.free & names))
-    curved = tuple(surface for surface in surfaces if not affine_in_each(surface, names))
+    curved = tuple(surface for surface in surfaces if not all(plane(surface, (name,)) for name in names))
     if not all(map(enclosable, curved)):
         return None
     shown = tuple_(surface for surface in surfaces if surface not in curved)
@@ -71,22 +71,6 @@ def box_of(term: Integral, found: Iterable[Finding], body: Lam, inlined: Term) -
     nodes = max(ORDERS[-1] + 1 if d is None else d // 2 + 1 for d in degrees)
     exact = nodes if nodes <= ORDERS[-1] else None
     return Box(term.variables, function_of(tuple_(bounds)), function_of(shown), curved, body, exact)
-
-
-def affine_in_each(term: Term, names: frozenset[str]) -> bool:
-    """Whether a term is affine in each of some variables while the others stand still, by its form."""
-    if not term.free & names or term.__class__.__name__ == "Var":
-        return True
-    if not isinstance(term, Prim):
-        return False
-    if term.op in ("add", "neg"):
-        return all(affine_in_each(a, names) for a in term.args)
-    if term.op == "mul":
-        apart = sum(len(a.free & names) for a in term.args) == len(term.free & names)
-        return apart and all(affine_in_each(a, names) for a in term.args)
-    if term.op == "div":
-        return not term.args[1].free & names and affine_in_each(term.args[0], names)
-    return False
 
 
 def uncut(box: Box, machine: Evaluator, env: dict[str, Value], batch: int) -> tuple[Bools, Sums] | None:
@@ -115,17 +99,11 @@ def uncut(box: Box, machine: Evaluator, env: dict[str, Value], batch: int) -> tu
                 return None
             part, good = found
             if sums is None:
-                sums = _empty(part, batch)
+                sums = Sums.zeros(part.v.shape[0], machine.directions, batch)
             taken = index[good]
             done[taken] = True
-            for name in ("v", "e", "t", "et", "gross"):
-                getattr(sums, name)[..., taken] = getattr(part, name)[..., good]
+            sums.put(taken, part.pick(good))
     return (done, sums) if sums is not None and done.any() else None
-
-
-def _empty(like: Sums, batch: int) -> Sums:
-    parts = (np.zeros((*getattr(like, name).shape[:-1], batch)) for name in ("v", "e", "t", "et"))
-    return Sums(*parts, gross=np.zeros((2, batch)))
 
 
 def _free_of_surfaces(box: Box, machine: Evaluator, env: dict[str, Value], low: Array, high: Array) -> Bools:
@@ -179,21 +157,17 @@ def _product(
     for n, variable in enumerate(box.variables):
         here[variable] = Cell(low[n] + size[n] * nodes[n], None, (None,) * k)
     machine.count(low.shape[1] * nodes[0].size)
-    cells = components(machine.evaluate(box.body, {n: here[n] for n in box.body.params}, None))
-    if any(c.e is not None or any(e is not None for e in c.et) for c in cells):
+    value = machine.evaluate(box.body, {n: here[n] for n in box.body.params}, None)
+    h, errors = dense(value, k, (nodes[0].size, low.shape[1]))
+    if errors is not None:
         return None  # values of integrals, which have errors of their own
-    h = np.empty((len(cells), 1 + k, nodes[0].size, low.shape[1]))
-    for c, cell in enumerate(cells):
-        h[c, 0] = cell.v
-        for d, tangent in enumerate(cell.t or (None,) * k):
-            h[c, 1 + d] = 0.0 if tangent is None else tangent
     channels = h.reshape(-1, *h.shape[2:])
     far, exact = np.maximum(np.abs(low), np.abs(high)) / size, order == box.exact
     integral, error, floor = _estimated(channels, order, far, weights, exact)
     volume = size.prod(axis=0)
     asked = np.maximum(0.5 * machine.rtol * np.abs(integral), 0.5 * machine.atol / volume)
     good: Bools = (error <= np.maximum(asked, 8 * floor)).all(axis=0)
-    shape = (len(cells), 1 + k, low.shape[1])
+    shape = (*h.shape[:2], low.shape[1])
     total, bound = (integral * volume).reshape(shape), ((error + floor) * volume).reshape(shape)
     most = (weights[-1] @ np.abs(h)).max(axis=0) * volume
     gross = np.stack((most[0], most[1:].max(axis=0, initial=0.0)))

@@ -32,7 +32,7 @@ from potto.integrate.montecarlo.rare_events import (
 )
 from potto.integrate.montecarlo.replicates import Moments, Replicates, added
 from potto.integrate.montecarlo.surface_terms import Surface, factors
-from potto.integrate.pieces import Sums, spread
+from potto.integrate.pieces import Sums, dense
 from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.sobol import MOST, Sobol
@@ -329,10 +329,9 @@ class _Run:
         k, body = self.machine.directions, self.plan.body
         self.machine.count(n)
         value = self.machine.evaluate(body, {p: point.env[p] for p in body.params}, self.plan.trace(sides))
-        f, _, ft, e, et = spread(value, (n,), k, False)
-        m = f.shape[0]
-        ft, e = np.zeros((m, k, n)) if ft is None else ft, np.zeros((m, n)) if e is None else e
-        et = np.zeros((m, k, n)) if et is None else et[:, :k]
+        numbers, errors = dense(value, k, (n,))
+        errors = np.zeros(numbers.shape) if errors is None else errors
+        (f, ft), (e, et) = ((x[:, 0], x[:, 1:]) for x in (numbers, errors))
         bad = np.nonzero(np.isnan(f).any(axis=0))[0]
         if bad.size:
             zero = guarded_samples(self.plan, point.env, sides, bad, self.machine)

@@ -13,7 +13,7 @@ import numpy as np
 
 from potto.integrate.rules import substitution
 from potto.integrate.rules.substitution import Segments
-from potto.kernels.cells import Array, Ints
+from potto.kernels.cells import Array, Bools, Ints
 
 # The channels at nodes, and the errors that came with them: see `PanelBatch.values`.
 Evaluated = Callable[[Segments, Ints, Array, Array, Array], tuple[Array, Array | None]]
@@ -28,38 +28,26 @@ def mend(
 ) -> None:
     """Put values, and bounds of their errors, from further in where channels (C, P, n) are no numbers.
 
-    u, du: (P, n) as for the map.
+    u, du: (P, n) as for the map. Of nodes so close to an end that integrals further in give up, of 1/(x + y) along y at
+    x = 1e-20, nothing is known but that they count little if values grow slowly; they may be off by all that they are.
     """
-    turning = np.isin(seg.kind, (substitution.LEFT, substitution.RIGHT, substitution.BOTH))[:, None]
-    for close in CLOSE if turning.any() else ():
-        bad = ~np.isfinite(h).all(axis=0) & turning & ((u < close) | (u > 1 - close))
+    turning = np.isin(seg.kind, (substitution.LEFT, substitution.RIGHT, substitution.BOTH))
+
+    def put(close: float, segments: Bools, doubt: float) -> bool:
+        bad = ~np.isfinite(h).all(axis=0) & segments[:, None] & ((u < close) | (u > 1 - close))
         rows = np.nonzero(bad.any(axis=1))[0]
-        if not rows.size:
+        if rows.size:
+            part, inner = seg.pick(rows), np.clip(u[rows], close, 1 - close)
+            x, slope, label = substitution.points(part, inner)
+            found, errors = evaluated(part, index[rows], x, label, slope * np.broadcast_to(du, u.shape)[rows])
+            h[:, rows] = np.where(bad[rows], found, h[:, rows])
+            if bounds is not None:
+                off = doubt * np.abs(found) + (0.0 if errors is None else errors)
+                bounds[:, rows] = np.where(bad[rows], off, bounds[:, rows])
+        return bool(rows.size)
+
+    for close in CLOSE if turning.any() else ():
+        if not put(close, turning, 0.0):
             break
-        part, inner = seg.pick(rows), np.clip(u[rows], close, 1 - close)
-        x, slope, label = substitution.points(part, inner)
-        found, errors = evaluated(part, index[rows], x, label, slope * np.broadcast_to(du, u.shape)[rows])
-        h[:, rows] = np.where(bad[rows], found, h[:, rows])
-        if bounds is not None and errors is not None:
-            bounds[:, rows] = np.where(bad[rows], errors, bounds[:, rows])
     if bounds is not None and not np.isfinite(h).all():
-        _unreached(evaluated, seg, index, u, du, h, bounds)
-
-
-def _unreached(
-    evaluated: Evaluated, seg: Segments, index: Ints, u: Array, du: Array, h: Array, bounds: Array
-) -> None:
-    """Values for nodes so close to an end that integrals further in give up: of 1/(x + y) along y at x = 1e-20.
-
-    Nothing is known of them but that they count little if values grow slowly; they may be off by all that they are.
-    """
-    plain = (seg.kind == substitution.LINEAR)[:, None]
-    bad = ~np.isfinite(h).all(axis=0) & plain & ((u < UNREACHED) | (u > 1 - UNREACHED))
-    rows = np.nonzero(bad.any(axis=1))[0]
-    if rows.size:
-        part, inner = seg.pick(rows), np.clip(u[rows], UNREACHED, 1 - UNREACHED)
-        x, slope, label = substitution.points(part, inner)
-        found, errors = evaluated(part, index[rows], x, label, slope * np.broadcast_to(du, u.shape)[rows])
-        off = np.abs(found) if errors is None else np.abs(found) + errors
-        h[:, rows] = np.where(bad[rows], found, h[:, rows])
-        bounds[:, rows] = np.where(bad[rows], off, bounds[:, rows])
+        put(UNREACHED, seg.kind == substitution.LINEAR, 1.0)

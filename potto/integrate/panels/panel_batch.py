@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from contextlib import nullcontext
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from potto.integrate.levels import LevelPlan
 from potto.integrate.panels.iterated import Iterated
 from potto.integrate.panels.mending import mend
 from potto.integrate.panels.roundoff import few_doubles, misplaced, noise, note_ends, shake, together
-from potto.integrate.pieces import Crossing, Ends, Evaluator, Pieces, Sums, column, gather, joined, spread, still
+from potto.integrate.pieces import Crossing, Ends, Evaluator, Pieces, Sums, all_of, column, dense, gather, still
 from potto.integrate.rules import substitution
 from potto.integrate.rules.gauss import EPS, Rule, gauss, truncation
 from potto.integrate.rules.substitution import Segments
@@ -80,12 +79,8 @@ class PanelBatch:
         """
         rows = max(1, CHUNK // order)
         if p.segment.size > rows:
-            return joined(
-                [
-                    self.measure(p.places(part), order)
-                    for part in (slice(i, i + rows) for i in range(0, p.segment.size, rows))
-                ]
-            )
+            chunks = (slice(i, i + rows) for i in range(0, p.segment.size, rows))
+            return all_of([self.measure(p.places(chunk), order) for chunk in chunks])
         rule = gauss(order)
         if whole:
             seg = self.seg
@@ -156,43 +151,28 @@ class PanelBatch:
 
     def values(self, seg: Segments, index: Ints, x: Array, label: Array, weight: Array) -> tuple[Array, Array | None]:
         """The channels at the nodes, times the weight: (C, P, n), and the errors that came with them."""
-        f, fx, ft, e, et, common = self.integrand(index, x, weight)
-        m, k = f.shape[0], self.k
-        rows = 1 + k + (k if self.both else 0)
-        h = np.empty((m, rows, *x.shape))
-        h[:, 0] = f
-        if self.moving:
-            for d in range(k):
-                v, dv = substitution.velocity(seg, label, d)
-                h[:, 1 + d] = ft[:, d] + fx * v + f * dv
-                if self.both:
-                    h[:, 1 + k + d] = ft[:, d]
-        elif k:
-            h[:, 1:] = ft
+        numbers, errors, common = self.integrand(index, x, weight)
+        k, self.width = self.k, numbers.shape[0]
+        fixed = [*range(1 + k), *(range(1, 1 + k) if self.both else ())]
+        h, bound = numbers[:, fixed], None if errors is None else errors[:, fixed]
+        for d in range(k) if self.moving else ():
+            v, dv = substitution.velocity(seg, label, d)
+            h[:, 1 + d] += numbers[:, 1 + k] * v
+            h[:, 1 + d] += numbers[:, 0] * dv
+            if bound is not None and errors is not None:
+                bound[:, 1 + d] += np.abs(v) * errors[:, 1 + k] + np.abs(dv) * errors[:, 0]
+                if common is not None:
+                    bound[:, 1 + d] -= together(common, numbers[:, 1:], v, d)
         h *= weight
-        self.width = m
-        bound = None
-        if e is not None:
-            bound = np.zeros((m, rows, *x.shape))
-            bound[:, 0] = e
-            if et is not None and k:
-                bound[:, 1 : 1 + k] = et[:, :k]
-                if self.moving:
-                    for d in range(k):
-                        v, dv = substitution.velocity(seg, label, d)
-                        bound[:, 1 + d] += np.abs(v) * et[:, k] + np.abs(dv) * e
-                        if common is not None:
-                            bound[:, 1 + d] -= together(common, ft, fx, v, d)
-                    if self.both:
-                        bound[:, 1 + k :] = et[:, :k]
-            bound = (bound * np.abs(weight)).reshape(m * rows, *x.shape)
-        return h.reshape(m * rows, *x.shape), bound
+        if bound is not None:
+            bound = (bound * np.abs(weight)).reshape(-1, *x.shape)
+        return h.reshape(-1, *x.shape), bound
 
     def integrand(
         self, index: Ints, x: Array, weight: Array | None = None
-    ) -> tuple[Array, Any, Any, Array | None, Array | None, Array | None]:
-        """F, dF/dx, D_theta F (each with a leading axis of components), error bounds, and the part of the tangents'
-        that is one factor of all of them, at nodes (P, n).
+    ) -> tuple[Array, Array | None, Array | None]:
+        """F, D_theta F and, if nodes move, dF/dx at nodes, (m, 1 + k or more, P, n); their error bounds; and the part
+        of the tangents' that is one factor of all of them.
 
         weight: (P, n) or (P, 1), how much the nodes of a rule count, but for its own weights.
         """
@@ -206,39 +186,32 @@ class PanelBatch:
             env[name] = Cell(x, None, tangent)
             masks = {g: m[index][:, None] if isinstance(m, np.ndarray) else m for g, m in self.sides.items()}
             self.machine.count(x.size)
-            return *spread(self.parent.body(env, masks, self.inner), x.shape, k, self.moving), None
+            return *dense(self.parent.body(env, masks, self.inner), k + self.moving, x.shape), None
         n = x.shape[1]
         flat = np.repeat(np.arange(index.size), n)
         env = gather(here, owner[flat])
         env[name] = Cell(x.reshape(-1), None, tangent)
         masks = {g: m[index[flat]] if isinstance(m, np.ndarray) else m for g, m in self.sides.items()}
         root = self.below(owner[flat])
-        if weight is None or self.filled is None:
-            less = self.inherited(owner, n)
-        else:
-            less = self.spared(owner, np.broadcast_to(np.abs(weight), x.shape))
+        less = self.spared(owner, n, None if weight is None else np.broadcast_to(np.abs(weight), x.shape))
         sums = self.parent.run(self.number + 1, env, x.size, masks, self.inner, root, less)
         if sums.gross is not None:
             self.count_cancelling(sums, sums.gross, owner[flat])
-        shape = (sums.v.shape[0], *x.shape)
-        t = sums.t.reshape(shape[0], -1, *x.shape)
-        et = sums.et.reshape(t.shape)
-        common = sums.common if sums.common is None else sums.common.reshape(t.shape)
-        return sums.v.reshape(shape), t[:, k] if self.moving else None, t[:, :k], sums.e.reshape(shape), et, common
+        numbers, errors = (part.reshape(*part.shape[:2], *x.shape) for part in sums.channels())
+        return numbers, errors, None if sums.common is None else sums.common.reshape(sums.v.shape[0], -1, *x.shape)
 
-    def inherited(self, owner: Ints, n: int) -> Array | None:
-        """How many times the error may be larger of the nodes of members that have less weight than others."""
-        return None if self.slack is None else np.repeat(self.slack[owner], n)
-
-    def spared(self, owner: Ints, weight: Array) -> Array:
-        """How many times the error of integrals further in may be larger at nodes that count less than the mean."""
-        assert self.filled is not None
-        seg, nodes = self.seg, np.bincount(owner, minlength=self.batch) * weight.shape[1]
+    def spared(self, owner: Ints, n: int, weight: Array | None) -> Array | None:
+        """How many times the error of integrals further in may be larger at n nodes each of members that have less
+        weight than others, and by itself less than the mean."""
+        own = None if self.slack is None else np.repeat(self.slack[owner], n)
+        if weight is None or self.filled is None:
+            return own
+        seg, nodes = self.seg, np.bincount(owner, minlength=self.batch) * n
         reach = self.filled * np.bincount(seg.owner, seg.b - seg.a, minlength=self.batch)
         mean = (np.where(np.isfinite(reach), reach, 0.0) / np.maximum(nodes, 1))[owner]  # far out what counts is small
         with np.errstate(divide="ignore", invalid="ignore"):
             times: Array = np.fmax(1.0, np.fmin(mean[:, None] / weight, MOST_SLACK)).ravel()
-        return times if self.slack is None else times * np.repeat(self.slack[owner], weight.shape[1])
+        return times if own is None else times * own
 
     def count_cancelling(self, inner: Sums, added: Array, owner: Ints) -> None:
         """Keep how many times what they come to integrals further in add up, on the whole, for each of the batch.

@@ -115,14 +115,15 @@ def hidden_steps(at_ends: Array, seg: Segments, jumps: bool) -> Array:
     return np.where(np.isnan(lost), 0.0, lost)
 
 
-def together(common: Array, ft: Array, fx: Array, v: Array, d: int) -> Array:
+def together(common: Array, tangents: Array, v: Array, d: int) -> Array:
     """How much less D F/D theta + v dF/dx errs than its two parts by themselves, by a factor that they share: next to a
     fold, where both are as large as one likes, what they come to is not.
 
-    common: (m, k + 1, P, n) the errors that are due to such a factor, the last those of dF/dx.
+    tangents: (m, k + 1, P, n), the last of them dF/dx; common: their errors that are due to such a factor.
     """
+    ft, fx = tangents[:, d], tangents[:, -1]
     apart = common[:, d] + np.abs(v) * common[:, -1]
     with np.errstate(divide="ignore", invalid="ignore"):
-        factor = np.fmax(common[:, d] / np.abs(ft[:, d]), common[:, -1] / np.abs(fx))
-        joint = np.fmin(factor, 1.0) * np.abs(ft[:, d] + v * fx)
+        factor = np.fmax(common[:, d] / np.abs(ft), common[:, -1] / np.abs(fx))
+        joint = np.fmin(factor, 1.0) * np.abs(ft + v * fx)
     return np.where(np.isfinite(joint), np.maximum(apart - joint, 0.0), 0.0)

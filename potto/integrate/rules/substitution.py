@@ -8,10 +8,10 @@ the segment's two ends when these move.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from potto.integrate.columns import Columns
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Ints
 
@@ -26,7 +26,7 @@ TYPICAL = 0.25
 
 
 @dataclass
-class Segments:
+class Segments(Columns):
     """Stretches between neighbouring cuts, for a batch of integrals.
 
     owner: (S,) index of the integral. a, b: (S,) ends, a < b. ta, tb: (k, S) how they move. kind: (S,) the map.
@@ -50,12 +50,6 @@ class Segments:
     blur: Array
     da: Array
     db: Array
-
-    def pick(self, index: Any) -> Segments:
-        return Segments(self.owner[index], self.a[index], self.b[index], self.ta[:, index], self.tb[:, index],
-                        self.kind[index], self.left[index], self.right[index], self.rank[index],
-                        self.ea[index], self.eb[index], self.blur[:, index],
-                        self.da[:, index], self.db[:, index])  # fmt: skip
 
 
 def choose(a: Array, b: Array, left: Array, right: Array) -> Ints:

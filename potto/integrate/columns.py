@@ -1,0 +1,60 @@
+"""Arrays that belong together: the last axis of each is one batch.
+
+Owns `side_by_side`, and `Columns`, by which sums, panels, segments and places are picked from, put in place and joined.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Self, TypeVar
+
+import numpy as np
+
+from potto.kernels.cells import Array, Ints
+
+C = TypeVar("C", bound="Columns")
+
+
+class Columns:
+    """Of a dataclass the fields that are arrays have the batch as their last axis; others are the same for all."""
+
+    def arrays(self) -> dict[str, Array]:
+        return {name: x for name, x in vars(self).items() if isinstance(x, np.ndarray)}
+
+    def _with(self, arrays: dict[str, Array]) -> Self:
+        other = object.__new__(type(self))
+        vars(other).update(vars(self), **arrays)
+        return other
+
+    def pick(self, index: Any) -> Self:
+        """Some members of the batch."""
+        return self._with({n: x[index] if x.ndim == 1 else x[..., index] for n, x in self.arrays().items()})
+
+    def put(self, index: Any, part: Self) -> None:
+        """Replace some members of the batch; of what is not known of the part, nothing is known of the whole."""
+        there = part.arrays()
+        for name, x in self.arrays().items():
+            if name in there:
+                x[..., index] = there[name]
+            else:
+                setattr(self, name, None)
+
+
+def joined(parts: Sequence[C]) -> C:
+    """Batches put together, by one copy for any number of them; what is not known of one is not known of all."""
+    first, *rest = parts
+    if not rest:
+        return first
+    names = [name for name in first.arrays() if all(getattr(part, name) is not None for part in rest)]
+    found = first._with({name: np.concatenate([getattr(part, name) for part in parts], axis=-1) for name in names})
+    for name in set(first.arrays()).difference(names):
+        setattr(found, name, None)
+    return found
+
+
+def side_by_side(owner: Ints, values: Array, batch: int, gap: float = np.nan) -> Array:
+    """Values (..., n) of members, who come in order, as rows with one value for each: (..., rows, batch)."""
+    count = np.bincount(owner, minlength=batch)
+    rows = np.full((*values.shape[:-1], int(count.max(initial=0)), batch), gap)
+    rows[..., np.arange(owner.size) - (np.cumsum(count) - count)[owner], owner] = values
+    return rows
