@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from how_many import examples
 from mpmath import mp
 from program_checks import where
 from program_source import random_program
@@ -68,6 +69,6 @@ def test_duals() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("start", range(100, 300, 20))
+@pytest.mark.parametrize("start", range(100, 100 + examples(60, 400), 10))
 def test_many_duals(start: int) -> None:
-    check_all(range(start, start + 20))
+    check_all(range(start, start + 10))
