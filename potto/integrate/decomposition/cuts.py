@@ -147,7 +147,7 @@ def segments(
     if merged or edges or not nested or any(row.hides is not None for row in rows):
         cuts.slivers = slivers(plan, rows, low, high, ((tl, el), (th, eh)), directions, batch, kin)
     if directions:
-        cuts.folds = folds_at(plan, rows, low, high, directions, batch)
+        cuts.folds = folds_at(plan, rows, low, high, directions, batch, nested)
     if conflict:
         cuts.meetings = meetings(plan, rows, inside, low.size, directions)
     return cuts

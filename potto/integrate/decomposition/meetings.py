@@ -17,6 +17,9 @@ from potto.kernels.cells import Array, Bools, Ints
 
 # How far off, in units of the last place, a root may be that was found by numbers.
 SEARCHED = 4
+# How long a stretch is, in its own size, on which a surface is 0 to rounding because roots merge there: the root of what
+# rounding comes to, where that around a simple root is as long as its rounding.
+FLAT = 2.0**-30
 
 
 @dataclass
@@ -152,7 +155,8 @@ def slivers(
             every = np.broadcast_to(np.where(off_it, passes, 0.0), (directions, batch))[:, owner]
             moves = np.abs([tangents(jumps[i].t, batch, directions) for i in of]).max(axis=(0, 1), initial=0.0)
             if of.count(of[0]) > 1:  # roots that merge move infinitely fast
-                moves = np.where(moves > 0, np.inf, 0.0)
+                flat = (kin is None) & (width > FLAT * (1 + np.abs(at)))
+                moves = np.where((moves > 0) & flat, np.inf, moves)
             fast = (moves / (high - low))[owner]
             out.append(Sliver(tuple(jumps[i].cut for i in of), owner, at[owner], width[owner], fast, upper, every))
 
@@ -186,9 +190,11 @@ def _close(x: Array, off: Array) -> list[tuple[int, int]]:
     return sorted(pairs)
 
 
-def folds_at(plan: LevelPlan, rows: list[Row], low: Array, high: Array, directions: int, batch: int) -> list[Fold]:
-    """Where roots of one surface are at one place, to rounding, or one on which the integrand jumps moves infinitely
-    fast."""
+def folds_at(
+    plan: LevelPlan, rows: list[Row], low: Array, high: Array, directions: int, batch: int, nested: bool
+) -> list[Fold]:
+    """Where roots of one surface are at one place, or one on which the integrand jumps moves infinitely fast; and where
+    they merge to rounding, but for nodes of variables further out, which are cut where that happens."""
     out: list[Fold] = []
     before: dict[int, list[Any]] = {}
     for row in rows:
@@ -200,8 +206,9 @@ def folds_at(plan: LevelPlan, rows: list[Row], low: Array, high: Array, directio
         folded: Any = np.zeros(batch, dtype=bool)
         if plan.level.cuts[row.cut].decides and any(not np.isfinite(t).all() for t in row.t if t is not None):
             folded = ~np.isfinite(tangents(row.t, batch, directions)).all(axis=0)
-        if row.hides is not None and plan.level.cuts[row.cut].decides:
-            folded = folded | (tangents(row.t, batch, directions) != 0).any(axis=0)
+        if row.hides is not None and plan.level.cuts[row.cut].decides and not nested:
+            flat = row.hides > FLAT * (1 + np.abs(x))
+            folded = folded | (flat & (tangents(row.t, batch, directions) != 0).any(axis=0))
         for other in others[:-1]:
             folded = folded | (x == other)
         owner = np.nonzero(folded & (x >= low) & (x <= high))[0]

@@ -32,8 +32,9 @@ from potto.primitives import PRIMITIVES
 ORDERS = (6, 8, 12, 14, 20, 28)
 MOST_NODES = 4096
 POINTS = 1 << 15
-# A rule is good enough for a cell if what it may be off is this part of the accuracy asked for.
-SHARE = 0.03
+# A rule is good enough for a cell if what it may be off is this part of the accuracy asked for; for a few members, whom
+# more nodes cost next to nothing, this part of the number.
+SHARE, TIGHT = 0.01, 1e-13
 # At how many nodes rounding is followed at each; and how much more it may be elsewhere where it is at a few.
 TRACKED, ELSEWHERE = 1 << 12, 2.0
 # How many members tell the order for all, and up to how many it does not pay to ask them.
@@ -277,8 +278,10 @@ class Rule:
 
     def good(self, found: Measured) -> Bools:
         """For which cells the rule does."""
-        asked = SHARE * self.machine.rtol * np.abs(found.number)
-        return np.asarray((found.truncated <= np.maximum(asked, CANCELS * found.gross)).all(axis=0))
+        few = self.cell.members.size <= FEW
+        asked = (TIGHT if few else SHARE * self.machine.rtol) * np.abs(found.number)
+        least = (TIGHT if few else CANCELS) * found.gross
+        return np.asarray((found.truncated <= np.maximum(asked, least)).all(axis=0))
 
 
 @lru_cache(maxsize=1024)
