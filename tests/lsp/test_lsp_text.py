@@ -69,8 +69,8 @@ def test_edits_agree_with_the_reference(seed: int) -> None:
 
 
 @pytest.mark.slow
-def test_a_million_edits_agree_with_the_reference() -> None:
-    for seed in range(5_000):
+def test_many_edits_agree_with_the_reference() -> None:
+    for seed in range(1_000):
         check_edits(seed + 1_000, 200)
 
 

@@ -20,7 +20,7 @@ from potto.syntax import parse_chunk
 from potto.types import interface
 
 ROOT = "/broken"
-MUTATIONS = int(os.environ.get("POTTO_MUTATIONS", "5000"))
+MUTATIONS = int(os.environ.get("POTTO_MUTATIONS", "2000"))
 RECOVERY = 0.010  # seconds within which 99 in 100 are read, mistakes and all
 
 
