@@ -17,8 +17,8 @@ from potto.kernels.cells import Array, Bools, Ints
 
 # How far off, in units of the last place, a root may be that was found by numbers.
 SEARCHED = 4
-# How long a stretch is, in its own size, on which a surface is 0 to rounding because roots merge there: the root of what
-# rounding comes to, where that around a simple root is as long as its rounding.
+# How long a stretch is, in its own size, on which a surface is 0 to rounding because roots merge there: the root of
+# what rounding comes to, where that around a simple root is as long as its rounding.
 FLAT = 2.0**-30
 
 
