@@ -82,3 +82,59 @@ def as_term(polynomial: Polynomial, rounded: bool = False) -> Term | None:
 
 def _power_term(atom: Term, n: int) -> Term:
     return atom if n == 1 else pow_(atom, const(n))
+
+
+def divided(top: Polynomial, below: Polynomial, largest: int) -> Polynomial | None:
+    """top / below where that is a polynomial again, by division of leading monomials, in at most `largest` steps."""
+    if len(below) < 2 or len(top) < len(below) or len(top) * len(below) > largest:
+        return None
+    rank = {a: i for i, a in enumerate(sorted({a for m in (*top, *below) for a, _ in m}, key=lambda a: a.digest))}
+
+    def order(monomial: Monomial) -> list[tuple[int, int]]:
+        counts = dict(monomial)
+        return [(rank[a], counts.get(a, 0)) for a in sorted(rank, key=rank.__getitem__)]
+
+    lead = max(below, key=order)
+    rest, result = dict(top), dict[Monomial, Fraction]()
+    for _ in range(largest):
+        if not rest:
+            return result
+        head = max(rest, key=order)
+        counts = dict(head)
+        if any(counts.get(a, 0) < n for a, n in lead):
+            return None
+        step = without(head, dict(lead))
+        factor = rest[head] / below[lead]
+        result[step] = factor
+        for monomial, coefficient in below.items():
+            counts = dict(step)
+            for a, n in monomial:
+                counts[a] = counts.get(a, 0) + n
+            key = sorted_monomial(counts)
+            left = rest.get(key, Fraction(0)) - factor * coefficient
+            if left:
+                rest[key] = left
+            else:
+                rest.pop(key, None)
+    return None
+
+
+def shared_by(monomials: list[Monomial]) -> dict[Term, int]:
+    """The powers of atoms that are factors of all of them."""
+    common = dict(monomials[0])
+    for monomial in monomials[1:]:
+        other = dict(monomial)
+        common = {a: min(n, other[a]) for a, n in common.items() if a in other}
+        if not common:
+            break
+    return common
+
+
+def without(monomial: Monomial, shared: Mapping[Term, int]) -> Monomial:
+    """A monomial divided by these powers."""
+    return tuple((a, n - shared.get(a, 0)) for a, n in monomial if n > shared.get(a, 0))
+
+
+def sorted_monomial(counts: Mapping[Term, int]) -> Monomial:
+    """Powers of atoms in the order of their digests."""
+    return tuple(sorted(counts.items(), key=lambda pair: pair[0].digest))

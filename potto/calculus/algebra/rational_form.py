@@ -21,7 +21,17 @@ from potto.core import polynomials
 from potto.core.kinds import union_of
 from potto.core.normal_form import as_term as ordered
 from potto.core.normal_form import normal_form
-from potto.core.polynomials import ONE, Monomial, Polynomial, TooLarge, total
+from potto.core.polynomials import (
+    ONE,
+    Monomial,
+    Polynomial,
+    TooLarge,
+    divided,
+    shared_by,
+    sorted_monomial,
+    total,
+    without,
+)
 from potto.core.terms import (
     App,
     Const,
@@ -275,71 +285,22 @@ def _reduced(top: Polynomial, below: Polynomial) -> Rational:
     if top == below:
         return Rational(ONE, ONE)
     if len(below) > 1 or len(top) > 1:
-        exact = _divided(top, below)
+        exact = divided(top, below, _LARGEST)
         if exact is not None:
             return Rational(exact, ONE)
-        exact = _divided(below, top)
+        exact = divided(below, top, _LARGEST)
         if exact is not None:
             return _reduced(ONE, exact)
     if below != ONE:
-        shared = _shared([*top, *below])
+        shared = shared_by([*top, *below])
         if shared:
-            top = {_without(m, shared): c for m, c in top.items()}
-            below = {_without(m, shared): c for m, c in below.items()}
+            top = {without(m, shared): c for m, c in top.items()}
+            below = {without(m, shared): c for m, c in below.items()}
         lead = next(iter(below.values()))
         if lead != 1:
             top = {m: c / lead for m, c in top.items()}
             below = {m: c / lead for m, c in below.items()}
     return Rational(top, below)
-
-
-def _divided(top: Polynomial, below: Polynomial) -> Polynomial | None:
-    """top / below where that is a polynomial again, by division of leading monomials."""
-    if len(below) < 2 or len(top) < len(below) or len(top) * len(below) > _LARGEST:
-        return None
-    rank = {a: i for i, a in enumerate(sorted({a for m in (*top, *below) for a, _ in m}, key=lambda a: a.digest))}
-
-    def order(monomial: Monomial) -> list[tuple[int, int]]:
-        counts = dict(monomial)
-        return [(rank[a], counts.get(a, 0)) for a in sorted(rank, key=rank.__getitem__)]
-
-    lead = max(below, key=order)
-    rest, result = dict(top), dict[Monomial, Fraction]()
-    for _ in range(_LARGEST):
-        if not rest:
-            return result
-        head = max(rest, key=order)
-        counts = dict(head)
-        if any(counts.get(a, 0) < n for a, n in lead):
-            return None
-        step = _without(head, dict(lead))
-        factor = rest[head] / below[lead]
-        result[step] = factor
-        for monomial, coefficient in below.items():
-            counts = dict(step)
-            for a, n in monomial:
-                counts[a] = counts.get(a, 0) + n
-            key = _sorted(counts)
-            total = rest.get(key, Fraction(0)) - factor * coefficient
-            if total:
-                rest[key] = total
-            else:
-                rest.pop(key, None)
-    return None
-
-
-def _shared(monomials: list[Monomial]) -> dict[Term, int]:
-    common = dict(monomials[0])
-    for monomial in monomials[1:]:
-        other = dict(monomial)
-        common = {a: min(n, other[a]) for a, n in common.items() if a in other}
-        if not common:
-            break
-    return common
-
-
-def _without(monomial: Monomial, shared: Mapping[Term, int]) -> Monomial:
-    return tuple((a, n - shared.get(a, 0)) for a, n in monomial if n > shared.get(a, 0))
 
 
 def _times(a: Polynomial, b: Polynomial) -> Polynomial:
@@ -362,12 +323,8 @@ def _joined(first: Monomial, second: Monomial, coefficient: Fraction) -> Polynom
             rest = {a: k for a, k in counts.items() if a is not atom}
             if n > 2:
                 rest[atom] = n - 2
-            return _times(square, {_sorted(rest): coefficient})
-    return {_sorted(counts): coefficient}
-
-
-def _sorted(counts: Mapping[Term, int]) -> Monomial:
-    return tuple(sorted(counts.items(), key=lambda pair: pair[0].digest))
+            return _times(square, {sorted_monomial(rest): coefficient})
+    return {sorted_monomial(counts): coefficient}
 
 
 @lru_cache(maxsize=1024)
@@ -406,4 +363,4 @@ def _exponential(node: Prim, inner: Rational) -> Rational:
         side = top if (coefficient > 0) else below
         atom = prim("exp", part)
         side[atom] = side.get(atom, 0) + (int(abs(coefficient)) if whole else 1)
-    return Rational({_sorted(top): Fraction(1)}, {_sorted(below): Fraction(1)})
+    return Rational({sorted_monomial(top): Fraction(1)}, {sorted_monomial(below): Fraction(1)})

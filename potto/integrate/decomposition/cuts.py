@@ -92,6 +92,13 @@ def _ends(lo: Cell, hi: Cell, batch: int, directions: int) -> tuple[_End, _End, 
     return (low, tl, el), (high, th, eh), sign
 
 
+def _counted(row: Row, nested: bool) -> Bools | bool:
+    """For whom a root counts: if `nested` not where it merges with another just here, at a single node of the variables
+    further out, and so moves infinitely fast."""
+    speeds = [speed for speed in row.t if isinstance(speed, np.ndarray)]
+    return np.asarray(np.isfinite(speeds).all(axis=0)) if nested and speeds else True
+
+
 def segments(
     plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, directions: int, kin: Ints | None
 ) -> Cuts:
@@ -113,22 +120,12 @@ def segments(
     beyond: list[tuple[Array, bool]] = []
     for i, row in enumerate(rows, 1):
         root = as_array(row.x, batch)
-        inner = (root > low) & (root < high)
-        if nested:  # roots that merge just here move infinitely fast; a single node of the variables further out
-            for speed in row.t:
-                if speed is not None and isinstance(speed, np.ndarray):
-                    inner &= np.isfinite(speed)
-        inside[i] = inner
+        inner = inside[i] = (root > low) & (root < high) & _counted(row, nested)
         x[i] = np.where(inner, root, high)
         off = SEARCHED * EPS * np.abs(root) if row.e is None else row.e
         e[i] = np.where(inner, off, eh)
-        t[:directions, i] = np.where(inner, 0.0, th)
-        for d, speed in enumerate(row.t[:directions]):
-            if speed is not None:
-                t[d, i] = np.where(inner, speed, th[d])
-        for d, slip in enumerate(row.et[:directions]):
-            if slip is not None:
-                t[directions + d, i] = np.where(inner, slip, 0.0)
+        t[:directions, i] = np.where(inner, tangents(row.t[:directions], batch, directions), th)
+        t[directions:, i] = np.where(inner, tangents(row.et[:directions], batch, directions), 0.0)
         if row.turning or (row.cut >= 0 and plan.level.cuts[row.cut].turning):
             beyond.append((root, True))
         if directions and row.cut >= 0:
