@@ -21,6 +21,9 @@ BAD_SETTING = declare("P0520", "a setting that does not exist or cannot have thi
 
 Method = Literal["auto", "quadrature", "mc", "qmc"]
 METHODS: tuple[str, ...] = get_args(Method)
+Backend = Literal["auto", "numpy", "native"]
+BACKENDS: tuple[str, ...] = get_args(Backend)
+CHOICES = {"method": METHODS, "backend": BACKENDS}
 
 # The relative accuracy that samples are held against where nobody asked for another one: an error of 4 standard errors
 # of 10,000 samples of a condition that holds half of the time is 4 % of the answer.
@@ -42,6 +45,7 @@ class Settings:
     samples: points of a Monte Carlo estimate.
     seed: where its random numbers start; equal seeds give equal answers.
     max_evals: the most evaluations of an integrand before the answer comes as it is, marked as not converged.
+    backend: what computes at many points: "numpy", machine code ("native"), or numpy until machine code pays ("auto").
     """
 
     method: Method = "auto"
@@ -50,6 +54,7 @@ class Settings:
     samples: int = 100_000
     seed: int = 0
     max_evals: int = 20_000_000
+    backend: Backend = "auto"
 
     def asked(self, drawn: bool) -> float:
         """The relative accuracy that an answer is held against; `drawn` if it is made of samples."""
@@ -70,8 +75,8 @@ def current(base: Settings = DEFAULTS) -> Settings:
 
 def problem(name: str, value: object) -> str | None:
     """Why `value` cannot be the setting `name`, or None if it can."""
-    if name == "method":
-        return None if value in METHODS else f"method must be one of {', '.join(METHODS)}, not {value!r}"
+    if name in CHOICES:
+        return None if value in CHOICES[name] else f"{name} must be one of {', '.join(CHOICES[name])}, not {value!r}"
     if name not in {field.name for field in fields(Settings)}:
         return f"there is no setting `{name}`; there are {', '.join(field.name for field in fields(Settings))}"
     if isinstance(value, bool) or not isinstance(value, int | float):

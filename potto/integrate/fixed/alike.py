@@ -15,18 +15,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
-from potto.core.terms import Prim, Term, function_of, postorder, tuple_
+from potto.core.terms import function_of, tuple_
 from potto.integrate.fixed.a_priori import Straight
+from potto.integrate.fixed.edges import EDGE, edges_of
+from potto.integrate.fixed.lowered import Axis, Lowered, Raw
 from potto.integrate.fixed.moving_sums import SUMMED, evaluated, product
 from potto.integrate.fixed.topologies import Uniform, topologies
 from potto.integrate.pieces import Evaluator, Sums, dense, still
 from potto.integrate.rules.gauss import EPS, analytic_truncation, gauss
-from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays
-from potto.primitives import PRIMITIVES
+from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays, pattern
 
 # Nodes per variable that are tried, one after the other.
 ORDERS = (6, 8, 12, 14, 20, 28)
@@ -41,12 +41,13 @@ TRACKED, ELSEWHERE = 1 << 12, 2.0
 PILOTS = 16
 FEW = 4 * PILOTS
 ENOUGH = 0.9
-# How near to 0, of what it comes to elsewhere on the cell, the edge of a builtin's domain may be at a node.
-EDGE = 0.1
 # How many times larger than at all nodes the integrand may be at the ends of stretches: else something narrow is there.
 PEAK = 8.0
 # What errors may be where what is added up cancels, as a part of that: no other way would mend it.
 CANCELS = 1e-13
+
+
+_lowered: dict = {}
 
 
 @dataclass(frozen=True)
@@ -174,8 +175,10 @@ class Rule:
 
     def applied(self, env: dict[str, Value], members: Ints) -> Measured:
         """The integrals over the cells of some members."""
-        here = {n: map_arrays(v, lambda a: a[members] if a.ndim else a) for n, v in env.items()}
         self.machine.count(members.size * math.prod(self.orders))
+        if self.machine.backend == "native":
+            return self.by_machine_code(env, members)
+        here = {n: map_arrays(v, lambda a: a[members] if a.ndim else a) for n, v in env.items()}
         whole = [np.arange(n) for n in self.orders]
         tracking = self.machine.tracking()
         if members.size * math.prod(self.orders) <= TRACKED:
@@ -195,6 +198,34 @@ class Rule:
             plain &= ~(_largest(corners.value[:1]) > PEAK * _largest(every.value[:1]))
         truncated[:, ~plain] = np.inf
         return Measured(number, truncated, rounding, gross)
+
+    def by_machine_code(self, env: dict[str, Value], members: Ints) -> Measured:
+        """The same by the rule as one function."""
+        key = (self.cell.path, self.cell.face, self.machine.directions, tuple(
+            pattern(env[name], self.machine.directions) for name in self.plan.names))
+        found = _lowered.get(key)
+        if found is None:
+            found = _lowered[key] = Lowered(self.plan, self.cell.path, self.cell.face, edges_of(self.cell.face), self.machine, env)
+        several = members.size * math.prod(self.orders) > TRACKED
+        axes = []
+        for i, n in enumerate(self.orders):
+            rule, (nodes, speeds) = gauss(n), self.axis(i)
+            picked = np.unique([0, n // 2, n - 1]) if several else np.arange(n)
+            transform = np.ascontiguousarray(rule.weights[:, None] if self.exact[i] else rule.transform)
+            axes.append(Axis(nodes, speeds, rule.weights, transform, nodes[picked], speeds[picked]))
+        raw = found.run(env, members, axes)
+        truncated = np.zeros(raw.number.shape)
+        for i, size in enumerate(raw.coefficients):
+            if not self.exact[i]:
+                truncated += analytic_truncation(size)
+        gross = np.maximum(raw.most, np.abs(raw.number))
+        beyond = ELSEWHERE if several else 1.0
+        rounding = beyond * raw.off + ELSEWHERE * SUMMED * gross
+        plain = raw.clear > 0
+        if not all(self.exact):
+            plain &= ~(raw.corners > PEAK * raw.largest)
+        truncated[:, ~plain] = np.inf
+        return Measured(raw.number, truncated, rounding, gross)
 
     def at_nodes(
         self, machine: Evaluator, env: dict[str, Value], count: int, picked: Sequence[Ints], corners: bool = False
@@ -282,19 +313,6 @@ class Rule:
         asked = (TIGHT if few else SHARE * self.machine.rtol) * np.abs(found.number)
         least = (TIGHT if few else CANCELS) * found.gross
         return np.asarray((found.truncated <= np.maximum(asked, least)).all(axis=0))
-
-
-@lru_cache(maxsize=1024)
-def edges_of(term: Term) -> tuple[Term, ...]:
-    """What is 0 where a builtin in a term is singular, poles aside, and varies."""
-    found = (
-        edge
-        for node in postorder(term)
-        if isinstance(node, Prim) and node.op != "div"
-        for edge in PRIMITIVES[node.op].edges(*node.args)
-        if edge.free
-    )
-    return tuple(dict.fromkeys(found))
 
 
 def _largest(value: Array) -> Array:

@@ -156,6 +156,10 @@ class Machine:
     def atol(self) -> float:
         return self.settings.atol
 
+    @property
+    def backend(self) -> str:
+        return self.settings.backend
+
     def with_directions(self, directions: int) -> Machine:
         if directions == self.directions:
             return self
@@ -221,15 +225,20 @@ class Machine:
 
     def run(self, function: Lam, args: list[Value], trace: Trace | None) -> Value:
         k = self.directions
-        key = (function, tuple([pattern(a, k) for a in args]), k, self.rounding)
-        found = self.linker.kernels.get(key)
-        if found is None:
-            found = self.linker.kernels[key] = kernel(function, key[1], k, self.rounding, self)
-        else:
-            counts.reused += 1
+        found = self.kernel(function, tuple([pattern(a, k) for a in args]))
         if found.plain and many(args):
             return in_chunks(found, self, trace, args)
         return found.run(self, trace, *args)
+
+    def kernel(self, function: Lam, patterns: tuple[Pattern, ...]) -> Kernel:
+        """The kernel of a function for arguments of these patterns."""
+        key = (function, patterns, self.directions, self.rounding)
+        found = self.linker.kernels.get(key)
+        if found is None:
+            found = self.linker.kernels[key] = kernel(function, patterns, self.directions, self.rounding, self)
+        else:
+            counts.reused += 1
+        return found
 
     def term(self, term: Term, env: dict[str, Value]) -> Value:
         return self.evaluate(function_of(term), env, None)

@@ -1,0 +1,27 @@
+"""Where builtins stop being analytic: what is 0 there, as x is for its root.
+
+Owns `edges_of` and EDGE.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+from potto.core.terms import Prim, Term, postorder
+from potto.primitives import PRIMITIVES
+
+# How near to 0, of what it comes to elsewhere on the cell, the edge of a builtin's domain may be at a node.
+EDGE = 0.1
+
+
+@lru_cache(maxsize=1024)
+def edges_of(term: Term) -> tuple[Term, ...]:
+    """What is 0 where a builtin in a term is singular, poles aside, and varies."""
+    found = (
+        edge
+        for node in postorder(term)
+        if isinstance(node, Prim) and node.op != "div"
+        for edge in PRIMITIVES[node.op].edges(*node.args)
+        if edge.free
+    )
+    return tuple(dict.fromkeys(found))

@@ -1,0 +1,84 @@
+"""Text of LLVM to functions that can be called, by way of object code, which can be kept.
+
+Owns `available`, `Loaded`, `compiled` and `loaded`. llvmlite is loaded when the first function is asked for. Nothing is
+optimized but the choice of instructions: what comes here is straight already.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import ctypes.util
+import itertools
+import threading
+from functools import lru_cache
+from importlib.util import find_spec
+from typing import Any
+
+from potto.kernels.native.vectors import LIBRARY
+
+FUNCTION = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
+_lock = threading.Lock()
+_numbers = itertools.count()
+
+
+@lru_cache(maxsize=1)
+def available() -> bool:
+    """Whether machine code can be made here."""
+    return find_spec("llvmlite") is not None
+
+
+class _Compiler:
+    """LLVM, for the processor at hand."""
+
+    def __init__(self) -> None:
+        from llvmlite import binding
+
+        self.binding: Any = binding
+        binding.initialize_native_target()
+        binding.initialize_native_asmprinter()
+        self.cpu = binding.get_host_cpu_name()
+        self.features = binding.get_host_cpu_features().flatten()
+        target = binding.Target.from_default_triple()
+        self.machine = target.create_target_machine(cpu=self.cpu, features=self.features, opt=2, jit=True)
+        self.jit = binding.create_lljit_compiler(self.machine)
+        mathematics = ctypes.CDLL(ctypes.util.find_library("m"))
+        self.symbols = {name: ctypes.cast(getattr(mathematics, name), ctypes.c_void_p).value for name in LIBRARY}
+
+    @property
+    def signature(self) -> str:
+        """What object code depends on beside its text."""
+        version = ".".join(map(str, self.binding.llvm_version_info))
+        return f"llvm {version} {self.binding.get_process_triple()} {self.cpu} {self.features}"
+
+
+@lru_cache(maxsize=1)
+def compiler() -> _Compiler:
+    return _Compiler()
+
+
+class Loaded:
+    """A function in memory, as long as this is."""
+
+    def __init__(self, library: Any, address: int) -> None:
+        self.library = library
+        self.call = FUNCTION(address)
+
+
+def compiled(text: str) -> bytes:
+    """The object code of a text."""
+    with _lock:
+        llvm = compiler()
+        module = llvm.binding.parse_assembly(text)
+        module.verify()
+        return bytes(llvm.machine.emit_object(module))
+
+
+def loaded(code: bytes, name: str) -> Loaded:
+    """The function of that name in object code."""
+    with _lock:
+        llvm = compiler()
+        builder = llvm.binding.JITLibraryBuilder().add_object_img(code).export_symbol(name)
+        for symbol, address in llvm.symbols.items():
+            builder.import_symbol(symbol, address)
+        library = builder.link(llvm.jit, f"potto{next(_numbers)}")
+        return Loaded(library, library[name])

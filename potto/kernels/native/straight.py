@@ -1,0 +1,315 @@
+"""Kernels' texts as straight lines of operations, and which of these don't depend on the point.
+
+Owns `Straight`. The text of a plain kernel (`compile.py`) is its intermediate form: arguments are taken apart, numbers
+are computed one line after the other, cells are put together. What depends only on arguments that are the same at
+every point is computed once, by the lines as they are; the rest are operations on numbers and masks.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from potto.kernels.compile import Kernel
+from potto.kernels.whole import UNIT_ROUNDOFF
+
+ARITHMETIC: dict[type, str] = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul"}
+RELATIONS: dict[type, str] = {ast.Lt: "lt", ast.LtE: "le", ast.Gt: "gt", ast.GtE: "ge", ast.Eq: "eq", ast.NotEq: "ne"}
+# Functions of numbers by what kernels call them; those of the C library are among them.
+FUNCTIONS = {
+    "divide": "div", "sqrt": "sqrt", "minimum": "min", "maximum": "max", "floor": "floor", "ceil": "ceil",
+    "logical_and": "and", "logical_or": "or", "logical_not": "not", "support_select": "select", "abs": "abs",
+    "exp": "exp", "log": "log", "log1p": "log1p", "expm1": "expm1", "sinh": "sinh", "cosh": "cosh", "tanh": "tanh",
+    "arcsinh": "asinh", "arccosh": "acosh", "arctanh": "atanh", "sin": "sin", "cos": "cos", "tan": "tan",
+    "arcsin": "asin", "arccos": "acos", "arctan": "atan", "arctan2": "atan2", "hypot": "hypot", "power": "pow",
+    "special_erf": "erf",
+}  # fmt: skip
+COMPARED = (*RELATIONS.values(), "and", "or", "not", "nan")
+ZERO, HALF_ULP = repr(0.0), repr(UNIT_ROUNDOFF)
+
+
+class NotStraight(Exception):
+    """A kernel does something that has no form as operations on numbers."""
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A part of an argument: which one (and which item of it, where it is a tuple), and "v", "e", "t" or "et" of it."""
+
+    path: tuple[int, ...]
+    kind: str
+    direction: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Operation:
+    """`name` = `code` of arguments, which are names or numbers as text."""
+
+    name: str
+    code: str
+    args: tuple[str, ...]
+
+    @property
+    def is_mask(self) -> bool:
+        return self.code in COMPARED
+
+    @property
+    def masks(self) -> tuple[str, ...]:
+        """Of its arguments, those that are masks."""
+        return self.args if self.code in ("and", "or", "not") else self.args[:1] if self.code == "select" else ()
+
+
+@dataclass(frozen=True, slots=True)
+class Packed:
+    """A cell that a kernel makes: the names of its parts, numbers as text; None for what is not there."""
+
+    v: str
+    e: str | None
+    t: tuple[str | None, ...]
+    et: tuple[str | None, ...]
+
+    def parts(self) -> Iterator[str]:
+        yield from (part for part in (self.v, self.e, *self.t, *self.et) if part is not None)
+
+
+Result = Packed | tuple[Any, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A statement of a kernel: the names it sets, those it reads, and itself."""
+
+    sets: tuple[str, ...]
+    reads: frozenset[str]
+    node: ast.stmt
+
+
+@dataclass(frozen=True)
+class Straight:
+    """A kernel as lines. parts: of arguments, by the names that the lines have for them."""
+
+    kernel: Kernel
+    parts: dict[str, Part]
+    lines: tuple[Line, ...]
+    result: Result
+
+    @classmethod
+    def of(cls, kernel: Kernel) -> Straight:
+        """The lines of a plain kernel. Raises NotStraight."""
+        definition = ast.parse(kernel.text).body[0]
+        assert isinstance(definition, ast.FunctionDef)
+        paths = {arg.arg: (i,) for i, arg in enumerate(definition.args.args[2:])}
+        parts: dict[str, Part] = {}
+        lines: list[Line] = []
+        for node in definition.body[:-1]:
+            if not _taken_apart(node, paths, parts):
+                lines.append(_line(node))
+        last = definition.body[-1]
+        assert isinstance(last, ast.Return) and last.value is not None
+        return cls(kernel, parts, tuple(lines), _result(last.value))
+
+    def constant(self, uniform: Iterable[str]) -> frozenset[str]:
+        """Of all names, those that are the same at every point if these parts are."""
+        known = set(uniform)
+        for line in self.lines:
+            if line.reads - {"rt"} <= known:
+                known.update(line.sets)
+        return frozenset(known)
+
+    def prelude(self, constant: frozenset[str], wanted: tuple[str, ...]) -> Callable[..., tuple[Any, ...]]:
+        """A function of `rt` and the parts in `constant`, in the order of `parts`, to the numbers that are wanted."""
+        body: list[ast.stmt] = [line.node for line in self.lines if set(line.sets) <= constant]
+        given = ["rt", *(name for name in self.parts if name in constant)]
+        body.append(ast.Return(ast.Tuple([ast.Name(name, ast.Load()) for name in wanted], ast.Load())))
+        arguments = ast.arguments([], [ast.arg(name) for name in given], None, [], [], None, [])
+        function = ast.FunctionDef("prelude", arguments, body, [])
+        module = ast.fix_missing_locations(ast.Module([function], []))
+        scope = dict(self.kernel.run.__globals__)
+        exec(compile(module, "<prelude>", "exec"), scope)
+        return scope["prelude"]  # type: ignore[no-any-return]
+
+    def operations(self, constant: frozenset[str] = frozenset()) -> list[Operation]:
+        """What is left to be done at each point. Raises NotStraight."""
+        flat = _Flat()
+        for line in self.lines:
+            if not set(line.sets) <= constant:
+                flat.statement(line.node)
+        return flat.made
+
+
+def needed(operations: Sequence[Operation], wanted: Iterable[str]) -> list[Operation]:
+    """Those operations that lead to what is wanted."""
+    names, kept = set(wanted), []
+    for operation in reversed(operations):
+        if operation.name in names:
+            names.update(operation.args)
+            kept.append(operation)
+    return kept[::-1]
+
+
+def read(operations: Iterable[Operation], result: Iterable[str]) -> tuple[str, ...]:
+    """The names that operations and a result need of what is not among the operations, in the order of their use."""
+    operations = list(operations)
+    made = {operation.name for operation in operations}
+    needed = [arg for operation in operations for arg in operation.args]
+    return tuple(dict.fromkeys(n for n in (*needed, *result) if n not in made and n[0].isalpha() and n.isidentifier()))
+
+
+def packed(result: Result) -> Iterator[Packed]:
+    """All cells of a result."""
+    if isinstance(result, Packed):
+        yield result
+    else:
+        for item in result:
+            yield from packed(item)
+
+
+# Statements
+
+
+def _taken_apart(node: ast.stmt, paths: dict[str, tuple[int, ...]], parts: dict[str, Part]) -> bool:
+    """Whether a statement takes an argument apart: items of a tuple become paths, parts of cells are noted."""
+    if not isinstance(node, ast.Assign):
+        return False
+    target, value = node.targets[0], node.value
+    if isinstance(target, ast.Tuple) and isinstance(value, ast.Name) and value.id in paths:
+        for i, item in enumerate(target.elts):
+            assert isinstance(item, ast.Name)
+            paths[item.id] = (*paths[value.id], i)
+        return True
+    if isinstance(value, ast.IfExp) and isinstance(value.body, ast.Attribute | ast.Subscript):
+        value = value.body  # a part that may not be there
+    direction = 0
+    if isinstance(value, ast.Subscript) and isinstance(value.slice, ast.Constant):
+        direction, value = int(str(value.slice.value)), value.value
+    if not isinstance(value, ast.Attribute) or not isinstance(value.value, ast.Name) or value.value.id not in paths:
+        return False
+    assert isinstance(target, ast.Name)
+    parts[target.id] = Part(paths[value.value.id], value.attr, direction)
+    return True
+
+
+def _line(node: ast.stmt) -> Line:
+    names = [inner for inner in ast.walk(node) if isinstance(inner, ast.Name)]
+    sets = tuple(dict.fromkeys(name.id for name in names if isinstance(name.ctx, ast.Store)))
+    skipped = {*sets, "trace", "abs", "float", "None"}
+    return Line(sets, frozenset(n.id for n in names if n.id not in skipped and not n.id.startswith("f_")), node)
+
+
+def _result(node: ast.expr) -> Result:
+    if isinstance(node, ast.Tuple):
+        return tuple(map(_result, node.elts))
+    if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Cell"):
+        raise NotStraight(ast.unparse(node))
+    v, e, *rest = node.args
+    t, et = (tuple(map(_named, part.elts)) if isinstance(part, ast.Tuple) else () for part in (*rest, None, None)[:2])
+    value = _named(v)
+    assert value is not None
+    return Packed(value, _named(e), t, et)
+
+
+def _named(node: ast.expr) -> str | None:
+    """A name, or a number as text; None for None."""
+    if isinstance(node, ast.Constant) and node.value is None:
+        return None
+    if isinstance(node, ast.Name):
+        return node.id
+    number = _number(node)
+    if number is None:
+        raise NotStraight(ast.unparse(node))
+    return number
+
+
+def _number(node: ast.expr) -> str | None:
+    """The text of a number, if a node is one."""
+    match node:
+        case ast.Constant(value=bool() as value):
+            return str(value)
+        case ast.Constant(value=float() | int() as value):
+            return repr(float(value))
+        case ast.UnaryOp(op=ast.USub(), operand=ast.Constant(value=float() | int() as value)):
+            return repr(-float(value))
+        case ast.Call(func=ast.Name(id="float"), args=[ast.Constant(value=value)]):
+            return repr(float(str(value)))
+    return None
+
+
+class _Flat:
+    """Statements as operations, each with a name of its own."""
+
+    def __init__(self) -> None:
+        self.made: list[Operation] = []
+
+    def statement(self, node: ast.stmt) -> None:
+        match node:
+            case ast.Assign(targets=[ast.Name(id=name)], value=value):
+                self.put(value, name)
+            case ast.Assign(targets=[ast.Tuple()]) | ast.Assign(value=ast.IfExp()):
+                raise NotStraight(ast.unparse(node))
+            case ast.If(body=[ast.Assign(targets=[ast.Tuple(elts=[ast.Name(id=mask), ast.Name(id=spoiled)])],
+                                         value=ast.Call(args=[surface, ast.Constant(value=strict)]))]):  # fmt: skip
+                place = self.put(surface)
+                self.made.append(Operation(mask, "gt" if strict else "ge", (place, ZERO)))
+                bad = self.new("nan", (place,))
+                self.made.append(Operation(spoiled, "select", (bad, "nan", ZERO)))
+            case _:
+                if "trace" not in ast.unparse(node):  # a mask that may be forced: none is, where this runs
+                    raise NotStraight(ast.unparse(node))
+
+    def new(self, code: str, args: tuple[str, ...], name: str = "") -> str:
+        name = name or f"n{len(self.made)}"
+        self.made.append(Operation(name, code, args))
+        return name
+
+    def put(self, node: ast.expr, name: str = "") -> str:
+        """The operations of an expression; the name of its value."""
+        number = _number(node)
+        if number is not None:
+            return self.new("is", (number,), name) if name else number
+        match node:
+            case ast.Name(id=own):
+                return self.new("is", (own,), name) if name else own
+            case ast.UnaryOp(op=ast.USub(), operand=operand):
+                return self.new("neg", (self.put(operand),), name)
+            case ast.BinOp(left=left, op=op, right=right) if type(op) in ARITHMETIC:
+                return self.new(ARITHMETIC[type(op)], (self.put(left), self.put(right)), name)
+            case ast.Compare(left=left, ops=[op], comparators=[right]) if type(op) in RELATIONS:
+                return self.new(RELATIONS[type(op)], (self.put(left), self.put(right)), name)
+            case ast.IfExp(test=ast.Compare(left=ast.Name(id=spoiled)), body=body):  # v if nothing is spoiled
+                value = self.put(body)
+                return self.new("add", (value, spoiled), name)
+            case ast.Call(func=ast.Name(id=function), args=args):
+                return self.call(function.removeprefix("f_"), tuple(map(self.put, args)), name)
+        raise NotStraight(ast.unparse(node))
+
+    def call(self, function: str, args: tuple[str, ...], name: str) -> str:
+        if function.startswith("whole_"):
+            return self.rounded_sum(*args, name=name) if function == "whole_add" else self.half_ulp(args[0], name)
+        if function == "potto_clamp":
+            return self.new("min", (self.new("max", args[:2]), args[2]), name)
+        if function == "sign":
+            negative = self.new("select", (self.new("lt", (args[0], ZERO)), "-1.0", args[0]))
+            return self.new("select", (self.new("gt", (args[0], ZERO)), "1.0", negative), name)
+        if function not in FUNCTIONS:
+            raise NotStraight(function)
+        return self.new(FUNCTIONS[function], args, name)
+
+    def half_ulp(self, value: str, name: str = "") -> str:
+        return self.new("mul", (HALF_ULP, self.new("abs", (value,))), name)
+
+    def rounded_sum(self, value: str, first: str, *rest: str, name: str) -> str:
+        """What `whole.add` says of a batch."""
+        if len(rest) == 1:
+            return self.half_ulp(value, name)
+        off, total = self.half_ulp(value), first
+        least = off
+        for arg in rest[:-1]:
+            longer = self.new("add", (total, arg))
+            part = self.new("sub", (longer, total))
+            here = self.new("sub", (arg, part))
+            there = self.new("sub", (total, self.new("sub", (longer, part))))
+            off = self.new("add", (off, self.new("abs", (self.new("add", (there, here)),))))
+            total = longer
+        return self.new("select", (self.new("lt", (off, "inf")), off, least), name)

@@ -1,0 +1,218 @@
+"""LLVM text for operations on eight numbers at a time.
+
+Owns `Vectors`. Numbers are `<8 x double>`, masks `<8 x i1>`. No operation is marked as one that may be reordered,
+fused or done by reciprocals: what it gives is what numpy gives, bit by bit; functions of the C library are called for
+one number after the other.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable, Mapping, Sequence
+
+from potto.kernels.native.straight import NotStraight, Operation
+
+LANES = 8
+NUMBER, MASK = f"<{LANES} x double>", f"<{LANES} x i1>"
+ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
+RELATIONS = {"lt": "olt", "le": "ole", "gt": "ogt", "ge": "oge", "eq": "oeq", "ne": "une"}
+INTRINSICS = {"sqrt": 1, "floor": 1, "ceil": 1, "abs": 1, "min": 2, "max": 2}
+_NAMES = {"abs": "fabs", "min": "minimum", "max": "maximum"}
+LIBRARY = {
+    "exp": 1, "log": 1, "log1p": 1, "expm1": 1, "sinh": 1, "cosh": 1, "tanh": 1, "asinh": 1, "acosh": 1, "atanh": 1,
+    "sin": 1, "cos": 1, "tan": 1, "asin": 1, "acos": 1, "atan": 1, "erf": 1, "atan2": 2, "hypot": 2, "pow": 2,
+}  # fmt: skip
+
+
+def bits(value: float) -> str:
+    """A double as LLVM reads it to the last bit."""
+    return f"0x{struct.unpack('<Q', struct.pack('<d', value))[0]:016X}"
+
+
+class Vectors:
+    """Lines of a function, in loops inside of each other.
+
+    What is asked for twice is done once, and in the outermost loop in which all that it takes is known.
+    """
+
+    def __init__(self) -> None:
+        self.bodies: list[list[str]] = [[]]
+        self.known: list[dict[str, str]] = [{}]
+        self.depths: dict[str, int] = {}
+        self.loops: list[tuple[str, str]] = []
+        self.used: dict[str, int] = {}
+        self.count = 0
+
+    @property
+    def depth(self) -> int:
+        return len(self.bodies) - 1
+
+    def name(self) -> str:
+        self.count += 1
+        return f"%n{self.count}"
+
+    def line(self, text: str) -> None:
+        """A line that stays where it is."""
+        self.bodies[-1].append("  " + text)
+
+    def let(self, text: str) -> str:
+        """A name for what a line gives that stays where it is."""
+        name = self.name()
+        self.line(f"{name} = {text}")
+        self.depths[name] = self.depth
+        return name
+
+    def once(self, text: str, *args: str) -> str:
+        """A name for what an operation gives that depends on nothing but these."""
+        depth = max((self.depths.get(arg, 0) for arg in args), default=0)
+        found = self.known[depth].get(text)
+        if found is None:
+            found = self.known[depth][text] = self.name()
+            self.bodies[depth].append(f"  {found} = {text}")
+            self.depths[found] = depth
+        return found
+
+    def begin(self, count: str) -> str:
+        """Begin a loop of so many rounds, at least one; the number of the round."""
+        self.count += 1
+        stem = str(self.count)
+        self.bodies.append([])
+        self.known.append({})
+        self.loops.append((stem, count))
+        self.depths[f"%j{stem}"] = self.depth
+        return f"%j{stem}"
+
+    def end(self) -> None:
+        """End the innermost loop."""
+        stem, count = self.loops.pop()
+        body = self.bodies.pop()
+        self.known.pop()
+        self.bodies[-1] += [
+            f"  br label %before{stem}", f"before{stem}:", f"  br label %loop{stem}", f"loop{stem}:",
+            f"  %j{stem} = phi i64 [0, %before{stem}], [%next{stem}, %last{stem}]", *body,
+            f"  br label %last{stem}", f"last{stem}:", f"  %next{stem} = add i64 %j{stem}, 1",
+            f"  %more{stem} = icmp ult i64 %next{stem}, {count}",
+            f"  br i1 %more{stem}, label %loop{stem}, label %after{stem}", f"after{stem}:",
+        ]  # fmt: skip
+
+    # Memory and whole numbers
+
+    def whole(self, code: str, a: str | int, b: str | int) -> str:
+        """An operation (add, mul, ...) on whole numbers."""
+        return self.once(f"{code} i64 {a}, {b}", *(x for x in (a, b) if isinstance(x, str)))
+
+    def room(self, count: str | int) -> str:
+        """Memory for so many vectors."""
+        name = self.name()
+        self.bodies[0].append(f"  {name} = alloca {NUMBER}, i64 {count}, align 64")
+        return name
+
+    def at(self, memory: str, index: str | int, kind: str = NUMBER) -> str:
+        """The place of an item."""
+        return self.once(f"getelementptr {kind}, ptr {memory}, i64 {index}", memory,
+                         *([index] if isinstance(index, str) else []))  # fmt: skip
+
+    def load(self, place: str) -> str:
+        return self.let(f"load {NUMBER}, ptr {place}, align 8")
+
+    def store(self, value: str, place: str) -> None:
+        self.line(f"store {NUMBER} {value}, ptr {place}, align 8")
+
+    def constant(self, memory: str, index: str | int) -> str:
+        """A number of a table that never changes, at all places."""
+        place = self.at(memory, index, "double")
+        return self.spread(self.once(f"load double, ptr {place}", place))
+
+    def address(self, memory: str, index: int, kind: str = "i64") -> str:
+        """A whole number (or a ptr) of a table that never changes."""
+        place = self.at(memory, index, "i64")
+        return self.once(f"load {kind}, ptr {place}", place)
+
+    def number(self, value: float) -> str:
+        return f"splat (double {bits(value)})"
+
+    def spread(self, scalar: str) -> str:
+        """A double at all places."""
+        one = self.once(f"insertelement {NUMBER} poison, double {scalar}, i32 0", scalar)
+        return self.once(f"shufflevector {NUMBER} {one}, {NUMBER} poison, <{LANES} x i32> zeroinitializer", one)
+
+    def apply(self, code: str, *args: str) -> str:
+        """An operation on numbers (masks for and, or, not; a mask first for select)."""
+        return self.once(self.operation(code, args), *args)
+
+    def operation(self, code: str, args: Sequence[str]) -> str:
+        if code in ARITHMETIC:
+            return f"{ARITHMETIC[code]} {NUMBER} {args[0]}, {args[1]}"
+        if code in RELATIONS:
+            return f"fcmp {RELATIONS[code]} {NUMBER} {args[0]}, {args[1]}"
+        if code == "neg":
+            return f"fneg {NUMBER} {args[0]}"
+        if code == "nan":
+            return f"fcmp uno {NUMBER} {args[0]}, {args[0]}"
+        if code == "select":
+            return f"select {MASK} {args[0]}, {NUMBER} {args[1]}, {NUMBER} {args[2]}"
+        if code in ("and", "or"):
+            return f"{code} {MASK} {args[0]}, {args[1]}"
+        if code == "not":
+            return f"xor {MASK} {args[0]}, splat (i1 true)"
+        given = ", ".join(f"{NUMBER} {arg}" for arg in args)
+        if code in INTRINSICS:
+            return f"call {NUMBER} @llvm.{_NAMES.get(code, code)}.v{LANES}f64({given})"
+        if code in LIBRARY:
+            self.used[code] = LIBRARY[code]
+            return f"call {NUMBER} @each_{code}({given})"
+        raise NotStraight(code)
+
+    def run(self, operations: Iterable[Operation], known: Mapping[str, str]) -> dict[str, str]:
+        """The operations, given the values of the names that they read; the values of all names."""
+        values = dict(known)
+
+        def value(arg: str) -> str:
+            if arg in values:
+                return values[arg]
+            if arg in ("True", "False"):
+                return f"splat (i1 {arg.lower()})"
+            return self.number(float(arg))
+
+        for operation in operations:
+            args = tuple(map(value, operation.args))
+            values[operation.name] = args[0] if operation.code == "is" else self.apply(operation.code, *args)
+        return values
+
+
+    def module(self, name: str, parameters: str) -> str:
+        """A module with the function that the lines are."""
+        (body,) = self.bodies
+        text = "\n".join([f"define void @{name}({parameters}) {{", "entry:", *body, "  ret void", "}"])
+        least = "declare i64 @llvm.umin.i64(i64, i64)"
+        return "\n".join([_library(self.used), _declarations(text), least, text, ""])
+
+
+def _library(used: Mapping[str, int]) -> str:
+    """Functions that call those of the C library at each place."""
+    text = []
+    for code, arity in used.items():
+        arguments = ", ".join(["double"] * arity)
+        text.append(f"declare double @{code}({arguments}) nounwind memory(none)")
+        lines = [f"define internal {NUMBER} @each_{code}({', '.join(f'{NUMBER} %x{i}' for i in range(arity))}) {{"]
+        result = "poison"
+        for lane in range(LANES):
+            given = []
+            for i in range(arity):
+                lines.append(f"  %a{lane}_{i} = extractelement {NUMBER} %x{i}, i32 {lane}")
+                given.append(f"double %a{lane}_{i}")
+            lines.append(f"  %y{lane} = call double @{code}({', '.join(given)})")
+            lines.append(f"  %r{lane} = insertelement {NUMBER} {result}, double %y{lane}, i32 {lane}")
+            result = f"%r{lane}"
+        text.append("\n".join([*lines, f"  ret {NUMBER} {result}", "}"]))
+    return "\n".join(text)
+
+
+def _declarations(text: str) -> str:
+    """The intrinsics that a text calls."""
+    wanted = []
+    for code, arity in INTRINSICS.items():
+        name = f"@llvm.{_NAMES.get(code, code)}.v{LANES}f64"
+        if name + "(" in text:
+            wanted.append(f"declare {NUMBER} {name}({', '.join([NUMBER] * arity)})")
+    return "\n".join(wanted)
