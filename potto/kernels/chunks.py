@@ -1,7 +1,8 @@
-"""Kernels over many points, a few thousand at a time.
+"""Kernels over many points: by machine code, or by numpy a few thousand at a time.
 
-Owns `in_chunks`. A kernel is a line of numpy an operation, each with an array of its own: where these are larger than
-the caches, or so large that the allocator gives them back to the system each time, a point takes several times as long.
+Owns `at_points`. By numpy, a kernel is a line of numpy an operation, each with an array of its own: where these are
+larger than the caches, or so large that the allocator gives them back to the system each time, a point takes several
+times as long.
 """
 
 from __future__ import annotations
@@ -12,18 +13,40 @@ import numpy as np
 
 from potto.kernels.cells import Cell, Number, Trace, Value, combined, map_arrays, map_trace
 from potto.kernels.compile import Kernel, Runtime
+from potto.kernels.native.points import Pointwise
 
 # Points at once: a few arrays of this length fit the second-level cache. A kernel of 60 operations takes 60 to 100 ns a
 # point at 4 K to 16 K points, and two to four times as long from 64 K on.
 POINTS = 1 << 14
 
 
+# From how many points on a function of machine code takes less than numpy: a call takes 30 to 50 us, each line of a
+# kernel 1 us and 0.6 ns a point.
+MANY = 1 << 10
+
+
 def many(args: list[Value]) -> bool:
-    """Whether there are more points than are taken at once."""
+    """Whether there are so many points that it is worth a thought who does them."""
     for arg in args:  # noqa: SIM110 - runs with every kernel: no generator
-        if arg.__class__ is Cell and arg.v.__class__ is np.ndarray and arg.v.size > POINTS:
+        if arg.__class__ is Cell and arg.v.__class__ is np.ndarray and arg.v.size > MANY:
             return True
     return False
+
+
+def at_points(kernel: Kernel, rt: Runtime, trace: Trace | None, args: list[Value], backend: str) -> Value:
+    """The value of a kernel that works point by point: by machine code once that pays, by numpy until then."""
+    if backend == "numpy" or trace or not all(isinstance(arg, Cell) for arg in args):
+        return in_chunks(kernel, rt, trace, args)
+    parts = [x for arg in args for x in (arg.v, arg.e, *arg.t, *arg.et)]  # type: ignore[union-attr]
+    varying = tuple(part.__class__ is np.ndarray for part in parts)
+    found = kernel.native.get(varying)
+    if found is None:
+        found = kernel.native[varying] = Pointwise(kernel, varying, args)
+    function = found.promotion.function(backend, found.text)
+    if function is not None:
+        return found.run(function, rt, args)
+    with found.promotion.by_numpy():
+        return in_chunks(kernel, rt, trace, args)
 
 
 def in_chunks(kernel: Kernel, rt: Runtime, trace: Trace | None, args: list[Value]) -> Value:

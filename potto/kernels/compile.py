@@ -12,7 +12,7 @@ from __future__ import annotations
 import threading
 from collections import OrderedDict
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, Protocol
 
@@ -68,13 +68,15 @@ class Runtime(Protocol):
 class Kernel:
     """A compiled kernel: its function, its text (for `potto dump kernel`), and the parameters that it takes.
 
-    plain: whether it works point by point, without asking anything of the runtime but how conditions fall.
+    plain: whether it works point by point, without asking anything of the runtime but how conditions fall. native: what
+    there is of it in machine code (`native.points`).
     """
 
     run: Callable[..., Value]
     text: str
     params: tuple[str, ...]
     plain: bool = False
+    native: dict[Any, Any] = field(default_factory=dict, compare=False, repr=False)
 
 
 _cache: OrderedDict[Any, Kernel] = OrderedDict()

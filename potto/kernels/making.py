@@ -1,6 +1,7 @@
 """What is made once and used again, and the time that takes: kernels, plans, proofs.
 
-Owns `making`, and `counts` of kernels. What is made on the way to something else counts once.
+Owns `making`, and `counts` of kernels and of functions of machine code (which another thread makes). What is made on
+the way to something else counts once.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ class Counts:
     compiled: int = 0
     reused: int = 0
     seconds: float = 0.0
+    native: int = 0
+    native_seconds: float = 0.0
 
 
 counts = Counts()

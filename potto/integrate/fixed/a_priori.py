@@ -77,6 +77,7 @@ class Straight:
     names: tuple[str, ...]
     faces: dict[tuple[bool, ...], Term] = field(default_factory=dict, compare=False)
     regions: dict[Any, object] = field(default_factory=dict, compare=False)
+    lowered: dict[Any, Any] = field(default_factory=dict, compare=False)
 
     @property
     def items(self) -> tuple[tuple[Term, ...], ...]:

@@ -56,6 +56,11 @@ def compiler() -> _Compiler:
     return _Compiler()
 
 
+def loaded_llvm() -> bool:
+    """Whether LLVM is in memory already."""
+    return compiler.cache_info().currsize > 0
+
+
 class Loaded:
     """A function in memory, as long as this is."""
 

@@ -8,78 +8,103 @@ numbers that lie side by side.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from potto.kernels.cells import Array, Cell, Value
 from potto.kernels.compile import Kernel, Runtime
-from potto.kernels.native import objects
-from potto.kernels.native.straight import NotStraight, Operation, Packed, Part, Result, Straight, packed, read
+from potto.kernels.native.objects import Loaded
+from potto.kernels.native.promotion import Promotion
+from potto.kernels.native.straight import NotStraight, Operation, Packed, Part, Result, Straight, needed, packed, read
 from potto.kernels.native.vectors import LANES, Vectors
 
 NAME = "points"
+Parts = tuple[bool, ...]  # of all parts of all arguments, which are arrays
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """What is done where. prelude: of the parts in `uniform`, gives what is in `given`; the function takes that and the
+    parts in `arrays`, and gives `outputs`."""
+
+    parts: dict[str, Part]
+    uniform: tuple[str, ...]
+    prelude: Callable[..., tuple[Any, ...]]
+    given: tuple[str, ...]
+    arrays: tuple[str, ...]
+    outputs: tuple[str, ...]
+    result: Result
 
 
 class Pointwise:
-    """The kernel for arguments whose parts in `varying` are arrays. Raises NotStraight."""
+    """A kernel for arguments some parts of which are arrays."""
 
-    def __init__(self, kernel: Kernel, varying: frozenset[Part]) -> None:
-        straight = Straight.of(kernel)
-        self.parts = straight.parts
-        uniform = [name for name, part in straight.parts.items() if part not in varying]
-        constant = straight.constant(uniform)
+    def __init__(self, kernel: Kernel, varying: Parts, args: Sequence[Value]) -> None:
+        self.kernel = kernel
+        every = [part for i, arg in enumerate(args) for part in _parts(i, arg)]
+        self.varying = frozenset(part for part, varies in zip(every, varying, strict=True) if varies)
+        self.promotion = Promotion(NAME)
+        self.layout: Layout | None = None
+
+    def text(self) -> str:
+        """The function. Raises NotStraight."""
+        straight = Straight.of(self.kernel)
+        constant = straight.constant(name for name, part in straight.parts.items() if part not in self.varying)
         operations = straight.operations(constant)
-        self.result = straight.result
-        names = list(dict.fromkeys(name for cell in packed(self.result) for name in cell.parts()))
-        made = {operation.name for operation in operations}
-        needed = read(operations, names)
-        self.arrays = tuple(n for n in needed if n in self.parts and self.parts[n] in varying and n not in constant)
-        self.given = tuple(n for n in needed if n in constant)
-        self.outputs = tuple(n for n in names if n in made)
-        masks = {operation.name for operation in operations if operation.is_mask}
-        if masks & set(self.outputs):
+        names = tuple(dict.fromkeys(name for cell in packed(straight.result) for name in cell.parts()))
+        made = {operation.name: operation.is_mask for operation in operations}
+        if any(made.get(name) for name in names):
             raise NotStraight("a condition as a result")
-        self.uniform = tuple(name for name in self.parts if name in constant)
-        self.prelude = straight.prelude(constant, self.given)
-        self.text = _text(operations, self.arrays, self.given, self.outputs)
-        self.function = objects.loaded(objects.compiled(self.text), NAME)
+        operations = needed(operations, names)
+        wanted = read(operations, names)
+        given = tuple(name for name in wanted if name in constant)
+        arrays = tuple(name for name in wanted if name not in constant)
+        outputs = tuple(name for name in names if name in made)
+        uniform = tuple(name for name in straight.parts if name in constant)
+        prelude = straight.prelude(constant, given)
+        self.layout = Layout(straight.parts, uniform, prelude, given, arrays, outputs, straight.result)
+        return _text(operations, arrays, given, outputs)
 
-    def run(self, rt: Runtime, args: Sequence[Value]) -> Value:
+    def run(self, function: Loaded, rt: Runtime, args: Sequence[Value]) -> Value:
         """The kernel's value; its arrays all have the shape of the batch."""
-        numbers = {name: _part(args, part) for name, part in self.parts.items()}
-        given = self.prelude(rt, *(numbers[name] for name in self.uniform))
+        layout = self.layout
+        assert layout is not None
+        parts = layout.parts
+        numbers = {name: _part(args, parts[name]) for name in layout.uniform}
+        given = layout.prelude(rt, *numbers.values())
         constants = np.array([0.0 if x is None else x for x in given], dtype=float)
-        arrays = [numbers[name] for name in self.arrays]
-        shape = np.broadcast_shapes(*(a.shape for a in arrays))
-        outputs = [np.empty(shape) for _ in self.outputs]
-        frame = np.array(_frame(arrays, shape) + [address(a) for a in outputs], dtype=np.int64)
-        self.function.call(address(frame), address(constants))
-        known = {**numbers, **dict(zip(self.given, given, strict=True)), **dict(zip(self.outputs, outputs, strict=True))}
-        return _unpacked(self.result, known)
+        arrays = [_part(args, parts[name]) for name in layout.arrays]
+        shape = arrays[0].shape
+        if not all(a.shape == shape and a.flags.c_contiguous for a in arrays):
+            shape = np.broadcast_shapes(*(a.shape for a in arrays))
+        outputs = np.empty((len(layout.outputs), *shape))
+        size, first = 8 * math.prod(shape), address(outputs)
+        ends = [first + size * i for i in range(len(outputs))]
+        frame = np.array(_frame(arrays, shape) + ends, dtype=np.int64)
+        function.call(address(frame), address(constants))
+        numbers.update(zip(layout.given, given, strict=True))
+        numbers.update(zip(layout.arrays, arrays, strict=True))
+        numbers.update(zip(layout.outputs, outputs, strict=True))
+        return _unpacked(layout.result, numbers)
 
 
 def _part(args: Sequence[Value], part: Part) -> Any:
-    value: Any = args[part.path[0]]
-    for item in part.path[1:]:
-        value = value[item]
-    found = getattr(value, part.kind)
+    found = getattr(args[part.path[0]], part.kind)
     if part.kind in ("t", "et"):
         found = found[part.direction]
     return 0.0 if found is None else found
 
 
-def parts_of(value: Value, path: tuple[int, ...]) -> list[tuple[Part, Any]]:
-    """The parts of a value that are there."""
-    if isinstance(value, Cell):
-        found = [(Part(path, "v"), value.v), (Part(path, "e"), value.e)]
-        found += [(Part(path, "t", d), x) for d, x in enumerate(value.t)]
-        found += [(Part(path, "et", d), x) for d, x in enumerate(value.et)]
-        return [(part, x) for part, x in found if x is not None]
-    if isinstance(value, tuple):
-        return [found for i, item in enumerate(value) for found in parts_of(item, (*path, i))]
-    return []
+def _parts(number: int, value: Value) -> list[Part]:
+    """All parts of an argument that is a number."""
+    assert isinstance(value, Cell)
+    rows = [("t", value.t), ("et", value.et)]
+    return [Part((number,), "v"), Part((number,), "e")] + [
+        Part((number,), kind, d) for kind, row in rows for d in range(len(row))
+    ]
 
 
 def _unpacked(result: Result, known: dict[str, Any]) -> Value:
@@ -102,22 +127,20 @@ def _frame(arrays: list[Array], shape: tuple[int, ...]) -> list[int]:
     Arrays that don't lie so are copied; they are replaced in the list, so that they live as long as it does.
     """
     rows, inner = shape[:-1], shape[-1]
-    whole = [a.shape == shape and a.flags.c_contiguous for a in arrays]
-    if all(whole):
+    if inner < LANES:
+        arrays[:] = [np.ascontiguousarray(np.broadcast_to(a, shape)) for a in arrays]
+    if all(a.shape == shape and a.flags.c_contiguous for a in arrays):
         return [1, 1, math.prod(shape), *(x for a in arrays for x in (address(a), 0, 0))]
     outer, middle = (math.prod(rows[:-1]), rows[-1]) if rows else (1, 1)
     found = [outer, middle, inner]
     for i, a in enumerate(arrays):
         steps = np.broadcast_to(a, shape).strides
-        front = [s for s, n in zip(steps[:-2], shape[:-2], strict=True) if n > 1]
-        fits = (steps[-1] == 8 or inner == 1) and len(front) <= 1
-        if not fits:
+        front = [step for step, n in zip(steps[:-2], shape[:-2], strict=True) if n > 1]
+        if steps[-1] != a.itemsize or len(front) > 1:
             a = arrays[i] = np.ascontiguousarray(np.broadcast_to(a, shape))
-            steps, front = a.strides, [a.strides[-2]] if len(shape) > 1 else []
-            lead = shape[-2] * a.strides[-2] if len(shape) > 1 else 0
-        else:
-            lead = front[0] if front else 0
-        found += [address(a), lead, steps[-2] if len(shape) > 1 else 0]
+            steps = a.strides
+            front = [steps[-2] * middle]
+        found += [address(a), front[0] if front else 0, steps[-2] if rows else 0]
     return found
 
 
@@ -128,12 +151,12 @@ def _text(
     at = Vectors()
     values: dict[str, str] = {}
     masks = {arg for operation in operations for arg in operation.masks}
-    for i, name in enumerate(given):
-        number = at.constant("%constants", i)
+    for slot, name in enumerate(given):
+        number = at.constant("%constants", slot)
         values[name] = at.apply("ne", number, at.number(0.0)) if name in masks else number
-    outer, middle, inner = (at.address("%frame", i) for i in range(3))
-    slots = [[at.address("%frame", 3 + 3 * i + j) for j in range(3)] for i in range(len(arrays))]
-    ends = [at.address("%frame", 3 + 3 * len(arrays) + i) for i in range(len(outputs))]
+    outer, middle, inner = (at.address("%frame", slot) for slot in range(3))
+    slots = [[at.address("%frame", 3 + 3 * number + j) for j in range(3)] for number in range(len(arrays))]
+    ends = [at.address("%frame", 3 + 3 * len(arrays) + number) for number in range(len(outputs))]
     last = at.whole("sub", inner, LANES)
     vectors = at.whole("udiv", at.whole("add", inner, LANES - 1), LANES)
     i, j = at.begin(outer), at.begin(middle)

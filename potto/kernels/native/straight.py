@@ -27,6 +27,7 @@ FUNCTIONS = {
     "special_erf": "erf",
 }  # fmt: skip
 COMPARED = (*RELATIONS.values(), "and", "or", "not", "nan")
+CONSTANTS = ("inf", "nan", "True", "False")
 ZERO, HALF_ULP = repr(0.0), repr(UNIT_ROUNDOFF)
 
 
@@ -100,7 +101,7 @@ class Straight:
         """The lines of a plain kernel. Raises NotStraight."""
         definition = ast.parse(kernel.text).body[0]
         assert isinstance(definition, ast.FunctionDef)
-        paths = {arg.arg: (i,) for i, arg in enumerate(definition.args.args[2:])}
+        paths: dict[str, tuple[int, ...]] = {arg.arg: (i,) for i, arg in enumerate(definition.args.args[2:])}
         parts: dict[str, Part] = {}
         lines: list[Line] = []
         for node in definition.body[:-1]:
@@ -153,8 +154,9 @@ def read(operations: Iterable[Operation], result: Iterable[str]) -> tuple[str, .
     """The names that operations and a result need of what is not among the operations, in the order of their use."""
     operations = list(operations)
     made = {operation.name for operation in operations}
-    needed = [arg for operation in operations for arg in operation.args]
-    return tuple(dict.fromkeys(n for n in (*needed, *result) if n not in made and n[0].isalpha() and n.isidentifier()))
+    asked = [arg for operation in operations for arg in operation.args]
+    names = dict.fromkeys((*asked, *result))
+    return tuple(name for name in names if name.isidentifier() and name not in made and name not in CONSTANTS)
 
 
 def packed(result: Result) -> Iterator[Packed]:

@@ -25,7 +25,7 @@ from potto.integrate.events import MEETINGS, Event, Events, Members
 from potto.integrate.pieces import STRAY
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Ints, Number, Pattern, Trace, Value, pad, pattern
-from potto.kernels.chunks import in_chunks, many
+from potto.kernels.chunks import at_points, many
 from potto.kernels.compile import Kernel, kernel
 from potto.kernels.making import counts
 from potto.projects.settings import Settings
@@ -227,7 +227,7 @@ class Machine:
         k = self.directions
         found = self.kernel(function, tuple([pattern(a, k) for a in args]))
         if found.plain and many(args):
-            return in_chunks(found, self, trace, args)
+            return at_points(found, self, trace, args, "numpy" if self.record.second else self.settings.backend)
         return found.run(self, trace, *args)
 
     def kernel(self, function: Lam, patterns: tuple[Pattern, ...]) -> Kernel:

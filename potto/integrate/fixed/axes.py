@@ -1,0 +1,68 @@
+"""The nodes of product rules along each variable, and what comes of cells at them.
+
+Owns `Axis` and `Raw`, which the ways to work out a rule (`nodes`, `lowered`) share.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from potto.integrate.rules.gauss import gauss
+from potto.kernels.cells import Array, Bools
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Nodes of a variable on [0, 1].
+
+    speeds: how fast they run, as they crowd at turning points, where roots are. transform: (n, rows) from numbers at
+    the nodes to Legendre coefficients, or to the sum alone where that is exact. few, few_speeds: those nodes at which
+    rounding is followed.
+    """
+
+    nodes: Array
+    speeds: Array
+    weights: Array
+    transform: Array
+    few: Array
+    few_speeds: Array
+
+    @classmethod
+    def of(cls, order: int, exact: bool, turning: tuple[bool, bool], several: bool) -> Axis:
+        """turning: whether an end of the stretch is like a square root. several: rounding is followed at few nodes."""
+        rule = gauss(order)
+        u = rule.nodes
+        match turning:
+            case (True, True):
+                nodes, speeds = np.sin(0.5 * math.pi * u) ** 2, 0.5 * math.pi * np.sin(math.pi * u)
+            case (True, False):
+                nodes, speeds = u * u, 2 * u
+            case (False, True):
+                nodes, speeds = u * (2 - u), 2 * (1 - u)
+            case _:
+                nodes, speeds = u, np.ones_like(u)
+        picked = np.unique([0, order // 2, order - 1]) if several else np.arange(order)
+        transform = np.ascontiguousarray(rule.weights[:, None] if exact else rule.transform)
+        return cls(nodes, speeds, rule.weights, transform, nodes[picked], speeds[picked])
+
+
+@dataclass(frozen=True)
+class Raw:
+    """Sums over the nodes of cells, for each of M members.
+
+    number: (1 + k, M), the integrals. coefficients: per variable (1 + k, M, rows), the sizes of Legendre coefficients
+    along it, integrated over the others. most, off: (1 + k, M), what is added up, and what rounding puts it off, by the
+    nodes at which that is followed. clear: (M,) whether no cut comes between, and nothing near by is singular. corners,
+    largest: (M,) the largest value at the ends of stretches, and at nodes.
+    """
+
+    number: Array
+    coefficients: list[Array]
+    most: Array
+    off: Array
+    clear: Bools
+    corners: Array
+    largest: Array

@@ -1,0 +1,171 @@
+"""A product rule for cells of one shape, by numpy: all nodes of all members at once.
+
+Owns `at_once`. Blocks of numbers have values in row 0 and tangents in rows 1 ... k of their first axis. The members are
+their last axis, so that whatever is done is done to long rows of numbers; before it come the nodes of each variable,
+the outermost one's next to the members.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from potto.core.terms import Term, function_of, tuple_
+from potto.integrate.fixed.a_priori import Path, Straight
+from potto.integrate.fixed.axes import Axis, Raw
+from potto.integrate.fixed.edges import EDGE, edges_of
+from potto.integrate.fixed.moving_sums import evaluated, product
+from potto.integrate.pieces import Evaluator, dense, still
+from potto.integrate.rules.gauss import EPS
+from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays
+
+
+@dataclass(frozen=True)
+class Nodes:
+    """Numbers at some nodes of cells. value, off: of the integrand and its rounding, (1 + k, ..., n1, M).
+
+    widths: per variable those of its stretches, and how far they may be off, with its own axis left out.
+    clear: (M,) whether no cut comes between, and nothing near by is singular.
+    """
+
+    value: Array
+    off: Array
+    widths: list[tuple[Array, Array]]
+    clear: Bools
+
+
+def at_once(
+    plan: Straight, path: Path, face: Term, machine: Evaluator, env: Mapping[str, Value], members: Ints,
+    axes: Sequence[Axis],
+) -> Raw:  # fmt: skip
+    """The sums over the cells of some members."""
+    here = {n: map_arrays(v, lambda a: a[members] if a.ndim else a) for n, v in env.items()}
+    cells = _Cells(plan, path, face, here, members.size, axes)
+    tracking = machine.tracking()
+    some = cells.at_nodes(tracking, [axis.few for axis in axes], True)
+    every = some
+    if any(len(axis.few) < len(axis.nodes) for axis in axes):
+        every = cells.at_nodes(machine, [axis.nodes for axis in axes], False)
+    number, coefficients = cells.added(every)
+    off, most = cells.rounded(some)
+    corners = every
+    if any(axis.transform.shape[1] > 1 for axis in axes):
+        corners = cells.at_nodes(tracking, [np.array([0.0, 1.0])] * len(axes), False)
+    largest = [_largest(nodes.value[:1]) for nodes in (corners, every)]
+    return Raw(number, coefficients, most, off, every.clear & some.clear, *largest)
+
+
+@dataclass(frozen=True)
+class _Cells:
+    """The cells of some members, between these cuts."""
+
+    plan: Straight
+    path: Path
+    face: Term
+    env: dict[str, Value]
+    count: int
+    axes: Sequence[Axis]
+
+    def at_nodes(self, machine: Evaluator, places: Sequence[Array], tracked: bool) -> Nodes:
+        """The integrand at nodes, per variable; `tracked` where the rounding of nodes counts."""
+        here, shape, k = dict(self.env), (self.count,), machine.directions
+        clear = np.ones(self.count, dtype=bool)
+        widths = []
+        for i, (variable, frame, (low, high)) in enumerate(
+            zip(self.plan.variables, self.plan.frames, self.path, strict=True)
+        ):
+            values = evaluated(frame, machine, {name: here[name] for name in frame.params})
+            ends, lost = dense((values[low], values[high]), k, shape)
+            lo, width = ends[0], ends[1] - ends[0]
+            off = EPS * np.abs(ends).sum(axis=0) + (0.0 if lost is None else lost.sum(axis=0))
+            widths.append((width, off))
+            if i:
+                clear &= _clear(values, low, high, ends[:, 0])
+            at = lo[:, None] + width[:, None] * places[i].reshape(-1, *(1,) * len(shape))
+            moves = [values[low].t[d] is not None or values[high].t[d] is not None for d in range(k)]
+            errors = off if tracked else (None,) * (1 + k)
+            here[variable] = Cell(
+                at[0], errors[0], tuple(at[d] if m else None for d, m in enumerate(moves, 1)),
+                tuple(errors[d] if m else None for d, m in enumerate(moves, 1)),
+            )  # fmt: skip
+            shape = at.shape[1:]
+        function = function_of(self.face)
+        value, lost = dense(machine.evaluate(function, {name: here[name] for name in function.params}, None), k, shape)
+        if tracked:
+            clear &= self.clear_of_edges(machine.with_directions(0), here, shape)
+        return Nodes(value[0], np.zeros(value[0].shape) if lost is None else lost[0], widths, clear)
+
+    def clear_of_edges(self, machine: Evaluator, here: dict[str, Value], shape: tuple[int, ...]) -> Bools:
+        """The members on whose cells nothing comes to the edge of where it is analytic, as a root of x does at 0: there
+        coefficients fall so slowly that they don't tell."""
+        fine, found = np.ones(shape[-1], dtype=bool), edges_of(self.face)
+        if not found:
+            return fine
+        edges = function_of(tuple_(found))
+        for cell in evaluated(edges, machine, {name: still(here[name]) for name in edges.params}):
+            size = np.broadcast_to(np.abs(cell.v), shape).reshape(-1, shape[-1])
+            fine &= size.min(axis=0) > EDGE * size.max(axis=0)
+        return fine
+
+    def added(self, nodes: Nodes) -> tuple[Array, list[Array]]:
+        """What the nodes amount to, (1 + k, M), and the sizes of coefficients along each variable."""
+        number, k1, count = nodes.value, len(nodes.value), self.count
+        volumes = [np.ones((k1, count))]  # of a node of the variables further out, with weights, and of its stretch
+        volumes[0][1:] = 0.0
+        for i, (width, _) in enumerate(nodes.widths):
+            volumes[i] = product(volumes[i], width)
+            weights = (self.axes[i].weights * self.axes[i].speeds).reshape(-1, *(1,) * (width.ndim - 1))
+            volumes.append(volumes[i][:, None] * weights)
+        sizes = []
+        for i in reversed(range(len(self.axes))):
+            axis, (width, _), flat = self.axes[i], nodes.widths[i], number.reshape(*number.shape[:2], -1)
+            if np.ptp(axis.speeds) > 0:
+                flat = flat * axis.speeds[:, None]
+            if axis.transform.shape[1] == 1:
+                number = axis.transform[:, 0] @ flat
+                sizes.append(np.abs(number)[..., None])
+            else:
+                coefficients = axis.transform.T @ flat
+                number = coefficients[:, 0]
+                sizes.append(_summed(np.abs(coefficients), np.abs(volumes[i])))
+            number = product(number.reshape(width.shape), width)
+        return number, sizes[::-1]
+
+    def rounded(self, nodes: Nodes) -> tuple[Array, Array]:
+        """What rounding may put the integrals off, and what is added up for them, from some nodes: (1 + k, M)."""
+        most, off = np.abs(nodes.value), nodes.off
+        for i in reversed(range(len(self.axes))):
+            (width, lost), speeds = nodes.widths[i], self.axes[i].few_speeds
+            speeds = speeds.reshape(-1, *(1,) * (most.ndim - 2))
+            most, off = (most * speeds).max(axis=1), (off * speeds).max(axis=1)
+            size = np.abs(width)
+            off = product(off, size) + product(most, lost)
+            most = product(most, size)
+        return off, most
+
+
+def _largest(value: Array) -> Array:
+    """Of numbers (..., M) the largest without regard to sign, those that are none left out: (M,)."""
+    size = np.abs(value)
+    return np.asarray(np.where(np.isfinite(size), size, 0.0).reshape(-1, value.shape[-1]).max(axis=0))
+
+
+def _clear(values: Sequence[Cell], low: int, high: int, ends: Array) -> Bools:
+    """The members for which a stretch is one at all nodes: its ends in order, no other cut between them."""
+    fine = ends[1] > ends[0]
+    for row, cell in enumerate(values):
+        if row not in (low, high):
+            fine &= ~((cell.v > ends[0]) & (cell.v < ends[1]))
+    return np.asarray(np.asarray(fine).reshape(-1, ends.shape[-1]).all(axis=0))
+
+
+def _summed(block: Array, volume: Array) -> Array:
+    """(f g)', with f (1 + k, n, R), summed over all nodes g of the variables further out: (1 + k, M, n)."""
+    k1, count = len(volume), volume.shape[-1]
+    block, volume = block.reshape(k1, block.shape[1], -1, count), volume.reshape(k1, -1, count)
+    total: Array = np.einsum("knrm,rm->kmn", block, volume[0])
+    if k1 > 1:
+        total[1:] += np.einsum("nrm,krm->kmn", block[0], volume[1:])
+    return total

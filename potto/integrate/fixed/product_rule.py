@@ -1,0 +1,102 @@
+"""One product rule for cells of one shape, whoever's they are, and how far off it is.
+
+Owns `Rule` and `Measured`. What the nodes amount to is worked out by numpy, or by machine code once that pays; what
+follows from it is said here.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from potto.integrate.fixed.a_priori import Straight
+from potto.integrate.fixed.axes import Axis, Raw
+from potto.integrate.fixed.lowered import Lowered, lowered
+from potto.integrate.fixed.moving_sums import SUMMED
+from potto.integrate.fixed.nodes import at_once
+from potto.integrate.fixed.topologies import Uniform
+from potto.integrate.pieces import Evaluator
+from potto.integrate.rules.gauss import analytic_truncation
+from potto.kernels.cells import Array, Bools, Ints, Value
+
+# At how many nodes rounding is followed at each; and how much more it may be elsewhere where it is at a few.
+TRACKED, ELSEWHERE = 1 << 12, 2.0
+# How many times larger than at all nodes the integrand may be at the ends of stretches: else something narrow is there.
+PEAK = 8.0
+# A rule is good enough for a cell if what it may be off is this part of the accuracy asked for; for a few members, whom
+# more nodes cost next to nothing, this part of the number.
+SHARE, TIGHT = 0.01, 1e-13
+# Up to how many members are few.
+FEW = 64
+# What errors may be where what is added up cancels, as a part of that: no other way would mend it.
+CANCELS = 1e-13
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Integrals over cells (1 + k, M), how far rules and rounding put them off, and what is added up for them."""
+
+    number: Array
+    truncated: Array
+    rounding: Array
+    gross: Array
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A product rule for cells of one shape, with so many nodes for each variable; exact: for polynomials."""
+
+    plan: Straight
+    cell: Uniform
+    orders: tuple[int, ...]
+    exact: tuple[bool, ...]
+    machine: Evaluator
+
+    @property
+    def nodes(self) -> int:
+        return math.prod(self.orders)
+
+    def lowered(self, env: dict[str, Value]) -> Lowered:
+        return lowered(self.plan, self.cell.path, self.cell.face, self.machine.directions, env)
+
+    def span(self, env: dict[str, Value]) -> int:
+        """How many numbers of a member are kept at a time: those at all nodes, or of coefficients alone."""
+        return self.nodes if self.lowered(env).function(self.machine) is None else sum(self.orders)
+
+    def applied(self, env: dict[str, Value], members: Ints) -> Measured:
+        """The integrals over the cells of some members."""
+        self.machine.count(members.size * self.nodes)
+        several = members.size * self.nodes > TRACKED
+        axes = [
+            Axis.of(order, exact, (low in turning, high in turning), several)
+            for order, exact, turning, (low, high) in zip(
+                self.orders, self.exact, self.plan.turning, self.cell.path, strict=True
+            )
+        ]
+        raw = self.raw(env, members, axes)
+        truncated = np.zeros(raw.number.shape)
+        for exact, sizes in zip(self.exact, raw.coefficients, strict=True):
+            if not exact:
+                truncated += analytic_truncation(sizes)
+        clear = raw.clear if all(self.exact) else raw.clear & ~(raw.corners > PEAK * raw.largest)
+        truncated[:, ~clear] = np.inf
+        gross = np.maximum(raw.most, np.abs(raw.number))
+        rounding = (ELSEWHERE if several else 1.0) * raw.off + ELSEWHERE * SUMMED * gross
+        return Measured(raw.number, truncated, rounding, gross)
+
+    def raw(self, env: dict[str, Value], members: Ints, axes: list[Axis]) -> Raw:
+        way = self.lowered(env)
+        function = way.function(self.machine)
+        if function is not None:
+            return way.run(function, env, members, axes, self.machine.directions)
+        with way.promotion.by_numpy():
+            return at_once(self.plan, self.cell.path, self.cell.face, self.machine, env, members, axes)
+
+    def good(self, found: Measured) -> Bools:
+        """For which cells the rule does."""
+        few = self.cell.members.size <= FEW
+        asked = (TIGHT if few else SHARE * self.machine.rtol) * np.abs(found.number)
+        least = (TIGHT if few else CANCELS) * found.gross
+        return np.asarray((found.truncated <= np.maximum(asked, least)).all(axis=0))

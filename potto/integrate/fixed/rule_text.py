@@ -1,0 +1,338 @@
+"""The text of a product rule (`lowered`), as LLVM reads it.
+
+Owns `RuleText`. In loops over the nodes of the variables, from the outermost to the innermost, bounds, cuts, nodes and
+the integrand are worked out, and Legendre coefficients added up on the way back. A formula is worked out in the
+outermost loop in which all that it needs is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from potto.core.terms import Lam, Term, function_of
+from potto.integrate.fixed.a_priori import Path, Straight
+from potto.integrate.fixed.edges import EDGE, edges_of
+from potto.integrate.pieces import Evaluator
+from potto.integrate.rules.gauss import EPS
+from potto.kernels.native.straight import NotStraight, Packed, Part, needed, packed
+from potto.kernels.native.straight import Straight as Lines
+from potto.kernels.native.vectors import LANES, Vectors
+
+NAME = "rule"
+ONE = "1.0"
+PER_AXIS = 9  # numbers of the frame: how many nodes, coefficients and nodes with rounding, then where tables are
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A part of a parameter, and what is there: an "array", a "number" for all members, or ONE."""
+
+    name: str
+    part: Part
+    kind: str
+
+
+@dataclass(frozen=True, slots=True)
+class Symbol:
+    """A cell whose parts are names of vectors; None where a part is 0, ONE where a tangent is 1."""
+
+    v: str
+    e: str | None
+    t: tuple[str | None, ...]
+    et: tuple[str | None, ...]
+
+    def pattern(self) -> Any:
+        moving = tuple(0 if x is None else 1 if x == ONE else 2 for x in self.t)
+        return self.e is not None or any(x is not None for x in self.et), moving
+
+    def part(self, part: Part) -> str | None:
+        if part.kind in ("v", "e"):
+            return self.v if part.kind == "v" else self.e
+        return (self.t if part.kind == "t" else self.et)[part.direction]
+
+
+Dual = list[str | None]
+Env = dict[str, Symbol]
+
+
+class RuleText:
+    """Writes the function. Lists of 1 + k names have a value first, then its tangents."""
+
+    def __init__(self, plan: Straight, path: Path, face: Term, machine: Evaluator) -> None:
+        self.plan, self.path, self.machine = plan, path, machine
+        self.face, self.edges = function_of(face), [function_of(edge) for edge in edges_of(face)]
+        self.at = Vectors()
+        self.k1 = 1 + machine.directions
+        self.zero, self.one = self.at.number(0.0), self.at.number(1.0)
+
+    def text(self, places: Sequence[Place]) -> str:
+        at, k1, count = self.at, self.k1, len(self.plan.variables)
+        blocks, total, out = (at.address("%frame", i) for i in range(3))
+        self.tables = [[at.address("%frame", 3 + PER_AXIS * i + j, "i64" if j < 3 else "ptr")
+                        for j in range(PER_AXIS)] for i in range(count)]  # fmt: skip
+        self.sums = [at.room(at.whole("mul", table[1], k1)) for table in self.tables]
+        self.added = [at.room(at.whole("mul", table[1], k1)) for table in self.tables]
+        clear, corners, largest = at.room(1), at.room(1), at.room(1)
+        self.clear = clear
+        block = at.begin(blocks)
+        here = self.parameters(places, block)
+        at.store(self.one, clear)
+        at.store(self.zero, corners)
+        at.store(self.zero, largest)
+        for i, table in enumerate(self.tables):
+            self.fill(self.added[i], table[1])
+        number = self.every(0, here, [self.one, *[None] * (k1 - 1)], largest)
+        bounds = [(at.room(1), at.room(1)) for _ in self.edges]
+        for least, most in bounds:
+            at.store(at.number(np.inf), least)
+            at.store(self.zero, most)
+        sizes, off = self.few(0, here, bounds)
+        for least, most in bounds:
+            self.only(at.apply("gt", at.load(least), at.apply("mul", at.number(EDGE), at.load(most))))
+        self.ends(0, {name: _still(symbol) for name, symbol in here.items()}, corners)
+        place = at.once(f"inttoptr i64 {out} to ptr", out)
+        base = at.whole("mul", block, total)
+        row = 0
+        for value in (*number, *sizes, *off, at.load(clear), at.load(corners), at.load(largest)):
+            at.store(value or self.zero, at.at(place, at.whole("add", base, row)))
+            row += 1
+        behind = at.whole("add", base, row)
+        for added, table in zip(self.added, self.tables, strict=True):
+            size = at.whole("mul", table[1], k1)
+            own = at.begin(size)
+            at.store(at.load(at.at(added, own)), at.at(place, at.whole("add", behind, own)))
+            at.end()
+            behind = at.whole("add", behind, size)
+        at.end()
+        return at.module(NAME, "ptr %frame, ptr %constants")
+
+    def parameters(self, places: Sequence[Place], block: str) -> Env:
+        """The parameters of the members of a block."""
+        at, start = self.at, 3 + PER_AXIS * len(self.plan.variables)
+        first = at.whole("mul", block, LANES)
+        known: dict[tuple[str, Part], str] = {}
+        arrays = [place for place in places if place.kind == "array"]
+        numbers = [place for place in places if place.kind == "number"]
+        for i, place in enumerate(arrays):
+            source = at.address("%frame", start + i, "ptr")
+            known[place.name, place.part] = at.load(at.at(source, first, "double"))
+        for i, place in enumerate(numbers):
+            known[place.name, place.part] = at.constant("%constants", i)
+        known |= {(place.name, place.part): ONE for place in places if place.kind == ONE}
+
+        def parts(name: str, kind: str) -> tuple[str | None, ...]:
+            return tuple(known.get((name, Part((), kind, d))) for d in range(self.k1 - 1))
+
+        return {
+            name: Symbol(
+                known[name, Part((), "v")], known.get((name, Part((), "e"))), parts(name, "t"), parts(name, "et")
+            )
+            for name in self.plan.names
+        }
+
+    # The three ways through the nodes
+
+    def every(self, i: int, env: Env, volume: Dual, largest: str) -> Dual:
+        """The integral over variable i and those further in. volume: of a node of those further out, with weights."""
+        at, k1 = self.at, self.k1
+        n, rows, _, nodes, speeds, weights, transform, _, _ = self.tables[i]
+        low, width, _ = self.stretch(i, env, self.machine)
+        volume = self.product(volume, width)
+        self.fill(self.sums[i], rows)
+        j = at.begin(n)
+        speed, weight = at.constant(speeds, j), at.constant(weights, j)
+        inner = {**env, self.plan.variables[i]: self.node(low, width, at.constant(nodes, j))}
+        if i + 1 == len(self.plan.variables):
+            (cell,) = self.evaluated(self.face, inner, self.machine)
+            value: Dual = [cell.v, *map(self.plain, cell.t)]
+            self.raise_to(largest, self.finite(at.apply("abs", cell.v)))
+        else:
+            share = at.apply("mul", weight, speed)
+            value = self.every(i + 1, inner, [self.times(x, share) for x in volume], largest)
+        value = [self.times(x, speed) for x in value]
+        row = at.begin(rows)
+        factor = at.constant(transform, at.whole("add", at.whole("mul", j, rows), row))
+        for c, x in enumerate(value):
+            if x is not None:
+                place = at.at(self.sums[i], at.whole("add", at.whole("mul", row, k1), c))
+                at.store(at.apply("add", at.load(place), at.apply("mul", factor, x)), place)
+        at.end()
+        at.end()
+        moving = [c for c in range(k1) if value[c] is not None]
+        self.coefficients(i, volume, moving)
+        number = [at.load(at.at(self.sums[i], c)) if c in moving else None for c in range(k1)]
+        return self.product(number, width)
+
+    def coefficients(self, i: int, volume: Dual, moving: Sequence[int]) -> None:
+        """Add the sizes of the coefficients along variable i, times the volume of the node further out."""
+        at, k1 = self.at, self.k1
+        sizes = [None if x is None else at.apply("abs", x) for x in volume]
+        row = at.begin(self.tables[i][1])
+        base = at.whole("mul", row, k1)
+        found = {c: at.apply("abs", at.load(at.at(self.sums[i], at.whole("add", base, c)))) for c in moving}
+        for c in range(k1):
+            terms = [self.times(found.get(c), sizes[0])]
+            if c:
+                terms.append(self.times(found.get(0), sizes[c]))
+            total = self.total(*terms)
+            if total is not None:
+                place = at.at(self.added[i], at.whole("add", base, c))
+                at.store(at.apply("add", at.load(place), total), place)
+        at.end()
+
+    def few(self, i: int, env: Env, bounds: Sequence[tuple[str, str]]) -> tuple[Dual, Dual]:
+        """The most that is added up from variable i on, and what rounding puts it off, by nodes at which that is
+        followed. bounds: of the edges of builtins."""
+        at, k1 = self.at, self.k1
+        _, _, n, _, _, _, _, nodes, speeds = self.tables[i]
+        low, width, lost = self.stretch(i, env, self.machine.tracking())
+        slots = [(at.room(1), at.room(1)) for _ in range(k1)]
+        for place in (place for pair in slots for place in pair):
+            at.store(self.zero, place)
+        j = at.begin(n)
+        here = {**env, self.plan.variables[i]: self.node(low, width, at.constant(nodes, j), lost)}
+        most: Dual
+        off: Dual
+        if i + 1 == len(self.plan.variables):
+            (cell,) = self.evaluated(self.face, here, self.machine.tracking())
+            most = [self.size(cell.v), *(self.size(self.plain(x)) for x in cell.t)]
+            off = [cell.e, *(cell.et or [None] * (k1 - 1))]
+            self.at_edges(here, bounds)
+        else:
+            most, off = self.few(i + 1, here, bounds)
+        speed = at.constant(speeds, j)
+        for (size, error), x, y in zip(slots, most, off, strict=True):
+            for place, part in ((size, x), (error, y)):
+                if part is not None:
+                    self.raise_to(place, at.apply("mul", part, speed))
+        at.end()
+        largest: Dual = [at.load(size) for size, _ in slots]
+        worst: Dual = [at.load(error) for _, error in slots]
+        sizes = [self.size(x) for x in width]
+        errors = map(self.total, self.product(worst, sizes), self.product(largest, lost))
+        return self.product(largest, sizes), list(errors)
+
+    def at_edges(self, env: Env, bounds: Sequence[tuple[str, str]]) -> None:
+        here = {name: _still(symbol) for name, symbol in env.items()}
+        for edge, (least, most) in zip(self.edges, bounds, strict=True):
+            (cell,) = self.evaluated(edge, here, self.machine.with_directions(0))
+            size = self.at.apply("abs", cell.v)
+            self.at.store(self.at.apply("min", self.at.load(least), size), least)
+            self.raise_to(most, size)
+
+    def ends(self, i: int, env: Env, largest: str) -> None:
+        """The largest value at the corners of cells."""
+        at, machine = self.at, self.machine.with_directions(0)
+        low, width, _ = self.stretch(i, env, machine, False)
+        j = at.begin("2")
+        node = at.spread(at.once(f"uitofp i64 {j} to double", j))
+        here = {**env, self.plan.variables[i]: self.node(low, width, node)}
+        if i + 1 == len(self.plan.variables):
+            (cell,) = self.evaluated(self.face, here, machine)
+            self.raise_to(largest, self.finite(at.apply("abs", cell.v)))
+        else:
+            self.ends(i + 1, here, largest)
+        at.end()
+
+    # Stretches and nodes
+
+    def stretch(self, i: int, env: Env, machine: Evaluator, checked: bool = True) -> tuple[Dual, Dual, Dual]:
+        """The lower end, the length, and how far off both are; where another cut comes between, that is noted."""
+        at, k1 = self.at, 1 + machine.directions
+        cells = self.evaluated(self.plan.frames[i], env, machine)
+        low, high = (cells[row] for row in self.path[i])
+        lower: Dual = [low.v, *map(self.plain, low.t)]
+        upper: Dual = [high.v, *map(self.plain, high.t)]
+        width = [self.total(x, None if y is None else at.apply("neg", y)) for x, y in zip(upper, lower, strict=True)]
+        if i and checked:
+            self.only(at.apply("gt", high.v, low.v))
+            for row, cell in enumerate(cells):
+                if row not in self.path[i]:
+                    between = at.apply("and", at.apply("gt", cell.v, low.v), at.apply("lt", cell.v, high.v))
+                    self.only(at.apply("not", between))
+        errors = ([low.e, *low.et], [high.e, *high.et])
+        lost = []
+        for c in range(k1):
+            ends = self.total(self.size(lower[c]), self.size(upper[c]))
+            lost.append(self.total(self.times(ends, at.number(EPS)), *(row[c] for row in errors if len(row) > c)))
+        return lower, width, lost
+
+    def node(self, low: Dual, width: Dual, u: str, lost: Dual | None = None) -> Symbol:
+        """A node, which moves with the ends of its stretch."""
+        at = [self.total(x, self.times(w, u)) for x, w in zip(low, width, strict=True)]
+        errors = tuple((lost or [None] * len(at))[1:])
+        assert at[0] is not None
+        return Symbol(at[0], lost[0] if lost else None, tuple(at[1:]), tuple(
+            None if moves is None else error for moves, error in zip(at[1:], errors, strict=True)
+        ))  # fmt: skip
+
+    def evaluated(self, function: Lam, env: Env, machine: Evaluator) -> list[Symbol]:
+        """The numbers of a function to a number or a tuple of them."""
+        args = [env[name] for name in function.params]
+        kernel = machine.kernel(function, tuple(arg.pattern() for arg in args))
+        if not kernel.plain or "rt." in kernel.text:
+            raise NotStraight(kernel.text)
+        lines = Lines.of(kernel)
+        known = {}
+        for name, part in lines.parts.items():
+            known[name] = self.plain(args[part.path[0]].part(part)) or self.zero
+        cells = list(packed(lines.result))
+        wanted = {name for cell in cells for name in cell.parts()}
+        found = self.at.run(needed(lines.operations(), wanted), known)
+        return [self.symbol(cell, found) for cell in cells]
+
+    def symbol(self, cell: Packed, found: Mapping[str, str]) -> Symbol:
+        def part(name: str | None) -> str | None:
+            return None if name is None else found.get(name) or self.at.number(float(name))
+
+        value = part(cell.v)
+        assert value is not None
+        return Symbol(value, part(cell.e), tuple(map(part, cell.t)), tuple(map(part, cell.et)))
+
+    # Arithmetic of what may be 0
+
+    def plain(self, x: str | None) -> str | None:
+        return self.one if x == ONE else x
+
+    def size(self, x: str | None) -> str | None:
+        return None if x is None else self.at.apply("abs", x)
+
+    def times(self, x: str | None, y: str | None) -> str | None:
+        return None if x is None or y is None else self.at.apply("mul", x, y)
+
+    def total(self, *terms: str | None) -> str | None:
+        result = None
+        for term in terms:
+            if term is not None:
+                result = term if result is None else self.at.apply("add", result, term)
+        return result
+
+    def product(self, f: Dual, g: Dual) -> Dual:
+        """(f g)' = f' g + f g'."""
+        moved = [self.total(self.times(x, g[0]), self.times(f[0], y)) for x, y in zip(f[1:], g[1:], strict=True)]
+        return [self.times(f[0], g[0]), *moved]
+
+    # Memory
+
+    def fill(self, memory: str, rows: str) -> None:
+        i = self.at.begin(self.at.whole("mul", rows, self.k1))
+        self.at.store(self.zero, self.at.at(memory, i))
+        self.at.end()
+
+    def raise_to(self, place: str, value: str) -> None:
+        self.at.store(self.at.apply("max", self.at.load(place), value), place)
+
+    def finite(self, size: str) -> str:
+        return self.at.apply("select", self.at.apply("lt", size, self.at.number(np.inf)), size, self.zero)
+
+    def only(self, mask: str) -> None:
+        """Members for which the mask doesn't hold are not clear."""
+        self.at.store(self.at.apply("select", mask, self.at.load(self.clear), self.zero), self.clear)
+
+
+def _still(symbol: Symbol) -> Symbol:
+    return Symbol(symbol.v, None, (), ())

@@ -1,0 +1,84 @@
+"""When machine code takes over from numpy: once numpy has taken as long as making it is expected to.
+
+Owns `Promotion`. First answers never wait: the text is written when it pays, LLVM works on it in a thread of its own,
+and numpy goes on until that is done. Who rents for as long as buying costs, and then buys,
+pays at most twice the least.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from potto.kernels.making import counts, making
+from potto.kernels.native import objects
+from potto.kernels.native.straight import NotStraight
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future, ThreadPoolExecutor
+
+# Seconds, as `benchmarks/calibration.py native` measures them: a function of machine code from its kernels, and once in
+# a process the loading of LLVM.
+FUNCTION, LLVM = 0.05, 0.3
+
+
+class Promotion:
+    """A function of machine code: not asked for yet, on its way, ready, or impossible. name: of it in its text."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.spent = 0.0
+        self.impossible = False
+        self._ready: objects.Loaded | None = None
+        self._coming: Future[objects.Loaded] | None = None
+
+    def function(self, backend: str, text: Callable[[], str]) -> objects.Loaded | None:
+        """The function if it is to be used now, None if numpy is. text: what to compile; may raise NotStraight."""
+        if backend == "numpy" or self.impossible:
+            return None
+        if self._ready is None and (backend == "native" or self._pays()):
+            self._get(text, backend == "native")
+        return self._ready
+
+    @contextmanager
+    def by_numpy(self) -> Iterator[None]:
+        """Count the time of the block as that of numpy."""
+        start = time.perf_counter()
+        yield
+        self.spent += time.perf_counter() - start
+
+    def _pays(self) -> bool:
+        return self._coming is not None or (
+            self.spent > FUNCTION + (0.0 if objects.loaded_llvm() else LLVM) and objects.available()
+        )
+
+    def _get(self, text: Callable[[], str], now: bool) -> None:
+        try:
+            if self._coming is None:
+                with making:
+                    written = text()
+                self._coming = _worker().submit(_made, written, self.name)
+            if now or self._coming.done():
+                self._ready = self._coming.result()
+                self._coming = None
+        except NotStraight:
+            self.impossible = True
+
+
+def _made(text: str, name: str) -> objects.Loaded:
+    start = time.perf_counter()
+    found = objects.loaded(objects.compiled(text), name)
+    counts.native += 1
+    counts.native_seconds += time.perf_counter() - start
+    return found
+
+
+@lru_cache(maxsize=1)
+def _worker() -> ThreadPoolExecutor:
+    """One thread: LLVM has one lock. It is waited for when the process ends."""
+    from concurrent.futures import ThreadPoolExecutor  # takes its time to load: where code is made only
+
+    return ThreadPoolExecutor(1, "potto-native")
