@@ -126,21 +126,19 @@ def _frame(arrays: list[Array], shape: tuple[int, ...]) -> list[int]:
 
     Arrays that don't lie so are copied; they are replaced in the list, so that they live as long as it does.
     """
-    rows, inner = shape[:-1], shape[-1]
-    if inner < LANES:
-        arrays[:] = [np.ascontiguousarray(np.broadcast_to(a, shape)) for a in arrays]
-    if all(a.shape == shape and a.flags.c_contiguous for a in arrays):
-        return [1, 1, math.prod(shape), *(x for a in arrays for x in (address(a), 0, 0))]
-    outer, middle = (math.prod(rows[:-1]), rows[-1]) if rows else (1, 1)
-    found = [outer, middle, inner]
+    inner = shape[-1]
+    middle = shape[-2] if len(shape) > 1 else 1
+    found = [math.prod(shape[:-2]), middle, inner]
     for i, a in enumerate(arrays):
         steps = np.broadcast_to(a, shape).strides
-        front = [step for step, n in zip(steps[:-2], shape[:-2], strict=True) if n > 1]
-        if steps[-1] != a.itemsize or len(front) > 1:
+        front = [step for step, n in zip(steps[:-2], shape[:-2], strict=False) if n > 1]
+        if inner < LANES or steps[-1] != a.itemsize or len(front) > 1:
             a = arrays[i] = np.ascontiguousarray(np.broadcast_to(a, shape))
             steps = a.strides
-            front = [steps[-2] * middle]
-        found += [address(a), front[0] if front else 0, steps[-2] if rows else 0]
+            front = [steps[-2] * middle] if len(shape) > 1 else []
+        found += [address(a), front[0] if front else 0, steps[-2] if len(shape) > 1 else 0]
+    if all(a.shape == shape and a.flags.c_contiguous for a in arrays):
+        return [1, 1, math.prod(shape), *(x for a in arrays for x in (address(a), 0, 0))]
     return found
 
 

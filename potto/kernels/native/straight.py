@@ -117,6 +117,8 @@ class Straight:
         for line in self.lines:
             if line.reads - {"rt"} <= known:
                 known.update(line.sets)
+            else:
+                known.difference_update(line.sets)
         return frozenset(known)
 
     def prelude(self, constant: frozenset[str], wanted: tuple[str, ...]) -> Callable[..., tuple[Any, ...]]:
@@ -127,7 +129,7 @@ class Straight:
         arguments = ast.arguments([], [ast.arg(name) for name in given], None, [], [], None, [])
         function = ast.FunctionDef("prelude", arguments, body, [])
         module = ast.fix_missing_locations(ast.Module([function], []))
-        scope = dict(self.kernel.run.__globals__)
+        scope = {**self.kernel.run.__globals__, "trace": None}
         exec(compile(module, "<prelude>", "exec"), scope)
         return scope["prelude"]  # type: ignore[no-any-return]
 
@@ -246,10 +248,10 @@ class _Flat:
 
     def statement(self, node: ast.stmt) -> None:
         match node:
+            case ast.Assign(value=ast.Constant(value=None) | ast.IfExp(test=ast.Name(id="trace"))):
+                pass  # a mask that may be forced: none is, where this runs
             case ast.Assign(targets=[ast.Name(id=name)], value=value):
                 self.put(value, name)
-            case ast.Assign(targets=[ast.Tuple()]) | ast.Assign(value=ast.IfExp()):
-                raise NotStraight(ast.unparse(node))
             case ast.If(body=[ast.Assign(targets=[ast.Tuple(elts=[ast.Name(id=mask), ast.Name(id=spoiled)])],
                                          value=ast.Call(args=[surface, ast.Constant(value=strict)]))]):  # fmt: skip
                 place = self.put(surface)
@@ -257,8 +259,7 @@ class _Flat:
                 bad = self.new("nan", (place,))
                 self.made.append(Operation(spoiled, "select", (bad, "nan", ZERO)))
             case _:
-                if "trace" not in ast.unparse(node):  # a mask that may be forced: none is, where this runs
-                    raise NotStraight(ast.unparse(node))
+                raise NotStraight(ast.unparse(node))
 
     def new(self, code: str, args: tuple[str, ...], name: str = "") -> str:
         name = name or f"n{len(self.made)}"
