@@ -104,9 +104,10 @@ class Straight:
         paths: dict[str, tuple[int, ...]] = {arg.arg: (i,) for i, arg in enumerate(definition.args.args[2:])}
         parts: dict[str, Part] = {}
         lines: list[Line] = []
+        calls = _Calls()
         for node in definition.body[:-1]:
             if not _taken_apart(node, paths, parts):
-                lines.append(_line(node))
+                lines += map(_line, calls.before(node))
         last = definition.body[-1]
         assert isinstance(last, ast.Return) and last.value is not None
         return cls(kernel, parts, tuple(lines), _result(last.value))
@@ -193,6 +194,33 @@ def _taken_apart(node: ast.stmt, paths: dict[str, tuple[int, ...]], parts: dict[
     assert isinstance(target, ast.Name)
     parts[target.id] = Part(paths[value.value.id], value.attr, direction)
     return True
+
+
+class _Calls(ast.NodeTransformer):
+    """Gives calls inside of expressions lines of their own: what one says of numbers may differ from what it says of
+    arrays, so that those with nothing but numbers that are the same everywhere must be told apart."""
+
+    def __init__(self) -> None:
+        self.made: list[ast.stmt] = []
+        self.count = 0
+
+    def before(self, node: ast.stmt) -> list[ast.stmt]:
+        """The statement, and before it the calls in it."""
+        self.made = []
+        if isinstance(node, ast.Assign) and isinstance(node.value, ast.Call):
+            node.value.args = [self.visit(arg) for arg in node.value.args]
+        elif isinstance(node, ast.Assign):
+            node.value = self.visit(node.value)
+        return [*self.made, node]
+
+    def visit_Call(self, node: ast.Call) -> ast.expr:
+        self.generic_visit(node)
+        if not (isinstance(node.func, ast.Name) and node.func.id.startswith("f_")):
+            return node
+        self.count += 1
+        name = f"h{self.count}"
+        self.made.append(ast.Assign([ast.Name(name, ast.Store())], node))
+        return ast.Name(name, ast.Load())
 
 
 def _line(node: ast.stmt) -> Line:
