@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from potto.cli.console import Console
 from potto.projects.project import Projects
-from potto.projects.settings import DEFAULTS, METHODS, Settings, problem
+from potto.projects.settings import BACKENDS, DEFAULTS, METHODS, Settings, problem
 
 if TYPE_CHECKING:
     from potto.runtime.answers.estimate import Estimate
@@ -25,6 +25,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--samples", type=_whole, help=_help("points of a Monte Carlo estimate", "samples"))
     group.add_argument("--seed", type=_whole, help=_help("where its random numbers start", "seed"))
     group.add_argument("--max-evals", type=_whole, help=_help("the most evaluations", "max_evals"))
+    group.add_argument("--backend", choices=BACKENDS, help=_help("what computes at many points", "backend"))
     group.add_argument("--stats", action="store_true", help="say what the evaluation cost")
 
 

@@ -18,6 +18,7 @@ class Counts:
     seconds: float = 0.0
     native: int = 0
     native_seconds: float = 0.0
+    native_points: int = 0
 
 
 counts = Counts()

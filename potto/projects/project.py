@@ -6,7 +6,7 @@
     P0620 = "off"            # or "hint", "info", "warning", "error"
 
     [settings]
-    rtol = 1e-6              # or method, atol, samples, seed, max_evals
+    rtol = 1e-6              # or method, atol, samples, seed, max_evals, backend
 
 The project of a file is told by the nearest such file in its folder and above. Owns finding and reading it, and what
 is wrong with it as sentences; the command line, the prompt, Python and the editor all ask here.

@@ -76,7 +76,13 @@ def current(base: Settings = DEFAULTS) -> Settings:
 def problem(name: str, value: object) -> str | None:
     """Why `value` cannot be the setting `name`, or None if it can."""
     if name in CHOICES:
-        return None if value in CHOICES[name] else f"{name} must be one of {', '.join(CHOICES[name])}, not {value!r}"
+        if value not in CHOICES[name]:
+            return f"{name} must be one of {', '.join(CHOICES[name])}, not {value!r}"
+        from importlib.util import find_spec  # takes its time to load, and hardly anybody asks
+
+        if value == "native" and find_spec("llvmlite") is None:
+            return "machine code needs llvmlite: pip install 'potto[jit]'"
+        return None
     if name not in {field.name for field in fields(Settings)}:
         return f"there is no setting `{name}`; there are {', '.join(field.name for field in fields(Settings))}"
     if isinstance(value, bool) or not isinstance(value, int | float):

@@ -114,6 +114,7 @@ class Clock:
         self.seconds = time.perf_counter() - self.start
         self.compiled, self.reused = now.compiled - before.compiled, now.reused - before.reused
         self.spent = now.seconds - before.seconds
+        self.native, self.native_points = now.native - before.native, now.native_points - before.native_points
 
 
 def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
@@ -125,6 +126,8 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
         "integrals": record.integrals,
         "evaluations": record.evaluations,
     }
+    if clock.native or clock.native_points:
+        stats |= {"functions made as machine code": clock.native, "points by machine code": clock.native_points}
     if record.costs is not None:
         stats |= record.costs.told()
     answer = partial(

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from potto.ide import completions, resolve_completion
-from potto.projects.settings import METHODS
+from potto.projects.settings import CHOICES, METHODS
 from potto.reports import pages
 from potto_repl import options
 from potto_repl.commands.settings import NUMBERS
@@ -93,7 +93,7 @@ def _settings(session: Conversation, text: str) -> Iterator[Candidate]:
                 value = getattr(session.settings, name) if name in NUMBERS else options.shown(session.options, name)
                 yield Candidate(name, len(words[0]), str(value))
         return
-    found = METHODS if words[0] == "method" else options.choices(words[0]) if words[0] in options.NAMES else ()
+    found = options.choices(words[0]) if words[0] in options.NAMES else CHOICES.get(words[0], ())
     yield from (Candidate(value, len(words[-1])) for value in found if value.startswith(words[-1]))
 
 

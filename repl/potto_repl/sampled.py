@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from potto.applications.images import flat, sampled
@@ -184,7 +184,7 @@ def _sampled(session: Conversation, axes: Axes, places: list[Any]) -> list[list[
 
 def _coarse(chosen: Settings) -> dict[str, Any]:
     rough = replace(chosen, rtol=max(chosen.rtol, RTOL), atol=max(chosen.atol, 1e-9))
-    return {name: getattr(rough, name) for name in ("method", "rtol", "atol", "samples", "seed", "max_evals")}
+    return {field.name: getattr(rough, field.name) for field in fields(Settings)}
 
 
 def _call(axes: Axes, places: list[Any]) -> Estimate:

@@ -8,6 +8,7 @@ registers.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -20,6 +21,7 @@ from potto.integrate.fixed.axes import Axis, Raw
 from potto.integrate.fixed.rule_text import NAME, ONE, Place, RuleText
 from potto.integrate.pieces import Evaluator
 from potto.kernels.cells import Cell, Ints, Value
+from potto.kernels.making import counts
 from potto.kernels.native.objects import Loaded
 from potto.kernels.native.points import address
 from potto.kernels.native.promotion import Promotion
@@ -60,6 +62,7 @@ class Lowered:
         frame = [blocks, sum(rows), address(out), *(x for axis in axes for x in _told(axis)), *map(address, taken)]
         table = np.array(frame, dtype=np.int64)
         function.call(address(table), address(constants))
+        counts.native_points += count * math.prod(len(axis.nodes) for axis in axes)
         whole = out.transpose(1, 0, 2).reshape(sum(rows), -1)[:, :count]
         number, most, off, rest = np.split(whole[: rows[0]], [k1, 2 * k1, 3 * k1])
         parts = np.split(whole[rows[0] :], np.cumsum(rows[1:])[:-1])

@@ -16,6 +16,7 @@ import numpy as np
 
 from potto.kernels.cells import Array, Cell, Value
 from potto.kernels.compile import Kernel, Runtime
+from potto.kernels.making import counts
 from potto.kernels.native.objects import Loaded
 from potto.kernels.native.promotion import Promotion
 from potto.kernels.native.straight import NotStraight, Operation, Packed, Part, Result, Straight, needed, packed, read
@@ -85,6 +86,7 @@ class Pointwise:
         ends = [first + size * i for i in range(len(outputs))]
         frame = np.array(_frame(arrays, shape) + ends, dtype=np.int64)
         function.call(address(frame), address(constants))
+        counts.native_points += size // 8
         numbers.update(zip(layout.given, given, strict=True))
         numbers.update(zip(layout.arrays, arrays, strict=True))
         numbers.update(zip(layout.outputs, outputs, strict=True))

@@ -102,14 +102,17 @@ def show_time(session: Conversation, text: str) -> Iterator[Part]:
     program = session.world.program
     program.linker.inexact(term)  # follows every definition that the term refers to
     _lap(phases, "link", start)
-    made = counts.compiled
+    made, by_machine = counts.compiled, counts.native_points
     estimate = session.evaluate(text, session.settings).estimate
     phases["compile"] += estimate.compile_seconds
     phases["evaluate"] = max(estimate.seconds - estimate.compile_seconds, 0.0)
     kernels = counts.compiled - made
     total = sum(phases.values())
     rows = [f"{name:<9} {format_seconds(spent):>9}  {spent / total:4.0%}" for name, spent in phases.items()]
-    rows += [f"{'total':<9} {format_seconds(total):>9}", f"{kernels} kernels made, {estimate.evals:,} evaluations"]
+    cost = f"{kernels} kernels made, {estimate.evals:,} evaluations"
+    if counts.native_points > by_machine:
+        cost += f", {counts.native_points - by_machine:,} points by machine code"
+    rows += [f"{'total':<9} {format_seconds(total):>9}", cost]
     yield Part("answer", "\n".join(rows), {"seconds": phases, "kernels": kernels, "evaluations": estimate.evals})
 
 

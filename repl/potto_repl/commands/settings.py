@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from dataclasses import fields, replace
 
-from potto.projects.settings import METHODS, Settings, problem
+from potto.projects.settings import CHOICES, METHODS, Settings, problem
 from potto_repl import options
 from potto_repl.registry import command
 from potto_repl.reply import Part, Refusal, answer
@@ -18,7 +18,8 @@ NUMBERS = tuple(field.name for field in fields(Settings))
 def set_option(session: Conversation, text: str) -> Part:
     """Show the settings, or change one: `:set rtol 1e-6`, `:set seed 7`, `:set theme light`, `:set keys vi`.
 
-    Numbers: method, rtol, atol, samples, seed, max_evals. The prompt: unicode, theme, keys, suggest, check, details.
+    Numbers: method, rtol, atol, samples, seed, max_evals, backend. The prompt: unicode, theme, keys, suggest, check,
+    details.
     """
     name, _, value = text.replace("=", " ").strip().partition(" ")
     name, value = name.replace("-", "_"), value.strip()
@@ -42,7 +43,7 @@ def set_option(session: Conversation, text: str) -> Part:
 
 def _number(session: Conversation, name: str, text: str) -> Part:
     if text:
-        value = text if name == "method" else read_number(text)
+        value = text if name in CHOICES else read_number(text)
         complaint = problem(name, value)
         if complaint is not None:
             raise Refusal(complaint)
