@@ -17,6 +17,7 @@ class Counts:
     reused: int = 0
     seconds: float = 0.0
     native: int = 0
+    kept: int = 0
     native_seconds: float = 0.0
     native_points: int = 0
 

@@ -114,7 +114,8 @@ class Clock:
         self.seconds = time.perf_counter() - self.start
         self.compiled, self.reused = now.compiled - before.compiled, now.reused - before.reused
         self.spent = now.seconds - before.seconds
-        self.native, self.native_points = now.native - before.native, now.native_points - before.native_points
+        self.native, self.kept = now.native - before.native, now.kept - before.kept
+        self.native_points = now.native_points - before.native_points
 
 
 def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
@@ -126,8 +127,12 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
         "integrals": record.integrals,
         "evaluations": record.evaluations,
     }
-    if clock.native or clock.native_points:
-        stats |= {"functions made as machine code": clock.native, "points by machine code": clock.native_points}
+    if clock.native or clock.kept or clock.native_points:
+        stats |= {
+            "machine code compiled": clock.native,
+            "machine code from the cache": clock.kept,
+            "points by machine code": clock.native_points,
+        }
     if record.costs is not None:
         stats |= record.costs.told()
     answer = partial(

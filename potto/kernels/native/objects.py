@@ -1,7 +1,8 @@
 """Text of LLVM to functions that can be called, by way of object code, which can be kept.
 
-Owns `available`, `Loaded`, `compiled` and `loaded`. llvmlite is loaded when the first function is asked for. Nothing is
-optimized but the choice of instructions: what comes here is straight already.
+Owns `available`, `Loaded` and `made`. llvmlite is loaded when the first function is asked for. Nothing is optimized but
+the choice of instructions: what comes here is straight already. Object code is kept on disk by its text, the compiler
+and the processor.
 """
 
 from __future__ import annotations
@@ -14,8 +15,10 @@ from functools import lru_cache
 from importlib.util import find_spec
 from typing import Any
 
+from potto import store
 from potto.kernels.native.vectors import LIBRARY
 
+KIND = "machine-code"
 FUNCTION = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
 _lock = threading.Lock()
 _numbers = itertools.count()
@@ -69,21 +72,20 @@ class Loaded:
         self.call = FUNCTION(address)
 
 
-def compiled(text: str) -> bytes:
-    """The object code of a text."""
+def made(text: str, name: str) -> tuple[Loaded, bool]:
+    """The function of that name in a text, and whether its object code had to be compiled: nothing has kept it."""
     with _lock:
         llvm = compiler()
-        module = llvm.binding.parse_assembly(text)
-        module.verify()
-        return bytes(llvm.machine.emit_object(module))
-
-
-def loaded(code: bytes, name: str) -> Loaded:
-    """The function of that name in object code."""
-    with _lock:
-        llvm = compiler()
+        key = f"{llvm.signature}\n{text}".encode()
+        code = store.get(KIND, key)
+        new = code is None
+        if code is None:
+            module = llvm.binding.parse_assembly(text)
+            module.verify()
+            code = bytes(llvm.machine.emit_object(module))
+            store.put(KIND, key, code)
         builder = llvm.binding.JITLibraryBuilder().add_object_img(code).export_symbol(name)
         for symbol, address in llvm.symbols.items():
             builder.import_symbol(symbol, address)
         library = builder.link(llvm.jit, f"potto{next(_numbers)}")
-        return Loaded(library, library[name])
+        return Loaded(library, library[name]), new

@@ -70,8 +70,9 @@ class Promotion:
 
 def _made(text: str, name: str) -> objects.Loaded:
     start = time.perf_counter()
-    found = objects.loaded(objects.compiled(text), name)
-    counts.native += 1
+    found, new = objects.made(text, name)
+    counts.native += new
+    counts.kept += not new
     counts.native_seconds += time.perf_counter() - start
     return found
 
