@@ -274,7 +274,7 @@ class RuleText:
         """The numbers of a function to a number or a tuple of them."""
         args = [env[name] for name in function.params]
         kernel = machine.kernel(function, tuple(arg.pattern() for arg in args))
-        if not kernel.plain or "rt." in kernel.text:
+        if not kernel.plain:
             raise NotStraight(kernel.text)
         lines = Lines.of(kernel)
         known = {}

@@ -10,9 +10,11 @@ to be smooth and accurate here is left to `adaptive`.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -21,10 +23,13 @@ from potto.calculus.solving.enclosable import enclosable
 from potto.calculus.surfaces.discontinuities import Finding
 from potto.core.kinds import union_of
 from potto.core.terms import Integral, Lam, Term, function_of, postorder, tuple_
+from potto.integrate.fixed.a_priori import Straight
+from potto.integrate.fixed.axes import Axis
+from potto.integrate.fixed.lowered import lowered
 from potto.integrate.pieces import Evaluator, Sums, dense, gather, still
 from potto.integrate.rules.gauss import EPS, gauss, truncation
 from potto.integrate.rules.intervals import Interval, enclosure
-from potto.kernels.cells import Array, Bools, Cell, Value, map_arrays
+from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays
 
 MOST_VARIABLES = 3
 # Nodes per variable: first few, then more for the boxes that need them.
@@ -33,6 +38,7 @@ POINTS = 1 << 15
 # How near to 0, of its size, a surface at a corner may be before it counts as crossing.
 NEAR = 1e-9
 NODE_ROUNDING = 0.5
+WHOLE = ((0, 1),)  # the path between bounds, for each variable
 
 
 @dataclass(frozen=True)
@@ -40,7 +46,7 @@ class Box:
     """Bounds and surfaces of an integral over a box, as functions of parameters, and of parameters and variables.
 
     surfaces: those that are affine in each variable. curved: the others. exact: the nodes per variable that do for what
-    is a polynomial between its surfaces.
+    is a polynomial between its surfaces. plan: the same as an integral without cuts, for machine code.
     """
 
     variables: tuple[str, ...]
@@ -49,6 +55,7 @@ class Box:
     curved: tuple[Term, ...]
     body: Lam
     exact: int | None
+    plan: Straight
 
 
 def box_of(term: Integral, found: Iterable[Finding], body: Lam, inlined: Term) -> Box | None:
@@ -70,7 +77,17 @@ def box_of(term: Integral, found: Iterable[Finding], body: Lam, inlined: Term) -
     degrees = [degree(inlined, variable) for variable in term.variables]
     nodes = max(ORDERS[-1] + 1 if d is None else d // 2 + 1 for d in degrees)
     exact = nodes if nodes <= ORDERS[-1] else None
-    return Box(term.variables, function_of(tuple_(bounds)), function_of(shown), curved, body, exact)
+    functions = function_of(tuple_(bounds)), function_of(shown)
+    return Box(term.variables, *functions, curved, body, exact, _plan(term, inlined))
+
+
+def _plan(term: Integral, inlined: Term) -> Straight:
+    frames = tuple(function_of(tuple_(pair)) for pair in term.bounds)
+    free = inlined.free.union(*(frame.body.free for frame in frames)) - set(term.variables)
+    nothing: tuple[Any, ...] = ((),) * len(frames)
+    turning = (frozenset[int](),) * len(frames)
+    surfaces = function_of(tuple_(()))
+    return Straight(term.variables, frames, nothing, turning, inlined, surfaces, tuple(sorted(free)))
 
 
 def uncut(box: Box, machine: Evaluator, env: dict[str, Value], batch: int) -> tuple[Bools, Sums] | None:
@@ -93,8 +110,7 @@ def uncut(box: Box, machine: Evaluator, env: dict[str, Value], batch: int) -> tu
         todo = np.nonzero(free & ~done)[0]
         size = max(1, POINTS // order ** len(box.variables))
         for index in (todo[i : i + size] for i in range(0, todo.size, size)):
-            here = gather({n: env[n] for n in box.body.params if n in env}, index)
-            found = _product(box, machine, here, low[:, index], high[:, index], order)
+            found = _product(box, machine, env, index, low[:, index], high[:, index], order)
             if found is None:
                 return None
             part, good = found
@@ -148,47 +164,68 @@ def _tensor(order: int, count: int) -> tuple[tuple[Array, ...], tuple[Array, ...
 
 
 def _product(
-    box: Box, machine: Evaluator, env: dict[str, Value], low: Array, high: Array, order: int
+    box: Box, machine: Evaluator, env: dict[str, Value], index: Ints, low: Array, high: Array, order: int
 ) -> tuple[Sums, Bools] | None:
     """The integrals over some boxes by the product rule, and for which of them it is accurate enough."""
-    nodes, weights = _tensor(order, len(box.variables))
+    machine.count(index.size * order ** len(box.variables))
     size, k = high - low, machine.directions
-    here = dict(env)
-    for n, variable in enumerate(box.variables):
-        here[variable] = Cell(low[n] + size[n] * nodes[n], None, (None,) * k)
-    machine.count(low.shape[1] * nodes[0].size)
-    value = machine.evaluate(box.body, {n: here[n] for n in box.body.params}, None)
-    h, errors = dense(value, k, (nodes[0].size, low.shape[1]))
-    if errors is not None:
-        return None  # values of integrals, which have errors of their own
-    channels = h.reshape(-1, *h.shape[2:])
     far, exact = np.maximum(np.abs(low), np.abs(high)) / size, order == box.exact
-    integral, error, floor = _estimated(channels, order, far, weights, exact)
     volume = size.prod(axis=0)
+    way = lowered(box.plan, WHOLE * len(box.variables), box.plan.body, k, env) if exact_values(env, box.plan) else None
+    function = None if way is None else way.function(machine)
+    if way is not None and function is not None:
+        axis = Axis.of(order, False, (False, False), True)
+        raw = way.run(function, env, index, [axis] * len(box.variables), k)
+        shape = (1, *raw.number.shape)
+        means = [sizes / volume[:, None] for sizes in raw.coefficients]
+        integral, most = raw.number / volume, raw.most[None] / volume
+        floor = 4 * EPS * most[0]
+    else:
+        here = gather({n: env[n] for n in box.body.params if n in env}, index)
+        with nullcontext() if way is None else way.promotion.by_numpy():
+            found = _at_nodes(box, machine, here, low, size, order)
+        if found is None:
+            return None
+        integral, means, most, shape = found
+        floor = 4 * EPS * most.reshape(integral.shape)
+    error = np.zeros(integral.shape)
+    for distance, mean in zip(far, means, strict=True):
+        error += 0.0 if exact else truncation(mean)
+        floor += (mean @ gauss(order).slopes) * np.minimum(NODE_ROUNDING * EPS * distance, 1.0)
     asked = np.maximum(0.5 * machine.rtol * np.abs(integral), 0.5 * machine.atol / volume)
     good: Bools = (error <= np.maximum(asked, 8 * floor)).all(axis=0)
-    shape = (*h.shape[:2], low.shape[1])
     total, bound = (integral * volume).reshape(shape), ((error + floor) * volume).reshape(shape)
-    most = (weights[-1] @ np.abs(h)).max(axis=0) * volume
+    most = most.max(axis=0) * volume
     gross = np.stack((most[0], most[1:].max(axis=0, initial=0.0)))
     return Sums(total[:, 0], bound[:, 0], total[:, 1:], bound[:, 1:], gross=gross), good
 
 
-def _estimated(
-    h: Array, order: int, far: Array, weights: tuple[Array, ...], exact: bool
-) -> tuple[Array, Array, Array]:
-    """Mean values of channels over boxes, from values at nodes (C, n^d, B); truncation errors and rounding, (C, B).
+def _at_nodes(
+    box: Box, machine: Evaluator, env: dict[str, Value], low: Array, size: Array, order: int
+) -> tuple[Array, list[Array], Array, tuple[int, ...]] | None:
+    """Mean values of channels over boxes (C, B), mean sizes of coefficients along each variable (C, B, n), what is
+    added up (m, 1 + k, B), and the shape of components and channels. None for values with errors of their own."""
+    nodes, weights = _tensor(order, len(box.variables))
+    here = dict(env)
+    for n, variable in enumerate(box.variables):
+        here[variable] = Cell(low[n] + size[n] * nodes[n], None, (None,) * machine.directions)
+    value = machine.evaluate(box.body, {n: here[n] for n in box.body.params}, None)
+    numbers, errors = dense(value, machine.directions, (nodes[0].size, low.shape[1]))
+    if errors is not None:
+        return None
+    most = weights[-1] @ np.abs(numbers)
+    h = numbers.reshape(-1, *numbers.shape[2:])
+    means = []
+    for rest in reversed(weights[:-1]):  # one variable after another, outermost first
+        coefficients = gauss(order).transform.T @ h.reshape(h.shape[0], order, -1)
+        sizes = np.abs(coefficients).reshape(h.shape[0], order, rest.size, -1)
+        mean = sizes[:, :, 0] if rest.size == 1 else np.einsum("r,cnrb->cnb", rest, sizes)
+        means.append(np.moveaxis(mean, 1, -1))
+        h = coefficients[:, 0].reshape(h.shape[0], rest.size, -1)
+    return h[:, 0], means, most, (*numbers.shape[:2], low.shape[1])
 
-    far: how far from 0 a box lies in each variable, in its own lengths. exact: whether the rule is.
-    """
-    rule, boxes = gauss(order), h.shape[-1]
-    error = np.zeros((h.shape[0], boxes))
-    floor = 4 * EPS * (weights[-1] @ np.abs(h))
-    for distance, rest in zip(far, reversed(weights[:-1]), strict=True):  # one variable after another, outermost first
-        coefficients = rule.transform.T @ h.reshape(h.shape[0], order, -1)
-        sizes = np.abs(coefficients).reshape(h.shape[0], order, rest.size, boxes)
-        mean = np.moveaxis(sizes[:, :, 0] if rest.size == 1 else np.einsum("r,cnrb->cnb", rest, sizes), 1, -1)
-        error += 0.0 if exact else truncation(mean)
-        floor += (mean @ rule.slopes) * np.minimum(NODE_ROUNDING * EPS * distance, 1.0)
-        h = coefficients[:, 0].reshape(h.shape[0], rest.size, boxes)
-    return h[:, 0], error, floor
+
+def exact_values(env: Mapping[str, Value], plan: Straight) -> bool:
+    """Whether all parameters are numbers without errors."""
+    cells = [env[name] for name in plan.names]
+    return all(isinstance(cell, Cell) and cell.e is None and not any(cell.et) for cell in cells)

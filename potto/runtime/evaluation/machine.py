@@ -158,7 +158,8 @@ class Machine:
 
     @property
     def backend(self) -> str:
-        return self.settings.backend
+        """What computes at many points; where it is told how surfaces fall (`falls`), numpy."""
+        return "numpy" if self.record.second else self.settings.backend
 
     def with_directions(self, directions: int) -> Machine:
         if directions == self.directions:
@@ -227,7 +228,7 @@ class Machine:
         k = self.directions
         found = self.kernel(function, tuple([pattern(a, k) for a in args]))
         if found.plain and many(args):
-            return at_points(found, self, trace, args, "numpy" if self.record.second else self.settings.backend)
+            return at_points(found, self, trace, args, self.backend)
         return found.run(self, trace, *args)
 
     def kernel(self, function: Lam, patterns: tuple[Pattern, ...]) -> Kernel:
