@@ -96,6 +96,7 @@ def test_arithmetic_is_the_same_to_the_last_bit(seed: int) -> None:
             np.testing.assert_array_equal(*np.broadcast_arrays(ours, theirs))
 
 
+OURS = ("exp", "log", "sin", "cos")
 ELEMENTARY = {
     "exp": (-20.0, 20.0), "log": (1e-8, 1e8), "log1p": (-0.9, 50.0), "expm1": (-5.0, 5.0), "sinh": (-5.0, 5.0),
     "cosh": (-5.0, 5.0), "tanh": (-4.0, 4.0), "asinh": (-50.0, 50.0), "acosh": (1.0, 50.0), "atanh": (-0.99, 0.99),
@@ -106,14 +107,15 @@ ELEMENTARY = {
 
 @pytest.mark.parametrize("name", ELEMENTARY)
 def test_elementary_functions(name: str) -> None:
-    """Within two units in the last place: one of the function, one of what mpmath's value is rounded to. The error
-    function: within the 3 units of 2^-53 that the registry states, and one."""
+    """Within 1 unit in the last place where the polynomials are ours, within 2 where they are the C library's; half a
+    unit more for what mpmath's value is rounded to."""
     least, most = ELEMENTARY[name]
     x = np.random.default_rng(1).uniform(least, most, COUNT)
     (found, *_) = outcome(core.prim(name, core.var("x")), {"x": Cell(x, None, (None,))}, "native", False)
     with mp.workdps(40):
         truth = np.array([float(getattr(mp, name)(mp.mpf(value))) for value in x.tolist()])
-    assert (np.abs(found - truth) <= 2 * np.spacing(np.abs(truth))).all()
+    units = np.abs(found - truth) / np.spacing(np.abs(truth))
+    assert units.max() <= (1.5 if name in OURS else 2.5), units.max()
 
 
 ENDS = [("exp", 1000.0), ("exp", -1000.0), ("log", 0.0), ("log", -1.0), ("sin", math.inf), ("cos", 1e22),

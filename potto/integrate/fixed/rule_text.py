@@ -18,6 +18,7 @@ from potto.integrate.fixed.a_priori import Path, Straight
 from potto.integrate.fixed.edges import EDGE, edges_of
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.gauss import EPS
+from potto.kernels.native.elementary import module
 from potto.kernels.native.straight import NotStraight, Packed, Part, needed, packed
 from potto.kernels.native.straight import Straight as Lines
 from potto.kernels.native.vectors import LANES, Vectors
@@ -108,7 +109,7 @@ class RuleText:
             at.end()
             behind = at.whole("add", behind, size)
         at.end()
-        return at.module(NAME, "ptr %frame, ptr %constants")
+        return module(at, NAME, "ptr %frame, ptr %constants")
 
     def parameters(self, places: Sequence[Place], block: str) -> Env:
         """The parameters of the members of a block."""

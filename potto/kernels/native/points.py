@@ -17,6 +17,7 @@ import numpy as np
 from potto.kernels.cells import Array, Cell, Value
 from potto.kernels.compile import Kernel, Runtime
 from potto.kernels.making import counts
+from potto.kernels.native.elementary import module
 from potto.kernels.native.objects import Loaded
 from potto.kernels.native.promotion import Promotion
 from potto.kernels.native.straight import NotStraight, Operation, Packed, Part, Result, Straight, needed, packed, read
@@ -178,4 +179,4 @@ def _text(
         at.store(values[name], place(end))
     for _ in range(3):
         at.end()
-    return at.module(NAME, "ptr %frame, ptr %constants")
+    return module(at, NAME, "ptr %frame, ptr %constants")

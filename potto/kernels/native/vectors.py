@@ -18,6 +18,7 @@ ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
 RELATIONS = {"lt": "olt", "le": "ole", "gt": "ogt", "ge": "oge", "eq": "oeq", "ne": "une"}
 INTRINSICS = {"sqrt": 1, "floor": 1, "ceil": 1, "abs": 1, "min": 2, "max": 2}
 _NAMES = {"abs": "fabs", "min": "minimum", "max": "maximum"}
+OTHERS = {"@llvm.umin.i64": ("i64", "i64, i64"), f"@llvm.vector.reduce.or.v{LANES}i1": ("i1", MASK)}
 LIBRARY = {
     "exp": 1, "log": 1, "log1p": 1, "expm1": 1, "sinh": 1, "cosh": 1, "tanh": 1, "asinh": 1, "acosh": 1, "atanh": 1,
     "sin": 1, "cos": 1, "tan": 1, "asin": 1, "acos": 1, "atan": 1, "erf": 1, "atan2": 2, "hypot": 2, "pow": 2,
@@ -180,39 +181,14 @@ class Vectors:
         return values
 
 
-    def module(self, name: str, parameters: str) -> str:
-        """A module with the function that the lines are."""
-        (body,) = self.bodies
-        text = "\n".join([f"define void @{name}({parameters}) {{", "entry:", *body, "  ret void", "}"])
-        least = "declare i64 @llvm.umin.i64(i64, i64)"
-        return "\n".join([_library(self.used), _declarations(text), least, text, ""])
-
-
-def _library(used: Mapping[str, int]) -> str:
-    """Functions that call those of the C library at each place."""
-    text = []
-    for code, arity in used.items():
-        arguments = ", ".join(["double"] * arity)
-        text.append(f"declare double @{code}({arguments}) nounwind memory(none)")
-        lines = [f"define internal {NUMBER} @each_{code}({', '.join(f'{NUMBER} %x{i}' for i in range(arity))}) {{"]
-        result = "poison"
-        for lane in range(LANES):
-            given = []
-            for i in range(arity):
-                lines.append(f"  %a{lane}_{i} = extractelement {NUMBER} %x{i}, i32 {lane}")
-                given.append(f"double %a{lane}_{i}")
-            lines.append(f"  %y{lane} = call double @{code}({', '.join(given)})")
-            lines.append(f"  %r{lane} = insertelement {NUMBER} {result}, double %y{lane}, i32 {lane}")
-            result = f"%r{lane}"
-        text.append("\n".join([*lines, f"  ret {NUMBER} {result}", "}"]))
-    return "\n".join(text)
-
-
-def _declarations(text: str) -> str:
-    """The intrinsics that a text calls."""
+def intrinsics(text: str) -> str:
+    """Declarations of the intrinsics that a text calls."""
     wanted = []
     for code, arity in INTRINSICS.items():
         name = f"@llvm.{_NAMES.get(code, code)}.v{LANES}f64"
         if name + "(" in text:
             wanted.append(f"declare {NUMBER} {name}({', '.join([NUMBER] * arity)})")
+    for name, (result, parameters) in OTHERS.items():
+        if name + "(" in text:
+            wanted.append(f"declare {result} {name}({parameters})")
     return "\n".join(wanted)
