@@ -9,6 +9,7 @@ in their names; the truth is a rule of 20 nodes on 800 graded panels.
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -112,10 +113,41 @@ def edge() -> None:
         print(f"  {nearest:6g}  " + "  ".join(f"{w:9.3g}" for w in worst))
 
 
+def native() -> None:
+    """What it takes to load LLVM and to make machine code, and by how many points it pays."""
+    import potto
+    from potto.kernels.making import counts
+    from potto.kernels.native import objects
+
+    start = time.perf_counter()
+    objects.compiler()
+    print(f"native: LLVM loaded in {time.perf_counter() - start:.3f} s")
+    programs = {
+        "1-D, a root": "def f(a) integral [0, 3] exp(-x)*[x*x < a] d(x)",
+        "2-D, a line": "def f(a) integral ([0, 1], [0, 1]) 1/(x + y + a)^2*[x + y < a] d(x, y)",
+        "2-D, two curves": "def f(a) integral ([0, 2], [0, 2]) exp(x*y)*[x*x + y*y < a]*[y < x] d(x, y)",
+        "3-D, a plane": "def f(a) integral ([0, 1], [0, 1], [0, 1]) [x + y + z < a]/(1 + x*y) d(x, y, z)",
+    }
+    for name, text in programs.items():
+        function = potto.grad(potto.compile(text).f, ["a"])
+        where, made, spent = np.linspace(0.3, 0.9, 4_000), counts.native, counts.native_seconds
+        times = []
+        for backend in ("numpy", "native"):
+            with potto.settings(backend=backend):
+                function(where)
+                start = time.perf_counter()
+                function(where)
+                times.append((time.perf_counter() - start) / where.size)
+        made, spent = counts.native - made, counts.native_seconds - spent
+        print(f"  {name:16} {made} functions, {spent / max(made, 1) * 1e3:5.1f} ms each; "
+              f"a member {times[0] * 1e6:.1f} us by numpy, {times[1] * 1e6:.1f} us by machine code")  # fmt: skip
+
+
 EXPERIMENTS: dict[str, Callable[[], None]] = {
     "truncation": lambda: estimates("truncation"),
     "analytic": lambda: estimates("analytic"),
     "edge": edge,
+    "native": native,
 }
 
 

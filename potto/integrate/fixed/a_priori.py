@@ -106,18 +106,31 @@ def straight(term: Integral, body: Term, levels: Sequence[LevelPlan]) -> Straigh
     cuts = (cut for level in levels for cut in children(level.frame.body))
     if not all(map(enclosable, (*surfaces, _all_sides(body), *cuts))):
         return None
-    frames = tuple(level.frame for level in levels)
+    places, frames = zip(*(_distinct(level.frame) for level in levels), strict=True)
     free = body.free.union(*(frame.body.free for frame in frames)) - set(term.variables)
     jumps = tuple(
         tuple(
-            (cut.surface, tuple(row for row, (at, _) in enumerate(level.rows, 2) if at == number))
+            (cut.surface, tuple({place[row] for row, (at, _) in enumerate(level.rows, 2) if at == number}))
             for number, cut in enumerate(level.level.cuts)
             if cut.jumps
         )
-        for level in levels
+        for level, place in zip(levels, places, strict=True)
     )
-    turning = tuple(frozenset(row for row, (_, turns) in enumerate(level.rows, 2) if turns) for level in levels)
+    turning = tuple(
+        frozenset(place[row] for row, (_, turns) in enumerate(level.rows, 2) if turns)
+        for level, place in zip(levels, places, strict=True)
+    )
     return Straight(term.variables, frames, jumps, turning, body, function_of(tuple_(surfaces)), tuple(sorted(free)))
+
+
+def _distinct(frame: Lam) -> tuple[dict[int, int], Lam]:
+    """A frame with each formula once: where a line meets a bound in a corner, a cut is that bound for all parameters.
+    With the new place of each row."""
+    items = children(frame.body)
+    kept = list(dict.fromkeys(items))
+    if len(kept) == len(items) or items[0] is items[1]:
+        return {row: row for row in range(len(items))}, frame
+    return {row: kept.index(item) for row, item in enumerate(items)}, function_of(tuple_(kept))
 
 
 def _not_plain(level: LevelPlan) -> bool:

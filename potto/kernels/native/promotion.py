@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 # Seconds, as `benchmarks/calibration.py native` measures them: a function of machine code from its kernels, and once in
 # a process the loading of LLVM.
-FUNCTION, LLVM = 0.05, 0.3
+FUNCTION, LLVM = 0.03, 0.15
 
 
 class Promotion:
