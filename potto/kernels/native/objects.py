@@ -10,6 +10,7 @@ from __future__ import annotations
 import ctypes
 import ctypes.util
 import itertools
+import os
 import threading
 from functools import lru_cache
 from importlib.util import find_spec
@@ -21,6 +22,8 @@ from potto.kernels.native.vectors import LIBRARY
 KIND = "machine-code"
 FUNCTION = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
 _lock = threading.Lock()
+if hasattr(os, "register_at_fork"):  # a fork in the middle of a compilation has the lock, and nobody to give it back
+    os.register_at_fork(before=_lock.acquire, after_in_parent=_lock.release, after_in_child=_lock.release)
 _numbers = itertools.count()
 
 

@@ -7,6 +7,7 @@ pays at most twice the least.
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -60,7 +61,7 @@ class Promotion:
             if self._coming is None:
                 with making:
                     written = text()
-                self._coming = _worker().submit(_made, written, self.name)
+                self._coming = _worker(os.getpid()).submit(_made, written, self.name)
             if now or self._coming.done():
                 self._ready = self._coming.result()
                 self._coming = None
@@ -78,8 +79,8 @@ def _made(text: str, name: str) -> objects.Loaded:
 
 
 @lru_cache(maxsize=1)
-def _worker() -> ThreadPoolExecutor:
-    """One thread: LLVM has one lock. It is waited for when the process ends."""
+def _worker(process: int) -> ThreadPoolExecutor:
+    """One thread, as LLVM has one lock, in each process, as forks have no threads. It ends with the process."""
     from concurrent.futures import ThreadPoolExecutor  # takes its time to load: where code is made only
 
     return ThreadPoolExecutor(1, "potto-native")
