@@ -1,0 +1,117 @@
+"""Who computes at many points: numpy first, machine code when it pays, from the cache what was compiled before."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import multiprocessing
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import potto
+from potto.kernels.making import counts
+
+needs_llvm = pytest.mark.skipif(importlib.util.find_spec("llvmlite") is None, reason="llvmlite is not installed")
+TEXT = "def f(c) integral ([0, 1], [0, 1]) 1/(x + y + c + 2)^2*[x + y + c >= 0] d(x, y)"
+WHERE = np.linspace(-1.9, -0.1, 2_000)
+
+
+def closed(c: np.ndarray) -> np.ndarray:
+    """The integral of 1/(s + c + 2)^2 with s = x + y, where s >= -c: over s of its density, s and 2 - s."""
+
+    def of_s(s: np.ndarray) -> np.ndarray:  # of s/(s + c + 2)^2
+        return np.log(s + c + 2) + (c + 2) / (s + c + 2)
+
+    def of_rest(s: np.ndarray) -> np.ndarray:  # of (2 - s)/(s + c + 2)^2
+        return -(c + 4) / (s + c + 2) - np.log(s + c + 2)
+
+    low, one, two = -c, np.ones_like(c), np.full_like(c, 2.0)
+    first = np.where(low < 1, of_s(one) - of_s(np.minimum(low, 1.0)), 0.0)
+    return first + of_rest(two) - of_rest(np.maximum(low, 1.0))
+
+
+def held(answer: potto.Estimate) -> None:
+    """Right, within its own error and what rounding does to the closed form."""
+    assert (np.abs(answer.value - closed(WHERE)) <= answer.error + 2e-15).all()
+    assert answer.converged
+
+
+@needs_llvm
+def test_numpy_answers_first_and_machine_code_takes_over() -> None:
+    function, before = potto.compile(TEXT).f, counts.native_points
+    with potto.settings(backend="auto"):
+        held(function(WHERE))
+        assert counts.native_points == before
+        for _ in range(400):
+            held(function(WHERE))
+            if counts.native_points > before:
+                return
+    raise AssertionError("machine code never took over")
+
+
+@needs_llvm
+def test_numpy_alone_where_it_is_asked_for() -> None:
+    before = counts.native_points
+    with potto.settings(backend="numpy"):
+        held(potto.compile(TEXT).f(WHERE))
+    assert counts.native_points == before
+
+
+@needs_llvm
+def test_statistics_tell_what_machine_code_did() -> None:
+    with potto.settings(backend="native"):
+        stats = potto.compile(TEXT.replace("2)^2", "3)^2")).f(WHERE).stats
+    assert stats["points by machine code"] > WHERE.size
+    assert stats["machine code compiled"] + stats["machine code from the cache"] > 0
+
+
+@needs_llvm
+def test_a_second_process_finds_it_compiled(tmp_path: Path) -> None:
+    program = (
+        f"import json, numpy, potto\nwith potto.settings(backend='native'):\n"
+        f"    r = potto.compile({TEXT!r}).f(numpy.linspace(-1.9, -0.1, 2000))\n"
+        "counted = [r.stats['machine code ' + where] for where in ('compiled', 'from the cache')]\n"
+        "print(json.dumps([float(r.value.sum()), *counted]))"
+    )
+    environment = {**os.environ, "POTTO_CACHE": str(tmp_path)}
+
+    def run() -> tuple[float, int, int]:
+        done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, check=True)
+        value, compiled, kept = json.loads(done.stdout)
+        return value, compiled, kept
+
+    first, second = run(), run()
+    assert first[1] > 0 and first[2] == 0
+    assert second[1] == 0 and second[2] == first[1]
+    assert first[0] == second[0] == pytest.approx(closed(WHERE).sum(), rel=1e-14)
+    for entry in (tmp_path / "store" / "machine-code").iterdir():
+        entry.write_bytes(entry.read_bytes()[:-1])  # damaged: compiled again
+    assert run() == first
+
+
+def _in_a_fork() -> None:
+    with potto.settings(backend="native"):
+        held(potto.compile(TEXT.replace("def f", "def g")).g(WHERE))
+
+
+@needs_llvm
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there are no forks here")
+def test_forks_compile_for_themselves() -> None:
+    with potto.settings(backend="native"):
+        held(potto.compile(TEXT).f(WHERE))
+    child = multiprocessing.get_context("fork").Process(target=_in_a_fork)
+    child.start()
+    child.join(60)
+    assert child.exitcode == 0
+
+
+def test_what_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    wanted = r"machine code needs llvmlite: pip install 'potto\[jit\]'"
+    with pytest.raises(potto.PottoError, match=wanted), potto.settings(backend="native"):
+        pass
