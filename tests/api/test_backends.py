@@ -43,6 +43,9 @@ def held(answer: potto.Estimate) -> None:
 
 @needs_llvm
 def test_numpy_answers_first_and_machine_code_takes_over() -> None:
+    from potto.kernels import compile
+
+    compile.clear()  # of what other tests have made
     function, before = potto.compile(TEXT).f, counts.native_points
     with potto.settings(backend="auto"):
         held(function(WHERE))

@@ -41,7 +41,7 @@ from potto.integrate.rules.proved_orders import Region, proved
 from potto.kernels.cells import Cell, Value
 from potto.kernels.making import making
 
-MOST_VARIABLES, MOST_CUTS, MOST_CELLS, MOST_NODES, MOST_TERMS = 3, 8, 24, 60_000, 300
+MOST_VARIABLES, MOST_CUTS, MOST_CELLS, MOST_NODES, MOST_TERMS = 3, 13, 24, 60_000, 600
 # The truncation error that is proved for the value, as a part of the accuracy that is asked for; nobody gains by less
 # than LOOSEST.
 MARGIN = 1e-3

@@ -15,7 +15,7 @@ import numpy as np
 
 from potto.integrate.fixed.a_priori import Straight
 from potto.integrate.fixed.product_rule import CANCELS, FEW, Rule
-from potto.integrate.fixed.topologies import Uniform, topologies
+from potto.integrate.fixed.topologies import Alike, topologies
 from potto.integrate.pieces import Evaluator, Sums
 from potto.kernels.cells import Array, Bools, Cell, Value
 
@@ -60,7 +60,7 @@ def together(
 
 
 def _settled(
-    plan: Straight, degrees: Sequence[int | None], machine: Evaluator, env: dict[str, Value], cell: Uniform,
+    plan: Straight, degrees: Sequence[int | None], machine: Evaluator, env: dict[str, Value], cell: Alike,
     total: Sequence[Array],
 ) -> Bools:  # fmt: skip
     """Add the integrals over cells of one shape to those of their members; for which of them that could be done."""
@@ -71,11 +71,13 @@ def _settled(
         left = []
         for start in range(0, todo.size, step):
             index = todo[start : start + step]
-            found = rule.applied(env, cell.members[index])
+            found = rule.applied(env, index)
             good = rule.good(found)
             fine[index[good]] = True
+            owners = cell.members[index[good]]
             for whole, part in zip(total, (found.number, found.truncated, found.rounding, found.gross), strict=True):
-                whole[:, cell.members[index[good]]] += part[:, good]
+                for row, numbers in zip(whole, part, strict=True):
+                    row += np.bincount(owners, numbers[good], row.size)
             left.append(index[~good])
         todo = np.concatenate(left)
         if not todo.size:
@@ -84,7 +86,7 @@ def _settled(
 
 
 def _tried(
-    plan: Straight, degrees: Sequence[int | None], machine: Evaluator, env: dict[str, Value], cell: Uniform
+    plan: Straight, degrees: Sequence[int | None], machine: Evaluator, env: dict[str, Value], cell: Alike
 ) -> list[Rule]:
     """Rules with ever more nodes: the one that does for a polynomial, or from the one on that does for most members."""
     exact = [None if d is None else d // 2 + 1 for d in degrees] or [None] * len(plan.variables)
@@ -98,7 +100,7 @@ def _tried(
         return tried[:1]
     if cell.members.size <= FEW:
         return tried[2:]
-    few = cell.members[:: max(1, cell.members.size // PILOTS)]
+    few = np.arange(0, cell.members.size, max(1, cell.members.size // PILOTS))
     for number, rule in enumerate(tried[:-1]):
         if rule.good(rule.applied(env, few)).mean() >= ENOUGH:
             return tried[number:]

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from potto.core.terms import Term
-from potto.integrate.fixed.a_priori import Path, Straight
+from potto.integrate.fixed.a_priori import Straight
 from potto.integrate.fixed.axes import Axis, Raw
 from potto.integrate.fixed.rule_text import NAME, ONE, Place, RuleText
 from potto.integrate.pieces import Evaluator
@@ -31,10 +31,9 @@ from potto.kernels.native.vectors import LANES
 
 @dataclass(frozen=True)
 class Lowered:
-    """The rule for one path between cuts and one integrand, for parameters with these parts."""
+    """The rule for one integrand, for parameters with these parts."""
 
     plan: Straight
-    path: Path
     face: Term
     places: tuple[Place, ...]
     promotion: Promotion = field(default_factory=lambda: Promotion(NAME), compare=False)
@@ -45,38 +44,41 @@ class Lowered:
 
     def text(self, machine: Evaluator) -> str:
         """The function. Raises NotStraight."""
-        return RuleText(self.plan, self.path, self.face, machine).text(self.places)
+        return RuleText(self.plan, self.face, machine).text(self.places)
 
     def run(
-        self, function: Loaded, env: Mapping[str, Value], members: Ints, axes: Sequence[Axis], directions: int
+        self, function: Loaded, env: Mapping[str, Value], members: Ints, rows: Ints, axes: Sequence[Axis],
+        directions: int,
     ) -> Raw:  # fmt: skip
-        """The sums over the cells of some members."""
+        """The sums over cells. members: (M,), whose they are; rows: (variables, 2, M), of the frames, between which."""
         k1, count = 1 + directions, members.size
         blocks = -(-count // LANES)
-        index = np.concatenate((members, np.repeat(members[-1:], blocks * LANES - count)))
-        taken = [_part(env[place.name], place.part)[index] for place in self.places if place.kind == "array"]
+        index = np.minimum(np.arange(blocks * LANES), count - 1)
+        whose, between = members[index], rows[:, :, index].astype(float, order="C")
+        taken = [_part(env[place.name], place.part)[whose] for place in self.places if place.kind == "array"]
+        taken += [ends for pair in between for ends in pair]
         numbers = [_part(env[place.name], place.part) for place in self.places if place.kind == "number"]
         constants = np.array(numbers, dtype=float)
-        rows = [3 * k1 + 3, *(axis.transform.shape[1] * k1 for axis in axes)]
-        out = np.empty((blocks, sum(rows), LANES))
-        frame = [blocks, sum(rows), address(out), *(x for axis in axes for x in _told(axis)), *map(address, taken)]
+        sizes = [3 * k1 + 3, *(axis.transform.shape[1] * k1 for axis in axes)]
+        out = np.empty((blocks, sum(sizes), LANES))
+        frame = [blocks, sum(sizes), address(out), *(x for axis in axes for x in _told(axis)), *map(address, taken)]
         table = np.array(frame, dtype=np.int64)
         function.call(address(table), address(constants))
         counts.native_points += count * math.prod(len(axis.nodes) for axis in axes)
-        whole = out.transpose(1, 0, 2).reshape(sum(rows), -1)[:, :count]
-        number, most, off, rest = np.split(whole[: rows[0]], [k1, 2 * k1, 3 * k1])
-        parts = np.split(whole[rows[0] :], np.cumsum(rows[1:])[:-1])
+        whole = out.transpose(1, 0, 2).reshape(sum(sizes), -1)[:, :count]
+        number, most, off, rest = np.split(whole[: sizes[0]], [k1, 2 * k1, 3 * k1])
+        parts = np.split(whole[sizes[0] :], np.cumsum(sizes[1:])[:-1])
         found = [part.reshape(-1, k1, count).transpose(1, 2, 0) for part in parts]
         return Raw(number, found, most, off, rest[0] > 0, rest[1], rest[2])
 
 
-def lowered(plan: Straight, path: Path, face: Term, directions: int, env: Mapping[str, Value]) -> Lowered:
-    """The rule for these cells, in an environment whose numbers have these parts."""
+def lowered(plan: Straight, face: Term, directions: int, env: Mapping[str, Value]) -> Lowered:
+    """The rule for an integrand, in an environment whose numbers have these parts."""
     places = tuple(Place(name, part, _kind(part, x)) for name in plan.names for part, x in _parts(env[name]))
-    key = (path, face, directions, places)
+    key = (face, directions, places)
     found: Lowered | None = plan.lowered.get(key)
     if found is None:
-        found = plan.lowered[key] = Lowered(plan, path, face, places)
+        found = plan.lowered[key] = Lowered(plan, face, places)
     return found
 
 

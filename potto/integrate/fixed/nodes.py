@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from potto.core.terms import Term, function_of, tuple_
-from potto.integrate.fixed.a_priori import Path, Straight
+from potto.integrate.fixed.a_priori import Straight
 from potto.integrate.fixed.axes import Axis, Raw
 from potto.integrate.fixed.edges import EDGE, edges_of
 from potto.integrate.fixed.moving_sums import evaluated, product
@@ -37,12 +37,12 @@ class Nodes:
 
 
 def at_once(
-    plan: Straight, path: Path, face: Term, machine: Evaluator, env: Mapping[str, Value], members: Ints,
+    plan: Straight, face: Term, machine: Evaluator, env: Mapping[str, Value], members: Ints, rows: Ints,
     axes: Sequence[Axis],
 ) -> Raw:  # fmt: skip
-    """The sums over the cells of some members."""
+    """The sums over cells. members: (M,), whose they are; rows: (variables, 2, M), of the frames, between which."""
     here = {n: map_arrays(v, lambda a: a[members] if a.ndim else a) for n, v in env.items()}
-    cells = _Cells(plan, path, face, here, members.size, axes)
+    cells = _Cells(plan, face, here, rows, axes)
     tracking = machine.tracking()
     some = cells.at_nodes(tracking, [axis.few for axis in axes], True)
     every = some
@@ -59,32 +59,32 @@ def at_once(
 
 @dataclass(frozen=True)
 class _Cells:
-    """The cells of some members, between these cuts."""
-
     plan: Straight
-    path: Path
     face: Term
     env: dict[str, Value]
-    count: int
+    rows: Ints
     axes: Sequence[Axis]
+
+    @property
+    def count(self) -> int:
+        return int(self.rows.shape[-1])
 
     def at_nodes(self, machine: Evaluator, places: Sequence[Array], tracked: bool) -> Nodes:
         """The integrand at nodes, per variable; `tracked` where the rounding of nodes counts."""
         here, shape, k = dict(self.env), (self.count,), machine.directions
         clear = np.ones(self.count, dtype=bool)
         widths = []
-        for i, (variable, frame, (low, high)) in enumerate(
-            zip(self.plan.variables, self.plan.frames, self.path, strict=True)
-        ):
+        for i, (variable, frame) in enumerate(zip(self.plan.variables, self.plan.frames, strict=True)):
             values = evaluated(frame, machine, {name: here[name] for name in frame.params})
-            ends, lost = dense((values[low], values[high]), k, shape)
+            numbers, lost = dense(values, k, shape)
+            ends = self.picked(numbers, i)
             lo, width = ends[0], ends[1] - ends[0]
-            off = EPS * np.abs(ends).sum(axis=0) + (0.0 if lost is None else lost.sum(axis=0))
+            off = EPS * np.abs(ends).sum(axis=0) + (0.0 if lost is None else self.picked(lost, i).sum(axis=0))
             widths.append((width, off))
             if i:
-                clear &= _clear(values, low, high, ends[:, 0])
+                clear &= _clear(numbers[:, 0], ends[:, 0])
             at = lo[:, None] + width[:, None] * places[i].reshape(-1, *(1,) * len(shape))
-            moves = [values[low].t[d] is not None or values[high].t[d] is not None for d in range(k)]
+            moves = [any(cell.t[d] is not None for cell in values) for d in range(k)]
             errors = off if tracked else (None,) * (1 + k)
             here[variable] = Cell(
                 at[0], errors[0], tuple(at[d] if m else None for d, m in enumerate(moves, 1)),
@@ -96,6 +96,12 @@ class _Cells:
         if tracked:
             clear &= self.clear_of_edges(machine.with_directions(0), here, shape)
         return Nodes(value[0], np.zeros(value[0].shape) if lost is None else lost[0], widths, clear)
+
+    def picked(self, block: Array, i: int) -> Array:
+        """Of the rows of variable i's frame, (R, 1 + k, ..., M), those at the ends of the cells, (2, 1 + k, ..., M)."""
+        index = self.rows[i].reshape(2, *(1,) * (block.ndim - 2), -1)
+        found: Array = np.take_along_axis(block, index, 0)
+        return found
 
     def clear_of_edges(self, machine: Evaluator, here: dict[str, Value], shape: tuple[int, ...]) -> Bools:
         """The members on whose cells nothing comes to the edge of where it is analytic, as a root of x does at 0: there
@@ -152,13 +158,10 @@ def _largest(value: Array) -> Array:
     return np.asarray(np.where(np.isfinite(size), size, 0.0).reshape(-1, value.shape[-1]).max(axis=0))
 
 
-def _clear(values: Sequence[Cell], low: int, high: int, ends: Array) -> Bools:
+def _clear(rows: Array, ends: Array) -> Bools:
     """The members for which a stretch is one at all nodes: its ends in order, no other cut between them."""
-    fine = ends[1] > ends[0]
-    for row, cell in enumerate(values):
-        if row not in (low, high):
-            fine &= ~((cell.v > ends[0]) & (cell.v < ends[1]))
-    return np.asarray(np.asarray(fine).reshape(-1, ends.shape[-1]).all(axis=0))
+    fine = (ends[1] > ends[0]) & ~((rows > ends[0]) & (rows < ends[1])).any(axis=0)
+    return np.asarray(fine.reshape(-1, ends.shape[-1]).all(axis=0))
 
 
 def _summed(block: Array, volume: Array) -> Array:

@@ -16,7 +16,7 @@ from potto.integrate.fixed.axes import Axis, Raw
 from potto.integrate.fixed.lowered import Lowered, lowered
 from potto.integrate.fixed.moving_sums import SUMMED
 from potto.integrate.fixed.nodes import at_once
-from potto.integrate.fixed.topologies import Uniform
+from potto.integrate.fixed.topologies import Alike
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.gauss import analytic_truncation
 from potto.kernels.cells import Array, Bools, Ints, Value
@@ -49,7 +49,7 @@ class Rule:
     """A product rule for cells of one shape, with so many nodes for each variable; exact: for polynomials."""
 
     plan: Straight
-    cell: Uniform
+    cell: Alike
     orders: tuple[int, ...]
     exact: tuple[bool, ...]
     machine: Evaluator
@@ -59,23 +59,19 @@ class Rule:
         return math.prod(self.orders)
 
     def lowered(self, env: dict[str, Value]) -> Lowered:
-        return lowered(self.plan, self.cell.path, self.cell.face, self.machine.directions, env)
+        return lowered(self.plan, self.cell.face, self.machine.directions, env)
 
     def span(self, env: dict[str, Value]) -> int:
         """How many numbers of a member are kept at a time: those at all nodes, or of coefficients alone."""
         return self.nodes if self.lowered(env).function(self.machine) is None else sum(self.orders)
 
-    def applied(self, env: dict[str, Value], members: Ints) -> Measured:
-        """The integrals over the cells of some members."""
-        self.machine.count(members.size * self.nodes)
-        several = members.size * self.nodes > TRACKED
-        axes = [
-            Axis.of(order, exact, (low in turning, high in turning), several)
-            for order, exact, turning, (low, high) in zip(
-                self.orders, self.exact, self.plan.turning, self.cell.path, strict=True
-            )
-        ]
-        raw = self.raw(env, members, axes)
+    def applied(self, env: dict[str, Value], index: Ints) -> Measured:
+        """The integrals over some of the cells."""
+        self.machine.count(index.size * self.nodes)
+        several = index.size * self.nodes > TRACKED
+        given = zip(self.orders, self.exact, self.cell.turning, strict=True)
+        axes = [Axis.of(order, exact, turning, several) for order, exact, turning in given]
+        raw = self.raw(env, index, axes)
         truncated = np.zeros(raw.number.shape)
         for exact, sizes in zip(self.exact, raw.coefficients, strict=True):
             if not exact:
@@ -86,13 +82,13 @@ class Rule:
         rounding = (ELSEWHERE if several else 1.0) * raw.off + ELSEWHERE * SUMMED * gross
         return Measured(raw.number, truncated, rounding, gross)
 
-    def raw(self, env: dict[str, Value], members: Ints, axes: list[Axis]) -> Raw:
-        way = self.lowered(env)
+    def raw(self, env: dict[str, Value], index: Ints, axes: list[Axis]) -> Raw:
+        way, members, rows = self.lowered(env), self.cell.members[index], self.cell.rows[:, :, index]
         function = way.function(self.machine)
         if function is not None:
-            return way.run(function, env, members, axes, self.machine.directions)
+            return way.run(function, env, members, rows, axes, self.machine.directions)
         with way.promotion.by_numpy():
-            return at_once(self.plan, self.cell.path, self.cell.face, self.machine, env, members, axes)
+            return at_once(self.plan, self.cell.face, self.machine, env, members, rows, axes)
 
     def good(self, found: Measured) -> Bools:
         """For which cells the rule does."""

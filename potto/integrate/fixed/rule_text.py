@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from potto.core.terms import Lam, Term, function_of
-from potto.integrate.fixed.a_priori import Path, Straight
+from potto.integrate.fixed.a_priori import Straight
 from potto.integrate.fixed.edges import EDGE, edges_of
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.gauss import EPS
@@ -63,8 +63,8 @@ Env = dict[str, Symbol]
 class RuleText:
     """Writes the function. Lists of 1 + k names have a value first, then its tangents."""
 
-    def __init__(self, plan: Straight, path: Path, face: Term, machine: Evaluator) -> None:
-        self.plan, self.path, self.machine = plan, path, machine
+    def __init__(self, plan: Straight, face: Term, machine: Evaluator) -> None:
+        self.plan, self.machine = plan, machine
         self.face, self.edges = function_of(face), [function_of(edge) for edge in edges_of(face)]
         self.at = Vectors()
         self.k1 = 1 + machine.directions
@@ -123,6 +123,9 @@ class RuleText:
             known[place.name, place.part] = at.load(at.at(source, first, "double"))
         for i, place in enumerate(numbers):
             known[place.name, place.part] = at.constant("%constants", i)
+        rows = [at.load(at.at(at.address("%frame", start + len(arrays) + i, "ptr"), first, "double"))
+                for i in range(2 * len(self.plan.variables))]  # fmt: skip
+        self.rows = list(zip(rows[::2], rows[1::2], strict=True))
         known |= {(place.name, place.part): ONE for place in places if place.kind == ONE}
 
         def parts(name: str, kind: str) -> tuple[str | None, ...]:
@@ -245,22 +248,39 @@ class RuleText:
         """The lower end, the length, and how far off both are; where another cut comes between, that is noted."""
         at, k1 = self.at, 1 + machine.directions
         cells = self.evaluated(self.plan.frames[i], env, machine)
-        low, high = (cells[row] for row in self.path[i])
-        lower: Dual = [low.v, *map(self.plain, low.t)]
-        upper: Dual = [high.v, *map(self.plain, high.t)]
+        low, high = (self.chosen(cells, row) for row in self.rows[i])
+        lower, upper = [low.v, *low.t], [high.v, *high.t]
         width = [self.total(x, None if y is None else at.apply("neg", y)) for x, y in zip(upper, lower, strict=True)]
         if i and checked:
             self.only(at.apply("gt", high.v, low.v))
-            for row, cell in enumerate(cells):
-                if row not in self.path[i]:
-                    between = at.apply("and", at.apply("gt", cell.v, low.v), at.apply("lt", cell.v, high.v))
-                    self.only(at.apply("not", between))
+            for cell in cells:
+                between = at.apply("and", at.apply("gt", cell.v, low.v), at.apply("lt", cell.v, high.v))
+                self.only(at.apply("not", between))
         errors = ([low.e, *low.et], [high.e, *high.et])
         lost = []
         for c in range(k1):
             ends = self.total(self.size(lower[c]), self.size(upper[c]))
             lost.append(self.total(self.times(ends, at.number(EPS)), *(row[c] for row in errors if len(row) > c)))
         return lower, width, lost
+
+    def chosen(self, cells: Sequence[Symbol], row: str) -> Symbol:
+        """Of the rows of a frame the one with this number."""
+        masks = [self.at.apply("eq", row, self.at.number(float(number))) for number in range(1, len(cells))]
+
+        def part(parts: Sequence[str | None]) -> str | None:
+            if len(set(parts)) == 1:
+                return self.plain(parts[0])
+            found, *others = (self.plain(x) or self.zero for x in parts)
+            for mask, other in zip(masks, others, strict=True):
+                found = self.at.apply("select", mask, other, found)
+            return found
+
+        v = part([cell.v for cell in cells])
+        assert v is not None
+        t, et = (tuple(part(column) for column in zip(*rows, strict=True)) for rows in (
+            [cell.t for cell in cells], [cell.et or (None,) * len(cell.t) for cell in cells]
+        ))  # fmt: skip
+        return Symbol(v, part([cell.e for cell in cells]), t, et)
 
     def node(self, low: Dual, width: Dual, u: str, lost: Dual | None = None) -> Symbol:
         """A node, which moves with the ends of its stretch."""

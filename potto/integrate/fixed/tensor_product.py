@@ -38,7 +38,6 @@ POINTS = 1 << 15
 # How near to 0, of its size, a surface at a corner may be before it counts as crossing.
 NEAR = 1e-9
 NODE_ROUNDING = 0.5
-WHOLE = ((0, 1),)  # the path between bounds, for each variable
 
 
 @dataclass(frozen=True)
@@ -171,11 +170,12 @@ def _product(
     size, k = high - low, machine.directions
     far, exact = np.maximum(np.abs(low), np.abs(high)) / size, order == box.exact
     volume = size.prod(axis=0)
-    way = lowered(box.plan, WHOLE * len(box.variables), box.plan.body, k, env) if exact_values(env, box.plan) else None
+    way = lowered(box.plan, box.plan.body, k, env) if exact_values(env, box.plan) else None
     function = None if way is None else way.function(machine)
     if way is not None and function is not None:
         axis = Axis.of(order, False, (False, False), True)
-        raw = way.run(function, env, index, [axis] * len(box.variables), k)
+        whole = np.broadcast_to(np.array([[0], [1]]), (len(box.variables), 2, index.size))
+        raw = way.run(function, env, index, whole, [axis] * len(box.variables), k)
         shape = (1, *raw.number.shape)
         means = [sizes / volume[:, None] for sizes in raw.coefficients]
         integral, most = raw.number / volume, raw.most[None] / volume
