@@ -16,13 +16,14 @@ import numpy as np
 from potto.integrate.fixed.a_priori import Straight
 from potto.integrate.fixed.product_rule import CANCELS, FEW, Rule
 from potto.integrate.fixed.topologies import Alike, topologies
-from potto.integrate.pieces import Evaluator, Sums
+from potto.integrate.pieces import Evaluator, Sums, gather
 from potto.kernels.cells import Array, Bools, Cell, Value
 
 # Nodes per variable that are tried, one after the other.
 ORDERS = (6, 8, 12, 14, 20, 28)
 MOST_NODES = 4096
-POINTS = 1 << 15
+# How many members are cut, and numbers kept at nodes or of coefficients, at once.
+MEMBERS, POINTS = 1 << 16, 1 << 15
 # How many members tell the order for all, where there are many, and for how many of them it must do.
 PILOTS = 16
 ENOUGH = 0.9
@@ -38,13 +39,18 @@ def together(
     if machine.frozen or machine.side or not all(isinstance(env.get(name), Cell) for name in plan.names):
         return None
     here = {name: env[name] for name in plan.names}
-    done, cells = topologies(plan, machine, here, batch)
+    done = np.zeros(batch, dtype=bool)
+    total = [np.zeros((1 + machine.directions, batch)) for _ in range(4)]
+    for start in range(0, batch, MEMBERS):
+        stop = min(start + MEMBERS, batch)
+        some = here if stop - start == batch else gather(here, np.arange(start, stop))
+        part = [row[:, start:stop] for row in total]
+        done[start:stop], cells = topologies(plan, machine, some, stop - start)
+        for cell in cells:
+            fine = _settled(plan, degrees, machine, some, cell, part)
+            done[start + cell.members[~fine]] = False
     if not done.any():
         return None
-    total = [np.zeros((1 + machine.directions, batch)) for _ in range(4)]
-    for cell in cells:
-        fine = _settled(plan, degrees, machine, here, cell, total)
-        done[cell.members[~fine]] = False
     number, truncated, rounding, gross = total
     asked = 0.5 * np.maximum(machine.atol, machine.rtol * np.abs(number))
     most = CANCELS * gross.max(axis=0) if batch > 1 else 0.0  # for one there are other ways
