@@ -44,10 +44,10 @@ def together(
     for start in range(0, batch, MEMBERS):
         stop = min(start + MEMBERS, batch)
         some = here if stop - start == batch else gather(here, np.arange(start, stop))
-        part = [row[:, start:stop] for row in total]
+        sums = [row[:, start:stop] for row in total]
         done[start:stop], cells = topologies(plan, machine, some, stop - start)
         for cell in cells:
-            fine = _settled(plan, degrees, machine, some, cell, part)
+            fine = _settled(plan, degrees, machine, some, cell, sums)
             done[start + cell.members[~fine]] = False
     if not done.any():
         return None
