@@ -78,7 +78,10 @@ def _covering(gap: Array, own: Array, others: Array) -> Array:
 
 
 def _within_a_trial(problem: Problem, order: Integral) -> Sums | None:
-    """The sums with another variable innermost; None where that tells nothing, or costs too much."""
+    """The sums with another variable innermost; None where that tells nothing, or costs too much, as it does where the
+    first order has taken more already."""
+    if problem.machine.record.spent > TRIAL:
+        return None
     for turned in itertools.islice(orders(order), 1, None):
         part = problem.apart()
         other = within(TRIAL, part.plan(turned), part.machine, part.env, part.batch)
