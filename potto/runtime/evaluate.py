@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -106,14 +105,14 @@ class Clock:
     seconds = 0.0
 
     def __enter__(self) -> Clock:
-        self.start, self.before = time.perf_counter(), replace(counts)
+        self.start, self.before = time.perf_counter(), (counts.compiled, counts.reused, counts.seconds)
         return self
 
     def __exit__(self, *exc: object) -> None:
-        now, before = counts, self.before
+        compiled, reused, spent = self.before
         self.seconds = time.perf_counter() - self.start
-        self.compiled, self.reused = now.compiled - before.compiled, now.reused - before.reused
-        self.spent = now.seconds - before.seconds
+        self.compiled, self.reused = counts.compiled - compiled, counts.reused - reused
+        self.spent = counts.seconds - spent
 
 
 def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
@@ -148,7 +147,7 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
         tangent_bounds = told(value, lambda cell: cell.et[0] if cell.t else None)
     shown = _flat(numbers, bounds)
     missing = _missing([*shown, *_flat(tangents, tangent_bounds)], machine)
-    shape = np.broadcast_shapes(*(np.shape(number) for number, _ in shown))
+    shape = np.broadcast_shapes(*(number.shape for number, _ in shown if isinstance(number, np.ndarray)))
     return answer(
         numbers, bounds, tangents, tangent_bounds, converged=not missing,
         shortfalls={why: members_of(where, shape) if shape else True for why, where in missing.items()},

@@ -74,7 +74,7 @@ def trials(problem: Problem) -> Iterator[tuple[Integral, int | None]]:
     out at places that are not known may make one order a hundred times as expensive as another."""
     found = preferred(problem)
     most = TRIAL * TRIAL_FACTOR ** max(len(problem.term.variables) - 2, 0)
-    if isinstance(found, list) and problem.outermost and len(found) > 1 and searches(problem, found[0]):
+    if isinstance(found, list) and problem.outermost and len(found) > 1 and problem.plan(found[0]).searches:
         yield from ((order, most) for order in found)
     elif problem.outermost and passes_on(problem):
         yield problem.term, most
@@ -89,14 +89,6 @@ def passes_on(problem: Problem) -> bool:
 
 def preferred(problem: Problem) -> Iterable[Integral]:
     """The orders, those first in which the fewest jumps have to be searched for; a list where any have."""
-    if not searches(problem, problem.term):
+    if not problem.plan().searches:
         return orders(problem.term)
-    return sorted(orders(problem.term), key=lambda order: searches(problem, order))
-
-
-def searches(problem: Problem, order: Integral) -> int:
-    """How many jumps are searched for, having no closed form in the variable that they cut; 0 where none would be.
-
-    Each leaves, besides what it takes, unknown places further out where its roots merge.
-    """
-    return sum(cut.decides for level in problem.plan(order).levels for cut in level.searched)
+    return sorted(orders(problem.term), key=lambda order: problem.plan(order).searches)

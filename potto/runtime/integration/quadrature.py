@@ -34,7 +34,7 @@ def within(most: int | None, plan: Plan, machine: Machine, env: dict[str, Value]
     if most is None or machine.record.spent + most >= machine.settings.max_evals:
         return in_parts(plan, machine, env, batch)
     settings = replace(machine.settings, max_evals=math.ceil(machine.record.spent + most))
-    tight = replace(machine.apart(), settings=settings)
+    tight = machine.apart().changed(settings=settings)
     sums = in_parts(plan, tight, env, batch)
     if tight.exhausted():
         return None

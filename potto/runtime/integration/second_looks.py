@@ -42,7 +42,7 @@ def by_less(problem: Problem, order: Integral, sums: Sums) -> Sums:
     for rtol in TOLERANCES:
         most = math.ceil(machine.record.spent + EXTRA * machine.settings.max_evals)
         settings = replace(machine.settings, rtol=max(rtol, machine.rtol), max_evals=most)
-        loose = replace(machine.apart(), settings=settings)
+        loose = machine.apart().changed(settings=settings)
         other = in_parts(plan, loose, problem.env, problem.batch)
         met = loose.events.touched(problem.batch, TwoSided, Fold, Degenerate).any()
         if (other.e < sums.e).all() and (other.et <= sums.et).all() and not met:
