@@ -305,7 +305,6 @@ def _accurate(found: Totals, region: Region, machine: Evaluator, parameters: Seq
         if not (rounding <= asked and beyond <= max(asked, NOISE * gross, unit)):
             return None
         errors.append(rounding + beyond)
-    v, t = np.array(found.number[:1]), np.array(found.number[1:])
-    e, et = np.array(errors[:1]), np.array(errors[1:])
+    block = np.array((found.number, errors))[:, None, :, None]
     added = np.array([[found.gross[0]], [max(found.gross[1:], default=0.0)]])
-    return Sums(v[None], e[None], t[None, :, None], et[None, :, None], gross=added)
+    return Sums(block[0, :, 0], block[1, :, 0], block[0, :, 1:], block[1, :, 1:], gross=added)
