@@ -108,6 +108,8 @@ class Problem:
         """The problem with other values of some fields; what was found out is kept where it is about the same."""
         other = object.__new__(Problem)
         other.__dict__.update(self.__dict__, **fields)
+        if "env" in fields:
+            other.__dict__.pop("chosen", None)
         if "term" in fields or "functions" in fields:
             other.__dict__.pop("known", None)
         return other
@@ -149,15 +151,26 @@ class Problem:
 
     def plan(self, order: Integral | None = None) -> Plan:
         """The plan for these functions and plain values, with the variables in this order; made once."""
-        problem = self if order is None or order is self.term else self.changed(term=order)
-        known = problem.known.plans
+        order = self.term if order is None else order
+        plan = self.chosen.get(order)
+        if plan is None:
+            plan = self.chosen[order] = (self if order is self.term else self.changed(term=order))._plan()
+        return plan
+
+    @cached_property
+    def chosen(self) -> dict[Integral, Plan]:
+        """The plans for orders of the variables that hold at these parameters, as far as anyone has asked."""
+        return {}
+
+    def _plan(self) -> Plan:
+        known = self.known.plans
         for plan in tuple(known):
-            if all(problem.decided(t) == value for t, value in plan.decisions) and problem.fits(plan):
+            if all(self.decided(t) == value for t, value in plan.decisions) and self.fits(plan):
                 return plan
         with making:
-            plan = make(problem.term, problem.function, problem.decided, problem.plain_function, _Sampled(problem))
+            plan = make(self.term, self.function, self.decided, self.plain_function, _Sampled(self))
         known.append(plan)
-        fits = problem.fitting(plan)
+        fits = self.fitting(plan)
         if not fits.all():
             raise Mixed(fits)
         return plan
