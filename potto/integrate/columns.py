@@ -28,7 +28,11 @@ class Columns:
 
     def pick(self, index: Any) -> Self:
         """Some members of the batch."""
-        return self._with({n: x[index] if x.ndim == 1 else x[..., index] for n, x in self.arrays().items()})
+        if index.__class__ is slice:
+            return self._with({n: x[..., index] for n, x in self.arrays().items()})
+        if index.dtype == bool:
+            index = index.nonzero()[0]
+        return self._with({n: x.take(index, -1) for n, x in self.arrays().items()})
 
     def put(self, index: Any, part: Self) -> None:
         """Replace some members of the batch; of what is not known of the part, nothing is known of the whole."""

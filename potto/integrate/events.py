@@ -271,7 +271,8 @@ class Events:
         return [(event, members) for event, members in self if isinstance(event, kind)]
 
     def forget(self, *kinds: type[Event]) -> None:
-        self._met = {key: (event, who) for key, (event, who) in self._met.items() if not isinstance(event, kinds)}
+        if self._met:
+            self._met = {key: (event, who) for key, (event, who) in self._met.items() if not isinstance(event, kinds)}
 
     def touched(self, size: int, *kinds: type[Event]) -> Bools:
         """The members of a batch that met something of these kinds; all of them where nobody knows who did."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -89,6 +90,14 @@ class Plan:
     folds: bool = False
     degrees: tuple[int | None, ...] = ()
     over: LevelSet | None = None
+
+    @cached_property
+    def searches(self) -> int:
+        """How many jumps are searched for, having no closed form in the variable that they cut; 0 where none would be.
+
+        Each leaves, besides what it takes, unknown places further out where its roots merge.
+        """
+        return sum(cut.decides for level in self.levels for cut in level.searched)
 
     @property
     def mass(self) -> Term:

@@ -21,6 +21,9 @@ class Counts:
     native_seconds: float = 0.0
     native_points: int = 0
 
+    def so_far(self) -> tuple[int, int, float, int, int, int]:
+        return self.compiled, self.reused, self.seconds, self.native, self.kept, self.native_points
+
 
 counts = Counts()
 

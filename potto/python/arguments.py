@@ -6,6 +6,7 @@ become one flat batch; tuples are tuples, lists are lists, functions of Potto ar
 
 from __future__ import annotations
 
+import math
 import numbers
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
@@ -34,10 +35,13 @@ class Batch:
     shape: tuple[int, ...] | None
 
     def flat(self, array: np.ndarray[Any, np.dtype[np.float64]]) -> Any:
-        """An array as a part of the batch. An empty batch is run with one point, whose answer is dropped."""
+        """An array as a part of the batch, as a number where that has one member. An empty batch is run with one point,
+        whose answer is dropped."""
         assert self.shape is not None
         if 0 in self.shape:
             return np.ones(1)
+        if array.size == 1 and math.prod(self.shape) == 1:
+            return float(array.item())
         return np.ascontiguousarray(np.broadcast_to(array, self.shape)).reshape(-1)
 
     def shaped(self, estimate: Estimate) -> Estimate:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -106,16 +105,17 @@ class Clock:
     seconds = 0.0
 
     def __enter__(self) -> Clock:
-        self.start, self.before = time.perf_counter(), replace(counts)
+        self.before = counts.so_far()
+        self.start = time.perf_counter()
         return self
 
     def __exit__(self, *exc: object) -> None:
-        now, before = counts, self.before
+        compiled, reused, spent, native, kept, points = self.before
         self.seconds = time.perf_counter() - self.start
-        self.compiled, self.reused = now.compiled - before.compiled, now.reused - before.reused
-        self.spent = now.seconds - before.seconds
-        self.native, self.kept = now.native - before.native, now.kept - before.kept
-        self.native_points = now.native_points - before.native_points
+        self.compiled, self.reused = counts.compiled - compiled, counts.reused - reused
+        self.spent = counts.seconds - spent
+        self.native, self.kept = counts.native - native, counts.kept - kept
+        self.native_points = counts.native_points - points
 
 
 def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
@@ -156,7 +156,7 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
         tangent_bounds = told(value, lambda cell: cell.et[0] if cell.t else None)
     shown = _flat(numbers, bounds)
     missing = _missing([*shown, *_flat(tangents, tangent_bounds)], machine)
-    shape = np.broadcast_shapes(*(np.shape(number) for number, _ in shown))
+    shape = np.broadcast_shapes(*(number.shape for number, _ in shown if isinstance(number, np.ndarray)))
     return answer(
         numbers, bounds, tangents, tangent_bounds, converged=not missing,
         shortfalls={why: members_of(where, shape) if shape else True for why, where in missing.items()},

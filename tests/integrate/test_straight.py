@@ -106,3 +106,21 @@ def f(a, s) integral [0, 1] F(x + s, a + s) d(x)
 """)
     got = m.f(0.4937, 0.01)
     assert abs(got.value - (0.0063 * (1 - 0.50685) + 2 * 0.5)) <= 1e-15 + got.error
+
+
+CORNER = potto.compile("def f(t) integral ([0, 1], [0, 1]) [x + y < t]*x*y d(x, y)").f
+
+
+@pytest.mark.parametrize("around", [0.5, 1.0, 2.0])
+def test_cells_that_change_within_a_region_of_parameters(around: float) -> None:
+    """What is known of a region holds on all of it: the corner of a square, cut off, at 81 places one after the other,
+    through those where the line comes to a vertex. Bounds cover, but for two roundings of numbers up to 1."""
+    for step in range(-40, 41):
+        t = around + step / 1000
+        s = min(max(2 - t, 0.0), 1.0)
+        value = t**4 / 24 if t < 1 else 0.25 - s * s / 2 + s**3 / 3 - s**4 / 24
+        rate = t**3 / 6 if t < 1 else s - s * s + s**3 / 6
+        found = potto.deriv(CORNER)((t, 1.0))
+        assert abs(found.value - value) <= found.error + 3e-16 and found.error <= 1e-12
+        if t not in (1.0, 2.0):  # there the line lies on a vertex
+            assert abs(found.tangent - rate) <= found.tangent_error + 3e-16 and found.tangent_error <= 1e-12

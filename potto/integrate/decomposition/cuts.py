@@ -92,11 +92,26 @@ def _ends(lo: Cell, hi: Cell, batch: int, directions: int) -> tuple[_End, _End, 
     return (low, tl, el), (high, th, eh), sign
 
 
-def _counted(row: Row, nested: bool) -> Bools | bool:
-    """For whom a root counts: if `nested` not where it merges with another just here, at a single node of the variables
-    further out, and so moves infinitely fast."""
+def _counted(row: Row) -> Bools | bool:
+    """For whom a root counts of nodes of variables further out: not where it merges with another just here, at a single
+    one of them, and so moves infinitely fast."""
     speeds = [speed for speed in row.t if isinstance(speed, np.ndarray)]
-    return np.asarray(np.isfinite(speeds).all(axis=0)) if nested and speeds else True
+    return np.asarray(np.isfinite(speeds).all(axis=0)) if speeds else True
+
+
+def _stacked(rows: list[Row], batch: int, directions: int) -> tuple[Array, Array, Array]:
+    """Where roots are, and how far off they may be, (rows, B) each; their speeds, then how far off these may be,
+    (2k, rows + 2, B), with room for those of the bounds."""
+    roots, off = np.empty((2, len(rows), batch))
+    t = np.zeros((2 * directions, len(rows) + 2, batch))
+    for i, row in enumerate(rows):
+        roots[i] = row.x
+        off[i] = SEARCHED * EPS * np.abs(row.x) if row.e is None else row.e
+        for first, speeds in ((0, row.t), (directions, row.et)):
+            for d, speed in enumerate(speeds[:directions], first):
+                if speed is not None:
+                    t[d, i + 1] = speed
+    return roots, off, t
 
 
 def segments(
@@ -109,28 +124,22 @@ def segments(
     nested = kin is not None
     (low, tl, el), (high, th, eh), sign = _ends(lo, hi, batch, directions)
     count = len(rows)
-    x = np.empty((count + 2, batch))
-    t = np.zeros((2 * directions, count + 2, batch))  # speeds, then their errors
-    e = np.empty((count + 2, batch))
-    x[0], x[-1], e[0], e[-1] = low, high, el, eh
-    t[:directions, 0], t[:directions, -1] = tl, th
+    roots, off, t = _stacked(rows, batch, directions)
     inside = np.zeros((count + 2, batch), dtype=bool)
-    edges: list[Edge] = []
-    brushes: list[Edge] = []
-    beyond: list[tuple[Array, bool]] = []
-    for i, row in enumerate(rows, 1):
-        root = as_array(row.x, batch)
-        inner = inside[i] = (root > low) & (root < high) & _counted(row, nested)
-        x[i] = np.where(inner, root, high)
-        off = SEARCHED * EPS * np.abs(root) if row.e is None else row.e
-        e[i] = np.where(inner, off, eh)
-        t[:directions, i] = np.where(inner, tangents(row.t[:directions], batch, directions), th)
-        t[directions:, i] = np.where(inner, tangents(row.et[:directions], batch, directions), 0.0)
-        if row.turning or (row.cut >= 0 and plan.level.cuts[row.cut].turning):
-            beyond.append((root, True))
-        if directions and row.cut >= 0:
-            found, beside = (edges, None) if plan.level.cuts[row.cut].decides else (brushes, off)
-            found += _edges(row, root, beside, (low, tl, el), (high, th, eh), directions, batch)
+    inside[1:-1] = (roots > low) & (roots < high)
+    for i, row in enumerate(rows, 1) if nested else ():
+        inside[i] &= _counted(row)
+    inner = inside[1:-1]
+    x, e = np.empty((2, count + 2, batch))
+    x[0], x[-1], x[1:-1] = low, high, np.where(inner, roots, high)
+    e[0], e[-1], e[1:-1] = el, eh, np.where(inner, off, eh)
+    ends = (low, tl, el), (high, th, eh)
+    edges, brushes = _edges(plan, rows, roots, off, t[:directions, 1:-1], ends) if directions else ([], [])
+    t[:directions, 0], t[:directions, -1] = tl, th
+    t[:directions, 1:-1] = np.where(inner, t[:directions, 1:-1], th[:, None])
+    t[directions:, 1:-1] = np.where(inner, t[directions:, 1:-1], 0.0)
+    turning = (row.turning or (row.cut >= 0 and plan.level.cuts[row.cut].turning) for row in rows)
+    beyond = [(root, True) for root, turns in zip(roots, turning, strict=True) if turns]
     rank = np.zeros((count + 2, batch), dtype=np.int64)
     conflict = merged = False
     blur = np.zeros_like(x)
@@ -162,24 +171,29 @@ def at_rest(cuts: Cuts) -> Cuts:
     return replace(cuts, moving=False)
 
 
-def _edges(row: Row, root: Array, off: Any, lower: _End, upper: _End, directions: int, batch: int) -> list[Edge]:
-    """Where a cut lies on a bound, or beside it by rounding, and does not move with it. off: that of the cut's place;
-    None for cuts that must lie on the bound."""
-    out: list[Edge] = []
-    for above, (bound, tb, e) in ((False, lower), (True, upper)):
-        on = root == bound
-        if off is not None:
-            with np.errstate(invalid="ignore"):
-                on = on | (np.abs(root - bound) <= np.minimum(off + e, ONE_PLACE * (upper[0] - lower[0])))
-        if not on.any():
-            continue
-        on = on & np.isfinite(bound) & (lower[0] < upper[0])
-        speed = tangents(row.t, batch, directions)
-        moves = np.abs(speed - tb) > 64 * EPS * np.maximum(np.abs(speed), np.abs(tb))
-        owner = np.nonzero(on & moves.any(axis=0))[0]
-        if owner.size:
-            out.append(Edge(row.cut, owner, above, bound[owner], speed[:, owner], tb[:, owner]))
-    return out
+def _edges(
+    plan: LevelPlan, rows: list[Row], roots: Array, off: Array, speeds: Array, ends: tuple[_End, _End]
+) -> tuple[list[Edge], list[Edge]]:
+    """Where cuts lie on a bound and do not move with it: those that decide; and the others, also where they lie beside
+    it by rounding."""
+    decides = np.array([row.cut >= 0 and plan.level.cuts[row.cut].decides for row in rows], dtype=bool)
+    (low, _, _), (high, _, _) = ends
+    found: list[tuple[int, Edge]] = []
+    for upper, (bound, tb, e) in enumerate(ends):
+        with np.errstate(invalid="ignore"):
+            near = np.where(decides[:, None], 0.0, np.minimum(off + e, ONE_PLACE * (high - low)))
+            on = (roots == bound) | (np.abs(roots - bound) <= near)
+        for i in np.nonzero(on.any(axis=1))[0].tolist():
+            if rows[i].cut < 0:
+                continue
+            speed = speeds[:, i]
+            moves = np.abs(speed - tb) > 64 * EPS * np.maximum(np.abs(speed), np.abs(tb))
+            owner = np.nonzero(on[i] & np.isfinite(bound) & (low < high) & moves.any(axis=0))[0]
+            if owner.size:
+                edge = Edge(rows[i].cut, owner, bool(upper), bound[owner], speed[:, owner], tb[:, owner])
+                found.append((i, edge))
+    found.sort(key=lambda pair: pair[0])
+    return [edge for i, edge in found if decides[i]], [edge for i, edge in found if not decides[i]]
 
 
 def _sorted(

@@ -14,6 +14,7 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,7 @@ from potto.integrate.levels import LevelPlan
 from potto.integrate.pieces import Evaluator, Sums
 from potto.integrate.rules.complex_enclosures import enclosable
 from potto.integrate.rules.gauss import EPS
+from potto.integrate.rules.intervals import Interval, enclosure
 from potto.integrate.rules.proved_orders import Cell as Stretch
 from potto.integrate.rules.proved_orders import Region, proved
 from potto.kernels.cells import Cell, Value
@@ -54,6 +56,8 @@ TINY = 1e-280
 # How far off a rule may be for a sum that cancels, as a part of what it is when nothing does.
 NOISE = 1e-12
 MOST_REGIONS = 512
+# How far apart cuts are all over a region, as a part of the range: far more than their rounding, which sums tell.
+APART = 1e-6
 UNKNOWN = object()
 
 Path = tuple[tuple[int, int], ...]
@@ -65,7 +69,8 @@ class Straight:
 
     jumps: per variable the surfaces that it crosses, with the rows of the frame that are their places. turning: the
     rows where something is like a square root. surfaces: what the integrand's branches depend on, as one function to a
-    tuple. names: parameters.
+    tuple. names: parameters. regions: what was proved of the rules for cells in a region, None where nothing
+    could be. settled: of a region in all of which the cells are the same.
     """
 
     variables: tuple[str, ...]
@@ -78,8 +83,9 @@ class Straight:
     faces: dict[tuple[bool, ...], Term] = field(default_factory=dict, compare=False)
     regions: dict[Any, object] = field(default_factory=dict, compare=False)
     lowered: dict[Any, Any] = field(default_factory=dict, compare=False)
+    settled: dict[Any, Region] = field(default_factory=dict, compare=False)
 
-    @property
+    @cached_property
     def items(self) -> tuple[tuple[Term, ...], ...]:
         return tuple(children(frame.body) for frame in self.frames)
 
@@ -237,6 +243,49 @@ def _sides(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> tuple[b
 
 # What is proved
 
+Places = tuple[tuple[str, float, float], ...]  # per parameter the middle of the region in which it lies, the radius
+
+
+def _around(values: Mapping[str, float], size: Mapping[str, float]) -> Places | None:
+    """The region in which parameters of this size lie; None where they are too small for one."""
+    places = []
+    for name, value in values.items():
+        step = 2.0 ** math.floor(math.log2(size[name])) * REGION
+        if step < TINY:
+            return None
+        places.append((name, round(value / (2 * step)) * 2 * step, step))
+    return tuple(places)
+
+
+def _all_over(plan: Straight, places: Places) -> tuple[Stretch, ...] | None:
+    """The cells that there are all over a region; None where they may not be the same, or cuts be close together."""
+    box: dict[str, Interval] = {name: (middle - radius, middle + radius) for name, middle, radius in places}
+    cells: list[Stretch] = []
+
+    def over(i: int, path: Path) -> bool:
+        if i == len(plan.variables):
+            sides = enclosure(children(plan.surfaces.body), box)
+            if any(not (lo > 0 or hi < 0) for lo, hi in sides):
+                return False
+            face = plan.face(tuple(bool(lo > 0) for lo, _ in sides))
+            if not (isinstance(face, Const) and face.value == 0):
+                cells.append(Stretch(path, face))
+            return True
+        ends = enclosure(plan.items[i], box)
+        (a0, a1), (b0, b1) = ends[:2]
+        gap = APART * (b1 - a0)
+        rows = ((lo, hi, row) for row, (lo, hi) in enumerate(ends[2:], 2))
+        kept = [(a0, a1, 0), *sorted(r for r in rows if not (r[1] < a0 - gap or r[0] > b1 + gap)), (b0, b1, 1)]
+        if any(not (b[0] - a[1] > gap) for a, b in itertools.pairwise(kept)):
+            return False
+        for a, b in itertools.pairwise(kept):
+            box[plan.variables[i]] = (0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]))
+            if not over(i + 1, (*path, (a[2], b[2]))):
+                return False
+        return True
+
+    return tuple(cells) if over(0, ()) else None
+
 
 def _region(
     plan: Straight, cells: tuple[Stretch, ...], values: Mapping[str, float], reach: float, shortest: float, rtol: float
@@ -252,13 +301,10 @@ def _region(
     if shortest < reach / 8:
         sizes.append({n: min(abs(v) or reach, shortest) for n, v in values.items()})
     for size in sizes:
-        places = []
-        for name, value in values.items():
-            step = 2.0 ** math.floor(math.log2(size[name])) * REGION
-            if step < TINY:
-                return None
-            places.append((name, round(value / (2 * step)) * 2 * step, step))
-        key = (cells, tuple(places), rtol)
+        places = _around(values, size)
+        if places is None:
+            return None
+        key = (cells, places, rtol)
         region = plan.regions.get(key, UNKNOWN)
         if region is UNKNOWN:
             if len(plan.regions) >= MOST_REGIONS:
@@ -286,20 +332,34 @@ def certain(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Sums |
             return None
         values[name] = float(cell.v)
     frame = evaluated(plan.frames[0], machine.tracking(), env)
-    try:
-        cells, shortest = _cells(plan, machine, env, frame)
-    except _NotPlain:
-        return None
-    if not cells:
-        return Sums.zeros(1, machine.directions, 1)
-    region = None
-    if len(cells) <= MOST_CELLS:
-        reach = float(frame[1].v - frame[0].v)
-        region = _region(plan, cells, values, reach, shortest, min(machine.rtol, LOOSEST))
-    if region is None or sum(region.outer) * math.prod(region.inner) > MOST_NODES:
-        return None
+    reach, rtol = float(frame[1].v - frame[0].v), min(machine.rtol, LOOSEST)
+    known = 0 < reach < math.inf and all(env[name].e is None for name in plan.names)  # type: ignore[union-attr]
+    places = _around(values, {n: max(abs(v), reach) for n, v in values.items()}) if known else None
+    region = plan.settled.get((places, rtol)) if machine.costs is None else None
+    if region is None:
+        try:
+            cells, shortest = _cells(plan, machine, env, frame)
+        except _NotPlain:
+            return None
+        if not cells:
+            return Sums.zeros(1, machine.directions, 1)
+        if len(cells) <= MOST_CELLS:
+            region = _region(plan, cells, values, reach, shortest, rtol)
+        if region is None or sum(region.outer) * math.prod(region.inner) > MOST_NODES:
+            return None
+        if places is not None and region is plan.regions.get((cells, places, rtol)):
+            with making:
+                _settle(plan, region, places, rtol)
     sums = summed(plan.variables, plan.frames, region, machine, env, frame)
     return None if sums is None else _accurate(sums, region, machine, [env[name] for name in plan.names])
+
+
+def _settle(plan: Straight, region: Region, places: Places, rtol: float) -> None:
+    """Keep what was proved of a region where its cells are the same all over, so that they need not be looked for."""
+    if _all_over(plan, places) == region.cells:
+        if len(plan.settled) >= MOST_REGIONS:
+            plan.settled.clear()
+        plan.settled[places, rtol] = region
 
 
 def _accurate(found: Totals, region: Region, machine: Evaluator, parameters: Sequence[Value]) -> Sums | None:
@@ -319,7 +379,6 @@ def _accurate(found: Totals, region: Region, machine: Evaluator, parameters: Seq
         if not (rounding <= asked and beyond <= max(asked, NOISE * gross, unit)):
             return None
         errors.append(rounding + beyond)
-    v, t = np.array(found.number[:1]), np.array(found.number[1:])
-    e, et = np.array(errors[:1]), np.array(errors[1:])
+    block = np.array((found.number, errors))[:, None, :, None]
     added = np.array([[found.gross[0]], [max(found.gross[1:], default=0.0)]])
-    return Sums(v[None], e[None], t[None, :, None], et[None, :, None], gross=added)
+    return Sums(block[0, :, 0], block[1, :, 0], block[0, :, 1:], block[1, :, 1:], gross=added)

@@ -18,7 +18,6 @@ import numpy as np
 from potto.core.terms import Lam, function_of
 from potto.integrate.pieces import Evaluator, gather
 from potto.integrate.rules.gauss import EPS, gauss
-from potto.integrate.rules.proved_orders import Cell as Stretch
 from potto.integrate.rules.proved_orders import Region
 from potto.kernels.cells import Array, Cell, Ints, Value
 
@@ -33,12 +32,41 @@ def evaluated(function: Lam, machine: Evaluator, env: dict[str, Value]) -> tuple
     return values  # type: ignore[return-value]
 
 
+@dataclass(frozen=True)
+class _Layout:
+    """What nodes of a region do not depend on numbers for.
+
+    ends: per variable, for every node of the outermost one, where the ends of its cell are among the values of the
+    frame, row after row: (2, P).
+    nodes: per variable in [0, 1]. weights: of all variables but the innermost of several. count: of all nodes. faces:
+    what is integrated, as functions, with the nodes of the outermost variable at which it is; None: at all.
+    """
+
+    ends: tuple[Ints, ...]
+    nodes: tuple[Array, ...]
+    weights: Array
+    count: int
+    faces: tuple[tuple[Lam, Ints | None], ...]
+
+
 @lru_cache(maxsize=4096)
-def _outer(orders: tuple[int, ...]) -> tuple[Ints, Array, Array]:
-    """For the nodes of the outermost variable, cell after cell: the cell, the node in [0, 1], the weight."""
-    rules = [gauss(n) for n in orders]
-    owner = np.repeat(np.arange(len(orders)), orders)
-    return owner, np.concatenate([r.nodes for r in rules]), np.concatenate([r.weights for r in rules])
+def _layout(region: Region) -> _Layout:
+    rules, inner = [gauss(n) for n in region.outer], [gauss(n) for n in region.inner]
+    owner = np.repeat(np.arange(len(rules)), region.outer)
+    by_variable = np.moveaxis(np.array([cell.rows for cell in region.cells])[owner], 1, 0)
+    weights = np.concatenate([r.weights for r in rules])
+    for rule in inner[:-1]:
+        weights = weights[..., None] * rule.weights
+    faces = tuple(dict.fromkeys(cell.body for cell in region.cells))
+    found = (np.nonzero(np.array([cell.body is face for cell in region.cells])[owner])[0] for face in faces)
+    every, (outer, *others) = np.arange(owner.size), (rows.T for rows in by_variable)
+    return _Layout(
+        (outer.copy(), *(rows * owner.size + every for rows in others)),
+        (np.concatenate([r.nodes for r in rules]), *(r.nodes for r in inner)),
+        weights,
+        owner.size * math.prod(region.inner),
+        tuple((function_of(face), None if len(faces) == 1 else at) for face, at in zip(faces, found, strict=True)),
+    )
 
 
 @dataclass(frozen=True)
@@ -58,53 +86,48 @@ def summed(
 
     frames: per variable its bounds and cuts, as functions of what is further out; `frame` has the values of the first.
     """
-    tracked, here = machine.tracking(), dict(env)
-    owner, nodes, weights = _outer(region.outer)
-    rows = _rows(region)
-    shape, length, rounded = (1,), None, None
+    tracked, here, layout, k = machine.tracking(), dict(env), _layout(region), machine.directions
+    shape: tuple[int, ...] = (1,)
+    length = rounded = layout.weights
     for i, variable in enumerate(variables):
         if i:
             frame = evaluated(frames[i], tracked, here)
-            nodes = gauss(region.inner[i - 1]).nodes
-        found = _between(_block(frame, machine.directions, shape), rows[i], i > 0)
-        if found is None:
+        block = _block(frame, k, shape) if i else _numbers(frame, k)
+        ends = block.take(layout.ends[i], axis=2)
+        if i and _crossed(block[0, 0].reshape(len(frame), *shape), *ends[0, 0]):
             return None
-        lo, width, off = found
-        if i > 1:
-            weights = weights[..., None] * gauss(region.inner[i - 2]).weights
+        lo, width, off = _between(ends)
         for name in variables[:i]:
             here[name] = here[name].map(_deeper)  # type: ignore[union-attr]
-        moves = [any(cell.t[d] is not None for cell in frame) for d in range(machine.directions)]
-        here[variable] = _placed(lo, width, off, nodes, i > 0, moves)
-        if length is None or rounded is None:
+        moves = [not {cell.t[d] is None for cell in frame} <= {True} for d in range(k)]
+        here[variable] = placed = _placed(lo, width, off, layout.nodes[i], i > 0, moves)
+        if not i:
             length, rounded = width, off
         else:
             if i > 1:
                 length, rounded = _deeper(length), _deeper(rounded)
             length, rounded = _times(length, rounded, width, off)
-        shape = here[variable].v.shape  # type: ignore[union-attr]
-    values = _integrand(region.cells, owner, tracked, here, shape)
+        shape = placed.v.shape  # type: ignore[union-attr]
+    values = _integrand(layout, tracked, here, shape)
     if len(variables) > 1:
         values = values @ gauss(region.inner[-1]).weights
-    machine.count(math.prod(shape))
-    return _added(values, length * weights, rounded * weights)  # type: ignore[operator]
-
-
-@lru_cache(maxsize=4096)
-def _rows(region: Region) -> tuple[Ints, ...]:
-    """Per variable, for every node of the outermost one, which rows of the frame are the ends of its cell: (2, P)."""
-    owner, _, _ = _outer(region.outer)
-    count = len(region.cells[0].rows)
-    ends = np.array([cell.rows for cell in region.cells])[owner]
-    return tuple(ends[:, i].T.copy() for i in range(count))
+    machine.count(layout.count)
+    return _added(values, length * layout.weights, rounded * layout.weights)
 
 
 def _deeper(array: Array) -> Array:
     return array[..., None]
 
 
+def _numbers(frame: Sequence[Cell], k: int) -> Array:
+    """Cells that are one number each as one array: (2, 1 + k, cells), the numbers and their errors."""
+    none = (None,) * k
+    parts = ([(c.v, *(c.t or none)) for c in frame], [(c.e, *(c.et or none)) for c in frame])
+    return np.array([[[row[d] or 0.0 for row in rows] for d in range(1 + k)] for rows in parts])
+
+
 def _block(frame: Sequence[Cell], k: int, shape: tuple[int, ...]) -> Array:
-    """Cells as one array: (2, 1 + k, cells, *shape), the numbers and their errors; values, then tangents."""
+    """Cells as one array: (2, 1 + k, cells times P, ...), the numbers and their errors; values, then tangents."""
     out = np.zeros((2, 1 + k, len(frame), *shape))
     for row, cell in enumerate(frame):
         out[0, 0, row] = cell.v
@@ -115,19 +138,23 @@ def _block(frame: Sequence[Cell], k: int, shape: tuple[int, ...]) -> Array:
                 out[0, d, row] = t
             if et is not None:
                 out[1, d, row] = et
-    return out
+    return out.reshape(2, 1 + k, -1, *shape[1:])
 
 
-def _between(block: Array, rows: Ints, inner: bool) -> tuple[Array, Array, Array] | None:
-    """Per node the lower end, the length, and the rounding of both: (1 + k, P, ...). None where cuts cross."""
-    ends = block[:, :, rows, np.arange(rows.shape[1])] if inner else block[:, :, rows, 0]
+def _between(ends: Array) -> tuple[Array, Array, Array]:
+    """Per node the lower end, the length, and the rounding of both, (1 + k, P, ...), from the ends and their errors."""
     lo, hi = ends[0, :, 0], ends[0, :, 1]
-    width = hi - lo
-    if inner:
-        places = block[0, 0]
-        if not (width[0] > 0).all() or ((places > lo[0]) & (places < hi[0])).any():
-            return None
-    return lo, width, (ends[1] + EPS * np.abs(ends[0])).sum(axis=1)
+    off = np.abs(ends[0])
+    off *= EPS
+    off += ends[1]
+    return lo, hi - lo, off[:, 0] + off[:, 1]
+
+
+def _crossed(places: Array, lo: Array, hi: Array) -> bool:
+    """Whether ends are not in order, or a cut lies between them, at any node."""
+    if not (lo < hi).all():
+        return True
+    return len(places) > 2 and bool(((places > lo) & (places < hi)).any())
 
 
 def _placed(lo: Array, width: Array, off: Array, nodes: Array, inner: bool, moves: Sequence[bool]) -> Cell:
@@ -135,35 +162,32 @@ def _placed(lo: Array, width: Array, off: Array, nodes: Array, inner: bool, move
     if inner:
         lo, width, off = lo[..., None], width[..., None], off[..., None]
     at = lo + width * nodes
-    t = tuple(at[d] if m else None for d, m in enumerate(moves, 1))
-    return Cell(at[0], off[0], t, tuple(off[d] if m else None for d, m in enumerate(moves, 1)))
+    t = tuple([at[d] if m else None for d, m in enumerate(moves, 1)])
+    return Cell(at[0], off[0], t, tuple([off[d] if m else None for d, m in enumerate(moves, 1)]))
 
 
 def _times(length: Array, rounded: Array, width: Array, off: Array) -> tuple[Array, Array]:
     """The product of the lengths so far with that of one more variable, its tangents, and its rounding."""
     found = product(length, width)
-    return found, product(rounded, np.abs(width)) + product(np.abs(length), off) + 2 * EPS * np.abs(found)
+    slack = product(rounded, np.abs(width))
+    slack += product(np.abs(length), off)
+    slack += 2 * EPS * np.abs(found)
+    return found, slack
 
 
 def product(block: Array, factor: Array) -> Array:
     """(f g)' = f' g + f g', for blocks (1 + k, ...)."""
     found: Array = block * factor[0]
-    found[1:] += block[0] * factor[1:]
+    if len(block) > 1:
+        found[1:] += block[0] * factor[1:]
     return found
 
 
-def _integrand(
-    cells: tuple[Stretch, ...], owner: Ints, machine: Evaluator, here: dict[str, Value], shape: tuple[int, ...]
-) -> Array:
+def _integrand(layout: _Layout, machine: Evaluator, here: dict[str, Value], shape: tuple[int, ...]) -> Array:
     """Numbers, errors and magnitudes of the integrand at the nodes: (3, 1 + k, *shape)."""
     out = np.zeros((3, 1 + machine.directions, *shape))
-    faces = dict.fromkeys(cell.body for cell in cells)
-    for face in faces:
-        function = function_of(face)
-        env, index = {n: here[n] for n in function.params}, None
-        if len(faces) > 1:
-            index = np.nonzero(np.array([cell.body is face for cell in cells])[owner])[0]
-            env = gather(env, index)
+    for function, index in layout.faces:
+        env = here if index is None else gather({n: here[n] for n in function.params}, index)
         cell = machine.evaluate(function, env, None)
         assert isinstance(cell, Cell)
         for part, numbers in enumerate(((cell.v, *cell.t), (cell.e, *cell.et))):
@@ -176,15 +200,15 @@ def _integrand(
 
 def _added(values: Array, length: Array, rounded: Array) -> Totals:
     """Sums over nodes of the integrand (3, 1 + k, P, ...) times the lengths (1 + k, P, ...) with their weights."""
-    values, k1 = values.reshape(*values.shape[:2], -1), len(length)
-    length, rounded = length.reshape(k1, -1).T, rounded.reshape(k1, -1).T
-    size = np.abs(length)
+    k1 = len(length)
+    factors = np.concatenate((length, np.abs(length), rounded)).reshape(3 * k1, -1)
+    products = (values.reshape(3 * k1, -1) @ factors.T).tolist()
 
-    def ruled(products: Array) -> Array:  # (f g)' = f' g + f g'
-        total: Array = products[:, 0] + products[0]
-        total[0] = products[0, 0]
-        return total
+    def ruled(part: int, by: int) -> list[float]:  # (f g)' = f' g + f g'
+        rows, at = products[part * k1 : (part + 1) * k1], by * k1
+        first = rows[0][at : at + k1]
+        return [first[0], *(row[at] + x for row, x in zip(rows[1:], first[1:], strict=True))]
 
-    gross = ruled(values[2] @ size)
-    rounding = ruled(values[1] @ size) + ruled(values[2] @ rounded) + SUMMED * gross
-    return Totals(ruled(values[0] @ length).tolist(), rounding.tolist(), gross.tolist())
+    gross = ruled(2, 1)
+    off = zip(ruled(1, 1), ruled(2, 2), gross, strict=True)
+    return Totals(ruled(0, 0), [a + b + SUMMED * c for a, b, c in off], gross)

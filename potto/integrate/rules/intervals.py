@@ -8,6 +8,7 @@ the boxes get smaller; where nothing is known they are infinite, and where the t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
@@ -45,14 +46,40 @@ def _fractional(node: Prim) -> bool:
 def enclosure(terms: tuple[Term, ...], box: Mapping[str, Interval]) -> list[Interval]:
     """Bounds of the values of terms, which are `enclosable`, for variables in a box."""
     with np.errstate(all="ignore"):
-        return INTERVALS.walk(terms, box, {})
+        env = {name: _marked(*ends) for name, ends in box.items()}
+        known: dict[Term, Interval] = {}
+        for node in _order(terms):
+            known[node] = INTERVALS.node(node, env, known)
+    return [known[term] for term in terms]
+
+
+@lru_cache(maxsize=4096)
+def _order(terms: tuple[Term, ...]) -> tuple[Term, ...]:
+    return tuple(postorder(*terms))
+
+
+class _Finite(tuple[Any, Any]):
+    """Bounds of which none is infinite or nan: what could come of those need not be looked for in what they lead to."""
+
+    __slots__ = ()
+
+
+def _marked(lo: Any, hi: Any) -> Interval:
+    """Bounds, with whether they are finite everywhere found out by one sum: infinities and nans stay what they are."""
+    both = lo + hi
+    finite = math.isfinite(np.add.reduce(both, None) if isinstance(both, np.ndarray) else both)
+    return _Finite((lo, hi)) if finite else (lo, hi)
+
+
+def _all_finite(args: Sequence[Interval]) -> bool:
+    return set(map(type, args)) == {_Finite}
 
 
 class _Intervals(Domain[Interval]):
     """Bounds of batches: arithmetic as below, everything else by the rules of the entries."""
 
     def constant(self, node: Const) -> Interval:
-        return node.value, node.value  # nan is what a guard leaves where there is no value
+        return _marked(node.value, node.value)  # nan is what a guard leaves where there is no value
 
     def unknown(self) -> Interval:
         return ANYTHING
@@ -108,45 +135,69 @@ def _defined(args: Sequence[Interval], result: tuple[Any, ...], room: Any = ROUN
     Neither has what is infinite all over. A third item of the result says where the builtin itself is not defined.
     """
     lo, hi = result[0], result[1]
+    below, above = lo - room * abs(lo), hi + room * abs(hi)
+    if off:
+        below, above = below - off, above + off
+    unsure = [a[0] for a in args if a.__class__ is not _Finite]
+    found = _marked(below, above)
+    if len(result) == 2 and not unsure and found.__class__ is _Finite:
+        return found
     nowhere = (lo == np.inf) | (hi == -np.inf)
-    lo = np.where(np.isnan(lo), -np.inf, lo - room * np.abs(lo) - off)
-    hi = np.where(np.isnan(hi), np.inf, hi + room * np.abs(hi) + off)
     if len(result) == 3:
         nowhere = nowhere | result[2]
-    for a in args:
-        nowhere = nowhere | np.isnan(a[0])
+    for low in unsure:
+        nowhere = nowhere | np.isnan(low)
+    below, above = np.fmax(below, -np.inf), np.fmin(above, np.inf)
     if np.any(nowhere):
-        lo, hi = np.where(nowhere, np.nan, lo), np.where(nowhere, np.nan, hi)
-    return lo, hi
+        below, above = np.where(nowhere, np.nan, below), np.where(nowhere, np.nan, above)
+    return _marked(below, above)
 
 
 def _add(node: Prim, args: list[Interval]) -> Interval:
-    lo, hi = args[0]
+    (lo, hi), finite = args[0], _all_finite(args)
     for a in args[1:]:
         lo, hi = lo + a[0], hi + a[1]
-        size = np.maximum(np.abs(lo), np.abs(hi)) + np.maximum(np.abs(a[0]), np.abs(a[1]))
-        slack = np.where(np.isfinite(size), EPS * size, 0.0)  # of operands that cancel
+        slack = EPS * (np.maximum(abs(lo), abs(hi)) + _largest(a))  # of operands that cancel
+        if not finite:
+            slack = np.where(np.isfinite(slack), slack, 0.0)
         lo, hi = lo - slack, hi + slack
     return lo, hi
+
+
+def _largest(a: Interval) -> Any:
+    """How large an interval's values may be."""
+    return abs(a[0]) if a[0] is a[1] else np.maximum(abs(a[0]), abs(a[1]))
 
 
 def _neg(node: Prim, args: list[Interval]) -> Interval:
     return -args[0][1], -args[0][0]
 
 
-def _times(a: Interval, b: Interval) -> Interval:
-    corners = [np.where((x == 0) | (y == 0), 0.0, x * y) for x in a for y in b]
+def _times(a: Interval, b: Interval, finite: bool) -> Interval:
+    for c, (low, high) in ((_number(a), b), (_number(b), a)) if finite else ():
+        if c is not None:
+            return (low * c, high * c) if c >= 0 else (high * c, low * c)
+    if finite:
+        corners = [x * y for x in a for y in b]
+    else:
+        corners = [np.where((x == 0) | (y == 0), 0.0, x * y) for x in a for y in b]
     lo, hi = corners[0], corners[0]
     for c in corners[1:]:
         lo, hi = np.minimum(lo, c), np.maximum(hi, c)
     return lo, hi
 
 
+def _number(a: Interval) -> float | None:
+    """The number that a constant is."""
+    return a[0] if a[0].__class__ is float and a[0] == a[1] else None
+
+
 def _mul(node: Prim, args: list[Interval]) -> Interval:
-    by_term = dict(zip(node.args, args, strict=True))
-    result: Interval = (1.0, 1.0)
-    for arg, interval in by_term.items():
-        result = _times(result, _whole_power(interval, node.args.count(arg)))
+    by_term, finite = dict(zip(node.args, args, strict=True)), _all_finite(args)
+    powers = [_whole_power(interval, node.args.count(arg)) for arg, interval in by_term.items()]
+    result = powers[0]
+    for power in powers[1:]:
+        result = _times(result, power, finite)
     return result
 
 
@@ -155,8 +206,11 @@ def _inverse(a: Interval) -> Interval:
     return np.where(apart, np.divide(1.0, a[1]), -np.inf), np.where(apart, np.divide(1.0, a[0]), np.inf)
 
 
-def _div(node: Prim, args: list[Interval]) -> tuple[Any, Any, Any]:
-    return *_times(args[0], _inverse(args[1])), _zero(args[1])
+def _div(node: Prim, args: list[Interval]) -> tuple[Any, Any] | tuple[Any, Any, Any]:
+    above, (lo, hi) = args
+    if _all_finite(args) and np.all((lo > 0) | (hi < 0)):
+        return _times(above, (np.divide(1.0, hi), np.divide(1.0, lo)), True)
+    return *_times(above, _inverse(args[1]), False), _zero(args[1])
 
 
 def _zero(a: Interval) -> Any:
@@ -167,7 +221,7 @@ def _zero(a: Interval) -> Any:
 def _whole_power(a: Interval, n: int) -> Interval:
     if n == 1:
         return a
-    p, q = np.power(a[0], float(n)), np.power(a[1], float(n))
+    p, q = (a[0] * a[0], a[1] * a[1]) if n == 2 else (np.power(a[0], float(n)), np.power(a[1], float(n)))
     if n % 2:
         return p, q
     inside = (a[0] <= 0) & (a[1] >= 0)

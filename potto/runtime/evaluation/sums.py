@@ -37,6 +37,7 @@ def total(machine: Machine, term: Sum, lo: Value, hi: Value, env: dict[str, Valu
     shape = np.broadcast_shapes(*(a.shape for v in env.values() for a in all_arrays(v)))
     wide = {n: map_arrays(v, lambda a: a[..., None]) for n, v in env.items()}
     step = max(1, CHUNK // max(1, int(np.prod(shape))))
+    machine = machine if shape else machine.changed(summed=True)
     result: Value | None = None
     for start in range(int(first), int(last) + 1, step):
         index = np.arange(start, min(start + step, int(last) + 1), dtype=float)

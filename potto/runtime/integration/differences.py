@@ -9,7 +9,6 @@ a gap between the sides that does not shrink with the step (a kink) speak agains
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 
 import numpy as np
 
@@ -39,7 +38,7 @@ def by_differences(problem: Problem, order: Integral, sums: Sums) -> Sums:
     if sums.gross is not None:
         rough &= ~(sums.et <= CANCELLED * np.where(np.isfinite(sums.gross[1]), sums.gross[1], 0.0))
     for member in map(int, np.nonzero(rough.any(axis=(0, 1)))[0]):
-        one = replace(problem, machine=machine.with_directions(0)).member(member)
+        one = problem.changed(machine=machine.with_directions(0)).member(member)
         for d in np.nonzero(rough[:, :, member].any(axis=0))[0]:
             step = min(_reaches(one.env, int(d)), default=0.0) * REACH / 4
             if not 0 < step < np.inf:

@@ -114,9 +114,10 @@ def _in_groups(problem: Problem, flat: dict[str, Value], groups: Iterable[Ints])
 
 def _in_cases(problem: Problem, flat: dict[str, Value]) -> Sums:
     """The integrals of a batch, those together that meet the same cases of conditions inside of conditions."""
-    batch, apart = problem.batch, problem.apart()
+    batch = problem.batch
     if batch == 1:
         return solve(problem)
+    apart = problem.apart()
     try:
         sums = solve(apart)
         problem.events.take(apart.events, np.arange(batch))
@@ -143,8 +144,8 @@ def poisoned(sums: Sums, env: dict[str, Value]) -> Sums:
     for value in env.values():
         for cell in (value,) if isinstance(value, Cell) else value if isinstance(value, tuple) else ():
             if isinstance(cell, Cell):
-                bad = bad | np.isnan(cell.v)
-    if np.any(bad):
+                bad = bad | (cell.v != cell.v)
+    if bad is not False and np.any(bad):
         where = np.broadcast_to(bad, sums.v.shape[-1:])
         sums.v[:, where] = np.nan
     if sums.v.size == 1 and math.isfinite(sums.v[0, 0]):  # numpy takes its time over a single number

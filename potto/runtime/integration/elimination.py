@@ -5,8 +5,6 @@ Owns `step_by_step`.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from potto.integrate.elimination.recursion import Eliminated, one_by_one
@@ -50,7 +48,7 @@ def _member(known: Eliminated, problem: Problem) -> Sums | None:
     if row is None or not folds or any(fold.number for fold, _ in folds):
         return row
     try:
-        beside_folds(replace(problem, solver=tabled), known.plans[0], row)
+        beside_folds(problem.changed(solver=tabled), known.plans[0], row)
     except _NotEvaluated:
         return None
     return row

@@ -16,6 +16,7 @@ import numpy as np
 
 from potto.core.terms import Integral
 from potto.integrate.events import Degenerate, Events, Fold, Shortfall, TwoSided, Unsearched
+from potto.integrate.fixed.a_priori import certain
 from potto.integrate.pieces import Sums
 from potto.kernels.cells import Array, Bools, Ints
 from potto.runtime.answers.convergence import missing
@@ -24,8 +25,11 @@ from potto.runtime.integration.one_sided import one_direction
 from potto.runtime.integration.problem import Problem
 from potto.runtime.integration.quadrature import in_parts
 
-# Up to how many members are done one by one from the start: together they are no faster.
+# Up to how many members are done one by one, to the digits that each has by itself.
 FEW_MEMBERS = 10
+# The same for each variable where they are summands that proofs settle: eq. (1) at 8 values takes 5.5 ms so, and 6.3
+# together; a condition in one variable at 4 takes 1.8 and 1.6.
+PROVED = 4
 # Up to how many are done one by one where somebody has met something and nobody knows who; more are halved.
 MOST_UNKNOWN = 64
 # For how many members without the accuracy asked for it is tried what can be done for one.
@@ -61,14 +65,32 @@ def added_up(sums: Sums) -> Array:
 def by_members(problem: Problem, settled: Settled) -> Sums:
     """The sums of a batch."""
     found = Whole()
-    everybody = np.arange(problem.batch)
-    alone = [everybody] if problem.batch <= FEW_MEMBERS else _together(problem, everybody, settled, found)
+    summed = problem.machine.summed
+    few = PROVED * len(problem.term.variables) if summed else FEW_MEMBERS
+    todo = np.arange(problem.batch) if problem.batch > few else _proved(problem, found)
+    alone = [todo] if todo.size <= (1 if summed else FEW_MEMBERS) else _together(problem, todo, settled, found)
     for i in map(int, np.concatenate(alone)):
         one = np.array([i])
         with problem.among(one) as single:
             found.put(one, single.solver(single))
         problem.events.take(single.events, one)
     return found.sums
+
+
+def _proved(problem: Problem, found: Whole) -> Ints:
+    """Put the first members, as long as there is a proof for each; those that are left."""
+    everybody = np.arange(problem.batch)
+    plan = problem.plan(next(iter(preferred(problem))))
+    if plan.straight is None:
+        return everybody
+    for i in everybody:
+        one = everybody[i : i + 1]
+        with problem.among(one) as single:
+            sums = certain(plan.straight, single.machine, single.env)
+        if sums is None:
+            return everybody[i:]
+        found.put(one, sums)
+    return everybody[:0]
 
 
 def one_by_one(problem: Problem) -> Sums:

@@ -74,12 +74,12 @@ def on_both_sides(problem: Problem, order: Integral, sums: Sums) -> Sums:
 def _one_side(problem: Problem, order: Integral, side: int) -> tuple[Sums, bool]:
     """The derivatives to one side, and whether they are by another order of the variables: where surfaces are steep in
     the variable that is innermost rounding leaves them few digits."""
-    machine = replace(problem.machine.apart(), side=side)
+    machine = problem.machine.apart().changed(side=side)
     found, turned = iterated(problem.plan(order), machine, problem.env, problem.batch), False
     for other in itertools.islice(orders(order), 1, None):
         if (found.et <= ROUGH * np.abs(found.t) + ROUNDED * found.e[:, None]).all() or machine.exhausted():
             break
-        apart = replace(machine.apart(), side=side)
+        apart = machine.apart().changed(side=side)
         part = iterated(problem.plan(other), apart, problem.env, problem.batch)
         if (part.et <= found.et).all() and not apart.events.touched(problem.batch).any():
             found, turned = part, True

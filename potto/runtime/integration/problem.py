@@ -11,7 +11,8 @@ import threading
 from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -103,21 +104,31 @@ class Problem:
 
     # Others like it
 
+    def changed(self, **fields: Any) -> Problem:
+        """The problem with other values of some fields; what was found out is kept where it is about the same."""
+        other = object.__new__(Problem)
+        other.__dict__.update(self.__dict__, **fields)
+        if "env" in fields:
+            other.__dict__.pop("chosen", None)
+        if "term" in fields or "functions" in fields:
+            other.__dict__.pop("known", None)
+        return other
+
     def at(self, env: dict[str, Value], **changes: Any) -> Problem:
         """The problem at other parameters."""
         functions, extended = linked(env)
-        return replace(self, functions=functions, env=extended, **changes)
+        return self.changed(functions=functions, env=extended, **changes)
 
     def apart(self) -> Problem:
         """The problem with events of its own."""
-        return replace(self, machine=self.machine.apart())
+        return self.changed(machine=self.machine.apart())
 
     @contextmanager
     def among(self, index: Ints, env: dict[str, Value] | None = None) -> Iterator[Problem]:
         """The problem of some members by themselves, with a budget and events of their own."""
         with self.machine.among(index) as machine:
             part = self.picked(index) if env is None else self.at(env, batch=index.size)
-            yield replace(part, machine=machine)
+            yield part.changed(machine=machine)
 
     def picked(self, index: Ints) -> Problem:
         """The problem of some members; one of them by itself has plain numbers."""
@@ -126,7 +137,7 @@ class Problem:
             return float(a[index[0]]) if index.size == 1 else a[index]
 
         env = {name: map_arrays(value, part) for name, value in self.env.items()}
-        return replace(self, env=env, batch=index.size)
+        return self.changed(env=env, batch=index.size)
 
     def member(self, number: int) -> Problem:
         """The problem of one member by itself, apart."""
@@ -140,15 +151,26 @@ class Problem:
 
     def plan(self, order: Integral | None = None) -> Plan:
         """The plan for these functions and plain values, with the variables in this order; made once."""
-        problem = self if order is None or order is self.term else replace(self, term=order)
-        known = problem.known.plans
+        order = self.term if order is None else order
+        plan = self.chosen.get(order)
+        if plan is None:
+            plan = self.chosen[order] = (self if order is self.term else self.changed(term=order))._plan()
+        return plan
+
+    @cached_property
+    def chosen(self) -> dict[Integral, Plan]:
+        """The plans for orders of the variables that hold at these parameters, as far as anyone has asked."""
+        return {}
+
+    def _plan(self) -> Plan:
+        known = self.known.plans
         for plan in tuple(known):
-            if all(problem.decided(t) == value for t, value in plan.decisions) and problem.fitting(plan).all():
+            if all(self.decided(t) == value for t, value in plan.decisions) and self.fits(plan):
                 return plan
         with making:
-            plan = make(problem.term, problem.function, problem.decided, problem.plain_function, _Sampled(problem))
+            plan = make(self.term, self.function, self.decided, self.plain_function, _Sampled(self))
         known.append(plan)
-        fits = problem.fitting(plan)
+        fits = self.fitting(plan)
         if not fits.all():
             raise Mixed(fits)
         return plan
@@ -175,7 +197,7 @@ class Problem:
         where = np.asarray(where).reshape(-1)
         return [np.nonzero(where == number)[0] for number in range(int(where.max()) + 1)]
 
-    @property
+    @cached_property
     def known(self) -> Known:
         functions = tuple((name, f.digest) for name, f in sorted(self.functions.items()))
         key = (self.term.digest, functions, self.machine.linker.reached(self.term, *self.functions.values()))
@@ -195,6 +217,10 @@ class Problem:
         if isinstance(head, Var) and type(self.env.get(head.name)) is not Closure:
             return None
         return self.function(head)
+
+    def fits(self, plan: Plan) -> bool:
+        """Whether a plan holds for all members."""
+        return plan.premise is None or bool(self.fitting(plan).all())
 
     def fitting(self, plan: Plan) -> Bools:
         """The members for which a plan holds."""

@@ -26,6 +26,7 @@ ORDERS = (4, 6, 8, 10)
 PILOTS = 64
 BATCH = 4096  # members integrated at once
 FEW = 64  # members for which it does not pay to look for those that nothing cuts
+MOST_AXES = 2  # of a product rule for one member: with 4,096 nodes 14 of each of three, which hardly ever are enough
 
 
 def within(most: int | None, plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> Sums | None:
@@ -33,7 +34,7 @@ def within(most: int | None, plan: Plan, machine: Machine, env: dict[str, Value]
     if most is None or machine.record.spent + most >= machine.settings.max_evals:
         return in_parts(plan, machine, env, batch)
     settings = replace(machine.settings, max_evals=math.ceil(machine.record.spent + most))
-    tight = replace(machine.apart(), settings=settings)
+    tight = machine.apart().changed(settings=settings)
     sums = in_parts(plan, tight, env, batch)
     if tight.exhausted():
         return None
@@ -77,8 +78,13 @@ def _uncut(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> t
 
 
 def _alike(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> tuple[Bools, Sums] | None:
-    """Members with cells that are alike, where all of their cuts are plain."""
+    """Members with cells that are alike, where all of their cuts are plain.
+
+    One by itself is to have more digits there than product rules give over more than two variables.
+    """
     if plan.straight is None or any(level.peaks for level in plan.levels):
+        return None
+    if batch == 1 and len(plan.levels) - sum(d is not None for d in plan.degrees) > MOST_AXES:
         return None
     return together(plan.straight, plan.degrees, machine, env, batch)
 

@@ -42,7 +42,7 @@ def by_less(problem: Problem, order: Integral, sums: Sums) -> Sums:
     for rtol in TOLERANCES:
         most = math.ceil(machine.record.spent + EXTRA * machine.settings.max_evals)
         settings = replace(machine.settings, rtol=max(rtol, machine.rtol), max_evals=most)
-        loose = replace(machine.apart(), settings=settings)
+        loose = machine.apart().changed(settings=settings)
         other = in_parts(plan, loose, problem.env, problem.batch)
         met = loose.events.touched(problem.batch, TwoSided, Fold, Degenerate).any()
         if (other.e < sums.e).all() and (other.et <= sums.et).all() and not met:
@@ -78,7 +78,10 @@ def _covering(gap: Array, own: Array, others: Array) -> Array:
 
 
 def _within_a_trial(problem: Problem, order: Integral) -> Sums | None:
-    """The sums with another variable innermost; None where that tells nothing, or costs too much."""
+    """The sums with another variable innermost; None where that tells nothing, or costs too much, as it does where the
+    first order has taken more already."""
+    if problem.machine.record.spent > TRIAL:
+        return None
     for turned in itertools.islice(orders(order), 1, None):
         part = problem.apart()
         other = within(TRIAL, part.plan(turned), part.machine, part.env, part.batch)

@@ -127,7 +127,8 @@ def _evaluated(
     record.shortfalls, record.edges, record.within = {}, [], 0.0
     try:
         with machine.among(np.arange(size)) as together:
-            value = pad(together.with_directions(width).run(batch.function, args, None), width)
+            together = together.changed(directions=width, summed=not shape)
+            value = pad(together.run(batch.function, args, None), width)
         within, told = record.within, [*record.shortfalls.values(), *(np.isfinite(e.backward) for e in record.edges)]
     except PottoError:  # as it is written, it says what is wrong, and where
         return None, ~bad
