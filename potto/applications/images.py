@@ -7,6 +7,7 @@ image has a hole, and the pixels around it are found by halving the band.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -80,14 +81,8 @@ def sampled(call: Call, places: Sequence[Array], progress: Callable[[int], None]
     count = places[0].size
     found = Sampled(np.empty((0, count)))
     for start in range(0, count, BAND):
-        stop, gauge = min(start + BAND, count), Gauge()
-
-        def told(start: int = start, stop: int = stop, gauge: Gauge = gauge) -> None:
-            if progress is not None:
-                progress(start + int(gauge.share * (stop - start)))
-
-        gauge.told = told
-        with watching(gauge):
+        stop = min(start + BAND, count)
+        with nullcontext() if progress is None else watching(_gauge(progress, start, stop)):
             _fill(call, places, start, stop, found)
         if found.interrupted:
             break
@@ -96,6 +91,13 @@ def sampled(call: Call, places: Sequence[Array], progress: Callable[[int], None]
     if found.trouble is not None and found.holes == count:
         raise found.trouble
     return found
+
+
+def _gauge(progress: Callable[[int], None], start: int, stop: int) -> Gauge:
+    """What tells how many are done while one band is."""
+    gauge = Gauge()
+    gauge.told = lambda: progress(start + int(gauge.share * (stop - start)))
+    return gauge
 
 
 def _fill(call: Call, places: Sequence[Array], start: int, stop: int, found: Sampled) -> None:

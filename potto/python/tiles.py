@@ -97,9 +97,10 @@ def in_tiles(
 
     flat = flattened(given, batch)
     chosen = current(function._world.settings(function._file))
+    bare = type(function)(function._world, function._file, function._expr, function._whole)
 
     def task(parts: list[Part]) -> Task:
-        return Task(function, tuple(cut(flat, slice(*part)) for part in parts), wrt, chosen)
+        return Task(bare, tuple(cut(flat, slice(*part)) for part in parts), wrt, chosen)
 
     key = (function._call(given).elaborated, wrt, chosen)
     return batch.shaped(_Tiles(count, here, task, key).run(None if function._world._held else executor()))

@@ -38,13 +38,6 @@ class Gauge:
     samplings: int = 0
     told: Callable[[], None] | None = None
 
-    @property
-    def left(self) -> float | None:
-        """How many seconds are left, if what is left goes on as what is done; None while nobody knows."""
-        if not 0 < self.share <= 1:
-            return None
-        return (time.perf_counter() - self.start) * (1 - self.share) / self.share
-
     def begin(self) -> None:
         """Another evaluation begins."""
         self.start, self.evaluations, self.share, self.limit, self.samplings = time.perf_counter(), 0, 0.0, True, 0
