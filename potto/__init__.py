@@ -15,12 +15,14 @@ if TYPE_CHECKING:
     from potto.applications.hessian import hvp
     from potto.integrate.costs import counting
     from potto.python.api import Function, Module, ProgramWarning, Workspace, compile, deriv, grad, load
+    from potto.python.tiles import Interrupted
     from potto.runtime.answers.estimate import Estimate
 
 __version__ = "0.1.0"
 __all__ = [
     "Estimate",
     "Function",
+    "Interrupted",
     "Module",
     "PottoError",
     "ProgramWarning",
@@ -38,6 +40,7 @@ __all__ = [
 
 _HOMES = {
     "Estimate": "potto.runtime.answers.estimate",
+    "Interrupted": "potto.python.tiles",
     "counting": "potto.integrate.costs",
     "fit": "potto.applications.fitting",
     "hvp": "potto.applications.hessian",

@@ -7,6 +7,7 @@ image has a hole, and the pixels around it are found by halving the band.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,9 +17,11 @@ from potto.applications.png import encode
 from potto.diagnostics import PottoError
 from potto.kernels.cells import Array
 from potto.kernels.errors import WRONG_CALL
+from potto.runtime.answers.batches import INTERRUPTED
 from potto.runtime.answers.estimate import Estimate
+from potto.runtime.evaluation.record import Gauge, watching
 
-BAND = 1 << 15  # pixels of one array call
+BAND = 1 << 18  # pixels of one array call, which is evaluated in blocks
 HOLE = (128, 128, 128)
 DECADES = 16  # of an error map: from black, 1e-16, to white, 1
 
@@ -60,24 +63,41 @@ class Sampled:
         """Why numbers are not as accurate as was asked."""
         return list(dict.fromkeys(reason for answer in self.answers for reason in answer.reasons))
 
+    @property
+    def interrupted(self) -> bool:
+        """Whether somebody did not want to wait for the rest."""
+        return any(INTERRUPTED in answer.shortfalls for answer in self.answers)
+
 
 Call = Callable[..., tuple[Sequence[Any], Estimate]]  # places to the parts that are drawn, and where they are from
 
 
 def sampled(call: Call, places: Sequence[Array], progress: Callable[[int], None] | None = None) -> Sampled:
-    """The parts of a call at many places, band by band. `progress` is told how many are done.
+    """The parts of a call at many places, band by band. `progress` is told how many are done. Of a call that was
+    interrupted what it has done is kept, and no other follows.
 
     Raises the PottoError of the first place if the call has no value at any, or if it is no call of the function.
     """
     count = places[0].size
     found = Sampled(np.empty((0, count)))
     for start in range(0, count, BAND):
-        _fill(call, places, start, min(start + BAND, count), found)
+        stop = min(start + BAND, count)
+        with nullcontext() if progress is None else watching(_gauge(progress, start, stop)):
+            _fill(call, places, start, stop, found)
+        if found.interrupted:
+            break
         if progress is not None:
-            progress(min(start + BAND, count))
+            progress(stop)
     if found.trouble is not None and found.holes == count:
         raise found.trouble
     return found
+
+
+def _gauge(progress: Callable[[int], None], start: int, stop: int) -> Gauge:
+    """What tells how many are done while one band is."""
+    gauge = Gauge()
+    gauge.told = lambda: progress(start + int(gauge.share * (stop - start)))
+    return gauge
 
 
 def _fill(call: Call, places: Sequence[Array], start: int, stop: int, found: Sampled) -> None:

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from potto.runtime.answers.estimate import Estimate
 
 
+MOST_WORKERS = 1024
+
+
 def add_options(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("numbers")
     group.add_argument("--method", choices=METHODS, help=_help("how integrals are estimated", "method"))
@@ -27,6 +30,17 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--max-evals", type=_whole, help=_help("the most evaluations", "max_evals"))
     group.add_argument("--backend", choices=BACKENDS, help=_help("what computes at many points", "backend"))
     group.add_argument("--stats", action="store_true", help="say what the evaluation cost")
+
+
+def add_workers(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--workers", metavar="N", type=_some, help="processes for what takes seconds (default: as many "
+                        "as there are processors); the numbers are the same")  # fmt: skip
+
+
+def _some(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text) <= MOST_WORKERS:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of processes; write 1 for this one alone")
+    return int(text)
 
 
 def _number(text: str) -> float:

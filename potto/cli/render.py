@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from potto.cli.calling import arguments_in, assignment, function_in
 from potto.cli.console import Console
-from potto.cli.numbers import accounts, add_options, settings_of, show_stats
+from potto.cli.numbers import accounts, add_options, add_workers, settings_of, show_stats
 
 if TYPE_CHECKING:
     from potto.applications.images import Grid, Sampled
@@ -37,6 +37,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--wrt", metavar="NAME", action="append", default=[], help="draw also the derivative by this")
     parser.add_argument("--range", metavar="LO,HI", type=_range, help="what is black and what is white")
     parser.add_argument("--error", action="store_true", help="draw also the estimated error, by powers of ten")
+    add_workers(parser)
     add_options(parser)
 
 
@@ -94,9 +95,13 @@ class Picture:
         """The value, the derivatives and the errors at places, as parts one after the other."""
         from potto.applications.images import flat
         from potto.python.api import grad
+        from potto.python.tiles import Interrupted
 
         here = {**self.given, **dict(zip(self.axes, places, strict=True))}
-        answer = (grad(self.function, self.wrt) if self.wrt else self.function)(**here)
+        try:
+            answer = (grad(self.function, self.wrt) if self.wrt else self.function)(**here)
+        except Interrupted as stop:
+            answer = stop.estimate
         value, error = flat(answer.value), flat(answer.error)
         self.width = len(value)
         tangents, errors = (answer.tangent, answer.tangent_error) if self.wrt else ((), ())
@@ -120,7 +125,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         file = opened(world, options.file)
         picture = _picture(world, file, options)
         with accounts(options):
-            found = _sampled(picture, grid, settings, console)
+            found = _sampled(picture, grid, settings, options.workers, console)
     except PottoError as error:
         console.progress("")
         return fail(error, options, console)
@@ -130,6 +135,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
         console.complain(f"potto render: {error}")
         return 1
     _tell(picture, found, grid, time.perf_counter() - start, options, console)
+    if found.interrupted:
+        return 130
     return report_others(world, file, options, console)
 
 
@@ -153,19 +160,23 @@ def _picture(world: World, file: str, options: argparse.Namespace) -> Picture:
     return Picture(function, given, axes, tuple(known))
 
 
-def _sampled(picture: Picture, grid: Grid, chosen: Settings, console: Console) -> Sampled:
+def _sampled(picture: Picture, grid: Grid, chosen: Settings, workers: int | None, console: Console) -> Sampled:
     """All pixels, with progress for a person who waits."""
     from dataclasses import asdict
 
     from potto.applications.images import sampled
     from potto.projects.settings import settings
+    from potto.python.workers import Workers
+    from potto.runtime.answers.printing import format_seconds
 
-    total = grid.width * grid.height
+    total, start = grid.width * grid.height, time.perf_counter()
 
     def progress(done: int) -> None:
-        console.progress(f"{100 * done // total} % of {total:,} pixels")
+        left = (time.perf_counter() - start) * (total - done) / max(done, 1)
+        rest = f", {format_seconds(left)} left" if 0 < done < total and left >= 1 else ""
+        console.progress(f"{100 * done // total} % of {total:,} pixels{rest}")
 
-    with settings(**asdict(chosen)):
+    with Workers(workers) as pool, settings(**asdict(chosen), executor=pool):
         found = sampled(picture.call, grid.middles(), progress)
     console.progress("")
     return found

@@ -12,10 +12,13 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 from potto.diagnostics import PottoError, declare
 from potto.source import Span
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
 
 BAD_SETTING = declare("P0520", "a setting that does not exist or cannot have this value")
 
@@ -65,6 +68,7 @@ class Settings:
 
 DEFAULTS = Settings()
 _changes: ContextVar[Mapping[str, object]] = ContextVar("potto_settings", default=MappingProxyType({}))
+_executor: ContextVar[Executor | None] = ContextVar("potto_executor", default=None)
 
 
 def current(base: Settings = DEFAULTS) -> Settings:
@@ -73,8 +77,16 @@ def current(base: Settings = DEFAULTS) -> Settings:
     return replace(base, **changes) if changes else base  # type: ignore[arg-type]
 
 
+def executor() -> Executor | None:
+    """Who evaluates tiles of large batches; None for this thread alone. Answers are the same."""
+    return _executor.get()
+
+
 def problem(name: str, value: object) -> str | None:
     """Why `value` cannot be the setting `name`, or None if it can."""
+    if name == "executor":
+        able = value is None or callable(getattr(value, "submit", None))
+        return None if able else f"executor must be a concurrent.futures.Executor or None, not {value!r}"
     if name in CHOICES:
         if value not in CHOICES[name]:
             return f"{name} must be one of {', '.join(CHOICES[name])}, not {value!r}"
@@ -84,7 +96,8 @@ def problem(name: str, value: object) -> str | None:
             return "machine code needs llvmlite: pip install 'potto[jit]'"
         return None
     if name not in {field.name for field in fields(Settings)}:
-        return f"there is no setting `{name}`; there are {', '.join(field.name for field in fields(Settings))}"
+        known = (*(field.name for field in fields(Settings)), "executor")
+        return f"there is no setting `{name}`; there are {', '.join(known)}"
     if isinstance(value, bool) or not isinstance(value, int | float):
         return f"{name} must be a number, not {value!r}"
     if name in ("rtol", "atol"):
@@ -97,13 +110,20 @@ def problem(name: str, value: object) -> str | None:
 
 @contextmanager
 def settings(**changes: object) -> Iterator[Settings]:
-    """Change the settings for the `with` block: `with potto.settings(method="mc", samples=10_000, seed=7): ...`."""
+    """Change the settings for the `with` block: `with potto.settings(method="mc", samples=10_000, seed=7): ...`.
+
+    `executor`: any `concurrent.futures.Executor`, which evaluates tiles of large batches (threads, processes,
+    `dask.distributed.Client(…).get_executor()`, mpi4py's); None for none. It stays open, and its owner's.
+    """
     for name, value in changes.items():
         complaint = problem(name, value)
         if complaint is not None:
             raise PottoError([BAD_SETTING(Span(0, 0), complaint)])
-    token = _changes.set({**_changes.get(), **changes})
+    numbers = {name: value for name, value in changes.items() if name != "executor"}
+    token = _changes.set({**_changes.get(), **numbers})
+    helpers = _executor.set(changes.get("executor", _executor.get()))  # type: ignore[arg-type]  # `problem` looked
     try:
         yield current()
     finally:
+        _executor.reset(helpers)
         _changes.reset(token)

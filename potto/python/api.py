@@ -14,6 +14,7 @@ import os
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from potto.diagnostics import Diagnostic, PottoError
@@ -23,7 +24,9 @@ from potto.kernels.errors import wrong_call
 from potto.modules import DefinitionTarget, ModuleTarget, find_module, names, resolve
 from potto.modules.kinds import NO_MODULE
 from potto.python.arguments import Batch, batch_of, misfit, moving, value_of
-from potto.python.calls import Call, Form, Gradient, gradient
+from potto.python.calls import Call, Form, Gradient
+from potto.python.tiles import in_tiles
+from potto.python.travel import Travelling
 from potto.reports.render import ProgramError, display_name
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.evaluation.functions import Closure
@@ -74,6 +77,9 @@ class Workspace:
     def reload(self) -> bool:
         """Read what has changed on disk; True if something had. Modules and functions that exist see the new texts."""
         return self._world.refresh()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return partial(Workspace, roots=self._world.files.roots[1:]), (self.root,)
 
     def __repr__(self) -> str:
         return f"potto.Workspace({display_name(self.root)!r})"
@@ -140,7 +146,7 @@ class ProgramWarning(UserWarning):
     """A module is broken in part. What does not need the broken part can be used."""
 
 
-class Module:
+class Module(Travelling):
     """The definitions of a file, as attributes."""
 
     def __init__(self, world: World, file: str) -> None:
@@ -189,7 +195,7 @@ def expression(module: Module, text: str) -> Any:
     return _member(module._world, module._file, module._world.parse(text))
 
 
-class Function:
+class Function(Travelling):
     """A function of Potto, to be called with numbers, tuples, numpy arrays (which broadcast) and other functions.
 
     A call that gives all arguments of all groups is evaluated; one that gives the first groups only is a function of
@@ -221,7 +227,7 @@ class Function:
         arguments, batch = self._arguments(given)
         if self._is_derivative():
             self._must_move(given)
-        return self._call(given).run([value for _, value in arguments], batch)
+        return in_tiles(self, given, (), arguments, batch)
 
     def _is_derivative(self) -> bool:
         """Whether this is the derivative of a function, whose arguments are all that moves."""
@@ -376,7 +382,9 @@ class GradientFunction:
         function = self._function
         given = (*function._given, (args, kwargs))
         arguments, batch = function._arguments(given)
-        return gradient(function._call(given), arguments, self._wrt, batch)
+        found = in_tiles(function, given, self._wrt, arguments, batch)
+        assert isinstance(found, Gradient)
+        return found
 
     def __repr__(self) -> str:
         return f"<gradient of {self._function!r} by {', '.join(self._wrt)}>"

@@ -34,6 +34,11 @@ class Batch:
 
     shape: tuple[int, ...] | None
 
+    @property
+    def size(self) -> int:
+        """How many members it has."""
+        return 1 if self.shape is None else int(np.prod(self.shape))
+
     def flat(self, array: np.ndarray[Any, np.dtype[np.float64]]) -> Any:
         """An array as a part of the batch, as a number where that has one member. An empty batch is run with one point,
         whose answer is dropped."""
@@ -89,6 +94,29 @@ def batch_of(arguments: Iterable[tuple[str, Any]]) -> Batch:
     except ValueError:
         told = ", ".join(f"`{name}` has shape {shape}" for name, shape in shapes)
         raise wrong_call(f"these arrays do not broadcast against each other: {told}") from None
+
+
+def flattened(given: Any, batch: Batch) -> Any:
+    """What calls were given, with every array in it as one row over the batch."""
+    return _mapped(given, lambda array: batch.flat(array.astype(np.float64)))
+
+
+def cut(given: Any, members: slice) -> Any:
+    """Some members of what calls were given, which is `flattened`."""
+    return _mapped(given, lambda array: array[members])
+
+
+def _mapped(given: Any, change: Callable[[Any], Any]) -> Any:
+    """What calls were given with `change` done to every array. An answer over a batch becomes its numbers."""
+    if isinstance(given, np.ndarray):
+        return change(given) if given.ndim else given
+    if isinstance(given, tuple | list):
+        return type(given)(_mapped(item, change) for item in given)
+    if isinstance(given, dict):
+        return {name: _mapped(item, change) for name, item in given.items()}
+    if isinstance(given, Estimate) and given.value.__class__ is not float and given.value is not None:
+        return _mapped(given.value if given.tangent is None else (given.value, given.tangent), change)
+    return given
 
 
 def _arrays(argument: Any) -> Iterable[np.ndarray[Any, Any]]:

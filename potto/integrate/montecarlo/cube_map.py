@@ -11,6 +11,7 @@ surfaces is missed.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -95,12 +96,9 @@ class Chart:
         assert isinstance(values, tuple)
         lo, hi, rows = frame_rows(level, values)
         with np.errstate(invalid="ignore", over="ignore"):
-            cuts = np.stack([label_of(lo, hi, as_array(row.x, u.size)) for row in rows if row.cut >= 0] or [u[:0]])
-        if not cuts.size:
-            return u, None
-        inside = (cuts > 0) & (cuts < 1)
-        ends = np.concatenate((np.zeros((1, u.size)), np.where(inside, cuts, 1.0), np.ones((1, u.size))))
-        return crowd(np.sort(ends, axis=0), self.share, u)
+            cuts = [label_of(lo, hi, row.x) for row in rows if row.cut >= 0]
+            inside = [np.where((cut > 0) & (cut < 1), cut, 1.0) for cut in cuts]
+        return crowd(ascending(inside), self.share, u) if inside else (u, None)
 
     def above(self, surface: Term, env: dict[str, Value], n: int) -> Bools:
         """The points at which a surface is not negative."""
@@ -116,26 +114,61 @@ class Chart:
         return (_held(lo), _held(hi)) if self.machine.frozen else (lo, hi)
 
 
-def crowd(ends: Array, share: float, u: Array) -> tuple[Array, Array | None]:
+FEW = 6  # rows, up to which comparing pairs of them beats sorting columns (3 to 20 times at 16 K columns)
+
+
+def ascending(rows: Sequence[Array]) -> list[Array]:
+    """0, the places (n,) or () each in ascending order, and 1, all in [0, 1]."""
+    if len(rows) > FEW:
+        rows = list(np.sort(np.stack(np.broadcast_arrays(*rows)), axis=0))
+    else:
+        rows = list(rows)
+        for last in range(len(rows) - 1, 0, -1):
+            for i in range(last):
+                rows[i], rows[i + 1] = np.minimum(rows[i], rows[i + 1]), np.maximum(rows[i], rows[i + 1])
+    return [np.zeros(()), *rows, np.ones(())]
+
+
+def crowd(ends: Sequence[Array], share: float, u: Array) -> tuple[Array, Array | None]:
     """Points of [0, 1] for numbers u (n,) evenly spread over it, and the weights with which they count.
 
-    ends: (s + 1, n) the ends of stretches, from 0 to 1. A stretch shorter than `share` gets that much of the points.
+    ends: of stretches, from 0 to 1, (n,) each or () where they are the same for all. A stretch shorter than `share`
+    gets that much of the points. Only points beside such stretches are moved.
     """
-    length = np.diff(ends, axis=0)
-    thin = (length > 8 * EPS) & (length < share)
-    if not thin.any():
+    thin: Any = False
+    for low, high in itertools.pairwise(ends):
+        length = high - low
+        thin = thin | ((length > 8 * EPS) & (length < share))
+    if not np.any(thin):
         return u, None
-    count = thin.sum(axis=0)
-    least = np.minimum(share, 0.5 / np.maximum(count, 1))
-    rest = 1 - np.where(thin, length, 0.0).sum(axis=0)
-    part = np.where(thin, least, length * ((1 - count * least) / rest))
-    upto = np.cumsum(part, axis=0)
-    at = np.minimum((u >= upto).sum(axis=0), length.shape[0] - 1)[None]
-    start, size, whole = (np.take_along_axis(x, at, axis=0)[0] for x in (upto - part, part, length))
+    every = bool(np.all(thin))
+    at = slice(None) if every else np.nonzero(thin)[0]
+    moved, weights = _spread([end[at] if end.ndim else end for end in ends], share, u[at])
+    if every:
+        return moved, weights
+    label, weight = u.copy(), np.ones(u.shape)
+    label[at], weight[at] = moved, weights
+    return label, weight
+
+
+def _spread(ends: Sequence[Array], share: float, u: Array) -> tuple[Array, Array]:
+    """The same for points that are all beside a thin stretch."""
+    lengths = [high - low for low, high in itertools.pairwise(ends)]
+    thin = [(length > 8 * EPS) & (length < share) for length in lengths]
+    count = sum(x.astype(np.float64) for x in thin)
+    rest = 1 - sum(np.where(x, length, 0.0) for x, length in zip(thin, lengths, strict=True))
+    least = np.where(rest > share / 2, np.minimum(share, 0.5 / count), 1 / count)  # all are thin, if they are many
+    label, weight, upto = u, np.ones(u.shape), np.zeros(())
     with np.errstate(invalid="ignore", divide="ignore"):
-        weight = np.where(size > 0, whole / size, 1.0)
-    first = np.take_along_axis(ends, at, axis=0)[0]
-    return np.clip(first + (u - start) * weight, first, first + whole), weight
+        scale = (1 - count * least) / rest
+        for low, length, narrow in zip(ends, lengths, thin, strict=False):
+            part = np.where(narrow, least, length * scale)
+            counts = np.where(narrow, length / least, 1 / scale)
+            here = (u >= upto) & (part > 0)
+            label = np.where(here, low + np.minimum((u - upto) * counts, length), label)
+            weight = np.where(here, counts, weight)
+            upto = upto + part
+    return label, weight
 
 
 def _held(bound: Cell) -> Cell:
@@ -143,13 +176,12 @@ def _held(bound: Cell) -> Cell:
     return Cell(bound.v, bound.e, (None,) * len(bound.t))
 
 
-def label_of(lo: Cell, hi: Cell, x: Array) -> Array:
+def label_of(lo: Cell, hi: Cell, x: Number) -> Array:
     """The label of a point between the bounds: the inverse of `stretch`."""
-    n = x.size
-    low, high = as_array(lo.v, n), as_array(hi.v, n)
+    low, high = lo.v, hi.v
     a, b = np.minimum(low, high), np.maximum(low, high)
     with np.errstate(invalid="ignore", divide="ignore"):
-        finite = (x - low) / (high - low)
+        finite = np.divide(x - low, high - low)
         if np.isfinite(a).all() and np.isfinite(b).all():
             return finite
         up, down = np.isinf(b), np.isinf(a)
@@ -160,13 +192,13 @@ def label_of(lo: Cell, hi: Cell, x: Array) -> Array:
 
 def stretch(lo: Cell, hi: Cell, u: Array, k: int) -> tuple[Cell, Cell]:
     """The point at label u of [lo, hi] and dx/du, as cells; infinite ends by the same maps as in quadrature."""
-    low, high = as_array(lo.v, u.size), as_array(hi.v, u.size)
-    sign = np.where(high < low, -1.0, 1.0)
-    a, b = np.minimum(low, high), np.maximum(low, high)
+    low, high = lo.v, hi.v
     rate = tuple(_minus(hi.t, lo.t, d) for d in range(k))
-    if np.isfinite(a).all() and np.isfinite(b).all():
+    if np.isfinite(low).all() and np.isfinite(high).all():
         t = tuple(_mix(lo.t, hi.t, d, u) for d in range(k))
         return Cell(low + (high - low) * u, None, t), Cell(high - low, None, rate)
+    sign = np.where(high < low, -1.0, 1.0)
+    a, b = np.minimum(low, high), np.maximum(low, high)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         w = 2 * u - 1
         up, down = np.isinf(b), np.isinf(a)

@@ -49,9 +49,15 @@ class Largest:
     def add(self, samples: Sums) -> None:
         for name in ("v", "t"):
             x = np.abs(getattr(samples, name))
+            before = self.most.get(name)
+            if before is not None and before.shape[:-1] == x.shape[:-1] and before.shape[-1] == FEW:
+                larger = (x > before[..., :1]).reshape(-1, x.shape[-1])
+                some = np.flatnonzero(larger[0] if len(larger) == 1 else larger.any(axis=0))
+                if not some.size:
+                    continue
+                x = x[..., some]  # hardly any, after the first chunks
             if x.shape[-1] > FEW:
                 x = np.partition(x, x.shape[-1] - FEW, axis=-1)[..., -FEW:]
-            before = self.most.get(name)
             if before is not None:
                 shape = np.broadcast_shapes(before.shape[:-1], x.shape[:-1])
                 both = [np.broadcast_to(y, (*shape, y.shape[-1])) for y in (before, x)]
@@ -161,8 +167,8 @@ class Outcomes:
         self.counts = np.zeros(len(self.ways), dtype=np.int64)
 
     def add(self, env: dict[str, Value], n: int, machine: Evaluator) -> None:
-        """Count samples in."""
-        if not self.groups:
+        """Count samples in, until all ways have come often."""
+        if self.counts.min(initial=FEW) >= FEW:
             return
         sides = {g: side for g, side, _ in fallen(self.plan, env, n, machine, self.groups)}
         for i, way in enumerate(self.ways):

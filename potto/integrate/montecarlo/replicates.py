@@ -27,10 +27,16 @@ class _Spread:
     means: list[Array] = field(default_factory=list)
     variances: list[Array] = field(default_factory=list)
 
-    def add(self, x: Array) -> None:
-        self.counts.append(x.shape[-1])
-        self.means.append(x.mean(axis=-1))
-        self.variances.append(x.var(axis=-1))
+    def add(self, x: Array, spread: bool) -> None:
+        n = x.shape[-1]
+        mean = np.add.reduce(x, axis=-1) / n
+        self.counts.append(n)
+        self.means.append(mean)
+        if spread:
+            off = x - mean[..., None]
+            self.variances.append(np.einsum("...i,...i->...", off, off) / n)
+        else:
+            self.variances.append(np.zeros_like(mean))
 
     def outcome(self) -> tuple[Array, Array]:
         """The mean, and the variance of the mean."""
@@ -50,7 +56,7 @@ class Moments:
 
     def add(self, samples: Sums) -> None:
         for name, part in self.parts.items():
-            part.add(getattr(samples, name))
+            part.add(getattr(samples, name), name in ("v", "t"))  # nobody asks how errors vary
 
     @property
     def mean(self) -> Sums:

@@ -37,12 +37,13 @@ from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.sobol import MOST, Sobol
 from potto.kernels.cells import Array, Cell, Mask, Value, map_arrays
+from potto.kernels.chunks import POINTS
 
 SIGMAS = 4.0  # a reported error in standard errors: too small once in 16,000 times
 REPLICATES = 16
 # The same for a standard error that is itself estimated from 16 scramblings: Student's t with 15 degrees of freedom.
 STUDENT = 5.48
-CHUNK = 1 << 15
+CHUNK = POINTS
 FIRST = 1 << 5  # points of each scrambling before the first look at the error
 # Evaluations of a sample of a surface, which has two sides, and of a line that quadrature takes, about; how many
 # samples are taken at least, however few evaluations are allowed.
@@ -332,8 +333,8 @@ class _Run:
         numbers, errors = dense(value, k, (n,))
         errors = np.zeros(numbers.shape) if errors is None else errors
         (f, ft), (e, et) = ((x[:, 0], x[:, 1:]) for x in (numbers, errors))
-        bad = np.nonzero(np.isnan(f).any(axis=0))[0]
-        if bad.size:
+        if np.isnan(f.sum()):  # of infinite ones too
+            bad = np.nonzero(np.isnan(f).any(axis=0))[0]
             zero = guarded_samples(self.plan, point.env, sides, bad, self.machine)
             ft[:, :, bad] = np.nan
             for part in (f, ft, et):
@@ -341,10 +342,11 @@ class _Run:
         return self.weighted(Sums(f, e, ft, et), point.volume, n)
 
     def weighted(self, sums: Sums, volume: Cell, n: int) -> Sums:
-        k = self.machine.directions
-        size = _full(volume.v, n)
+        k, size = self.machine.directions, volume.v
         v, t = sums.v * size, sums.t * size
-        e, et = sums.e * np.abs(size) + ROUNDING * np.abs(v), sums.et * np.abs(size) + ROUNDING * np.abs(t)
+        e, et = ROUNDING * np.abs(v), ROUNDING * np.abs(t)
+        if sums.e.any() or sums.et.any():
+            e, et = e + sums.e * np.abs(size), et + sums.et * np.abs(size)
         if any(x is not None for x in volume.t[:k]):
             rates = np.stack([_full(x, n) for x in volume.t[:k]])
             t, et = t + sums.v[:, None] * rates, et + sums.e[:, None] * np.abs(rates)

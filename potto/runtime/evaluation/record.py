@@ -1,12 +1,12 @@
 """The record of one evaluation: what it has done so far, and how far it has come, for whoever watches.
 
-Owns `Record`, `Gauge` and `watching`. Without a watcher no gauge is kept.
+Owns `Record`, `Gauge`, `watching` and `advancing`. Without a watcher no gauge is kept.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -27,7 +27,8 @@ class Gauge:
 
     start: when it began, by `time.perf_counter`. evaluations: of integrands so far. share: how much of the work is
     done, 0 while nobody knows. limit: whether that is a share of the most that is allowed, so that it may be over
-    sooner. samplings: integrals that are sampled; of the second one on, nobody knows how many are to come.
+    sooner. samplings: integrals that are sampled; of the second one on, nobody knows how many are to come. told: is
+    called after each block of a large batch.
     """
 
     start: float = 0.0
@@ -35,6 +36,7 @@ class Gauge:
     share: float = 0.0
     limit: bool = True
     samplings: int = 0
+    told: Callable[[], None] | None = None
 
     def begin(self) -> None:
         """Another evaluation begins."""
@@ -60,6 +62,25 @@ def watching(gauge: Gauge) -> Iterator[Gauge]:
     token = _gauge.set(gauge)
     try:
         yield gauge
+    finally:
+        _gauge.reset(token)
+
+
+@contextmanager
+def advancing() -> Iterator[Callable[[float, int], None]]:
+    """In this block a batch is evaluated in parts, and how far it is as a whole is told by who does that: the share of
+    its members, and the evaluations."""
+    gauge = _begun()
+    token = _gauge.set(None)
+
+    def told(share: float, evaluations: int) -> None:
+        if gauge is not None:
+            gauge.share, gauge.evaluations, gauge.limit = share, evaluations, False
+            if gauge.told is not None:
+                gauge.told()
+
+    try:
+        yield told
     finally:
         _gauge.reset(token)
 

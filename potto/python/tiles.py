@@ -1,0 +1,243 @@
+"""Large batches in tiles: progress, interruption that keeps what is done, and as many processes as an executor has.
+
+Owns `in_tiles` and `Interrupted`. A batch is evaluated in blocks, whose size the first call of a function finds out by
+the clock and the process keeps: so answers are the same to the last bit wherever and in whatever company a block is
+evaluated. (They are not quite if members are blocked otherwise: numpy adds up rows and columns in another order then,
+which changes the last one or two digits, far within the error bars.) A tile is as many blocks as take half a second;
+tiles go to the executor of `potto.settings`. What an executor loses (a process that was killed, a machine that is gone)
+is evaluated again: by it, and then here.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
+from dataclasses import asdict, dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from potto.diagnostics import PottoError
+from potto.kernels.cells import Value, all_arrays, map_arrays
+from potto.projects.settings import Settings, current, executor, settings
+from potto.python.arguments import Batch, cut, flattened
+from potto.python.calls import gradient
+from potto.runtime.answers.batches import joined, unfinished
+from potto.runtime.answers.estimate import Estimate
+from potto.runtime.evaluation.record import advancing
+
+if TYPE_CHECKING:
+    from potto.python.api import Function
+
+LEAST = 2048  # members, from which on a batch has blocks: below, the calls for some would cost as much as all
+# Members of a block: as many as take ENOUGH seconds at least, tried from PILOT on; after less than LITTLE with 64 times
+# as many, else with 8 times. In MOST a picture takes 3 % longer than in one piece, in half as many 50 %.
+PILOT, MOST = 1 << 6, 1 << 16
+ENOUGH, LITTLE = 0.25, 0.03
+COLD = 2.0  # seconds, less than which the first run may only have been slow because it was the first
+TILE = 0.5  # seconds of a tile by the clock
+WORTH = 0.3  # seconds of work from which on others are asked to help; executors may say otherwise, by `worth`
+TRIES = 2  # of an executor at a tile
+MOST_SIZES = 4096
+
+Part = tuple[int, int]  # members first..stop-1
+
+
+class Interrupted(KeyboardInterrupt):
+    """A batch was interrupted. `estimate` has what was done until then; the other members are nan."""
+
+    def __init__(self, estimate: Estimate) -> None:
+        super().__init__("interrupted")
+        self.estimate = estimate
+
+
+@dataclass(frozen=True)
+class Task:
+    """Blocks of a batch as they travel: the function, its arguments in one row of members for each block, what it is
+    differentiated by, and how numbers are asked for."""
+
+    function: Function
+    blocks: tuple[Any, ...]
+    wrt: tuple[str, ...]
+    settings: Settings
+
+    def answers(self) -> list[Estimate] | None:
+        """The answers, block by block; None if there is an error, which is then met again by who asks."""
+        found = []
+        with settings(**asdict(self.settings), executor=None):
+            try:
+                for given in self.blocks:
+                    arguments, batch = self.function._arguments(given)
+                    found.append(whole(self.function, given, self.wrt, arguments, batch))
+            except PottoError:
+                return None
+        return found
+
+
+def whole(
+    function: Function, given: Any, wrt: tuple[str, ...], arguments: list[tuple[str, Value]], batch: Batch
+) -> Estimate:
+    """The estimate of a call for all members of a batch at once, with its derivatives by `wrt`."""
+    call = function._call(given)
+    return gradient(call, arguments, wrt, batch) if wrt else call.run([value for _, value in arguments], batch)
+
+
+def in_tiles(
+    function: Function, given: Any, wrt: tuple[str, ...], arguments: list[tuple[str, Value]], batch: Batch
+) -> Estimate:
+    """The estimate of a call, in tiles if its batch is large. Raises Interrupted, PottoError."""
+    count = batch.size
+    if count < LEAST or any(a.size != count for _, value in arguments for a in all_arrays(value)):
+        return whole(function, given, wrt, arguments, batch)
+
+    def here(part: Part) -> Estimate:
+        at = slice(*part)
+        some = [(name, map_arrays(value, lambda a: a[at])) for name, value in arguments]
+        return whole(function, given, wrt, some, Batch((part[1] - part[0],)))
+
+    flat = flattened(given, batch)
+    chosen = current(function._world.settings(function._file))
+    bare = type(function)(function._world, function._file, function._expr, function._whole)
+
+    def task(parts: list[Part]) -> Task:
+        return Task(bare, tuple(cut(flat, slice(*part)) for part in parts), wrt, chosen)
+
+    key = (function._call(given).elaborated, wrt, chosen)
+    return batch.shaped(_Tiles(count, here, task, key).run(None if function._world._held else executor()))
+
+
+_sizes: dict[Any, int] = {}  # of blocks, for functions called before
+
+
+@dataclass
+class _Tiles:
+    """One batch. key: for whom the size of blocks is kept. done: the answers so far, by the first member of their
+    block. again: how many blocks were lost. spent: seconds of the last block that was evaluated here."""
+
+    count: int
+    here: Callable[[Part], Estimate]
+    task: Callable[[list[Part]], Task]
+    key: Any
+    done: dict[int, Estimate] = field(default_factory=dict)
+    blocks: list[Part] = field(default_factory=list)
+    again: int = 0
+    spent: float = 0.0
+    start: float = field(default_factory=time.perf_counter)
+
+    def run(self, pool: Executor | None) -> Estimate:
+        with advancing() as told:
+            try:
+                self._all(pool, told)
+            except KeyboardInterrupt:
+                if not self.done:
+                    raise
+                raise Interrupted(self.estimate()) from None
+        return self.estimate()
+
+    def _all(self, pool: Executor | None, told: Callable[[float, int], None]) -> None:
+        size = _sizes.get(self.key) or self._size()
+        self.blocks = list(_parts(self.count, size))
+        for number, block in enumerate(self.blocks):
+            if block[0] not in self.done:
+                self._alone(block)
+            told(block[1] / self.count, sum(part.evals for part in self.done.values()))
+            rest = self.blocks[number + 1 :]
+            if pool is not None and self.spent * len(rest) > getattr(pool, "worth", WORTH):
+                return self._shared(pool, rest, told)
+        return None
+
+    def _size(self) -> int:
+        """The size of blocks, by trying; one that was taken is done."""
+        size = PILOT
+        while 2 * size <= self.count and size < MOST:
+            self._alone((0, size))
+            if ENOUGH <= self.spent < COLD:
+                self._alone((0, size))
+            if self.spent >= ENOUGH:
+                break
+            size = min(size * (64 if self.spent < LITTLE else 8), MOST)
+            self.done.clear()
+        if len(_sizes) > MOST_SIZES:
+            _sizes.clear()
+        _sizes[self.key] = size
+        return size
+
+    def _alone(self, block: Part) -> Estimate:
+        before = time.perf_counter()
+        found = self.done[block[0]] = self.here(block)
+        self.spent = time.perf_counter() - before - found.compile_seconds
+        return found
+
+    def _shared(self, pool: Executor, rest: list[Part], told: Callable[[float, int], None]) -> None:
+        """The rest by others."""
+        most = max(1, len(rest) // (2 * workers_of(pool)))
+        each = max(1, min(most, round(TILE / max(self.spent, 1e-6))))
+        waiting: dict[Future[list[Estimate] | None], tuple[list[Part], int]] = {}
+        try:
+            for first in range(0, len(rest), each):
+                self._ask(pool, rest[first : first + each], 1, waiting)
+            while waiting:
+                finished, _ = wait(waiting, return_when=FIRST_COMPLETED)
+                for future in finished:
+                    tile, tries = waiting.pop(future)
+                    self._take(pool, future, tile, tries, waiting)
+                members = sum(part.member_converged.size for part in self.done.values())
+                told(members / self.count, sum(part.evals for part in self.done.values()))
+        finally:
+            for future in waiting:
+                future.cancel()
+
+    def _ask(self, pool: Executor, tile: list[Part], tries: int, waiting: dict[Any, Any]) -> None:
+        """Give a tile to the executor; if it takes none any more, do it here."""
+        try:
+            waiting[pool.submit(Task.answers, self.task(tile))] = tile, tries
+        except RuntimeError:  # it is broken, or shut down
+            self._again(tile)
+
+    def _take(
+        self, pool: Executor, future: Future[list[Estimate] | None], tile: list[Part], tries: int, waiting: Any
+    ) -> None:  # fmt: skip
+        """What became of a tile. Whatever went wrong over there says nothing of the program: it is done again."""
+        try:
+            answers = future.result()
+        except (Exception, CancelledError):
+            answers = None
+            if tries < TRIES:
+                self.again += len(tile)
+                return self._ask(pool, tile, tries + 1, waiting)
+        if answers is None:
+            return self._again(tile)
+        self.done.update({first: answer for (first, _), answer in zip(tile, answers, strict=True)})
+        return None
+
+    def _again(self, tile: list[Part]) -> None:
+        self.again += len(tile)
+        for block in tile:
+            self._alone(block)
+
+    def estimate(self) -> Estimate:
+        """All that is done, in order."""
+        some = next(iter(self.done.values()))
+        blocks = self.blocks or [(0, some.member_converged.size), (some.member_converged.size, self.count)]
+        parts = [self.done.get(first) or unfinished(some, stop - first) for first, stop in blocks]
+        found = joined(parts)
+        stats = {**found.stats, "blocks": len(blocks)}
+        if self.again:
+            stats["blocks done again"] = self.again
+        return replace(found, seconds=time.perf_counter() - self.start, stats=stats)
+
+
+def _parts(count: int, size: int) -> Iterator[Part]:
+    """Blocks of about this size; none of one member alone, which would be evaluated as a number."""
+    start = 0
+    while start < count:
+        stop = min(start + size, count)
+        stop = count if count - stop == 1 else stop
+        yield start, stop
+        start = stop
+
+
+def workers_of(pool: Executor) -> int:
+    """How many tiles an executor works on at once, as far as one can tell."""
+    known = getattr(pool, "_max_workers", None)
+    return known if isinstance(known, int) and known > 0 else os.cpu_count() or 1

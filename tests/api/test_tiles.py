@@ -1,0 +1,237 @@
+"""Large batches: the same numbers by threads, processes and dask as without them, also when workers die; progress, and
+interruption that keeps what is done; functions that travel as text."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import pickle
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import contextmanager
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import potto
+from potto.python import tiles
+from potto.python.workers import Workers
+from potto.runtime.answers.batches import INTERRUPTED
+from potto.runtime.evaluation.record import Gauge, watching
+
+TEXT = """
+from shaders import bright
+def pixel(x, t, shader) integral ([x, x + 1], [0, 1]) shader (u, v)*[u + v < t] d(u, v)
+def plain(x, t) pixel(x, t, bright)
+def undefined(x) if x < 0.999 then x else integral [0, 1] [sqrt(x - 2 + 0*u) < u] d(u)
+def pair(x) (integral [0, x] u d(u), x)
+"""
+SHADERS = "def bright(u, v) 2*u"
+COUNT = 2100
+X, T = np.linspace(0, 1, COUNT), 1.5
+
+
+def exact(x: Any, t: float) -> tuple[Any, Any]:
+    """Of `plain` for x <= 0.5 or so, by parts: the integral of 2u*min(1, t - u) over [x, x + 1], and its rate by t."""
+    a, b = x, np.minimum(x + 1, t)  # the whole height up to t - 1, then t - u
+    c = np.clip(t - 1, a, b)
+    value = (c * c - a * a) + (t * (b * b - c * c) - 2 / 3 * (b**3 - c**3))
+    return value, b * b - c * c
+
+
+@pytest.fixture
+def module(tmp_path: Path) -> Any:
+    (tmp_path / "shaders.po").write_text(SHADERS)
+    (tmp_path / "pixels.po").write_text(TEXT)
+    return potto.Workspace(tmp_path).module("pixels")
+
+
+@pytest.fixture(autouse=True)
+def small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Blocks of 64 members, tiles of a few blocks, and helpers at once, that no test takes long."""
+    monkeypatch.setattr(tiles, "ENOUGH", 0.0)
+    monkeypatch.setattr(tiles, "WORTH", -1.0)
+    monkeypatch.setattr(Workers, "worth", -1.0)
+    monkeypatch.setattr(tiles, "_sizes", {})
+
+
+def same(one: Any, other: Any) -> None:
+    for name in ("value", "error", "tangent", "tangent_error", "member_converged"):
+        assert np.array_equal(getattr(one, name), getattr(other, name)), name
+    assert one.evals == other.evals
+
+
+class Deadly(Executor):
+    """An executor that gives its second task to a worker which is killed by it, once."""
+
+    def __init__(self, pool: Executor, mark: Path) -> None:
+        self.pool, self.mark, self.asked, self._max_workers = pool, mark, 0, 2
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        self.asked += 1
+        if self.asked == 2:
+            return self.pool.submit(killed_once, str(self.mark), fn, *args)
+        return self.pool.submit(fn, *args, **kwargs)
+
+
+def killed_once(mark: str, fn: Callable[..., Any], *args: Any) -> Any:
+    if not os.path.exists(mark):
+        Path(mark).touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return fn(*args)
+
+
+@contextmanager
+def dask_executor() -> Iterator[Executor]:
+    if importlib.util.find_spec("distributed") is None:
+        pytest.skip("needs dask.distributed: pip install 'potto[distributed]'")
+    from distributed import Client, LocalCluster
+
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
+        yield client.get_executor()
+
+
+POOLS: dict[str, Callable[[], Any]] = {
+    "processes": lambda: ProcessPoolExecutor(2, get_context("spawn")),
+    "workers": lambda: Workers(2),
+    "dask": dask_executor,
+}
+
+
+def test_blocks_are_within_the_error_bars_of_the_whole(module: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    program = potto.grad(module.plain, "t")
+    found = program(X, T)
+    value, rate = exact(X, T)
+    assert found.stats["blocks"] > 10
+    assert (np.abs(found.value - value) <= found.error + 1e-15).all()
+    inside = X < T - 1  # at the corner one-sided derivatives differ
+    assert (np.abs(found.tangent - rate) <= found.tangent_error + 1e-15)[inside].all()
+    monkeypatch.setattr(tiles, "LEAST", COUNT + 1)
+    whole = program(X, T)
+    assert (np.abs(found.value - whole.value) <= found.error + whole.error).all()
+
+
+def test_threads_give_the_same(module: Any) -> None:
+    program = potto.grad(module.pixel, ["t", "x"])
+    alone = program(X.reshape(3, -1), T, shader=module.bright)
+    with ThreadPoolExecutor(2) as pool, potto.settings(executor=pool):
+        same(program(X.reshape(3, -1), T, shader=module.bright), alone)
+    assert alone.value.shape == (3, COUNT // 3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", POOLS)
+def test_nothing_is_lost_when_a_worker_is_killed(kind: str, module: Any, tmp_path: Path) -> None:
+    program = potto.grad(module.pixel, "t")
+    alone = program(X, T, shader=module.bright)
+    with POOLS[kind]() as pool:
+        deadly = Deadly(pool, tmp_path / "killed")
+        with potto.settings(executor=deadly):
+            found = program(X, T, shader=module.bright)
+    assert (tmp_path / "killed").exists() and deadly.asked > 2
+    same(found, alone)
+    assert kind == "dask" or found.stats["blocks done again"]  # dask itself asks another worker
+
+
+def test_a_function_of_groups_travels_without_what_it_was_given(module: Any) -> None:
+    program = potto.compile("f = \\(x) . \\(t) . integral [0, 1] [u*x < t] d(u)").f(X + 1)
+    with ThreadPoolExecutor(2) as pool, potto.settings(executor=pool):
+        found = program(0.5)
+    assert found.stats["blocks"] > 10
+    assert np.allclose(found.value, 0.5 / (X + 1), rtol=1e-14, atol=0)
+
+
+def test_an_executor_that_takes_nothing_is_done_without(module: Any) -> None:
+    pool = ThreadPoolExecutor(1)
+    pool.shutdown()
+    with potto.settings(executor=pool):
+        found = module.plain(X, T)
+    same(found, module.plain(X, T))
+    with pytest.raises(potto.PottoError, match="executor must be"), potto.settings(executor=3):
+        pass
+
+
+def test_errors_are_those_of_the_call_itself(module: Any) -> None:
+    with ThreadPoolExecutor(2) as pool, potto.settings(executor=pool):
+        found = module.undefined(X)
+    alone = module.undefined(X)
+    same_nan = np.array_equal(found.value, alone.value, equal_nan=True)
+    assert same_nan and found.reasons == alone.reasons and not found.converged
+    assert found.reasons_of(-1) == alone.reasons_of(-1) != () == found.reasons_of(0)
+
+
+def test_tuples_and_the_least_batches(module: Any) -> None:
+    first, second = module.pair(X).value
+    assert np.allclose(first, X * X / 2, rtol=1e-13, atol=1e-16) and (second == X).all()
+    assert "blocks" not in module.pair(X[: tiles.LEAST - 1]).stats
+
+
+def test_an_interrupt_keeps_what_is_done(module: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole, alone = module.plain(X, T), tiles._Tiles._alone
+
+    def interrupted(self: Any, block: tuple[int, int]) -> Any:
+        if block[0] >= 640:
+            raise KeyboardInterrupt
+        return alone(self, block)
+
+    monkeypatch.setattr(tiles._Tiles, "_alone", interrupted)
+    with pytest.raises(potto.Interrupted) as stop:
+        module.plain(X, T)
+    found = stop.value.estimate
+    assert (found.value[:640] == whole.value[:640]).all() and np.isnan(found.value[640:]).all()
+    assert found.member_converged[:640].all() and not found.member_converged[640:].any() and not found.converged
+    assert found.reasons_of(700) == (INTERRUPTED.message,)
+
+
+def test_progress_is_told(module: Any) -> None:
+    shares: list[float] = []
+    gauge = Gauge()
+    gauge.told = lambda: shares.append(gauge.share)
+    with watching(gauge):
+        module.plain(X, T)
+    assert shares == sorted(shares) and shares[-1] == 1 and len(shares) > 10
+    assert not gauge.limit and gauge.evaluations > 0
+
+
+# What travels
+
+
+def test_functions_modules_and_answers_pickle(module: Any) -> None:
+    for kept in (module.pixel, module.plain, potto.deriv(module.plain), module.plain(0.3, T)):
+        arrived = pickle.loads(pickle.dumps(kept))
+        assert arrived.type == kept.type if isinstance(kept, potto.Function) else float(arrived) == float(kept)
+    assert float(pickle.loads(pickle.dumps(module)).plain(0.3, T)) == float(module.plain(0.3, T))
+    given = pickle.loads(pickle.dumps(potto.compile("f = \\(x) . \\(y) . x - y").f(3.0)))
+    assert float(given(1.0)) == 2.0
+    gradient = potto.grad(module.plain, ["x", "t"])
+    found, arrived = gradient(0.3, T), pickle.loads(pickle.dumps(gradient))(0.3, T)
+    assert (arrived["x"], arrived["t"]) == (found["x"], found["t"])
+    assert pickle.loads(pickle.dumps(found))["t"] == found["t"]
+
+
+def test_a_function_needs_no_files_where_it_arrives(module: Any, tmp_path: Path) -> None:
+    sent = pickle.dumps((module.pixel, module.bright))
+    for name in ("pixels.po", "shaders.po"):
+        (tmp_path / name).unlink()
+    text = "import pickle, sys; f, s = pickle.load(sys.stdin.buffer); print(repr(float(f(0.25, 1.5, s))))"
+    told = subprocess.run([sys.executable, "-c", text], input=sent, capture_output=True, check=True)
+    assert float(told.stdout) == pytest.approx(float(exact(0.25, T)[0]), rel=1e-14, abs=0)
+
+
+def test_other_texts_under_the_same_name_are_others(module: Any, tmp_path: Path) -> None:
+    before = pickle.dumps(module.bright)
+    (tmp_path / "shaders.po").write_text("def bright(u, v) 3*u")
+    after = pickle.dumps(potto.Workspace(tmp_path).module("shaders").bright)
+    assert [float(pickle.loads(x)(1.0, 1.0)) for x in (before, after, before)] == [2.0, 3.0, 2.0]
+
+
+def test_a_workspace_pickles_by_its_folder(module: Any, tmp_path: Path) -> None:
+    space = pickle.loads(pickle.dumps(potto.Workspace(tmp_path)))
+    assert space.root == os.fspath(tmp_path)
+    assert float(space.module("pixels").plain(0.25, T)) == float(module.plain(0.25, T))
