@@ -81,7 +81,8 @@ def test_pixels_of_a_shader_given_take_the_short_way_as_those_of_one_written_out
     assert apart.evals == whole.evals
     assert np.allclose(apart.value, whole.value, rtol=0, atol=1e-17)
     assert np.allclose(apart.tangent, whole.tangent, rtol=0, atol=1e-16)
-    # Swapped: a kernel for uncut pixels and one for those that are cut, whose nodes move, and the name's own.
-    for shader, most in ((m.second, 3), (m.first, 0)):
+    # Swapped: a kernel for uncut pixels and two for those that are cut, whose nodes move, as rounding is followed at
+    # some of them (all cut pixels are one group of more than 4,096 nodes), and the name's own.
+    for shader, most in ((m.second, 4), (m.first, 0)):
         found = potto.deriv(m.given)((u, 0.0), (v, 0.0), (-0.7, 1.0), potto.deriv(shader))
         assert int(found.stats["kernels compiled"]) <= most
