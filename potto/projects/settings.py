@@ -78,7 +78,8 @@ def current(base: Settings = DEFAULTS) -> Settings:
 
 
 def executor() -> Executor | None:
-    """Who evaluates tiles of large batches; None for this thread alone. Answers are the same."""
+    """Who evaluates tiles of large batches; None for this thread alone. Answers are the same by the same
+    backend."""
     return _executor.get()
 
 

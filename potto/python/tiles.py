@@ -2,8 +2,8 @@
 
 Owns `in_tiles` and `Interrupted`. A batch is evaluated in blocks, whose size the first call of a function finds out by
 the clock and the process keeps: so answers are the same to the last bit wherever and in whatever company a block is
-evaluated. (They are not quite if members are blocked otherwise: numpy adds up rows and columns in another order then,
-which changes the last one or two digits, far within the error bars.) A tile is as many blocks as take half a second;
+evaluated, by the same backend. (They are not quite if members are blocked otherwise: numpy adds up rows and columns in
+another order then, which changes the last one or two digits, far within the error bars.) A tile is as many blocks as take half a second;
 tiles go to the executor of `potto.settings`. What an executor loses (a process that was killed, a machine that is gone)
 is evaluated again: by it, and then here.
 """

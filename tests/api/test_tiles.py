@@ -53,12 +53,15 @@ def module(tmp_path: Path) -> Any:
 
 
 @pytest.fixture(autouse=True)
-def small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Blocks of 64 members, tiles of a few blocks, and helpers at once, that no test takes long."""
+def small_blocks(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Blocks of 64 members, tiles of a few blocks, and helpers at once, that no test takes long; by numpy alone, as
+    machine code, which takes over at some time, adds up in another order."""
     monkeypatch.setattr(tiles, "ENOUGH", 0.0)
     monkeypatch.setattr(tiles, "WORTH", -1.0)
     monkeypatch.setattr(Workers, "worth", -1.0)
     monkeypatch.setattr(tiles, "_sizes", {})
+    with potto.settings(backend="numpy"):
+        yield
 
 
 def same(one: Any, other: Any) -> None:
