@@ -38,6 +38,19 @@ def test_a_few_members_cost_what_their_numbers_do(name: str, count: int) -> None
     assert dual.evals <= sum(potto.deriv(f)((float(x), 1.0)).evals for x in c)
 
 
+@pytest.mark.parametrize("count", [2, 5, 10])
+def test_a_sum_of_few_integrals_costs_no_more_than_they_do(count: int) -> None:
+    """Discs of areas pi c k/n for k = 1 ... n add up to pi c (n + 1)/2, with bounds that cover but for rounding."""
+    disc = f"integral ([-1, 1], [-1, 1]) [x^2 + y^2 < c*k/{count}] d(x, y)"
+    m = potto.compile(f"def f(c) sum k in 1..{count} ({disc})\ndef one(c, k) {disc}")
+    found = potto.deriv(m.f)((0.5, 1.0))
+    single = [potto.deriv(m.one)((0.5, 1.0), (float(k), 0.0)) for k in range(1, count + 1)]
+    assert found.evals <= sum(one.evals for one in single)
+    assert abs(found.value - math.pi * 0.25 * (count + 1)) <= found.error + 4e-16 * found.value
+    assert abs(found.tangent - math.pi * 0.5 * (count + 1)) <= found.tangent_error + 4e-16 * found.tangent
+    assert found.error <= 1e-11 * found.value and found.converged
+
+
 def test_an_array_of_one_in_any_shape() -> None:
     one = potto.grad(M.plane, ["c"])(c=-0.7)
     for shape in ((1,), (1, 1), (1, 1, 1)):

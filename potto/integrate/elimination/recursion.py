@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,6 @@ from potto.core.terms import (
     Lam,
     Term,
     Tuple,
-    const,
     function_of,
     if_,
     integral,
@@ -42,6 +42,7 @@ from potto.integrate.adaptive.iterated import Iteration
 from potto.integrate.decomposition.vanishing import vanishing_of
 from potto.integrate.elimination.interpolants import Table, tabulated
 from potto.integrate.events import Fold, TwoSided
+from potto.integrate.levels import LevelPlan
 from potto.integrate.pieces import Evaluator, Sums, still
 from potto.integrate.plan import Plan, group_levels, level_plan
 from potto.integrate.rules.gauss import EPS
@@ -59,17 +60,20 @@ MOST_PLACES = 64  # where the integral over one variable is not smooth in the nu
 # 0 where the weight is, whatever is further in.
 WEIGHTED = function_of(if_(prim("eq", var("weight"), ZERO), ZERO, mul(var("weight"), var("further"))))
 
+# The names of the least and the largest that a state may be.
+LOW, HIGH = "#low", "#high"
 # A place in the state of a step, as a surface, and what is there.
 Place = tuple[Term, Kind]
 
 
 @dataclass(frozen=True)
 class Eliminated:
-    """The steps, outermost first: the plan of each, and where its integral is not smooth, or has a peak."""
+    """The steps, outermost first: the plan of each, and the state that it depends on as a variable from LOW to HIGH,
+    cut where its integral is not smooth, with hints where it has a peak; None where it depends on none."""
 
     steps: tuple[Step, ...]
     plans: tuple[Plan, ...]
-    places: tuple[tuple[Place, ...], ...]
+    states: tuple[LevelPlan | None, ...]
 
 
 def eliminated(term: Integral, resolve: Resolve) -> Eliminated | None:
@@ -78,7 +82,7 @@ def eliminated(term: Integral, resolve: Resolve) -> Eliminated | None:
     if steps is None:
         return None
     plans: list[Plan] = []
-    places: list[tuple[Place, ...]] = []
+    states: list[LevelPlan | None] = []
     further: tuple[Place, ...] = ()
     state = ""
     for step in reversed(steps):
@@ -93,8 +97,16 @@ def eliminated(term: Integral, resolve: Resolve) -> Eliminated | None:
         if len(further) > MOST_PLACES:
             return None
         plans.append(plan)
-        places.append(further)
-    return Eliminated(steps, tuple(reversed(plans)), tuple(reversed(places)))
+        states.append(_state(state, further) if state else None)
+    return Eliminated(steps, tuple(reversed(plans)), tuple(reversed(states)))
+
+
+def _state(name: str, places: Sequence[Place]) -> LevelPlan:
+    """The number that a step depends on as a variable, cut at places."""
+    cuts = tuple(replace(cut_along(at, name), turning=kind == "edge", steps=kind == "jump")
+                 for at, kind in places if kind != "center")  # fmt: skip
+    hints = points_of((at for at, kind in places if kind == "center"), name)[:MOST_CENTERS]
+    return level_plan(Level(name, var(LOW), var(HIGH), hints, cuts), (), ())
 
 
 def _planned(
@@ -172,10 +184,10 @@ def one_by_one(known: Eliminated, machine: Any, env: dict[str, Value]) -> Sums |
     spans = _spans(known.steps, env)
     further: Table | Cell | None = None
     sums: Sums | None = None
-    rows = list(zip(known.steps, known.plans, known.places, spans, strict=True))
-    for step, plan, places, span in reversed(rows):
+    rows = list(zip(known.plans, known.states, spans, strict=True))
+    for plan, state, span in reversed(rows):
         below = further
-        if step.state is None:
+        if state is None:
             sums = _Tabled(plan, fine, START_ORDER, tracked=True, further=below).run(0, env, 1, {}, fine)
             (further,) = sums.cells(())
             if isinstance(below, Table) and not below.seen:
@@ -184,21 +196,17 @@ def one_by_one(known: Eliminated, machine: Any, env: dict[str, Value]) -> Sums |
         # As one inside another: how much each may err is measured by the largest of all.
         inside = replace(plan, levels=(*plan.levels, *plan.levels))
         iteration = _Tabled(inside, fine, START_ORDER, tracked=True, further=further)
-        further = _table(iteration, step.state, places, span, fine, env)
+        further = _table(iteration, state, span, fine, env)
         if further is None or (isinstance(below, Table) and not below.seen):
             return None
     return sums
 
 
 def _table(
-    iteration: Iteration, state: str, places: Sequence[Place], span: tuple[float, float], machine: Any,
-    env: dict[str, Value],
+    iteration: Iteration, state: LevelPlan, span: tuple[float, float], machine: Any, env: dict[str, Value]
 ) -> Table | None:  # fmt: skip
-    cuts = tuple(replace(cut_along(at, state), turning=kind == "edge", steps=kind == "jump")
-                 for at, kind in places if kind != "center")  # fmt: skip
-    hints = points_of((at for at, kind in places if kind == "center"), state)[:MOST_CENTERS]
-    level = level_plan(Level(state, const(span[0]), const(span[1]), hints, cuts), (), ())
-    found, _ = iteration.cut(level, env, 1, machine, np.zeros(1, dtype=np.int64))
+    ends = {LOW: Cell(span[0]), HIGH: Cell(span[1])}
+    found, _ = iteration.cut(state, {**env, **ends}, 1, machine, np.zeros(1, dtype=np.int64))
     segments = found.segments
     size = np.fmin(np.maximum(np.abs(segments.a), np.abs(segments.b)), FARTHEST)
     segments = segments.pick(segments.b - segments.a > SLIVER * EPS * size)  # a span is rounded outwards
@@ -209,7 +217,7 @@ def _table(
         here = {name: pad(value, wide.directions) if len(speeds) else still(value) for name, value in env.items()}
         together = np.zeros(x.size, dtype=np.int64)  # what single nodes meet is no matter
         apart = wide.apart()
-        sums = iteration.run(1, {**here, state: Cell(x, None, tuple(speeds))}, x.size, {}, apart, together)
+        sums = iteration.run(1, {**here, state.variable: Cell(x, None, tuple(speeds))}, x.size, {}, apart, together)
         if not len(speeds):  # at the ends of pieces: derivatives are not asked for
             apart.events.forget(Fold, TwoSided)
         machine.events.take(apart.events, None)
@@ -241,8 +249,16 @@ def _spans(steps: Sequence[Step], env: dict[str, Value]) -> list[tuple[float, fl
 
 def _span(step: Step, passed: Term, box: dict[str, tuple[float, float]]) -> tuple[float, float]:
     """Between which numbers is what a step passes on: what is affine in the variable has its extremes at the bounds."""
-    found = range_of(passed, box)
-    if affine(passed, (step.variable,)) is None:
+    found, at_bounds = range_of(passed, box), _at_bounds(step, passed)
+    if not at_bounds:
         return found.lo, found.hi
-    ends = [range_of(simplify(substitute(passed, {step.variable: end})), box) for end in (step.lo, step.hi)]
+    ends = [range_of(end, box) for end in at_bounds]
     return max(found.lo, min(end.lo for end in ends)), min(found.hi, max(end.hi for end in ends))
+
+
+@lru_cache(maxsize=1024)
+def _at_bounds(step: Step, passed: Term) -> tuple[Term, ...]:
+    """What is passed on at both bounds, where it is affine in the variable; else nothing."""
+    if affine(passed, (step.variable,)) is None:
+        return ()
+    return tuple(simplify(substitute(passed, {step.variable: end})) for end in (step.lo, step.hi))

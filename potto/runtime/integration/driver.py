@@ -69,12 +69,14 @@ def integrate(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
 
 def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermost: bool) -> Value:
     arrays = [a for value in env.values() for a in all_arrays(value)]
-    shape = np.broadcast_shapes(*(a.shape for a in arrays))
+    shape = np.broadcast_shapes(*(a.shape for a in arrays)) if arrays else ()
     batch = int(np.prod(shape)) if shape else 1
     if batch == 0:
         return Cell(np.zeros(shape))
-    flat = {n: map_arrays(v, lambda a: np.ascontiguousarray(np.broadcast_to(a, shape)).reshape(-1))
-            for n, v in env.items()}  # fmt: skip
+    flat = env
+    if arrays:
+        flat = {n: map_arrays(v, lambda a: np.ascontiguousarray(np.broadcast_to(a, shape)).reshape(-1))
+                for n, v in env.items()}  # fmt: skip
     if batch == 1 and shape:
         flat = {n: map_arrays(v, lambda a: float(a[0])) for n, v in flat.items()}
     record = machine.record
