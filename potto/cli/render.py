@@ -93,7 +93,7 @@ class Picture:
     def call(self, *places: Any) -> tuple[Sequence[Any], Estimate]:
         """The value, the derivatives and the errors at places, as parts one after the other."""
         from potto.applications.images import flat
-        from potto.python.api import grad
+        from potto.python.gradients import grad
 
         here = {**self.given, **dict(zip(self.axes, places, strict=True))}
         answer = (grad(self.function, self.wrt) if self.wrt else self.function)(**here)

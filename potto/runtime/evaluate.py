@@ -117,6 +117,7 @@ class Clock:
 
 
 def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
+    """The estimate of a value; of its tangents the first is told, and all count for whether it converged."""
     record = machine.record
     method = "exact" if not record.methods else "+".join(sorted(record.methods))
     stats: dict[str, Any] = {
@@ -147,7 +148,8 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
         tangents = told(value, lambda cell: cell.t[0] if cell.t else None)
         tangent_bounds = told(value, lambda cell: cell.et[0] if cell.t else None)
     shown = _flat(numbers, bounds)
-    missing = _missing([*shown, *_flat(tangents, tangent_bounds)], machine)
+    slopes = [(number(t), number(et)) for c in all_cells(value) for t, et in zip(c.t, c.et, strict=True)]
+    missing = _missing([*shown, *slopes], machine)
     shape = np.broadcast_shapes(*(np.shape(number) for number, _ in shown))
     return answer(
         numbers, bounds, tangents, tangent_bounds, converged=not missing,
@@ -192,11 +194,15 @@ def _notes(record: Record) -> list[OneSided]:
 def told(value: Value, part: Callable[[Cell], Number | None]) -> Any:
     """One part of all numbers, in the form of the value; 0 where it is missing."""
     if isinstance(value, Cell):
-        x = part(value)
-        return x if isinstance(x, np.ndarray) else 0.0 if x is None else float(x)
+        return number(part(value))
     if isinstance(value, tuple | list):
         return type(value)([told(item, part) for item in value])
     raise errors.not_a_number(value)
+
+
+def number(part: Number | None) -> Number:
+    """A part of a number; 0 where it is missing."""
+    return part if isinstance(part, np.ndarray) else 0.0 if part is None else float(part)
 
 
 def _flat(numbers: Any, bounds: Any) -> list[tuple[Any, Any]]:
