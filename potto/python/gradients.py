@@ -1,8 +1,9 @@
 """Derivatives of functions of Potto for Python: gradients, Jacobians, products with vectors from either side.
 
-Owns `grad`, `value_and_grad`, `jacobian`, `vjp`, `jvp` and `Gradient`. What is differentiated by is named; without
-names it is the first parameter. All numbers come with their errors, and arrays broadcast as in a call. Second
-derivatives are in `applications/hessian`.
+Owns `grad`, `value_and_grad`, `jacobian`, `vjp`, `jvp` and `Gradient`. By many parameters it is differentiated in
+reverse, by few forward: that is chosen here, and both give the same. What is differentiated by is named; without names
+it is the first parameter. All numbers come with their errors, and arrays broadcast as in a call. Second derivatives
+are in `applications/hessian`.
 """
 
 from __future__ import annotations
@@ -14,8 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from potto.kernels.cells import Cell, Number, Value, all_cells, pad
+from potto.kernels.cells import Cell, Number, Value, all_cells, map_cells, pad
 from potto.kernels.errors import wrong_call
+from potto.kernels.tape import Node, Swept, Untaped, swept
 from potto.projects.settings import current
 from potto.python.api import Function, must_be_function
 from potto.python.arguments import value_of
@@ -23,6 +25,10 @@ from potto.runtime.answers.estimate import Estimate
 from potto.runtime.evaluate import Clock, number, report, told
 from potto.runtime.evaluation.machine import Machine
 
+# Parameters, from which on a tape is swept back instead of carrying a tangent for each: it costs 2.5 to 3.4 values
+# whatever their number, tangents 1.6 at 4 and, where all depends on all, 2.7 at 12 and 4.8 at 64; the first call costs
+# half as much from 8 on (`benchmarks/gradients.py ways`). What integrals carry is the same either way.
+MANY = 12
 Names = Sequence[str] | str | None
 
 
@@ -170,22 +176,50 @@ class _Run:
         self.call, self.arguments, self.batch = function.prepared(args, kwargs, extra or {})
         self.given = dict(self.arguments)
         self.extra = {name: value_of(name, item, self.batch, lambda _: None) for name, item in (extra or {}).items()}
-        self.machine: Machine = self.call.world.program.machine(current(self.call.world.settings(self.call.file)))
+        self.machine = self._machine()
         self.clock = Clock()
+
+    def _machine(self) -> Machine:
+        world = self.call.world
+        return world.program.machine(current(world.settings(self.call.file)))
 
     def along_each(self, wrt: tuple[str, ...]) -> Value:
         """The value, with a tangent for each number of the parameters named."""
         for name in wrt:
             self._must_have(name)
         directions = sum(_size(name, self.given[name]) for name in wrt)
+        if directions >= MANY:
+            try:
+                return self._swept(wrt)
+            except Untaped:
+                self.machine = self._machine()
         numbers = iter(range(directions))
         return self.evaluated({name: _seeded(self.given[name], numbers, directions) for name in wrt}, directions)
 
-    def evaluated(self, moving: Mapping[str, Value], directions: int) -> Value:
-        """The value where these parameters move, in so many directions."""
+    def _swept(self, wrt: tuple[str, ...]) -> Value:
+        """The same by a tape: what the value is made of is written down, and swept back from the answer."""
+        seeds: list[Any] = []
+        shape = () if self.batch.shape is None else (max(1, int(np.prod(self.batch.shape))),)
+
+        def seeded(cell: Cell) -> Cell:
+            seeds.append(Node((), shape))
+            return Cell(cell.v, cell.e, (seeds[-1],))
+
+        moving = {name: map_cells(self.given[name], seeded) for name in wrt}
+        value = self.evaluated(moving, 1, self.machine.taped())
+
+        def derived(cell: Cell) -> Cell:
+            node: Any = cell.t[0]
+            found = swept([(node, 1.0)]) if isinstance(node, Node) else dict[Node, Swept]()
+            return Cell(cell.v, cell.e, *zip(*(found.get(seed, (None, None)) for seed in seeds), strict=True))
+
+        return map_cells(value, derived)
+
+    def evaluated(self, moving: Mapping[str, Value], directions: int, machine: Machine | None = None) -> Value:
+        """The value where these parameters move, in so many directions, by this machine if it is none of those."""
         for name in moving:
             self._must_have(name)
-        machine = self.machine.with_directions(directions)
+        machine = self.machine.with_directions(directions) if machine is None else machine
         values = [moving[name] if name in moving else pad(value, directions) for name, value in self.arguments]
         with self.clock:
             value = self.call.value(values, machine)

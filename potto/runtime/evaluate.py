@@ -29,6 +29,7 @@ from potto.runtime.answers.estimate import Estimate, OneSided
 from potto.runtime.answers.inherited_errors import rough, widened
 from potto.runtime.evaluation.duals import call_derivative, call_paired
 from potto.runtime.evaluation.functions import Closure, Derivative
+from potto.runtime.evaluation.local import locally
 from potto.runtime.evaluation.machine import Linker, Machine, Record, Semantics
 from potto.runtime.evaluation.selection import lazy
 from potto.runtime.evaluation.sums import total
@@ -39,7 +40,7 @@ Lookup = Callable[[str, str], Term]
 def _integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
     from potto.runtime.integration.driver import integral  # loaded with the first integral: a prompt is there before
 
-    return integral(machine, term, env)
+    return locally(machine, env, lambda own, here: integral(own, term, here))
 
 
 def _added(machine: Machine, terms: tuple[Term, ...], env: dict[str, Value]) -> Value:

@@ -79,7 +79,8 @@ class Linker:
         self.constants: dict[tuple[str, str, Settings], Value] = {}
         self.duals: dict[tuple[Lam, bool], Lam] = {}
         self.reaches: dict[tuple[Term, ...], tuple[tuple[str, str, bytes], ...]] = {}
-        self.kernels: dict[tuple[Lam, tuple[Pattern, ...], int, bool], Kernel] = {}  # the ones met, without a lookup
+        # the ones met, without a lookup
+        self.kernels: dict[tuple[Lam, tuple[Pattern, ...], int, bool, bool], Kernel] = {}
 
     def term(self, module: str, name: str) -> Term:
         key = (module, name)
@@ -136,6 +137,7 @@ class Machine:
 
     frozen: surfaces, bounds and deltas stand still, so that tangents are those of the integrands alone.
     side: -1 or 1 where one-sided derivatives are wanted, for parameters that shrink or grow.
+    taping: the one tangent is written on a tape (`kernels/tape`).
     """
 
     linker: Linker
@@ -147,6 +149,7 @@ class Machine:
     root: bool = True
     frozen: bool = False
     side: int = 0
+    taping: bool = False
 
     @property
     def rtol(self) -> float:
@@ -157,9 +160,13 @@ class Machine:
         return self.settings.atol
 
     def with_directions(self, directions: int) -> Machine:
-        if directions == self.directions:
+        if directions == self.directions and not self.taping:
             return self
-        return replace(self, directions=directions)
+        return replace(self, directions=directions, taping=False)
+
+    def taped(self) -> Machine:
+        """The machine that writes tangents on a tape."""
+        return replace(self, directions=1, taping=True)
 
     def inside(self) -> Machine:
         """The machine for an integrand: rounding is estimated by the integrator, not kept track of."""
@@ -221,13 +228,13 @@ class Machine:
 
     def run(self, function: Lam, args: list[Value], trace: Trace | None) -> Value:
         k = self.directions
-        key = (function, tuple([pattern(a, k) for a in args]), k, self.rounding)
+        key = (function, tuple([pattern(a, k) for a in args]), k, self.rounding, self.taping)
         found = self.linker.kernels.get(key)
         if found is None:
             found = self.linker.kernels[key] = kernel(function, key[1], k, self.rounding, self)
         else:
             counts.reused += 1
-        if found.plain and many(args):
+        if found.plain and many(args) and not self.taping:
             return in_chunks(found, self, trace, args)
         return found.run(self, trace, *args)
 
@@ -250,7 +257,7 @@ class Machine:
         key = (module, name, self.settings)
         if key not in self.linker.constants:
             self.enter()
-            still = replace(self, directions=0, rounding=True, frozen=False)
+            still = replace(self.with_directions(0), rounding=True, frozen=False)
             self.linker.constants[key] = still.term(term, {})
             self.record.depth -= 1
         return pad(self.linker.constants[key], self.directions)
