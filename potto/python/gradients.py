@@ -29,6 +29,7 @@ from potto.runtime.evaluation.machine import Machine
 # whatever their number, tangents 1.6 at 4 and, where all depends on all, 2.7 at 12 and 4.8 at 64; the first call costs
 # half as much from 8 on (`benchmarks/gradients.py ways`). What integrals carry is the same either way.
 MANY = 12
+NOTHING: Swept = (None, None)
 Names = Sequence[str] | str | None
 
 
@@ -102,10 +103,8 @@ def vjp(function: Function, cotangent: Any, wrt: Names = None) -> Callable[..., 
 
     def product(*args: Any, **kwargs: Any) -> Gradient:
         run = _Run(function, args, kwargs, {"cotangent": cotangent})
-        value = run.along_each(names)
-        weights = run.extra["cotangent"]
-        _must_match(value, weights)
-        return run.gradient(value, _weighted(value, weights), names)
+        value, weighted = run.along_each_together(names, run.extra["cotangent"])
+        return run.gradient(value, weighted, names)
 
     return product
 
@@ -123,7 +122,8 @@ def jvp(function: Function, along: Mapping[str, Any]) -> Callable[..., Estimate]
         labels = {f"the tangent of {name}": tangent for name, tangent in along.items()}
         run = _Run(function, args, kwargs, labels)
         tangents = dict(zip(names, run.extra.values(), strict=True))
-        value = run.evaluated({name: _moved(name, run.given[name], tangents[name]) for name in names}, 1)
+        moving = {name: _moved(name, run.own(name), tangents[name]) for name in names}
+        value = run.evaluated(moving, run.machine.with_directions(1), lambda value: value)
         return run.batch.shaped(report(value, run.machine, run.clock))
 
     return product
@@ -185,51 +185,69 @@ class _Run:
 
     def along_each(self, wrt: tuple[str, ...]) -> Value:
         """The value, with a tangent for each number of the parameters named."""
-        for name in wrt:
-            self._must_have(name)
-        directions = sum(_size(name, self.given[name]) for name in wrt)
+
+        def swept_back(value: Value, seeds: Sequence[Node]) -> Value:
+            if len(all_cells(value)) > len(seeds):
+                raise Untaped  # a sweep for each number of the answer would cost more than a tangent for each parameter
+            return map_cells(value, lambda cell: Cell(cell.v, cell.e, *_swept([(cell, 1.0)], seeds)))
+
+        return self._differentiated(wrt, swept_back, lambda value: value)
+
+    def along_each_together(self, wrt: tuple[str, ...], weights: Value) -> tuple[Value, Value]:
+        """The value, and the sum of its numbers, each times its weight, with such tangents."""
+
+        def swept_back(value: Value, seeds: Sequence[Node]) -> Value:
+            _must_match(value, weights)
+            pairs = zip(all_cells(value), (weight.v for weight in all_cells(weights)), strict=True)
+            return map_cells(value, lambda cell: Cell(cell.v, cell.e)), Cell(0.0, None, *_swept(list(pairs), seeds))
+
+        def forward(value: Value) -> Value:
+            _must_match(value, weights)
+            return value, _weighted(value, weights)
+
+        found = self._differentiated(wrt, swept_back, forward)
+        assert isinstance(found, tuple)
+        return found[0], found[1]
+
+    def _differentiated(
+        self, wrt: tuple[str, ...], swept_back: Callable[[Value, Sequence[Node]], Value],
+        forward: Callable[[Value], Value],
+    ) -> Value:  # fmt: skip
+        """What one of these makes of the value: of a tape with its seeds, or of tangents."""
+        directions = sum(_size(name, self.own(name)) for name in wrt)
         if directions >= MANY:
+            seeds: list[Any] = []
+            shape = () if self.batch.shape is None else (max(1, int(np.prod(self.batch.shape))),)
+
+            def seeded(cell: Cell) -> Cell:
+                seeds.append(Node((), shape))
+                return Cell(cell.v, cell.e, (seeds[-1],))
+
+            moving = {name: map_cells(self.given[name], seeded) for name in wrt}
             try:
-                return self._swept(wrt)
+                return self.evaluated(moving, self.machine.taped(), lambda value: swept_back(value, seeds))
             except Untaped:
                 self.machine = self._machine()
         numbers = iter(range(directions))
-        return self.evaluated({name: _seeded(self.given[name], numbers, directions) for name in wrt}, directions)
+        moving = {name: _seeded(self.given[name], numbers, directions) for name in wrt}
+        return self.evaluated(moving, self.machine.with_directions(directions), forward)
 
-    def _swept(self, wrt: tuple[str, ...]) -> Value:
-        """The same by a tape: what the value is made of is written down, and swept back from the answer."""
-        seeds: list[Any] = []
-        shape = () if self.batch.shape is None else (max(1, int(np.prod(self.batch.shape))),)
-
-        def seeded(cell: Cell) -> Cell:
-            seeds.append(Node((), shape))
-            return Cell(cell.v, cell.e, (seeds[-1],))
-
-        moving = {name: map_cells(self.given[name], seeded) for name in wrt}
-        value = self.evaluated(moving, 1, self.machine.taped())
-
-        def derived(cell: Cell) -> Cell:
-            node: Any = cell.t[0]
-            found = swept([(node, 1.0)]) if isinstance(node, Node) else dict[Node, Swept]()
-            return Cell(cell.v, cell.e, *zip(*(found.get(seed, (None, None)) for seed in seeds), strict=True))
-
-        return map_cells(value, derived)
-
-    def evaluated(self, moving: Mapping[str, Value], directions: int, machine: Machine | None = None) -> Value:
-        """The value where these parameters move, in so many directions, by this machine if it is none of those."""
-        for name in moving:
-            self._must_have(name)
-        machine = self.machine.with_directions(directions) if machine is None else machine
-        values = [moving[name] if name in moving else pad(value, directions) for name, value in self.arguments]
+    def evaluated(self, moving: Mapping[str, Value], machine: Machine, ended: Callable[[Value], Value]) -> Value:
+        """What `ended` makes of the value that this machine finds where these parameters move."""
+        k = machine.directions
+        values = [moving[name] if name in moving else pad(value, k) for name, value in self.arguments]
         with self.clock:
             value = self.call.value(values, machine)
-        if not _numbers(value):
-            raise wrong_call("only a number or a tuple of numbers has a gradient")
-        return pad(value, directions)
+            if not _numbers(value):
+                raise wrong_call("only a number or a tuple of numbers has a gradient")
+            with np.errstate(all="ignore"):
+                return ended(pad(value, k))
 
-    def _must_have(self, name: str) -> None:
+    def own(self, name: str) -> Value:
+        """What a parameter is given. Raises PottoError if that is nothing."""
         if name not in self.given:
             raise wrong_call(f"`{name}` is given no value, so there is nothing to differentiate by")
+        return self.given[name]
 
     def answer(self, value: Value, tangents: Any, bounds: Any) -> Estimate:
         found = report(value, self.machine, self.clock)
@@ -243,6 +261,13 @@ class _Run:
         forms = (_by_name(part, wrt, self.given) for part in (tangents, bounds))
         found = self.answer(value, *(form[0] if len(wrt) == 1 else form for form in forms))
         return Gradient(**{item.name: getattr(found, item.name) for item in fields(Estimate)}, wrt=wrt)
+
+
+def _swept(answers: Sequence[tuple[Cell, Any]], seeds: Sequence[Node]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+    """The derivatives by the seeds of a sum of answers, each times a weight, and how far off they may be."""
+    nodes: list[tuple[Any, Any]] = [(cell.t[0], weight) for cell, weight in answers]
+    found = swept([(node, weight) for node, weight in nodes if isinstance(node, Node)])
+    return tuple(found.get(seed, NOTHING)[0] for seed in seeds), tuple(found.get(seed, NOTHING)[1] for seed in seeds)
 
 
 def _plain(found: Estimate) -> Estimate:

@@ -140,7 +140,7 @@ def test_parameters_that_are_tuples() -> None:
     assert np.allclose(product["p"], (0.25 + 3.0, 1.5), rtol=RTOL) and np.isclose(product["q"], 21.0, rtol=RTOL)
 
 
-MODULE = "def f(a, s) integral [0, 1] s(x)*[x < a] d(x)\ndef square(x) x^2\ndef two(a, b) (a*b, a)"
+MODULE = "def f(a, s) integral [0, 1] s(x)*[x < a] d(x)\ndef square(x) x^2\ndef two(a, b) (a*b, a)\ndef later(a)(b) a*b"
 
 
 def test_functions_stand_beside_parameters() -> None:
@@ -162,6 +162,8 @@ def test_functions_stand_beside_parameters() -> None:
     (lambda m: potto.vjp(m.two, (1.0, np.ones(3)))(np.ones(2), 2.0), "do not broadcast"),
     (lambda m: potto.vjp(m.two, "one")(1.0, 2.0), "cannot be given a Python str"),
     (lambda m: potto.hessian(m.two)(1.0, 2.0), "only a function that gives one number"),
+    (lambda m: potto.jvp(m.later, {"b": 1.0})(1.0), "given no value"),
+    (lambda m: potto.vjp(m.later, 1.0, "b")(1.0), "given no value"),
     (lambda m: potto.vjp(abs, 1.0), "not a Python builtin_function_or_method"),
 ])  # fmt: skip
 def test_mistakes_are_told(mistake: Callable[[Any], Any], message: str) -> None:

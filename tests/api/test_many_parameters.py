@@ -123,6 +123,23 @@ def test_functions_on_duals_that_are_written_by_hand() -> None:
     within(found.tangent, found.tangent_error, 2 * AT + 2 * np.eye(16)[1])
 
 
+def test_more_answers_than_parameters() -> None:
+    """All derivatives are then not swept back one answer at a time; a product with a cotangent is one sweep."""
+    rows = ", ".join(f"{name}*x{(i * 7) % 16} + {i}*x0" for i, name in enumerate(NAMES * 2))
+    f = potto.compile(f"def f{HEAD} ({rows})").f
+    wanted = np.zeros((32, 16))
+    for i in range(32):
+        wanted[i, i % 16] += AT[i * 7 % 16]
+        wanted[i, i * 7 % 16] += AT[i % 16]
+        wanted[i, 0] += i
+    matrix = potto.jacobian(f, NAMES)(*AT)
+    within(matrix.value, matrix.error, wanted)
+    weights = np.linspace(-1, 1, 32)
+    pulled = potto.vjp(f, tuple(weights.tolist()), NAMES)(*AT)
+    within(pulled.tangent, pulled.tangent_error, weights @ wanted)
+    within(pulled.value, pulled.error, [AT[i % 16] * AT[i * 7 % 16] + i * AT[0] for i in range(32)])
+
+
 @pytest.mark.parametrize("method", ["mc", "qmc"])
 def test_samples(method: Any) -> None:
     f = potto.compile(f"def f{HEAD} {SQUARES} + (integral ([0, 1], [0, 1]) x1*[x + y < x0] d(x, y))").f
