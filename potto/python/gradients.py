@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from potto.kernels.cells import Cell, Number, Value, all_cells, map_cells, pad
+from potto.kernels.chunks import POINTS
 from potto.kernels.errors import wrong_call
 from potto.kernels.tape import Node, Swept, Untaped, swept
 from potto.projects.settings import current
@@ -215,9 +216,9 @@ class _Run:
     ) -> Value:  # fmt: skip
         """What one of these makes of the value: of a tape with its seeds, or of tangents."""
         directions = sum(_size(name, self.own(name)) for name in wrt)
-        if directions >= MANY:
+        shape = () if self.batch.shape is None else (max(1, int(np.prod(self.batch.shape))),)
+        if directions >= MANY and np.prod(shape) <= POINTS:  # a tape keeps arrays for all operations
             seeds: list[Any] = []
-            shape = () if self.batch.shape is None else (max(1, int(np.prod(self.batch.shape))),)
 
             def seeded(cell: Cell) -> Cell:
                 seeds.append(Node((), shape))
