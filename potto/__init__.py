@@ -12,9 +12,10 @@ from potto.projects.settings import settings
 
 if TYPE_CHECKING:
     from potto.applications.fitting import fit
-    from potto.applications.hessian import hvp
+    from potto.applications.hessian import hessian, hvp
     from potto.integrate.costs import counting
-    from potto.python.api import Function, Module, ProgramWarning, Workspace, compile, deriv, grad, load
+    from potto.python.api import Function, Module, ProgramWarning, Workspace, compile, deriv, load
+    from potto.python.gradients import grad, jacobian, jvp, value_and_grad, vjp
     from potto.python.tiles import Interrupted
     from potto.runtime.answers.estimate import Estimate
 
@@ -33,9 +34,14 @@ __all__ = [
     "deriv",
     "fit",
     "grad",
+    "hessian",
     "hvp",
+    "jacobian",
+    "jvp",
     "load",
     "settings",
+    "value_and_grad",
+    "vjp",
 ]
 
 _HOMES = {
@@ -43,7 +49,13 @@ _HOMES = {
     "Interrupted": "potto.python.tiles",
     "counting": "potto.integrate.costs",
     "fit": "potto.applications.fitting",
+    "grad": "potto.python.gradients",
+    "hessian": "potto.applications.hessian",
     "hvp": "potto.applications.hessian",
+    "jacobian": "potto.python.gradients",
+    "jvp": "potto.python.gradients",
+    "value_and_grad": "potto.python.gradients",
+    "vjp": "potto.python.gradients",
 }
 
 

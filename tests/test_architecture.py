@@ -35,8 +35,8 @@ FORBIDDEN: dict[str, tuple[str, ...]] = {
 # Who may import a package that is not ours; nobody else may, at the top of a module or inside of a function.
 OUTSIDERS: dict[str, tuple[str, ...]] = {
     "lark": ("potto.syntax",),
-    "numpy": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.python.arguments", "potto.applications",
-              "potto.bench", "potto_lsp.preview", "potto_lsp.sampling"),
+    "numpy": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.python.arguments",
+              "potto.python.gradients", "potto.applications", "potto.bench", "potto_lsp.preview", "potto_lsp.sampling"),
     "scipy": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.applications.fitting", "potto.bench"),
     "jax": ("potto.bench.peers",),
     "vegas": ("potto.bench.peers",),

@@ -1,18 +1,22 @@
-"""Second derivatives along a direction: the Hessian times a vector, all its components in one run.
+"""Second derivatives: the Hessian times a vector, all its components in one run, and the whole of it.
 
-Owns `hvp`. The derivative of a function along a direction is a function of duals; its gradient, with one tangent for
-each parameter, is the product. No matrix is made, and the derivative is taken through the boundary terms of the first.
+Owns `hvp` and `hessian`. The derivative of a function along a direction is a function of duals; its gradient, with one
+tangent for each parameter, is the product. It is taken through the boundary terms of the first derivative. The matrix
+is the products with all unit vectors, as one batch.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields, replace
 from typing import Any
 
+import numpy as np
+
 from potto.kernels.errors import wrong_call
-from potto.python.api import Function, bound, deriv, grad
-from potto.python.calls import Gradient
+from potto.python.api import Function, bound, deriv
+from potto.python.arguments import batch_of
+from potto.python.gradients import Gradient, Names, grad, parameters_to_vary
 from potto.runtime.answers.estimate import Estimate
 
 
@@ -23,42 +27,110 @@ def hvp(function: Function, along: Mapping[str, Any]) -> Callable[..., Gradient]
     parameters of `along`, in their order (one number if there is one), and `answer["a"]` its component by `a`.
     Raises PottoError where the function has no second derivative, or the names are none of its parameters.
     """
-    once = deriv(function)
-    named = dict(zip(function.parameters, once.parameters, strict=True))
-    grad(function, list(along))  # checks the names
-    twice = grad(once, [named[name] for name in along])
+    names = parameters_to_vary(function, tuple(along))
+    twice = _twice(function, names)
 
     def product(*args: Any, **kwargs: Any) -> Gradient:
-        duals: dict[str, Any] = {}
-        for name, argument in bound(function, args, kwargs):
-            if name not in named:
-                raise wrong_call(f"the parameter for {argument!r} has no name, and a product is taken by names")
-            duals[named[name]] = _dual(argument, along.get(name))
-        return _product(twice(**duals), tuple(along))
+        return _product(twice(_named(function, args, kwargs), along), names)
 
     return product
+
+
+def hessian(function: Function, wrt: Names = None) -> Callable[..., Estimate]:
+    """All second derivatives of a function that gives one number, by the parameters in `wrt`, or by the first one.
+
+    `value` and `error` have the shape (*batch, parameters, parameters): batch is what arrays broadcast to, and there
+    are no axes where one parameter is named that is one number. Raises as `hvp` does, and for a tuple.
+    """
+    names = parameters_to_vary(function, wrt)
+    twice = _twice(function, names)
+
+    def matrix(*args: Any, **kwargs: Any) -> Estimate:
+        given = _named(function, args, kwargs)
+        numbers = [number for name in names if name in given for number in _leaves(given[name])]
+        axes = len(batch_of(given.items()).shape or ())
+        units = iter(np.eye(len(numbers)).reshape(len(numbers), len(numbers), *(1,) * axes))
+        found = twice(given, {name: _like(given[name], units) for name in names if name in given})
+        if isinstance(found.value[0], tuple):
+            raise wrong_call("only a function that gives one number has a Hessian", "take one component of the answer")
+        product = _product(found, names)
+        single = len(names) == 1 and not isinstance(given[names[0]], tuple)
+        value, error = (_as_matrix(list(_leaves(side)), single) for side in (product.tangent, product.tangent_error))
+        common = {field.name: getattr(found, field.name) for field in fields(Estimate)}
+        told = {"value": value, "error": error, "tangent": None, "tangent_error": None}
+        members = np.all(found.member_converged, axis=0) if axes else None
+        reasons = {why: np.any(where, axis=0) if axes else True for why, where in found.shortfalls.items()}
+        return Estimate(**{**common, **told, "member_converged": members, "shortfalls": reasons})
+
+    return matrix
+
+
+def _twice(function: Function, names: tuple[str, ...]) -> Callable[[dict[str, Any], Mapping[str, Any]], Gradient]:
+    """From arguments, and a direction, to the gradient of the derivative along it."""
+    once = deriv(function)
+    duals = dict(zip(function.parameters, once.parameters, strict=True))
+    gradient = grad(once, [duals[name] for name in names])
+
+    def found(given: dict[str, Any], along: Mapping[str, Any]) -> Gradient:
+        return gradient(**{duals[name]: _dual(argument, along.get(name)) for name, argument in given.items()})
+
+    return found
+
+
+def _named(function: Function, args: tuple[Any, ...], kwargs: dict[str, Any]) -> dict[str, Any]:
+    """The arguments of a call by the names of their parameters."""
+    given: dict[str, Any] = {}
+    for name, argument in bound(function, args, kwargs):
+        if name not in function.parameters:
+            raise wrong_call(f"the parameter for {argument!r} has no name, and second derivatives are taken by names")
+        given[name] = argument.value if isinstance(argument, Estimate) else argument
+    return given
 
 
 def _dual(argument: Any, direction: Any) -> Any:
     """An argument with its tangent: that of the vector, or none."""
     if isinstance(argument, Function):
         return deriv(argument)
-    if isinstance(argument, Estimate):
-        argument = argument.value
-    return argument, _still(argument) if direction is None else direction
+    return argument, _like(argument, None) if direction is None else direction
 
 
-def _still(argument: Any) -> Any:
-    return tuple(map(_still, argument)) if isinstance(argument, tuple) else 0.0
+def _like(argument: Any, numbers: Iterator[Any] | None) -> Any:
+    """These numbers, or zeros, in the form of an argument."""
+    if isinstance(argument, tuple):
+        return tuple(_like(item, numbers) for item in argument)
+    return 0.0 if numbers is None else next(numbers)
+
+
+def _leaves(argument: Any) -> Iterator[Any]:
+    if isinstance(argument, tuple):
+        for item in argument:
+            yield from _leaves(item)
+    else:
+        yield argument
 
 
 def _product(found: Gradient, names: tuple[str, ...]) -> Gradient:
     """Of the derivatives of (f, f' v) by each parameter and its tangent, those of f' v by the parameter."""
-    several = len(names) > 1
-    tangents = found.tangent if several else (found.tangent,)
-    errors = found.tangent_error if several else (found.tangent_error,)
-    parts = [tuple(item[0][1] for item in side) for side in (tangents, errors)]
-    tangent, error = parts if several else (part[0] for part in parts)
-    common = {field.name: getattr(found, field.name) for field in fields(Gradient)}
-    made = replace(Gradient(**common), tangent=tangent, tangent_error=error, wrt=names)
-    return replace(made, value=found.value[0], error=found.error[0])
+
+    def part(tangents: Any) -> Any:
+        items = tangents if len(names) > 1 else (tangents,)
+        parts = tuple(_last(item[0]) for item in items)
+        return parts if len(names) > 1 else parts[0]
+
+    return replace(
+        found, value=found.value[0], error=found.error[0], tangent=part(found.tangent),
+        tangent_error=part(found.tangent_error), wrt=names,
+    )  # fmt: skip
+
+
+def _last(slopes: Any) -> Any:
+    """The second of each pair (that of f, that of f' v), in the form of a parameter."""
+    return tuple(map(_last, slopes)) if isinstance(slopes[0], tuple) else slopes[1]
+
+
+def _as_matrix(rows: list[Any], single: bool) -> Any:
+    """Products with the unit vectors of a batch, by parameter: their components, (parameters, units, *batch)."""
+    whole = np.moveaxis(np.asarray(rows, dtype=float), (0, 1), (-1, -2))
+    if single:
+        whole = whole[..., 0, 0]
+    return whole if whole.ndim else float(whole)

@@ -13,7 +13,7 @@ from potto.cli.numbers import accounts, add_options, settings_of, show_stats
 
 if TYPE_CHECKING:
     from potto.evaluating.world import World
-    from potto.python.calls import Gradient
+    from potto.python.gradients import Gradient
 
 SUMMARY = "show the derivative of a definition in symbols, or its gradient in numbers"
 EXAMPLE = """  potto deriv examples/paper/renderer.po renderer
@@ -95,7 +95,8 @@ def _numbers(options: argparse.Namespace, console: Console) -> int:
 def _taken(world: World, file: str, options: argparse.Namespace) -> tuple[Gradient, Gradient | None]:
     """The gradient, and the Hessian's product with the vector if one is given. Raises PottoError."""
     from potto.applications.hessian import hvp
-    from potto.python.api import Function, grad
+    from potto.python.api import Function
+    from potto.python.gradients import grad
 
     function = function_in(world, file, options.name)
     given = arguments_in(world, file, options.given)

@@ -94,7 +94,7 @@ class Picture:
     def call(self, *places: Any) -> tuple[Sequence[Any], Estimate]:
         """The value, the derivatives and the errors at places, as parts one after the other."""
         from potto.applications.images import flat
-        from potto.python.api import grad
+        from potto.python.gradients import grad
         from potto.python.tiles import Interrupted
 
         here = {**self.given, **dict(zip(self.axes, places, strict=True))}

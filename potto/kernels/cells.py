@@ -7,12 +7,13 @@ cells, tuples and lists of values, and functions (anything with the methods of `
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Protocol, Union
 
 import numpy as np
 
 from potto.kernels.errors import not_a_number, wrong_call
+from potto.kernels.tape import Node
 
 if TYPE_CHECKING:
     from potto.core.terms import Lam
@@ -27,6 +28,7 @@ else:  # numpy's typing module takes longer to import than any of ours
     Array = Ints = Bools = np.ndarray
 
 Number = float | Array
+WIDE = frozenset((np.ndarray, Node))  # what has a shape: tangents that are written on a tape stand for arrays
 Mask = bool | Bools
 # A trace: for a branching site of a kernel a mask (forced) or the trace of a callee; sites not named go as they fall.
 Trace = dict[int, Any]
@@ -58,12 +60,20 @@ class Cell:
 
     def map(self, change: Callable[[Array], Number]) -> Cell:
         """The cell with `change` done to every part that is an array."""
-        e, *rest = [x if x is None or not isinstance(x, np.ndarray) else change(x) for x in (self.e, *self.t, *self.et)]
-        v, k = change(self.v) if isinstance(self.v, np.ndarray) else self.v, len(self.t)
-        return Cell(v, e, tuple(rest[:k]), tuple(rest[k:]))
+        v = change(self.v) if isinstance(self.v, np.ndarray) else self.v
+        e = change(self.e) if isinstance(self.e, np.ndarray) else self.e
+        return Cell(v, e, _mapped(self.t, change), _mapped(self.et, change)) if self.t else Cell(v, e)
 
     def arrays(self) -> list[Array]:
-        return [x for x in (self.v, self.e, *self.t, *self.et) if x is not None and isinstance(x, np.ndarray)]
+        parts = (self.v, self.e, *self.t, *self.et)
+        return [x for x in parts if x is not None and type(x) in WIDE]  # type: ignore[misc]
+
+
+def _mapped(side: Sequence[Number | None], change: Callable[[Array], Number]) -> tuple[Number | None, ...]:
+    """Of many tangents most are missing, or plain numbers: with none else they are not gone through one by one."""
+    if WIDE.isdisjoint(map(type, side)):
+        return tuple(side)
+    return tuple([change(x) if type(x) in WIDE else x for x in side])  # type: ignore[arg-type]
 
 
 class FunctionLike(Protocol):

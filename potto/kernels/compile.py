@@ -42,6 +42,7 @@ from potto.kernels import support
 from potto.kernels.cells import Cell, Pattern, Trace, Value, scalar_parts
 from potto.kernels.emit import Lines, Scalar
 from potto.kernels.making import counts, making
+from potto.kernels.taping import TapeLines
 
 MOST_KERNELS = 4096
 
@@ -49,6 +50,8 @@ MOST_KERNELS = 4096
 class Runtime(Protocol):
     """What kernels ask of the runtime. Groups of arguments are tuples of values."""
 
+    @property
+    def taping(self) -> bool: ...
     def global_value(self, module: str, name: str) -> Value: ...
     def inexact(self, term: Term) -> bool: ...
     def closure(self, lam: Lam, captured: dict[str, Value]) -> Value: ...
@@ -91,7 +94,7 @@ def references(term: Term) -> tuple[Global, ...]:
 def kernel(lam: Lam, patterns: tuple[Pattern, ...], directions: int, rounding: bool, rt: Runtime) -> Kernel:
     """The kernel of a function for arguments of these patterns; from the cache where it is known."""
     callees = tuple(rt.inexact(g) for g in references(lam.body))
-    key = (lam.digest, patterns, directions, rounding, callees)
+    key = (lam.digest, patterns, directions, rounding, rt.taping, callees)
     with _cache_lock:
         found = _cache.get(key)
         if found is not None:
@@ -139,7 +142,7 @@ class _Compiler:
 
     def __init__(self, lam: Lam, patterns: tuple[Pattern, ...], directions: int, rounding: bool, rt: Runtime) -> None:
         self.lam, self.rt, self.directions = lam, rt, directions
-        self.out = Lines(directions, rounding)
+        self.out = TapeLines(rounding) if rt.taping else Lines(directions, rounding)
         self.layout: Layout = layout(lam.body)
         self.values: dict[Term, Known] = {}
         self.env: dict[str, Known] = {}

@@ -9,7 +9,7 @@ order in the errors.
 from __future__ import annotations
 
 import operator
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, reduce
 
@@ -46,6 +46,10 @@ class Scalar:
     def plain(self) -> bool:
         """Whether there is nothing but a value."""
         return self.exact and not any(self.t)
+
+
+Bend = Callable[[int, int], str | None]  # how the slope by one argument changes with another
+Tangents = tuple[tuple[str | None, ...], tuple[str | None, ...]]  # and their errors
 
 
 def _number(x: Scalar) -> float | None:
@@ -177,10 +181,13 @@ class Lines:
 
     def add(self, args: Sequence[Scalar]) -> Scalar:
         v = self.total([a.v for a in args]) or ZERO
-        t = tuple(self.total([x for a in args if (x := a.t[d])]) for d in range(self.directions))
         e = self.total([a.e for a in args if a.e])
-        et = tuple(self.total([x for a in args if (x := a.et[d])]) for d in range(self.directions))
-        return self.rounded(Scalar(v, e, t, et), "add", args)
+        return self.rounded(Scalar(v, e, *self.added(args)), "add", args)
+
+    def added(self, args: Sequence[Scalar]) -> Tangents:
+        """The tangents of a sum."""
+        t = tuple(self.total([x for a in args if (x := a.t[d])]) for d in range(self.directions))
+        return t, tuple(self.total([x for a in args if (x := a.et[d])]) for d in range(self.directions))
 
     def mul(self, args: Sequence[Scalar]) -> Scalar:
         if all(a.plain for a in args) and not self.rounding:
@@ -201,19 +208,26 @@ class Lines:
         memo: dict[Term, Scalar] = {}
         moving = [i for i, a in enumerate(args) if not a.plain]
         slope = {i: self.smooth(first[i], local, memo).v for i in moving}
+
+        def bend(i: int, j: int) -> str | None:
+            curve = self.smooth(second_partial(op, len(args), i, j), local, memo).v
+            return None if curve == ZERO else curve
+
+        e = self.total([f"abs({self.product(slope[i], x)})" for i in moving if (x := args[i].e)])
+        return self.rounded(Scalar(v, e, *self.tangents(args, slope, bend)), op, args)
+
+    def tangents(self, args: Sequence[Scalar], slopes: Mapping[int, str], bend: Bend) -> Tangents:
+        """The tangents of a builtin with these slopes by those of its arguments that move or are not exact."""
         t, et = [], []
         for d in range(self.directions):
-            t.append(self.total([self.product(slope[i], x) for i in moving if (x := args[i].t[d])]))
-            bounds = [f"abs({self.product(slope[i], x)})" for i in moving if (x := args[i].et[d])]
-            for i in moving:
-                for j in moving:
-                    if args[i].t[d] and args[j].e:
-                        curve = self.smooth(second_partial(op, len(args), i, j), local, memo).v
-                        if curve != ZERO:
-                            bounds.append(f"abs({self.product(curve, args[i].t[d] or ONE, args[j].e or ONE)})")
+            t.append(self.total([self.product(slope, x) for i, slope in slopes.items() if (x := args[i].t[d])]))
+            bounds = [f"abs({self.product(slope, x)})" for i, slope in slopes.items() if (x := args[i].et[d])]
+            for i in slopes:
+                for j in slopes:
+                    if (x := args[i].t[d]) and (e := args[j].e) and (curve := bend(i, j)):
+                        bounds.append(f"abs({self.product(curve, x, e)})")
             et.append(self.total(bounds))
-        e = self.total([f"abs({self.product(slope[i], x)})" for i in moving if (x := args[i].e)])
-        return self.rounded(Scalar(v, e, tuple(t), tuple(et)), op, args)
+        return tuple(t), tuple(et)
 
     def rounded(self, x: Scalar, op: str, args: Sequence[Scalar]) -> Scalar:
         """With the rounding of this operation added to the bounds, where the kernel keeps track of it."""

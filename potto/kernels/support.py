@@ -1,9 +1,9 @@
 """The functions that generated kernels call by name.
 
 Owns `function`, which finds them: "sqrt" is numpy's, "special.erf" scipy's (imported at the first use), "potto.clamp"
-one of `potto.kernels.ufuncs`, "whole.add" one of `potto.kernels.whole`, "support.select" one of those below,
-"builtin.gamma" the numeric form
-of a builtin and "places.erfc" what it may be off. `OPS` is the arithmetic of arrays for the rules of entries.
+one of `potto.kernels.ufuncs`, "whole.add" one of `potto.kernels.whole`, "tape.linear" of `potto.kernels.tape`,
+"support.select" one of those below, "builtin.gamma" the numeric form of a builtin and "places.erfc" what it may be off.
+`OPS` is the arithmetic of arrays for the rules of entries.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from potto.core.terms import Branch, Const, If, Term
+from potto.kernels import tape
 from potto.kernels.cells import Mask, Number, Value, combined
 from potto.kernels.whole import ROUNDING
 from potto.primitives import PRIMITIVES, Primitive
@@ -35,6 +36,8 @@ def function(path: str) -> Callable[..., Any]:
         return ROUNDING[name]
     if where == "builtin":
         return ARRAYS.function(name)
+    if where == "tape":
+        return getattr(tape, name)  # type: ignore[no-any-return]
     if where == "places":
         return PRIMITIVES[name].places
     if where == "support":

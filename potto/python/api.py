@@ -12,9 +12,10 @@ import difflib
 import itertools
 import os
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from types import MappingProxyType
 from typing import Any
 
 from potto.diagnostics import Diagnostic, PottoError
@@ -24,7 +25,7 @@ from potto.kernels.errors import wrong_call
 from potto.modules import DefinitionTarget, ModuleTarget, find_module, names, resolve
 from potto.modules.kinds import NO_MODULE
 from potto.python.arguments import Batch, batch_of, misfit, moving, value_of
-from potto.python.calls import Call, Form, Gradient
+from potto.python.calls import Call, Form
 from potto.python.tiles import in_tiles
 from potto.python.travel import Travelling
 from potto.reports.render import ProgramError, display_name
@@ -41,6 +42,7 @@ from potto.types.types import Function as FunctionType
 
 NOWHERE = Span(0, 0)
 Given = tuple[tuple[tuple[Any, ...], dict[str, Any]], ...]  # per call the arguments by place and by name
+NOTHING: Mapping[str, Any] = MappingProxyType({})
 _texts = itertools.count(1)
 
 
@@ -101,21 +103,12 @@ def compile(text: str, name: str | None = None) -> Module:
 
 def deriv(function: Function) -> Function:
     """The derivative: a function of duals `(value, tangent)`, which gives a dual."""
-    _must_be_function(function)
+    must_be_function(function)
     return Function(function._world, function._file, _call_of("deriv", function._expr), derivative_type(function._type))
 
 
-def grad(function: Function, wrt: Sequence[str] | str) -> GradientFunction:
-    """The function with its derivatives by the parameters named in `wrt`.
-
-    It takes plain numbers. In the answer, `tangent` is the derivative by the one parameter, or a tuple of them in the
-    order of `wrt`; `answer["c"]` is the one by `c`.
-    """
-    _must_be_function(function)
-    return GradientFunction(function, (wrt,) if isinstance(wrt, str) else tuple(dict.fromkeys(wrt)))
-
-
-def _must_be_function(function: object) -> None:
+def must_be_function(function: object) -> None:
+    """Raise PottoError for anything else."""
     if not isinstance(function, Function):
         raise wrong_call(f"a function of Potto is needed here, not a Python {type(function).__name__}")
 
@@ -229,6 +222,18 @@ class Function(Travelling):
             self._must_move(given)
         return in_tiles(self, given, (), arguments, batch)
 
+    def in_tiles(self, args: tuple[Any, ...], kwargs: dict[str, Any], wrt: tuple[str, ...]) -> Estimate:
+        """The estimate of a call with its derivatives by the parameters named; a large batch in tiles."""
+        given = (*self._given, (args, kwargs))
+        return in_tiles(self, given, wrt, *self._arguments(given))
+
+    def prepared(
+        self, args: tuple[Any, ...], kwargs: dict[str, Any], extra: Mapping[str, Any]
+    ) -> tuple[Call, builtins.list[tuple[str, Value]], Batch]:
+        """A call that is to be run: its arguments as values, and the batch that they make with `extra`."""
+        given = (*self._given, (args, kwargs))
+        return self._call(given), *self._arguments(given, extra)
+
     def _is_derivative(self) -> bool:
         """Whether this is the derivative of a function, whose arguments are all that moves."""
         revision = self._world.db.revision
@@ -253,7 +258,9 @@ class Function(Travelling):
             self._calls[form] = Call(self._world, self._file, self._expr, form)
         return self._calls[form]
 
-    def _arguments(self, given: Given) -> tuple[builtins.list[tuple[str, Value]], Batch]:
+    def _arguments(
+        self, given: Given, extra: Mapping[str, Any] = NOTHING
+    ) -> tuple[builtins.list[tuple[str, Value]], Batch]:
         """The arguments as values, under the names of their parameters. Raises PottoError for what does not fit."""
         revision = self._world.db.revision
         if self._groups is None or self._groups[0] != revision:
@@ -263,7 +270,7 @@ class Function(Travelling):
             complaint = None if type is None else misfit(label, argument, type, _type_of(argument))
             if complaint is not None:
                 raise wrong_call(complaint)
-        batch = batch_of((label, argument) for label, argument, _ in labelled)
+        batch = batch_of([*((label, argument) for label, argument, _ in labelled), *extra.items()])
         return [(label, value_of(label, argument, batch, _function_value)) for label, argument, _ in labelled], batch
 
     def _value(self) -> Value:
@@ -286,6 +293,11 @@ class Function(Travelling):
     def type(self) -> str:
         """The type, as it is printed everywhere."""
         return format_type(self._type)
+
+    @property
+    def written(self) -> str:
+        """The expression that it stands for, without the groups that are given."""
+        return print_expression(self._expr)
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -360,34 +372,6 @@ def bound(function: Function, args: tuple[Any, ...], kwargs: dict[str, Any]) -> 
     """The arguments of a call under the names of their parameters. Raises PottoError if some are missing."""
     labelled = _labelled((*function._given, (args, kwargs)), groups_of(function._whole))
     return [(label, argument) for label, argument, _ in labelled]
-
-
-class GradientFunction:
-    """A function that also answers with its derivatives by some of its parameters."""
-
-    def __init__(self, function: Function, wrt: tuple[str, ...]) -> None:
-        parameters = [p.name for group in groups_of(function._whole) for p in group]
-        if not wrt:
-            raise wrong_call("`wrt` names no parameter to differentiate by")
-        for name in wrt:
-            if name not in parameters:
-                near = difflib.get_close_matches(name, [p for p in parameters if p], 1)
-                named = ", ".join(f"`{p}`" for p in parameters if p)
-                hint = f"did you mean `{near[0]}`?" if near else f"its parameters are {named}" if named else ""
-                raise wrong_call(f"`{print_expression(function._expr)}` has no parameter `{name}`", hint)
-        self._function = function
-        self._wrt = wrt
-
-    def __call__(self, *args: Any, **kwargs: Any) -> Gradient:
-        function = self._function
-        given = (*function._given, (args, kwargs))
-        arguments, batch = function._arguments(given)
-        found = in_tiles(function, given, self._wrt, arguments, batch)
-        assert isinstance(found, Gradient)
-        return found
-
-    def __repr__(self) -> str:
-        return f"<gradient of {self._function!r} by {', '.join(self._wrt)}>"
 
 
 def _call_of(name: str, argument: nodes.Expr) -> nodes.Expr:

@@ -1,28 +1,24 @@
 """Calls of functions of Potto from Python: elaborated once per form, then run on values.
 
-Owns `Call` and `Gradient`. A form says how many arguments each group was given by place and which by name; the names of
+Owns `Call`. A form says how many arguments each group was given by place and which by name; the names of
 parameters are resolved by elaboration, as in a program. Conversion of Python values is left to `arguments`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
-from typing import Any
+from dataclasses import dataclass, field
 
 from potto.core.terms import Lam, Term
 from potto.elaborate import elaborate_expression
 from potto.evaluating.world import World
-from potto.kernels.cells import Cell, Value, pad
-from potto.kernels.errors import wrong_call
+from potto.kernels.cells import Value
 from potto.projects.settings import current
 from potto.python.arguments import Batch
 from potto.reports.render import Located, ProgramError
-from potto.runtime.answers.convergence import Shortfalls, converged_members, merged
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.shown import as_dual, gives_dual
 from potto.runtime.evaluate import Clock, report
-from potto.runtime.evaluation.functions import Closure
 from potto.runtime.evaluation.machine import Machine
 from potto.source import Span
 from potto.syntax import nodes
@@ -96,91 +92,3 @@ def applied(expr: nodes.Expr, form: Form) -> nodes.Expr:
         body = nodes.Apply(NOWHERE, body, tuple(given), True)
     parameters = tuple(nodes.Parameter(NOWHERE, name) for name in names)
     return nodes.Lambda(NOWHERE, (parameters,), body)
-
-
-# Gradients
-
-
-@dataclass(frozen=True, repr=False)
-class Gradient(Estimate):
-    """An estimate with derivatives by several parameters: `gradient["c"]`, or `tangent` for all of them."""
-
-    wrt: tuple[str, ...] = ()
-
-    def __getitem__(self, name: str) -> Any:
-        if name not in self.wrt:
-            raise KeyError(name)
-        return self.tangent if len(self.wrt) == 1 else self.tangent[self.wrt.index(name)]
-
-
-def gradient(call: Call, arguments: Sequence[tuple[str, Value]], wrt: tuple[str, ...], batch: Batch) -> Gradient:
-    """The estimate of a call with its derivatives by the arguments named in `wrt`, all in one run."""
-    given = dict(arguments)
-    for name in wrt:
-        if name not in given:
-            raise wrong_call(f"`{name}` is given no value, so there is nothing to differentiate by")
-    directions = sum(_size(name, given[name]) for name in wrt)
-    machine = call.world.program.machine(current(call.world.settings(call.file))).with_directions(directions)
-    numbers = iter(range(directions))
-    seeded = {name: _seeded(given[name], numbers, directions) for name in wrt}
-    values = [seeded[name] if name in seeded else pad(value, directions) for name, value in arguments]
-    with Clock() as clock:
-        value = call.value(values, machine)
-    if not isinstance(value, Cell | tuple) or isinstance(value, Closure):
-        raise wrong_call("only a number or a tuple of numbers has a gradient")
-    parts = [report(_pick(value, direction), machine, clock) for direction in range(directions)]
-    return _gathered([batch.shaped(part) for part in parts], wrt, given)
-
-
-def _size(name: str, value: Value) -> int:
-    """How many numbers a parameter has."""
-    if isinstance(value, Cell):
-        return 1
-    if isinstance(value, tuple):
-        return sum(_size(name, item) for item in value)
-    raise wrong_call(f"`{name}` is not a number, so there is no derivative by it")
-
-
-def _seeded(value: Value, numbers: Any, directions: int) -> Value:
-    """The parameter, each of its numbers moving in a direction of its own."""
-    if isinstance(value, tuple):
-        return tuple(_seeded(item, numbers, directions) for item in value)
-    assert isinstance(value, Cell)
-    own = next(numbers)
-    return Cell(value.v, value.e, (None,) * own + (1.0,) + (None,) * (directions - own - 1))
-
-
-def _pick(value: Value, direction: int) -> Value:
-    """The value with the tangent of one direction."""
-    if isinstance(value, tuple):
-        return tuple(_pick(item, direction) for item in value)
-    assert isinstance(value, Cell)
-    tangent = value.t[direction] if value.t else None
-    bound = value.et[direction] if value.et else None
-    return Cell(value.v, value.e, (tangent,), (bound,))
-
-
-def _gathered(parts: list[Estimate], wrt: tuple[str, ...], given: dict[str, Value]) -> Gradient:
-    tangents = _by_name([part.tangent for part in parts], wrt, given)
-    bounds = _by_name([part.tangent_error for part in parts], wrt, given)
-    first = parts[0]
-    common = {field.name: getattr(first, field.name) for field in fields(Estimate)}
-    common["tangent"] = tangents[0] if len(wrt) == 1 else tangents
-    common["tangent_error"] = bounds[0] if len(wrt) == 1 else bounds
-    missing: Shortfalls = {}
-    for part in parts:
-        merged(missing, part.shortfalls)
-    common["shortfalls"], common["converged"] = missing, all(part.converged for part in parts)
-    if first.member_converged is not None:
-        common["member_converged"] = converged_members(missing, first.member_converged.shape)
-    return Gradient(**common, wrt=wrt)
-
-
-def _by_name(numbers: list[Any], wrt: tuple[str, ...], given: dict[str, Value]) -> tuple[Any, ...]:
-    """The derivatives in the form of the parameters that they belong to."""
-    rest = iter(numbers)
-
-    def form(value: Value) -> Any:
-        return tuple(form(item) for item in value) if isinstance(value, tuple) else next(rest)
-
-    return tuple(form(given[name]) for name in wrt)

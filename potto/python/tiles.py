@@ -3,9 +3,9 @@
 Owns `in_tiles` and `Interrupted`. A batch is evaluated in blocks, whose size the first call of a function finds out by
 the clock and the process keeps: so answers are the same to the last bit wherever and in whatever company a block is
 evaluated, by the same backend. (They are not quite if members are blocked otherwise: numpy adds up rows and columns in
-another order then, which changes the last one or two digits, far within the error bars.) A tile is as many blocks as take half a second;
-tiles go to the executor of `potto.settings`. What an executor loses (a process that was killed, a machine that is gone)
-is evaluated again: by it, and then here.
+another order then, which changes the last one or two digits, far within the error bars.) A tile is as many blocks as
+take half a second; tiles go to the executor of `potto.settings`. What an executor loses (a process that was killed, a
+machine that is gone) is evaluated again: by it, and then here.
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ from potto.diagnostics import PottoError
 from potto.kernels.cells import Value, all_arrays, map_arrays
 from potto.projects.settings import Settings, current, executor, settings
 from potto.python.arguments import Batch, cut, flattened
-from potto.python.calls import gradient
 from potto.runtime.answers.batches import joined, unfinished
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.evaluation.record import advancing
@@ -78,6 +77,8 @@ def whole(
     function: Function, given: Any, wrt: tuple[str, ...], arguments: list[tuple[str, Value]], batch: Batch
 ) -> Estimate:
     """The estimate of a call for all members of a batch at once, with its derivatives by `wrt`."""
+    from potto.python.gradients import gradient  # which knows functions, and these their tiles
+
     call = function._call(given)
     return gradient(call, arguments, wrt, batch) if wrt else call.run([value for _, value in arguments], batch)
 

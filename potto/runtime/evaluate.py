@@ -28,6 +28,7 @@ from potto.runtime.answers.estimate import Estimate, OneSided
 from potto.runtime.answers.inherited_errors import rough, widened
 from potto.runtime.evaluation.duals import call_derivative, call_paired
 from potto.runtime.evaluation.functions import Closure, Derivative
+from potto.runtime.evaluation.local import locally
 from potto.runtime.evaluation.machine import Linker, Machine, Record, Semantics
 from potto.runtime.evaluation.selection import lazy
 from potto.runtime.evaluation.sums import total
@@ -38,7 +39,7 @@ Lookup = Callable[[str, str], Term]
 def _integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
     from potto.runtime.integration.driver import integral  # loaded with the first integral: a prompt is there before
 
-    return integral(machine, term, env)
+    return locally(machine, env, lambda own, here: integral(own, term, here))
 
 
 def _added(machine: Machine, terms: tuple[Term, ...], env: dict[str, Value]) -> Value:
@@ -119,6 +120,7 @@ class Clock:
 
 
 def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
+    """The estimate of a value; of its tangents the first is told, and all count for whether it converged."""
     record = machine.record
     method = "exact" if not record.methods else "+".join(sorted(record.methods))
     stats: dict[str, Any] = {
@@ -155,7 +157,8 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
         tangents = told(value, lambda cell: cell.t[0] if cell.t else None)
         tangent_bounds = told(value, lambda cell: cell.et[0] if cell.t else None)
     shown = _flat(numbers, bounds)
-    missing = _missing([*shown, *_flat(tangents, tangent_bounds)], machine)
+    slopes = [(number(t), number(et)) for c in all_cells(value) for t, et in zip(c.t, c.et, strict=True)]
+    missing = _missing([*shown, *slopes], machine)
     shape = np.broadcast_shapes(*(number.shape for number, _ in shown if isinstance(number, np.ndarray)))
     return answer(
         numbers, bounds, tangents, tangent_bounds, converged=not missing,
@@ -200,11 +203,15 @@ def _notes(record: Record) -> list[OneSided]:
 def told(value: Value, part: Callable[[Cell], Number | None]) -> Any:
     """One part of all numbers, in the form of the value; 0 where it is missing."""
     if isinstance(value, Cell):
-        x = part(value)
-        return x if isinstance(x, np.ndarray) else 0.0 if x is None else float(x)
+        return number(part(value))
     if isinstance(value, tuple | list):
         return type(value)([told(item, part) for item in value])
     raise errors.not_a_number(value)
+
+
+def number(part: Number | None) -> Number:
+    """A part of a number; 0 where it is missing."""
+    return part if isinstance(part, np.ndarray) else 0.0 if part is None else float(part)
 
 
 def _flat(numbers: Any, bounds: Any) -> list[tuple[Any, Any]]:

@@ -12,6 +12,7 @@ from potto.calculus.inlining.currying import sizes_of
 from potto.integrate.pieces import still
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Trace, Value
+from potto.kernels.tape import Untaped
 from potto.runtime.evaluation.compared import compared
 from potto.runtime.evaluation.functions import Closure, Derivative, Paired
 from potto.runtime.evaluation.machine import Machine, fit
@@ -85,7 +86,9 @@ def split(value: Value) -> Value:
 def call_paired(
     machine: Machine, function: Paired, groups: tuple[tuple[Value, ...], ...], trace: Trace | None
 ) -> Value:
-    """Call a function on duals for each direction that is carried."""
+    """Call a function on duals for each direction that is carried. Raises Untaped: numbers are wanted there."""
+    if machine.taping:
+        raise Untaped
     k = machine.directions
     quiet = machine.with_directions(0)
     v: Cell | None = None

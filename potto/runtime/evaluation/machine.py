@@ -79,7 +79,8 @@ class Linker:
         self.constants: dict[tuple[str, str, Settings], Value] = {}
         self.duals: dict[tuple[Lam, bool], Lam] = {}
         self.reaches: dict[tuple[Term, ...], tuple[tuple[str, str, bytes], ...]] = {}
-        self.kernels: dict[tuple[Lam, tuple[Pattern, ...], int, bool], Kernel] = {}  # the ones met, without a lookup
+        # the ones met, without a lookup
+        self.kernels: dict[tuple[Lam, tuple[Pattern, ...], int, bool, bool], Kernel] = {}
 
     def term(self, module: str, name: str) -> Term:
         key = (module, name)
@@ -137,6 +138,7 @@ class Machine:
     frozen: surfaces, bounds and deltas stand still, so that tangents are those of the integrands alone.
     side: -1 or 1 where one-sided derivatives are wanted, for parameters that shrink or grow.
     summed: whether the members of batches are summands, so that nobody sees the digits of each.
+    taping: the one tangent is written on a tape (`kernels/tape`).
     """
 
     linker: Linker
@@ -149,6 +151,7 @@ class Machine:
     frozen: bool = False
     side: int = 0
     summed: bool = False
+    taping: bool = False
 
     @property
     def rtol(self) -> float:
@@ -171,9 +174,13 @@ class Machine:
         return other
 
     def with_directions(self, directions: int) -> Machine:
-        if directions == self.directions:
+        if directions == self.directions and not self.taping:
             return self
-        return self.changed(directions=directions)
+        return self.changed(directions=directions, taping=False)
+
+    def taped(self) -> Machine:
+        """The machine that writes tangents on a tape."""
+        return self.changed(directions=1, taping=True)
 
     def inside(self) -> Machine:
         """The machine for an integrand: rounding is estimated by the integrator, not kept track of."""
@@ -236,13 +243,13 @@ class Machine:
     def run(self, function: Lam, args: list[Value], trace: Trace | None) -> Value:
         k = self.directions
         found = self.kernel(function, tuple([pattern(a, k) for a in args]))
-        if found.plain and many(args):
+        if found.plain and many(args) and not self.taping:
             return at_points(found, self, trace, args, self.backend)
         return found.run(self, trace, *args)
 
     def kernel(self, function: Lam, patterns: tuple[Pattern, ...]) -> Kernel:
         """The kernel of a function for arguments of these patterns."""
-        key = (function, patterns, self.directions, self.rounding)
+        key = (function, patterns, self.directions, self.rounding, self.taping)
         found = self.linker.kernels.get(key)
         if found is None:
             found = self.linker.kernels[key] = kernel(function, patterns, self.directions, self.rounding, self)
@@ -269,7 +276,7 @@ class Machine:
         key = (module, name, self.settings)
         if key not in self.linker.constants:
             self.enter()
-            still = self.changed(directions=0, rounding=True, frozen=False)
+            still = self.changed(directions=0, taping=False, rounding=True, frozen=False)
             self.linker.constants[key] = still.term(term, {})
             self.record.depth -= 1
         return pad(self.linker.constants[key], self.directions)

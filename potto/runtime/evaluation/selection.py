@@ -25,6 +25,7 @@ from potto.kernels.cells import (
     map_cells,
     map_trace,
 )
+from potto.kernels.tape import Node, scattered
 from potto.runtime.evaluation.machine import Machine
 
 Pick = Callable[[Array], Array]
@@ -77,6 +78,8 @@ def apart(
         parts.append(evaluated(number, {n: map_arrays(v, pick) for n, v in env.items()}, pick))
 
     def whole(*rows: Number) -> Array:
+        if any(isinstance(row, Node) for row in rows):
+            return scattered(masks, rows, shape)  # type: ignore[no-any-return]
         out = np.empty(shape)
         for mask, row in zip(masks, rows, strict=True):
             out[mask] = row

@@ -96,9 +96,9 @@ def _reduce(value: Value, shape: tuple[int, ...], count: int) -> Value:
         raise errors.not_a_number(value)
 
     def part(x: Number) -> Number:
-        full = np.broadcast_to(x, (*shape, count)) if np.ndim(x) == 0 or np.shape(x)[-1] != count else np.asarray(x)
-        summed = np.add.reduce(full, axis=-1)
-        return float(summed) if summed.ndim == 0 else summed
+        full = np.broadcast_to(x, (*shape, count)) if np.ndim(x) == 0 or np.shape(x)[-1] != count else x
+        summed: Number = np.add.reduce(full, axis=-1)
+        return float(summed) if isinstance(summed, np.floating) else summed
 
     found = combined(part, value)
     assert isinstance(found, Cell)

@@ -18,6 +18,7 @@ from potto.core.terms import Const, Integral, Lam, Term, Var
 from potto.diagnostics import PottoError
 from potto.kernels import errors
 from potto.kernels.cells import Array, Bools, Cell, Number, Value, all_arrays, combined, map_arrays, pad
+from potto.kernels.tape import Node
 from potto.kernels.whole import ROUNDING, UNIT_ROUNDOFF
 from potto.runtime.answers.convergence import widest
 from potto.runtime.evaluation.machine import Machine
@@ -127,8 +128,9 @@ def _evaluated(
     record.shortfalls, record.edges, record.within = {}, [], 0.0
     try:
         with machine.among(np.arange(size)) as together:
-            together = together.changed(directions=width, summed=not shape)
-            value = pad(together.run(batch.function, args, None), width)
+            together = together.changed(summed=not shape)
+            own = together if machine.taping and width else together.with_directions(width)
+            value = pad(own.run(batch.function, args, None), width)
         within, told = record.within, [*record.shortfalls.values(), *(np.isfinite(e.backward) for e in record.edges)]
     except PottoError:  # as it is written, it says what is wrong, and where
         return None, ~bad
@@ -141,7 +143,7 @@ def _evaluated(
         bad |= np.broadcast_to(where, (*np.shape(where)[:-1], size)).reshape(-1, size).any(axis=0)
     if bad.all():
         return None, bad
-    parts = _Parts(value, (*shape, size), slots, machine.directions)
+    parts = _Parts(value, (*shape, size), slots, machine)
     whole = parts.total(~bad)
     if record.methods.isdisjoint(SAMPLED) and (lacking := parts.lacking(whole, machine.rtol, within) & ~bad).any():
         bad |= lacking
@@ -215,7 +217,11 @@ class _Parts:
     """The numbers of members and how far off they are, (..., m) each, by what they are added up to: in `into` 0 for the
     value, 1 and on for the tangents, and a number beyond those for nothing."""
 
-    def __init__(self, value: Cell, shape: tuple[int, ...], slots: Sequence[Slots], directions: int) -> None:
+    def __init__(self, value: Cell, shape: tuple[int, ...], slots: Sequence[Slots], machine: Machine) -> None:
+        directions = machine.directions
+        self.taped: tuple[Any, ...] = value.t if machine.taping else ()
+        if machine.taping:
+            value, slots, directions = Cell(value.v, value.e), [()] * len(slots), 0
         numbers, off = (value.v, *value.t), (value.e, *value.et)
         self.numbers, self.off = (
             np.stack([np.broadcast_to(0.0 if x is None else x, shape) for x in parts], axis=-2)
@@ -241,6 +247,9 @@ class _Parts:
             found[place] = sums if self.batch else (float(sums[0]), float(sums[1]))
         (v, e), *tangents = found
         assert v is not None
+        if self.taped:
+            node = np.broadcast_to(self.taped[0], self.numbers.shape[:-2] + self.numbers.shape[-1:])[..., keep]
+            return Cell(v, e, (np.add.reduce(node, axis=-1),))
         return Cell(v, e, tuple(t for t, _ in tangents), tuple(et for _, et in tangents))
 
     def lacking(self, whole: Cell, rtol: float, within: Any) -> Bools:
@@ -264,6 +273,8 @@ def _sum(parts: Sequence[Value], directions: int) -> Value:
     def total(numbers: Sequence[Number | None], off: Sequence[Number | None]) -> tuple[Number | None, Number | None]:
         given = [x for x in numbers if x is not None]
         whole = sum(given) if given else None
+        if isinstance(whole, Node):  # the tape keeps account of what is rounded off
+            return whole, None
         return whole, None if whole is None else ROUNDING["add"](whole, *given) + sum(x for x in off if x is not None)
 
     v, e = total([cell.v for cell in cells], [cell.e for cell in cells])

@@ -1,0 +1,298 @@
+"""Tangents that are written down instead of worked out: what a number depends on, and how steeply.
+
+Owns `Node`, `linear`, `swept` and `pushed`. A kernel that tapes carries one tangent, a node: the linear map from the
+numbers that it was made of. Swept from an answer back to the seeds, the tape gives the derivatives by all of them, at
+the cost of a few values whatever their number (reverse accumulation); pushed forward, it gives tangents.
+
+An edge keeps with its slope how far off that may be. To first order an error is then a sum over edges: the sensitivity
+of the answer, along all paths without regard to sign, times what the slope is off, times how far the seeds can have
+moved the parent, again without regard to sign. Two more numbers for each node are swept along for it.
+
+Nodes stand for arrays where numbers are batches: they have a shape, can be indexed, and numpy's functions that only
+move members about (`MOVES`) take them. Anything else done to one raises `Untaped`, and forward mode is used.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterable, Sequence
+from types import EllipsisType
+from typing import Any
+
+import numpy as np
+
+from potto.kernels.whole import UNIT_ROUNDOFF
+
+Pull = Callable[[Any], Any]
+Shape = tuple[int, ...]
+Swept = tuple[Any, Any]  # a derivative and how far off it may be
+
+FEW = 64  # leaves, up to which a node knows which of them it is made of
+
+TWICE = 2 * UNIT_ROUNDOFF
+
+_numbers = itertools.count()
+
+
+class Untaped(Exception):
+    """Something was done with a tangent that a tape does not know."""
+
+
+class Edge:
+    """From a node to one that it was made of: `slope` times it, the slope off by `off`; or its members moved about, by
+    what `pull` is the adjoint of."""
+
+    __slots__ = ("off", "parent", "pull", "slope")
+
+    def __init__(self, parent: Node, slope: Any = 1.0, off: Any = None, pull: Pull | None = None) -> None:
+        self.parent, self.slope, self.off, self.pull = parent, slope, off, pull
+
+
+class Node:
+    """A tangent on the tape. Without edges it is a seed. It is made of its `leaves` member by member: of seeds, and of
+    what was moved about."""
+
+    __slots__ = ("edges", "leaves", "number", "shape")
+
+    def __init__(self, edges: Sequence[Edge], shape: Shape) -> None:
+        self.edges, self.shape, self.number = edges, shape, next(_numbers)
+        self.leaves: frozenset[Node] | EllipsisType | None = ...
+
+    @property
+    def leaf(self) -> bool:
+        return not self.edges or self.edges[0].pull is not None
+
+    @property
+    def ndim(self) -> int:
+        return len(self.shape)
+
+    @property
+    def size(self) -> int:
+        return int(np.prod(self.shape))
+
+    def __add__(self, other: Any) -> Node:
+        return linear((1.0, self, None), (1.0, other, None))  # type: ignore[no-any-return]
+
+    __radd__ = __add__
+
+    def __getitem__(self, index: Any) -> Node:
+        shape = np.broadcast_to(0.0, self.shape)[index].shape
+
+        def pull(adjoint: Any) -> Any:
+            whole = np.zeros(self.shape)
+            np.add.at(whole, index, adjoint)
+            return whole
+
+        return Node((Edge(self, pull=pull),), shape)
+
+    def _unknown(self, *_: Any, **__: Any) -> Any:
+        raise Untaped
+
+    __float__ = __bool__ = __array__ = __neg__ = __abs__ = _unknown
+    __mul__ = __rmul__ = __truediv__ = __sub__ = __rsub__ = _unknown
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **given: Any) -> Any:
+        if ufunc is not np.add or method not in ("__call__", "reduce"):
+            raise Untaped
+        if method == "__call__":
+            return linear(*((1.0, x, None) for x in inputs))
+        axis = given.get("axis", 0) % self.ndim
+
+        def pull(adjoint: Any) -> Any:
+            return np.broadcast_to(np.expand_dims(adjoint, axis), self.shape)
+
+        return Node((Edge(self, pull=pull),), self.shape[:axis] + self.shape[axis + 1 :])
+
+    def __array_function__(self, function: Any, _: Any, args: Any, given: Any) -> Any:
+        move = MOVES.get(function)
+        if move is None:
+            raise Untaped
+        return move(*args, **given)
+
+
+def linear(*edges: tuple[Any, Any, Any]) -> Any:
+    """The sum of (slope, tangent, what the slope is off); what is no node is 0."""
+    kept: list[Edge] = []
+    shape: Shape = ()
+    for slope, parent, off in edges:
+        if parent.__class__ is Node:
+            kept.append(Edge(parent, slope, off))
+            if parent.shape or not isinstance(slope, float):
+                shape = np.broadcast_shapes(shape, np.shape(slope), parent.shape)
+        elif parent is not None and np.any(np.asarray(parent) != 0):
+            raise Untaped
+    return Node(kept, shape) if kept else 0.0
+
+
+def scattered(masks: Sequence[Any], rows: Sequence[Any], shape: Shape) -> Any:
+    """Rows put together again, each at the members of its mask."""
+
+    def pull(mask: Any) -> Pull:
+        return lambda adjoint: adjoint[mask]
+
+    parts = [(_broadcast(row, (int(mask.sum()),)), mask) for row, mask in zip(rows, masks, strict=True)]
+    return Node([Edge(row, pull=pull(mask)) for row, mask in parts if isinstance(row, Node)], shape)
+
+
+# What numpy's functions do to nodes
+
+
+def _broadcast(x: Any, shape: Shape) -> Any:
+    """A node of this shape; its members are repeated, which sweeps see by themselves."""
+    return x if not isinstance(x, Node) or x.shape == tuple(shape) else Node((Edge(x),), tuple(shape))
+
+
+def _where(mask: Any, a: Any, b: Any) -> Any:
+    def pull(kept: Any) -> Pull:
+        return lambda adjoint: np.where(kept, adjoint, 0.0)
+
+    shape = np.broadcast_shapes(np.shape(mask), *(x.shape for x in (a, b) if isinstance(x, Node)))
+    sides = [(_broadcast(x, shape), kept) for x, kept in ((a, mask), (b, ~mask)) if isinstance(x, Node)]
+    return Node([Edge(x, pull=pull(kept)) for x, kept in sides], shape)
+
+
+def _stack(parts: Sequence[Any], axis: int = 0) -> Any:
+    shape = np.broadcast_shapes(*(np.shape(x) for x in parts))
+    where = axis % (len(shape) + 1)
+    whole = (*shape[:where], len(parts), *shape[where:])
+
+    def pull(place: int) -> Pull:
+        return lambda adjoint: np.take(adjoint, place, axis=where)
+
+    return Node([Edge(_broadcast(x, shape), pull=pull(i)) for i, x in enumerate(parts) if isinstance(x, Node)], whole)
+
+
+def _broadcast_arrays(*parts: Any) -> list[Any]:
+    shape = np.broadcast_shapes(*(np.shape(x) for x in parts))
+    return [_broadcast(x, shape) if isinstance(x, Node) else np.broadcast_to(x, shape) for x in parts]
+
+
+MOVES: dict[Any, Callable[..., Any]] = {
+    np.broadcast_to: _broadcast,
+    np.broadcast_arrays: _broadcast_arrays,
+    np.where: _where,
+    np.stack: _stack,
+    np.shape: lambda x: x.shape,
+    np.ndim: lambda x: x.ndim,
+}
+
+
+# Sweeps
+
+
+def leaves(nodes: Sequence[Node]) -> frozenset[Node] | None:
+    """What nodes are made of member by member; None if that is more than FEW."""
+    if any(node.leaves is ... for node in nodes):
+        for node in _in_order(nodes, by_members=True):
+            if node.leaves is ...:
+                node.leaves = frozenset((node,)) if node.leaf else _union([edge.parent for edge in node.edges])
+    return _union(nodes)
+
+
+def _union(nodes: Iterable[Node]) -> frozenset[Node] | None:
+    found: frozenset[Node] = frozenset()
+    for node in nodes:
+        if node.leaves is None or node.leaves is ...:
+            return None
+        if not node.leaves <= found:
+            found |= node.leaves
+    return found if len(found) <= FEW else None
+
+
+def every_leaf(nodes: Sequence[Node]) -> list[Node]:
+    """What nodes are made of member by member, however much that is."""
+    return [node for node in _in_order(nodes, by_members=True) if node.leaf]
+
+
+def _in_order(nodes: Iterable[Node], by_members: bool = False) -> list[Node]:
+    """All that nodes are made of, each after its parents; as far as members are not moved about."""
+    seen = set(nodes)
+    todo = list(seen)
+    while todo:
+        node = todo.pop()
+        for edge in () if by_members and node.leaf else node.edges:
+            if edge.parent not in seen:
+                seen.add(edge.parent)
+                todo.append(edge.parent)
+    return sorted(seen, key=lambda node: node.number)
+
+
+def swept(answers: Sequence[tuple[Node, Any]]) -> dict[Node, Swept]:
+    """The derivatives of a sum of answers, each times a weight, by every seed, and how far off they may be."""
+    sums: dict[Node, tuple[Any, Any, Any]] = {}
+    for node, weight in answers:
+        _gather(sums, node, weight, abs(weight), 0.0)
+    found: dict[Node, Swept] = {}
+    for node in reversed(_in_order([node for node, _ in answers])):
+        adjoint, paths, error = sums.pop(node)
+        if not node.edges:
+            found[node] = adjoint, error
+        for edge in node.edges:
+            pull = edge.pull
+            if pull is not None:
+                _gather(sums, edge.parent, pull(adjoint), pull(paths), pull(error))
+            elif edge.slope.__class__ is float and edge.slope == 1.0 and edge.off is None:
+                _gather(sums, edge.parent, adjoint, paths, error + TWICE * paths)
+            else:
+                steep, off = _bounds(edge)
+                more = _times(steep, error) + _times(off, paths)
+                _gather(sums, edge.parent, _times(edge.slope, adjoint), _times(steep, paths), more)
+    return found
+
+
+def _bounds(edge: Edge) -> tuple[Any, Any]:
+    """How steep an edge is without regard to sign, and how far off its slope may be, rounding included."""
+    steep = abs(edge.slope)
+    off = TWICE * steep
+    return steep, off if edge.off is None else off + edge.off
+
+
+def pushed(nodes: Sequence[Node], directions: Sequence[Node]) -> list[list[Swept]]:
+    """For each node its tangents in the direction of each leaf, and how far off they may be; None where it has none."""
+    known: dict[Node, list[Any]] = {}
+    for node in _in_order(nodes, by_members=True):
+        known[node] = [None if node is not leaf else (1.0, 1.0, 0.0) for leaf in directions]
+        for edge in () if node.leaf else node.edges:
+            for d, parts in enumerate(known[edge.parent]):
+                if parts is not None:
+                    own, more = known[node][d], _pushed(edge, *parts)
+                    known[node][d] = more if own is None else tuple(a + b for a, b in zip(own, more, strict=True))
+    return [[(None, None) if x is None else (x[0], x[2]) for x in known[node]] for node in nodes]
+
+
+def _pushed(edge: Edge, tangent: Any, size: Any, error: Any) -> tuple[Any, Any, Any]:
+    steep, off = _bounds(edge)
+    return edge.slope * tangent, steep * size, steep * error + off * size
+
+
+def _gather(sums: dict[Node, tuple[Any, Any, Any]], node: Node, adjoint: Any, paths: Any, error: Any) -> None:
+    """Add what comes to a node: its adjoint, the same along all paths without regard to sign, and its error."""
+    if node.shape or not isinstance(adjoint, float):
+        adjoint, paths, error = (_fitted(part, node.shape) for part in (adjoint, paths, error))
+    known = sums.get(node)
+    if known is not None:
+        adjoint, paths, error = known[0] + adjoint, known[1] + paths, known[2] + error
+    sums[node] = adjoint, paths, error
+
+
+def _fitted(part: Any, shape: Shape) -> Any:
+    """An adjoint in the shape of its node: summed over the axes along which that was repeated."""
+    own = np.shape(part)
+    if own == shape:
+        return part
+    if len(own) > len(shape):
+        part = np.sum(part, axis=tuple(range(len(own) - len(shape))))
+    repeated = tuple(i for i, (n, m) in enumerate(zip(np.shape(part), shape[len(shape) - np.ndim(part) :], strict=True))
+                     if m == 1 and n != 1)  # fmt: skip
+    if repeated:
+        part = np.sum(part, axis=repeated, keepdims=True)
+    return np.broadcast_to(part, shape) if shape else float(part)
+
+
+def _times(slope: Any, adjoint: Any) -> Any:
+    """A slope times an adjoint; 0 where the answer does not depend on the number, however steep that is there."""
+    found = slope * adjoint
+    if isinstance(found, float):
+        return 0.0 if found != found and adjoint == 0 else found
+    wrong = np.isnan(found)
+    return np.where(wrong & (np.asarray(adjoint) == 0), 0.0, found) if wrong.any() else found

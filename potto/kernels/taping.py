@@ -1,0 +1,39 @@
+"""Lines of kernels whose tangents are written on a tape: for each builtin its slopes, and how far off these are.
+
+Owns `TapeLines`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from potto.kernels.emit import ONE, Bend, Lines, Scalar, Tangents
+
+
+class TapeLines(Lines):
+    """Lines that carry one tangent, a node; of its errors the tape keeps account."""
+
+    def __init__(self, rounding: bool) -> None:
+        super().__init__(1, rounding)
+
+    def tangents(self, args: Sequence[Scalar], slopes: Mapping[int, str], bend: Bend) -> Tangents:
+        edges = []
+        for i, slope in slopes.items():
+            if args[i].t[0]:
+                bends = [(found, e) for j in slopes if (e := args[j].e) and (found := bend(i, j))]
+                off = self.total([f"abs({self.product(found, e)})" for found, e in bends])
+                edges.append((slope, args[i].t[0], off))
+        return self.linear(edges)
+
+    def added(self, args: Sequence[Scalar]) -> Tangents:
+        return self.linear([(ONE, x.t[0], None) for x in args if x.t[0]])
+
+    def linear(self, edges: Sequence[tuple[str, str | None, str | None]]) -> Tangents:
+        if not edges:
+            return self.none, self.none
+        text = ", ".join(f"({slope}, {tangent}, {off})" for slope, tangent, off in edges)
+        return (self.let(f"{self.ufunc('tape.linear')}({text})", "t"),), self.none
+
+    def rounded(self, x: Scalar, op: str, args: Sequence[Scalar]) -> Scalar:
+        found = super().rounded(Scalar(x.v, x.e, self.none, self.none), op, args)
+        return Scalar(found.v, found.e, x.t, self.none)

@@ -1,0 +1,386 @@
+"""Derivatives of functions of Potto for Python: gradients, Jacobians, products with vectors from either side.
+
+Owns `grad`, `value_and_grad`, `jacobian`, `vjp`, `jvp` and `Gradient`. By many parameters it is differentiated in
+reverse, by few forward: that is chosen here, and both give the same. What is differentiated by is named; without names
+it is the first parameter. All numbers come with their errors, and arrays broadcast as in a call. Second derivatives
+are in `applications/hessian`.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from potto.kernels.cells import Cell, Number, Value, all_cells, map_cells, pad
+from potto.kernels.chunks import POINTS
+from potto.kernels.errors import wrong_call
+from potto.kernels.tape import Node, Swept, Untaped, swept
+from potto.projects.settings import current
+from potto.python.api import Function, must_be_function
+from potto.python.arguments import Batch, value_of
+from potto.python.calls import Call
+from potto.runtime.answers.estimate import Estimate
+from potto.runtime.evaluate import Clock, number, report, told
+from potto.runtime.evaluation.machine import Machine
+
+# Parameters, from which on a tape is swept back instead of carrying a tangent for each: it costs 2.5 to 3.4 values
+# whatever their number, tangents 1.6 at 4 and, where all depends on all, 2.7 at 12 and 4.8 at 64; the first call costs
+# half as much from 8 on (`benchmarks/gradients.py ways`). What integrals carry is the same either way.
+MANY = 12
+NOTHING: Swept = (None, None)
+Names = Sequence[str] | str | None
+
+
+@dataclass(frozen=True, repr=False)
+class Gradient(Estimate):
+    """An estimate with derivatives by several parameters: `gradient["c"]`, or `tangent` for all of them."""
+
+    wrt: tuple[str, ...] = ()
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self.wrt:
+            raise KeyError(name)
+        return self.tangent if len(self.wrt) == 1 else self.tangent[self.wrt.index(name)]
+
+
+def grad(function: Function, wrt: Names = None) -> GradientFunction:
+    """The function with its derivatives by the parameters named in `wrt`, or by the first one.
+
+    It takes plain numbers. In the answer, `tangent` is the derivative by the one parameter, or a tuple of them in the
+    order of `wrt`; `answer["c"]` is the one by `c`. The derivative by a tuple is a tuple. Raises PottoError if the
+    function has no such parameter, or one of them is no number.
+    """
+    return GradientFunction(function, parameters_to_vary(function, wrt))
+
+
+def value_and_grad(function: Function, wrt: Names = None) -> Callable[..., tuple[Estimate, Estimate]]:
+    """The value and the derivatives by the parameters named in `wrt`, or by the first one, as two estimates.
+
+    `value, slope = potto.value_and_grad(f)(0.3)`. The second one is what `grad` has as `tangent`. Raises as that does.
+    """
+    gradient = grad(function, wrt)
+
+    def pair(*args: Any, **kwargs: Any) -> tuple[Estimate, Estimate]:
+        found = _plain(gradient(*args, **kwargs))
+        value = replace(found, tangent=None, tangent_error=None)
+        return value, replace(value, value=found.tangent, error=found.tangent_error)
+
+    return pair
+
+
+def jacobian(function: Function, wrt: Names = None) -> Callable[..., Estimate]:
+    """All derivatives as one array: by the numbers of the function's answer, and by those of the parameters in `wrt`.
+
+    `value` and `error` have the shape (*batch, answers, parameters): batch is what arrays broadcast to, and an axis is
+    left out where the answer is one number, and where one parameter is named that is one number. Raises as `grad` does.
+    """
+    names = parameters_to_vary(function, wrt)
+
+    def matrix(*args: Any, **kwargs: Any) -> Estimate:
+        run = _Run(*function.prepared(args, kwargs, {}), {})
+        value = run.along_each(names)
+        tangents, bounds = (
+            tuple(tuple(map(number, side(cell))) for cell in all_cells(value)) for side in (_tangents, _bounds)
+        )
+        found = run.answer(value, tangents, bounds)
+        single = isinstance(value, Cell), len(names) == 1 and isinstance(run.given[names[0]], Cell)
+        slopes, errors = (_as_matrix(part, *single) for part in (found.tangent, found.tangent_error))
+        return replace(found, value=slopes, error=errors, tangent=None, tangent_error=None)
+
+    return matrix
+
+
+def vjp(function: Function, cotangent: Any, wrt: Names = None) -> Callable[..., Gradient]:
+    """The product of a cotangent with the Jacobian: the derivatives of `cotangent` times the function's answer.
+
+    `potto.vjp(f, (1.0, -2.0), wrt=["a"])(0.3)` takes what `f` takes; `value` is that of `f`, and `tangent` the product
+    in the form that `grad` has. The cotangent has the form of the answer: a number, or a tuple; arrays broadcast with
+    those of the call. Raises as `grad` does, and where the form is another.
+    """
+    names = parameters_to_vary(function, wrt)
+
+    def product(*args: Any, **kwargs: Any) -> Gradient:
+        extra = {"cotangent": cotangent}
+        run = _Run(*function.prepared(args, kwargs, extra), extra)
+        value, weighted = run.along_each_together(names, run.extra["cotangent"])
+        return run.gradient(value, weighted, names)
+
+    return product
+
+
+def jvp(function: Function, along: Mapping[str, Any]) -> Callable[..., Estimate]:
+    """The product of the Jacobian with a vector: the derivative along a direction, over the parameters that it names.
+
+    `potto.jvp(f, {"a": 1.0, "b": 2.0})(0.3, 0.6)` takes what `f` takes; the other parameters stand still. In the answer
+    `tangent` is the derivative. Raises PottoError if the function has no such parameter, one of them is no number, or a
+    tangent has not the form of its parameter.
+    """
+    names = parameters_to_vary(function, tuple(along))
+
+    def product(*args: Any, **kwargs: Any) -> Estimate:
+        labels = {f"the tangent of {name}": tangent for name, tangent in along.items()}
+        run = _Run(*function.prepared(args, kwargs, labels), labels)
+        tangents = dict(zip(names, run.extra.values(), strict=True))
+        moving = {name: _moved(name, run.own(name), tangents[name]) for name in names}
+        value = run.evaluated(moving, run.machine.with_directions(1), lambda value: value)
+        return run.batch.shaped(report(value, run.machine, run.clock))
+
+    return product
+
+
+class GradientFunction:
+    """A function that also answers with its derivatives by some of its parameters."""
+
+    def __init__(self, function: Function, wrt: tuple[str, ...]) -> None:
+        self._function = function
+        self._wrt = wrt
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Gradient:
+        found = self._function.in_tiles(args, kwargs, self._wrt)
+        assert isinstance(found, Gradient)
+        return found
+
+    def __repr__(self) -> str:
+        return f"<gradient of {self._function!r} by {', '.join(self._wrt)}>"
+
+
+def gradient(
+    call: Call, arguments: Sequence[tuple[str, Value]], wrt: tuple[str, ...], batch: Batch
+) -> Gradient:
+    """The estimate of a call with its derivatives by the arguments named in `wrt`, for all of a batch at once."""
+    run = _Run(call, arguments, batch, {})
+    value = run.along_each(wrt)
+    return run.gradient(value, value, wrt)
+
+
+def parameters_to_vary(function: Function, wrt: Names) -> tuple[str, ...]:
+    """The names in `wrt`, each once, or that of the first parameter. Raises PottoError if they are none of them."""
+    must_be_function(function)
+    parameters = function.parameters
+    if wrt is None:
+        if not parameters or not parameters[0]:
+            raise wrong_call("the first parameter has no name, and derivatives are taken by names")
+        return parameters[:1]
+    if not isinstance(wrt, str | Sequence) or not all(isinstance(name, str) for name in wrt):
+        raise wrong_call(f"`wrt` takes the names of parameters, not {wrt!r}")
+    names = (wrt,) if isinstance(wrt, str) else tuple(dict.fromkeys(wrt))
+    if not names:
+        raise wrong_call("`wrt` names no parameter to differentiate by")
+    for name in names:
+        if name not in parameters:
+            near = difflib.get_close_matches(name, [p for p in parameters if p], 1)
+            named = ", ".join(f"`{p}`" for p in parameters if p)
+            hint = f"did you mean `{near[0]}`?" if near else f"its parameters are {named}" if named else ""
+            raise wrong_call(f"`{function.written}` has no parameter `{name}`", hint)
+    return names
+
+
+class _Run:
+    """A call of a function on its way to derivatives. extra: values that broadcast with the arguments."""
+
+    def __init__(
+        self, call: Call, arguments: Sequence[tuple[str, Value]], batch: Batch, extra: Mapping[str, Any]
+    ) -> None:
+        self.call, self.arguments, self.batch = call, arguments, batch
+        self.given = dict(arguments)
+        self.extra = {name: value_of(name, item, batch, lambda _: None) for name, item in extra.items()}
+        self.machine = self._machine()
+        self.clock = Clock()
+
+    def _machine(self) -> Machine:
+        world = self.call.world
+        return world.program.machine(current(world.settings(self.call.file)))
+
+    def along_each(self, wrt: tuple[str, ...]) -> Value:
+        """The value, with a tangent for each number of the parameters named."""
+
+        def swept_back(value: Value, seeds: Sequence[Node]) -> Value:
+            if len(all_cells(value)) > len(seeds):
+                raise Untaped  # a sweep for each number of the answer would cost more than a tangent for each parameter
+            return map_cells(value, lambda cell: Cell(cell.v, cell.e, *_swept([(cell, 1.0)], seeds)))
+
+        return self._differentiated(wrt, swept_back, lambda value: value)
+
+    def along_each_together(self, wrt: tuple[str, ...], weights: Value) -> tuple[Value, Value]:
+        """The value, and the sum of its numbers, each times its weight, with such tangents."""
+
+        def swept_back(value: Value, seeds: Sequence[Node]) -> Value:
+            _must_match(value, weights)
+            pairs = zip(all_cells(value), (weight.v for weight in all_cells(weights)), strict=True)
+            return map_cells(value, lambda cell: Cell(cell.v, cell.e)), Cell(0.0, None, *_swept(list(pairs), seeds))
+
+        def forward(value: Value) -> Value:
+            _must_match(value, weights)
+            return value, _weighted(value, weights)
+
+        found = self._differentiated(wrt, swept_back, forward)
+        assert isinstance(found, tuple)
+        return found[0], found[1]
+
+    def _differentiated(
+        self, wrt: tuple[str, ...], swept_back: Callable[[Value, Sequence[Node]], Value],
+        forward: Callable[[Value], Value],
+    ) -> Value:  # fmt: skip
+        """What one of these makes of the value: of a tape with its seeds, or of tangents."""
+        directions = sum(_size(name, self.own(name)) for name in wrt)
+        shape = () if self.batch.shape is None else (max(1, int(np.prod(self.batch.shape))),)
+        if directions >= MANY and np.prod(shape) <= POINTS:  # a tape keeps arrays for all operations
+            seeds: list[Any] = []
+
+            def seeded(cell: Cell) -> Cell:
+                seeds.append(Node((), shape))
+                return Cell(cell.v, cell.e, (seeds[-1],))
+
+            moving = {name: map_cells(self.given[name], seeded) for name in wrt}
+            try:
+                return self.evaluated(moving, self.machine.taped(), lambda value: swept_back(value, seeds))
+            except Untaped:
+                self.machine = self._machine()
+        numbers = iter(range(directions))
+        moving = {name: _seeded(self.given[name], numbers, directions) for name in wrt}
+        return self.evaluated(moving, self.machine.with_directions(directions), forward)
+
+    def evaluated(self, moving: Mapping[str, Value], machine: Machine, ended: Callable[[Value], Value]) -> Value:
+        """What `ended` makes of the value that this machine finds where these parameters move."""
+        k = machine.directions
+        values = [moving[name] if name in moving else pad(value, k) for name, value in self.arguments]
+        with self.clock:
+            value = self.call.value(values, machine)
+            if not _numbers(value):
+                raise wrong_call("only a number or a tuple of numbers has a gradient")
+            with np.errstate(all="ignore"):
+                return ended(pad(value, k))
+
+    def own(self, name: str) -> Value:
+        """What a parameter is given. Raises PottoError if that is nothing."""
+        if name not in self.given:
+            raise wrong_call(f"`{name}` is given no value, so there is nothing to differentiate by")
+        return self.given[name]
+
+    def answer(self, value: Value, tangents: Any, bounds: Any) -> Estimate:
+        found = report(value, self.machine, self.clock)
+        return self.batch.shaped(replace(found, tangent=tangents, tangent_error=bounds))
+
+    def gradient(self, value: Value, moving: Value, wrt: tuple[str, ...]) -> Gradient:
+        """The estimate of a value, with the derivatives of `moving` in the form of the parameters."""
+        directions = range(sum(_size(name, self.given[name]) for name in wrt))
+        tangents = [told(moving, lambda cell, d=d: cell.t[d]) for d in directions]  # type: ignore[misc]
+        bounds = [told(moving, lambda cell, d=d: cell.et[d]) for d in directions]  # type: ignore[misc]
+        forms = (_by_name(part, wrt, self.given) for part in (tangents, bounds))
+        found = self.answer(value, *(form[0] if len(wrt) == 1 else form for form in forms))
+        return Gradient(**{item.name: getattr(found, item.name) for item in fields(Estimate)}, wrt=wrt)
+
+
+def _swept(answers: Sequence[tuple[Cell, Any]], seeds: Sequence[Node]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+    """The derivatives by the seeds of a sum of answers, each times a weight, and how far off they may be."""
+    nodes: list[tuple[Any, Any]] = [(cell.t[0], weight) for cell, weight in answers]
+    found = swept([(node, weight) for node, weight in nodes if isinstance(node, Node)])
+    return tuple(found.get(seed, NOTHING)[0] for seed in seeds), tuple(found.get(seed, NOTHING)[1] for seed in seeds)
+
+
+def _plain(found: Estimate) -> Estimate:
+    return Estimate(**{item.name: getattr(found, item.name) for item in fields(Estimate)})
+
+
+def _numbers(value: Value) -> bool:
+    return isinstance(value, Cell) or (isinstance(value, tuple) and all(map(_numbers, value)))
+
+
+# Parameters that move
+
+
+def _size(name: str, value: Value) -> int:
+    """How many numbers a parameter has."""
+    if isinstance(value, Cell):
+        return 1
+    if isinstance(value, tuple):
+        return sum(_size(name, item) for item in value)
+    kind = "list" if isinstance(value, list) else "function"
+    raise wrong_call(
+        f"`{name}` is a {kind} and not a number, so there is no derivative by it", "name other parameters in `wrt`"
+    )
+
+
+def _seeded(value: Value, numbers: Iterator[int], directions: int) -> Value:
+    """The parameter, each of its numbers moving in a direction of its own."""
+    if isinstance(value, tuple):
+        return tuple(_seeded(item, numbers, directions) for item in value)
+    assert isinstance(value, Cell)
+    own = next(numbers)
+    return Cell(value.v, value.e, (None,) * own + (1.0,) + (None,) * (directions - own - 1))
+
+
+def _moved(name: str, value: Value, tangent: Value) -> Value:
+    """The parameter, moving along the tangent."""
+    _size(name, value)
+    if isinstance(value, Cell) and isinstance(tangent, Cell):
+        return Cell(value.v, value.e, (tangent.v,), (tangent.e,))
+    if isinstance(value, tuple) and isinstance(tangent, tuple) and len(value) == len(tangent):
+        return tuple(_moved(name, *pair) for pair in zip(value, tangent, strict=True))
+    raise wrong_call(f"the tangent of `{name}` must have its form, {_form(value)}")
+
+
+def _form(value: Value) -> str:
+    return f"a tuple of {len(value)}" if isinstance(value, tuple) else "a number"
+
+
+# Derivatives in the form that was asked for
+
+
+def _tangents(cell: Cell) -> tuple[Number | None, ...]:
+    return cell.t
+
+
+def _bounds(cell: Cell) -> tuple[Number | None, ...]:
+    return cell.et
+
+
+def _by_name(numbers: list[Any], wrt: tuple[str, ...], given: dict[str, Value]) -> tuple[Any, ...]:
+    """The derivatives in the form of the parameters that they belong to."""
+    rest = iter(numbers)
+
+    def form(value: Value) -> Any:
+        return tuple(form(item) for item in value) if isinstance(value, tuple) else next(rest)
+
+    return tuple(form(given[name]) for name in wrt)
+
+
+def _as_matrix(rows: Any, one_answer: bool, one_parameter: bool) -> Any:
+    """Rows of numbers, or of arrays over a batch, as an array whose last axes are those of the rows."""
+    whole = np.asarray(rows, dtype=float)
+    whole = np.moveaxis(whole, (0, 1), (-2, -1))
+    if one_parameter:
+        whole = whole[..., 0]
+    if one_answer:
+        whole = whole[..., 0] if one_parameter else whole[..., 0, :]
+    return whole if whole.ndim else float(whole)
+
+
+def _must_match(value: Value, cotangent: Value) -> None:
+    """Raise PottoError if a cotangent has not the form of the answer."""
+    if isinstance(value, tuple):
+        if not isinstance(cotangent, tuple) or len(cotangent) != len(value):
+            wanted, found = _form(value), _form(cotangent)
+            raise wrong_call(f"the cotangent must have the form of the answer, {wanted}, and is {found}")
+        for pair in zip(value, cotangent, strict=True):
+            _must_match(*pair)
+    elif not isinstance(cotangent, Cell):
+        raise wrong_call(f"the cotangent must have the form of the answer, a number, and is {_form(cotangent)}")
+
+
+def _weighted(value: Value, weights: Value) -> Value:
+    """The sum of the numbers of an answer, each times its weight: its tangents."""
+    cells, factors = all_cells(value), [weight.v for weight in all_cells(weights)]
+
+    def total(side: Callable[[Cell], tuple[Number | None, ...]], factors: list[Any]) -> tuple[Number, ...]:
+        rows = zip(*map(side, cells), strict=True)
+        return tuple(sum((w * number(x) for w, x in zip(factors, row, strict=True)), start=0.0) for row in rows)
+
+    return Cell(0.0, None, total(_tangents, factors), total(_bounds, [np.abs(w) for w in factors]))
+
+
+__all__ = ["Gradient", "GradientFunction", "grad", "jacobian", "jvp", "value_and_grad", "vjp"]
