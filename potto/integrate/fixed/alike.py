@@ -49,6 +49,8 @@ def together(
         for cell in cells:
             fine = _settled(plan, degrees, machine, some, cell, sums)
             done[start + cell.members[~fine]] = False
+            if batch == 1 and not done[0]:
+                return None
     if not done.any():
         return None
     number, truncated, rounding, gross = total
