@@ -26,7 +26,7 @@ from potto.modules.texts import content
 from potto.query import Database
 from potto.reports.render import Located
 from potto.source import Span
-from potto.syntax.tables import cache_folder
+from potto.store import cache_folder
 
 logger = logging.getLogger(__name__)
 FOLDER = "checked-"
@@ -72,7 +72,10 @@ class Verdicts:
 
     def _path(self, file: str) -> Path | None:
         if self._folder is None:
-            self._folder = cache_folder() / f"{FOLDER}{program_digest()}"
+            kept = cache_folder()
+            if kept is None:
+                return None
+            self._folder = kept / f"{FOLDER}{program_digest()}"
         if not os.path.isabs(file) or not _is_ours(self._folder):
             return None
         return self._folder / f"{_hashed(file)}.json"

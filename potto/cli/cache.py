@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from potto.cli.console import Console
 
-SUMMARY = "where Potto keeps files between runs, how large they are"
+SUMMARY = "what Potto keeps on disk between runs: where, of which kinds, how much; --clear"
 EXAMPLE = "  potto cache --clear"
+# What is kept beside the store, and where.
+_BESIDE = {"parse tables": "grammar-*.json", "verdicts": "checked-*/*.json"}
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -15,24 +18,38 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    from potto.syntax.tables import cache_folder
+    from potto import store
 
-    folder = cache_folder()
-    tables = sorted(path for path in folder.glob("grammar-*.json") if path.is_file()) if folder.is_dir() else []
-    verdicts = sorted(path for path in folder.glob("checked-*/*.json") if path.is_file()) if folder.is_dir() else []
-    files = tables + verdicts
-    size = sum(path.stat().st_size for path in files)
+    report = store.report()
+    beside = {name: _files(report.folder, pattern) for name, pattern in _BESIDE.items()}
+    kinds = {name: (len(files), sum(path.stat().st_size for path in files)) for name, files in beside.items()}
+    kinds |= {kind.name: (kind.entries, kind.size) for kind in report.kinds}
     if options.clear:
-        for path in files:
-            path.unlink(missing_ok=True)
+        store.clear()
+        for files in beside.values():
+            for path in files:
+                path.unlink(missing_ok=True)
+    count, size = (sum(numbers) for numbers in zip(*kinds.values()))
     if options.json:
-        report = {"folder": str(folder), "files": len(files), "bytes": size, "cleared": options.clear}
-        console.answer_json({**report, "kernels": "in memory only"})
+        console.answer_json({
+            "folder": None if report.folder is None else str(report.folder), "files": count, "bytes": size,
+            "bound": report.bound, "kinds": {name: {"files": n, "bytes": b} for name, (n, b) in kinds.items()},
+            "refused": report.complaint, "cleared": options.clear,
+        })  # fmt: skip
         return 0
-    console.answer(f"folder:   {folder}")
-    count = f"{len(files)} file{'' if len(files) == 1 else 's'}, {size / 1024:.1f} KiB"
-    console.answer(f"contents: parse tables, and what was said about files that an editor had open; {count}")
-    console.answer("kernels:  kept in memory only, while a process runs")
+    if report.folder is None:
+        console.answer("turned off: POTTO_CACHE is `off`")
+        return 0
+    console.answer(f"folder: {report.folder}  (POTTO_CACHE; `off` keeps nothing)")
+    for name, (n, b) in {**kinds, "in all": (count, size)}.items():
+        console.answer(f"  {name:<14} {n:>7,} file{' ' if n == 1 else 's'} {b / 1e6:>10,.3f} MB")
+    console.answer(f"at most {report.bound / 1e6:,.0f} MB beside tables and verdicts  (POTTO_CACHE_MB)")
+    if report.complaint is not None:
+        console.complain(f"warning: {report.complaint}")
     if options.clear:
         console.answer("cleared")
     return 0
+
+
+def _files(folder: Path | None, pattern: str) -> list[Path]:
+    return [] if folder is None or not folder.is_dir() else [path for path in folder.glob(pattern) if path.is_file()]

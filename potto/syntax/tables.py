@@ -10,12 +10,13 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
+
+from potto.store import cache_folder
 
 STARTS = ("chunk", "expression")
 _FORMAT = 2
@@ -45,32 +46,19 @@ def grammar_text() -> str:
     return Path(__file__).with_name("grammar.lark").read_text(encoding="utf-8")
 
 
-def cache_folder() -> Path:
-    """Where Potto keeps what it can compute again: `POTTO_CACHE`, or `potto` in the user's cache folder."""
-    own = os.environ.get("POTTO_CACHE")
-    if own:
-        return Path(own)
-    if sys.platform == "win32":
-        base = os.environ.get("LOCALAPPDATA") or os.path.expanduser("~\\AppData\\Local")
-    elif sys.platform == "darwin":
-        base = os.path.expanduser("~/Library/Caches")
-    else:
-        base = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    return Path(base) / "potto"
-
-
 @lru_cache(maxsize=1)
 def tables() -> Tables:
     """The tables of the grammar, from the cache if it has them."""
     grammar = grammar_text()
     key = hashlib.sha256(f"{_FORMAT}\n{grammar}".encode()).hexdigest()[:24]
-    path = cache_folder() / f"grammar-{key}.json"
+    folder = cache_folder()
+    if folder is None:
+        return compute(grammar)
+    path = folder / f"grammar-{key}.json"
     cached = _read(path)
-    if cached is not None:
-        return cached
-    computed = compute(grammar)
-    _write(path, computed)
-    return computed
+    if cached is None:
+        _write(path, cached := compute(grammar))
+    return cached
 
 
 def compute(grammar: str) -> Tables:

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from command_runs import Potto
 
+from potto import store
 from potto.cli import COMMANDS
 
 HALF = "def f(t)\n    integral [0, 1] [x < t] d(x)\n"
@@ -315,8 +316,14 @@ def test_cache(potto: Potto, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     (tmp_path / "mine.txt").write_text("keep")
     ran = potto("cache", "--json")
     assert ran.json["folder"] == str(tmp_path) and ran.json["files"] >= 1
+    store.put("some-kind", b"key", b"data")
+    assert potto("cache", "--json").json["kinds"]["some-kind"]["files"] == 1
+    assert "some-kind" in potto("cache").out
     assert potto("cache", "--clear").status == 0
     assert not list(tmp_path.glob("grammar-*.json")) and (tmp_path / "mine.txt").exists()
+    assert store.get("some-kind", b"key") is None
+    monkeypatch.setenv("POTTO_CACHE", "off")
+    assert "off" in potto("cache").out and potto("cache", "--json").json["folder"] is None
 
 
 # The command line itself
