@@ -7,8 +7,9 @@ each parameter, is the product. No matrix is made, and the derivative is taken t
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import fields, replace
 from typing import Any
+
+from msgspec.structs import asdict, replace
 
 from potto.kernels.errors import wrong_call
 from potto.python.api import Function, bound, deriv, grad
@@ -59,6 +60,6 @@ def _product(found: Gradient, names: tuple[str, ...]) -> Gradient:
     errors = found.tangent_error if several else (found.tangent_error,)
     parts = [tuple(item[0][1] for item in side) for side in (tangents, errors)]
     tangent, error = parts if several else (part[0] for part in parts)
-    common = {field.name: getattr(found, field.name) for field in fields(Gradient)}
+    common = asdict(found)
     made = replace(Gradient(**common), tangent=tangent, tangent_error=error, wrt=names)
     return replace(made, value=found.value[0], error=found.error[0])

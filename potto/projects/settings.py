@@ -10,9 +10,11 @@ import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
 from typing import Literal, get_args
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from potto.diagnostics import PottoError, declare
 from potto.source import Span
@@ -31,8 +33,7 @@ class Unasked(float):
     """A tolerance that nobody asked for."""
 
 
-@dataclass(frozen=True, slots=True)
-class Settings:
+class Settings(Struct, frozen=True):
     """What an evaluation is asked for.
 
     method: how integrals are estimated; "auto" cuts and integrates by quadrature where the dimension allows it.
@@ -65,15 +66,15 @@ _changes: ContextVar[Mapping[str, object]] = ContextVar("potto_settings", defaul
 def current(base: Settings = DEFAULTS) -> Settings:
     """The settings in force in this thread or task; `base` counts where nothing is set, as a project says it."""
     changes = _changes.get()
-    return replace(base, **changes) if changes else base  # type: ignore[arg-type]
+    return replace(base, **changes) if changes else base
 
 
 def problem(name: str, value: object) -> str | None:
     """Why `value` cannot be the setting `name`, or None if it can."""
     if name == "method":
         return None if value in METHODS else f"method must be one of {', '.join(METHODS)}, not {value!r}"
-    if name not in {field.name for field in fields(Settings)}:
-        return f"there is no setting `{name}`; there are {', '.join(field.name for field in fields(Settings))}"
+    if name not in Settings.__struct_fields__:
+        return f"there is no setting `{name}`; there are {', '.join(Settings.__struct_fields__)}"
     if isinstance(value, bool) or not isinstance(value, int | float):
         return f"{name} must be a number, not {value!r}"
     if name in ("rtol", "atol"):

@@ -7,8 +7,10 @@ parameters are resolved by elaboration, as in a program. Conversion of Python va
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
 from typing import Any
+
+from msgspec import Struct
+from msgspec.structs import asdict
 
 from potto.core.terms import Lam, Term
 from potto.elaborate import elaborate_expression
@@ -32,15 +34,14 @@ NOWHERE = Span(0, 0)
 Form = tuple[tuple[int, tuple[str, ...]], ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Call:
+class Call(Struct, frozen=True, eq=False):
     """An expression with the file whose names it uses, and the form in which it is called."""
 
     world: World
     file: str
     expr: nodes.Expr
     form: Form
-    _known: dict[int, Term] = field(default_factory=dict, compare=False, repr=False)
+    _known: dict[int, Term] = {}
 
     def run(self, values: Sequence[Value], batch: Batch) -> Estimate:
         """The estimate of the call for these arguments. Raises PottoError."""
@@ -101,8 +102,7 @@ def applied(expr: nodes.Expr, form: Form) -> nodes.Expr:
 # Gradients
 
 
-@dataclass(frozen=True, repr=False)
-class Gradient(Estimate):
+class Gradient(Estimate, frozen=True):
     """An estimate with derivatives by several parameters: `gradient["c"]`, or `tangent` for all of them."""
 
     wrt: tuple[str, ...] = ()
@@ -164,7 +164,7 @@ def _gathered(parts: list[Estimate], wrt: tuple[str, ...], given: dict[str, Valu
     tangents = _by_name([part.tangent for part in parts], wrt, given)
     bounds = _by_name([part.tangent_error for part in parts], wrt, given)
     first = parts[0]
-    common = {field.name: getattr(first, field.name) for field in fields(Estimate)}
+    common = asdict(first)
     common["tangent"] = tangents[0] if len(wrt) == 1 else tangents
     common["tangent_error"] = bounds[0] if len(wrt) == 1 else bounds
     missing: Shortfalls = {}

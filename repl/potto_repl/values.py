@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from typing import Any
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from potto.core.terms import App, Delta, Global, Integral, Term, postorder
 from potto.diagnostics import PottoError
@@ -28,8 +30,7 @@ MANY = 2_000_000  # evaluations; fewer that took long waited for something else,
 TINY = 1e-13
 
 
-@dataclass(frozen=True, slots=True)
-class Parts:
+class Parts(Struct, frozen=True):
     """The two parts of a tangent, each with its error."""
 
     interior: Any

@@ -8,10 +8,11 @@ its table, and the cuts of the next step.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from potto.calculus.algebra.affine import affine
 from potto.calculus.algebra.ranges import range_of
@@ -63,8 +64,7 @@ WEIGHTED = function_of(if_(prim("eq", var("weight"), ZERO), ZERO, mul(var("weigh
 Place = tuple[Term, Kind]
 
 
-@dataclass(frozen=True)
-class Eliminated:
+class Eliminated(Struct, frozen=True):
     """The steps, outermost first: the plan of each, and where its integral is not smooth, or has a peak."""
 
     steps: tuple[Step, ...]
@@ -143,7 +143,6 @@ def _centers(term: Integral, variable: str, resolve: Resolve) -> list[Finding]:
     return [f for f in findings(term.body, resolve) if f.kind == "center" and f.surface.free & names == {variable}]
 
 
-@dataclass
 class _Tabled(Iteration):
     """The integral of one step: weight times what is further in, by its table, or the number that it is."""
 

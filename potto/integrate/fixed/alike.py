@@ -14,12 +14,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from msgspec import Struct
 
 from potto.core.terms import Prim, Term, function_of, postorder, tuple_
+from potto.integrate.columns import distinct
 from potto.integrate.fixed.a_priori import Straight
 from potto.integrate.fixed.moving_sums import SUMMED, evaluated, product
 from potto.integrate.fixed.topologies import Uniform, topologies
@@ -49,8 +50,7 @@ PEAK = 8.0
 CANCELS = 1e-13
 
 
-@dataclass(frozen=True)
-class Measured:
+class Measured(Struct, frozen=True):
     """Integrals over cells (1 + k, M), how far rules and rounding put them off, and what is added up for them."""
 
     number: Array
@@ -136,8 +136,7 @@ def _tried(
     return tried[-1:]
 
 
-@dataclass(frozen=True)
-class Nodes:
+class Nodes(Struct, frozen=True):
     """Numbers at some nodes of cells. value, off: of the integrand and its rounding, (1 + k, ..., n1, M).
 
     widths: per variable those of its stretches, and how far they may be off, with its own axis left out.
@@ -150,8 +149,7 @@ class Nodes:
     plain: Bools
 
 
-@dataclass(frozen=True)
-class Rule:
+class Rule(Struct, frozen=True):
     """A product rule for cells of one shape, with so many nodes for each variable."""
 
     plan: Straight
@@ -182,7 +180,7 @@ class Rule:
             some = every = self.at_nodes(tracking, here, members.size, whole)
             few, beyond = whole, 1.0
         else:
-            few, beyond = [np.unique([0, n // 2, n - 1]) for n in self.orders], ELSEWHERE
+            few, beyond = [distinct([0, n // 2, n - 1]) for n in self.orders], ELSEWHERE
             every = self.at_nodes(self.machine, here, members.size, whole)
             some = self.at_nodes(tracking, here, members.size, few)
         number, truncated = self.added(every)

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from msgspec import Struct
 
 from potto.core.terms import Lam, function_of
 from potto.integrate.pieces import Evaluator, gather
@@ -41,8 +41,7 @@ def _outer(orders: tuple[int, ...]) -> tuple[Ints, Array, Array]:
     return owner, np.concatenate([r.nodes for r in rules]), np.concatenate([r.weights for r in rules])
 
 
-@dataclass(frozen=True)
-class Totals:
+class Totals(Struct, frozen=True):
     """Values and tangents (1 + k,), the rounding of each, and what each is when nothing cancels."""
 
     number: list[float]

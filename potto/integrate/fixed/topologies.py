@@ -10,11 +10,12 @@ middle of a cell, is not plain, and is left to the general way.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 
 from potto.core.terms import Const, Term, children
+from potto.integrate.columns import distinct
 from potto.integrate.fixed.a_priori import CLEAR, Path, Straight
 from potto.integrate.fixed.moving_sums import evaluated
 from potto.integrate.pieces import Evaluator, gather
@@ -23,8 +24,7 @@ from potto.kernels.cells import Array, Bools, Cell, Ints, Number, Value
 MOST_SHAPES = 64
 
 
-@dataclass(frozen=True)
-class Uniform:
+class Uniform(Struct, frozen=True):
     """Cells of one shape: per variable the rows of the frame between which they lie, the integrand, whose they are."""
 
     path: Path
@@ -32,8 +32,7 @@ class Uniform:
     members: Ints
 
 
-@dataclass
-class _Search:
+class _Search(Struct):
     """The cells found so far, and which members are plain."""
 
     plan: Straight
@@ -56,7 +55,7 @@ class _Search:
                 self.machine.costs.saw(surface, roots, places[0], places[1], self.machine.directions > 0)
         codes, fine = in_order(places, off)
         self.plain[members[~fine]] = False
-        for code in np.unique(codes[fine]):
+        for code in distinct(codes[fine]):
             index, rows = np.nonzero(fine & (codes == code))[0], rows_of(int(code), len(places))
             here = gather(env, index)
             ends = places[:, index]
@@ -73,7 +72,7 @@ class _Search:
                 unclear = ~(np.abs(cell.v) > CLEAR * (0.0 if cell.e is None else cell.e))
                 self.plain[members[np.broadcast_to(unclear, members.shape)]] = False
                 codes |= np.broadcast_to(np.asarray(cell.v) > 0, members.shape).astype(np.int64) << bit
-        for code in np.unique(codes):
+        for code in distinct(codes):
             sides = tuple(bool(code >> bit & 1) for bit in range(len(children(surfaces.body))))
             face = self.plan.face(sides)
             whose = members[codes == code]

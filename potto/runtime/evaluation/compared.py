@@ -7,9 +7,8 @@ formula misses a part, and nothing is known of its derivative.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
+from msgspec.structs import replace
 
 from potto.diagnostics import PottoError
 from potto.integrate.events import DISAGREE, Events

@@ -9,9 +9,9 @@ a gap between the sides that does not shrink with the step (a kink) speak agains
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 
 import numpy as np
+from msgspec.structs import replace
 
 from potto.core.terms import Integral
 from potto.integrate.events import OneSidedDerivatives

@@ -5,9 +5,8 @@ Owns `step_by_step`.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
+from msgspec.structs import replace
 
 from potto.integrate.elimination.recursion import Eliminated, one_by_one
 from potto.integrate.events import Fold
