@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import threading
 import time
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 
-@dataclass(slots=True)
-class Counts:
+class Counts(Struct):
     compiled: int = 0
+    recalled: int = 0  # found on disk
     reused: int = 0
     seconds: float = 0.0
 

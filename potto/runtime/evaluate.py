@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
+from msgspec.structs import replace
 
 from potto.calculus.surfaces.branch_cuts import opened
 from potto.calculus.surfaces.discontinuities import TooDeep
@@ -113,6 +113,7 @@ class Clock:
         now, before = counts, self.before
         self.seconds = time.perf_counter() - self.start
         self.compiled, self.reused = now.compiled - before.compiled, now.reused - before.reused
+        self.recalled = now.recalled - before.recalled
         self.spent = now.seconds - before.seconds
 
 
@@ -121,6 +122,7 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
     method = "exact" if not record.methods else "+".join(sorted(record.methods))
     stats: dict[str, Any] = {
         "kernels compiled": clock.compiled,
+        "kernels from disk": clock.recalled,
         "kernels reused": clock.reused,
         "integrals": record.integrals,
         "evaluations": record.evaluations,

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from msgspec import Struct, field
+from msgspec.structs import replace
 
 from potto.calculus.differentiation.deltas import PRODUCT_OF_DELTAS
 from potto.calculus.inlining.currying import sizes_of, uncurry
@@ -26,8 +27,9 @@ from potto.integrate.pieces import STRAY
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Ints, Number, Pattern, Trace, Value, pad, pattern
 from potto.kernels.chunks import in_chunks, many
-from potto.kernels.compile import Kernel, kernel
+from potto.kernels.compile import kernel
 from potto.kernels.making import counts
+from potto.kernels.written import Kernel
 from potto.projects.settings import Settings
 from potto.runtime.evaluation.functions import Closure, Derivative, Paired
 from potto.runtime.evaluation.reach import Reach
@@ -41,8 +43,7 @@ OVERDRAFT = 3
 Groups = tuple[tuple[Value, ...], ...]
 
 
-@dataclass(frozen=True)
-class Semantics:
+class Semantics(Struct, frozen=True):
     """What is done by more than kernels: derivatives called, conditionals with one side taken, sums, integrals.
 
     derivative: of a function, called with duals; paired: a function on duals that was written by hand. added: summands
@@ -130,8 +131,7 @@ class Linker:
         return None
 
 
-@dataclass
-class Machine:
+class Machine(Struct):
     """One evaluation, carrying `directions` tangents; `rounding` where rounding errors are kept track of.
 
     frozen: surfaces, bounds and deltas stand still, so that tangents are those of the integrands alone.
