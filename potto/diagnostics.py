@@ -7,17 +7,16 @@ Owns `Diagnostic` and the table of kinds. A kind is declared beside the check th
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import Literal
 
-from potto.quick import quick
+from msgspec import Struct
+
 from potto.source import Span
 
 Severity = Literal["error", "warning", "info", "hint"]
 
 
-@dataclass(frozen=True, slots=True)
-class Related:
+class Related(Struct, frozen=True):
     """Another place that a diagnostic talks about. `file` None means the diagnostic's own file.
 
     `owner` is the name of the chunk (definition) that `span` is relative to; None means the diagnostic's own chunk,
@@ -30,8 +29,7 @@ class Related:
     owner: str | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Diagnostic:
+class Diagnostic(Struct, frozen=True):
     """One message. `span` is relative to its chunk until `shift` has made it absolute.
 
     `label` stands beside the underlined place ("varies inside the integral"), `notes` explain, `help` says what to do.
@@ -48,13 +46,12 @@ class Diagnostic:
     tags: tuple[Literal["unnecessary", "deprecated"], ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Kind:
+class Kind(Struct, frozen=True):
     """A kind of diagnostic: its stable code and what it is about."""
 
     code: str
     title: str
-    severity: Severity = field(default="error")
+    severity: Severity = "error"
 
     def __call__(
         self,
@@ -88,6 +85,3 @@ class PottoError(Exception):
     def __init__(self, diagnostics: tuple[Diagnostic, ...] | list[Diagnostic]) -> None:
         self.diagnostics = tuple(diagnostics)
         super().__init__("; ".join(f"{d.code}: {d.message}" for d in self.diagnostics))
-
-
-quick(Related, Diagnostic, Kind)

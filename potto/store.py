@@ -23,10 +23,11 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import lru_cache
 from hashlib import blake2b
 from pathlib import Path
+
+from msgspec import Struct
 
 DEFAULT_MB = 256
 _FOLDER = "store"
@@ -47,8 +48,7 @@ _USED = 3600.0  # seconds: that an entry was used is noted no more often
 _ABANDONED = 3600.0  # seconds after which nobody still writes a temporary file
 
 
-@dataclass(frozen=True, slots=True)
-class Kind:
+class Kind(Struct, frozen=True):
     """How much of one kind is kept."""
 
     name: str
@@ -56,8 +56,7 @@ class Kind:
     size: int  # bytes, of the files
 
 
-@dataclass(frozen=True, slots=True)
-class Report:
+class Report(Struct, frozen=True):
     """What is kept. folder: None if the store is turned off; complaint: why it is not used although it is on."""
 
     folder: Path | None
@@ -136,6 +135,11 @@ def complaint() -> str | None:
     """
     folder = cache_folder()
     return None if folder is None else _judged(os.path.join(folder, _FOLDER))[1]
+
+
+def refused() -> str | None:
+    """The complaint, if anything was asked of the store in this process."""
+    return complaint() if _judged.cache_info().currsize else None
 
 
 def report() -> Report:

@@ -3,14 +3,21 @@ for others.
 
 What tests start can be interrupted, also where the tests themselves run in the background of a script, which lets them
 ignore interrupts and whatever they start as well: only what is ignored is inherited, a handler is not.
+
+What is kept between runs is kept in a folder of this run alone: no test is answered by an earlier one's cache.
 """
 
+import os
 import signal
+import tempfile
 
 from hypothesis import settings
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, lambda *_: None)
+
+_cache = tempfile.TemporaryDirectory(prefix="potto-tests-")
+os.environ["POTTO_CACHE"] = _cache.name
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.register_profile("explore", deadline=None)

@@ -36,6 +36,12 @@ class Checked:
 
 class NoDataclass:
     x: int
+
+
+@value
+class Valued:
+    x: int
+
 '''
 
 
@@ -61,6 +67,8 @@ def test_constructors_are_written_out_and_no_line_moves(hook: types.ModuleType) 
     assert changed == [
         ("@dataclass(frozen=True, slots=True)", "@dataclass(init=False, frozen=True, slots=True)"),
         ("", "    def __init__(self, x: int, y: str = 'a') -> None: self.x = x; self.y = y  # type: ignore"),
+        ("@value", "@dataclass(init=False, frozen=True, slots=True)"),
+        ("", "    def __init__(self, x: int) -> None: self.x = x  # type: ignore"),
     ]
 
 

@@ -7,9 +7,10 @@ is convert, ask, convert.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
+
+from msgspec import Struct
 
 from potto.source import Span
 from potto_lsp import convert, protocol
@@ -43,8 +44,7 @@ def about(params: Any) -> str | None:
     return next((uri for uri in places if isinstance(uri, str)), None)
 
 
-@dataclass
-class Ask:
+class Ask(Struct, dict=True):
     """One request."""
 
     session: Session

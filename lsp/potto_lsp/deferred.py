@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
+
+from msgspec import Struct
 
 from potto_lsp.errors import RequestError
 
 
-@dataclass(frozen=True, slots=True)
-class Deferred:
+class Deferred(Struct, frozen=True):
     """What an adapter gives instead of an answer. `start(finish)` begins; whoever has the answer, or the error, calls
     `finish` with it, from any thread. `stop` is called if nobody waits for it any more."""
 

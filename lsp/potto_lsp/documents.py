@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
+
+from msgspec import Struct
 
 from potto_lsp.errors import InvalidParams
 from potto_lsp.text import Encoding, Text
@@ -16,8 +17,7 @@ from potto_lsp.text import Encoding, Text
 logger = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True)
-class Document:
+class Document(Struct, frozen=True):
     """One version of an open document."""
 
     uri: str

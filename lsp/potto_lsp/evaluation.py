@@ -13,10 +13,11 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from queue import Empty, PriorityQueue, SimpleQueue
 from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
+
+from msgspec import Struct, field
 
 if TYPE_CHECKING:
     from potto_lsp.analysis import Analysis
@@ -27,17 +28,16 @@ PATIENCE = 0.3  # seconds that a task may run on while a more urgent one waits
 COMMAND, LIVE, POINTS = 0, 1, 2  # how urgent a task is: what a user asked for comes first
 
 
-@dataclass(eq=False)
-class Task:
+class Task(Struct, eq=False):
     """Something to evaluate; `done` is called once, on the evaluator's thread, with `result` or `error` in it."""
 
     do: str
     file: str
     text: str
     done: Callable[[Mapping[str, Any]], None]
-    more: Mapping[str, Any] = field(default_factory=dict)
+    more: Mapping[str, Any] = {}
     cancelled: Event = field(default_factory=Event)
-    texts: Mapping[str, str] = field(default_factory=dict)
+    texts: Mapping[str, str] = {}
     roots: tuple[str, ...] = ()
     limit: float = LIMIT
     urgency: int = COMMAND

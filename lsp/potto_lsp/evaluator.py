@@ -13,9 +13,10 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import replace
 from threading import Thread
 from typing import TYPE_CHECKING, Any, TextIO
+
+from msgspec.structs import replace
 
 from potto.reports.render import Located, ProgramError, render
 from potto.source import Span

@@ -10,8 +10,9 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
+
+from msgspec import Struct
 
 from potto import ide
 from potto.core.terms import Global, Term, postorder
@@ -56,8 +57,7 @@ def fingerprint(db: Database, file: str, text: str) -> bytes:
     return whole.digest()
 
 
-@dataclass(frozen=True, slots=True)
-class Key:
+class Key(Struct, frozen=True):
     """Something to evaluate. The meaning is the digest of all that it reaches."""
 
     do: str
@@ -67,8 +67,7 @@ class Key:
     meaning: bytes
 
 
-@dataclass(frozen=True, slots=True)
-class Value:
+class Value(Struct, frozen=True):
     """What is known of a live expression: an answer of the evaluation process."""
 
     answer: Mapping[str, Any]

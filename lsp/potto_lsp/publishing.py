@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from potto.quick import quick
+from potto.quick import quick, value
 from potto_lsp import convert, protocol
 from potto_lsp.text import Text
 from potto_lsp.uris import to_uri
@@ -27,7 +26,7 @@ TOGETHER = 20  # closed files that are looked at in one step
 Notify = Callable[[str, Any], None]
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Report:
     """What there is to say about a file, as messages; the same `id` means the same messages.
 

@@ -13,11 +13,12 @@ import logging
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
 from itertools import chain
 from queue import Empty, SimpleQueue
 from threading import Lock, Thread
 from typing import TYPE_CHECKING, Literal
+
+from msgspec import Struct, field
 
 if TYPE_CHECKING:
     from potto.query import Database
@@ -29,8 +30,7 @@ PATIENCE = 8  # how often a job gives way to questions; then it is finished firs
 _claims = Lock()
 
 
-@dataclass(eq=False)
-class Job:
+class Job(Struct, eq=False):
     """Something to do. Whoever `claim`s it may answer it, and nobody else.
 
     `run` and `drop` are given the job, so that none refers to itself: a document stays no longer than its questions.

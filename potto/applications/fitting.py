@@ -11,10 +11,10 @@ import difflib
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from potto.diagnostics import PottoError
 from potto.kernels.cells import Array
@@ -34,8 +34,7 @@ FAR = 1e9  # how far a parameter may run from where it started, in its own size,
 Objective = Callable[[Array], "Seen"]
 
 
-@dataclass(frozen=True, slots=True)
-class Seen:
+class Seen(Struct, frozen=True):
     """The value and the gradient at one place; `error` bounds that of the gradient, `value_error` that of the value."""
 
     value: float
@@ -44,8 +43,7 @@ class Seen:
     value_error: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class Step:
+class Step(Struct, frozen=True):
     """How far a minimization has come: the parameters, the value there, its steepest slope, evaluations so far."""
 
     number: int
@@ -56,8 +54,7 @@ class Step:
     seconds: float
 
 
-@dataclass(frozen=True)
-class Fit:
+class Fit(Struct, frozen=True):
     """Where a minimization ended.
 
     parameters, value, slope: the best place met, what is to be least there, and the steepest slope there, measured for

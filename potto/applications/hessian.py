@@ -8,10 +8,10 @@ is the products with all unit vectors, as one batch.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
+from msgspec.structs import replace
 
 from potto.kernels.errors import wrong_call
 from potto.python.api import Function, bound, deriv
@@ -56,7 +56,7 @@ def hessian(function: Function, wrt: Names = None) -> Callable[..., Estimate]:
         product = _product(found, names)
         single = len(names) == 1 and not isinstance(given[names[0]], tuple)
         value, error = (_as_matrix(list(_leaves(side)), single) for side in (product.tangent, product.tangent_error))
-        common = {field.name: getattr(found, field.name) for field in fields(Estimate)}
+        common = {name: getattr(found, name) for name in Estimate.__struct_fields__}
         told = {"value": value, "error": error, "tangent": None, "tangent_error": None}
         members = np.all(found.member_converged, axis=0) if axes else None
         reasons = {why: np.any(where, axis=0) if axes else True for why, where in found.shortfalls.items()}

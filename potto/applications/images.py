@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from potto.applications.png import encode
 from potto.diagnostics import PottoError
@@ -26,8 +26,7 @@ HOLE = (128, 128, 128)
 DECADES = 16  # of an error map: from black, 1e-16, to white, 1
 
 
-@dataclass(frozen=True, slots=True)
-class Grid:
+class Grid(Struct, frozen=True):
     """Pixels over a box of the plane; the first row is the top one."""
 
     width: int
@@ -42,8 +41,7 @@ class Grid:
         return np.tile(across, self.height), np.repeat(down, self.width)
 
 
-@dataclass(slots=True)
-class Sampled:
+class Sampled(Struct):
     """Numbers at places: (parts, n), nan where there is none; how many have none, and what went wrong first.
 
     answers: the estimates that the numbers were taken from, one or more a band.
@@ -52,7 +50,7 @@ class Sampled:
     numbers: Array
     holes: int = 0
     trouble: PottoError | None = None
-    answers: list[Estimate] = field(default_factory=list)
+    answers: list[Estimate] = []
 
     @property
     def evaluations(self) -> int:

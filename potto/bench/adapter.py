@@ -6,15 +6,15 @@ Owns `Adapter` and `Answer`. An adapter turns one dial, from cheap to dear; each
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from typing import Protocol
+
+from msgspec import Struct
 
 from potto.bench.problems import Problem, Quantity
 
 
-@dataclass(frozen=True, slots=True)
-class Answer:
+class Answer(Struct, frozen=True):
     """One answer: the number, the evaluations of the integrand, and the error that the method itself reports.
 
     `reported` is None for a method that says nothing about its error.

@@ -11,7 +11,8 @@ import math
 import statistics
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from potto.bench.adapter import Adapter, Answer, Solve
 from potto.bench.problems import Problem, Quantity
@@ -22,8 +23,7 @@ SPARE = 0.02  # seconds that repeats may take in all
 FLOOR, CEILING = 1e-13, 0.5  # errors below are rounding, above no answers: they say nothing about convergence
 
 
-@dataclass(frozen=True, slots=True)
-class Run:
+class Run(Struct, frozen=True):
     """One method at one setting on one problem.
 
     seconds: the least time of an answer. error: relative; of a random method the root mean square over seeds.

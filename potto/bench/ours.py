@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from potto.bench.adapter import Answer, Solve
 from potto.bench.problems import Problem, Quantity
@@ -20,8 +21,7 @@ POINTS = tuple(2.0**k for k in range(7, 21))
 MOST_EVALUATIONS = 5_000_000
 
 
-@dataclass(frozen=True, slots=True)
-class Ours:
+class Ours(Struct, frozen=True):
     """One of our methods. `dial` is the name of the setting that is turned."""
 
     method: str

@@ -9,18 +9,18 @@ from __future__ import annotations
 import ast
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from importlib.resources import files
 from types import CodeType
 from typing import Any, Literal
 
+from msgspec import Struct
+
 Quantity = Literal["value", "derivative"]
 QUANTITIES: tuple[Quantity, ...] = ("value", "derivative")
 
 
-@dataclass(frozen=True)
-class Problem:
+class Problem(Struct, frozen=True, dict=True):
     """An integral over a box, as a function of one parameter.
 
     program: defines `f`. integrand: in Python's notation, over the variables and the parameter; `H(u)` is [u >= 0].

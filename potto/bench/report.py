@@ -11,8 +11,10 @@ import math
 import platform
 import statistics
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal, TextIO
+
+from msgspec import Struct
+from msgspec.structs import asdict
 
 from potto.bench.adapter import Adapter, installed
 from potto.bench.measure import Run, slope
@@ -25,8 +27,7 @@ BLANK = "-"
 _PACKAGES = ("numpy", "scipy", "vegas", "jax")
 
 
-@dataclass(frozen=True, slots=True)
-class Rate:
+class Rate(Struct, frozen=True):
     """How fast the error of a random method falls: error ~ evaluations^rate."""
 
     problem: str
@@ -120,7 +121,7 @@ def rates_table(found: Sequence[Rate]) -> str:
 
 def write_csv(runs: Iterable[Run], stream: TextIO) -> None:
     """Every run as a row, all digits."""
-    writer = csv.DictWriter(stream, [field.name for field in fields(Run)], lineterminator="\n")
+    writer = csv.DictWriter(stream, Run.__struct_fields__, lineterminator="\n")
     writer.writeheader()
     writer.writerows(asdict(run) for run in runs)
 

@@ -7,7 +7,6 @@ nothing of each other's messages; here they meet. No numbers, no files, no rende
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 
 from potto.calculus.checking.diffeo import check_conditions
 from potto.diagnostics import Diagnostic, Related
@@ -15,6 +14,7 @@ from potto.modules import chunk_start, module_diagnostics, names, statements
 from potto.modules.graph import runs
 from potto.modules.texts import syntax_diagnostics
 from potto.query import Database, query
+from potto.quick import replace
 from potto.reports.render import Located
 from potto.types import check_definition, check_statement, interface
 

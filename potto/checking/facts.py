@@ -8,7 +8,8 @@ editor and the prompt lay the same out in a definition's own words. No numbers a
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from potto.calculus.checking.conditions import conditions_of
 from potto.calculus.checking.diffeo import exported
@@ -29,8 +30,7 @@ from potto.types import derivative_type, format_type, interface
 _COPY = re.compile(r"'\d+")  # the mark of a copy of a bound variable: `x'1` is another x
 
 
-@dataclass(frozen=True, slots=True)
-class PartFacts:
+class PartFacts(Struct, frozen=True):
     """One integral of a definition, or its body around them, and the parts of its derivative; as Potto writes it.
 
     interior: the integral of the integrand's derivative. boundary: per surface its jump times its speed, at the
@@ -45,8 +45,7 @@ class PartFacts:
     reason: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class DerivativeFacts:
+class DerivativeFacts(Struct, frozen=True):
     """What `potto deriv` says of a definition."""
 
     name: str

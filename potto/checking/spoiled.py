@@ -7,7 +7,8 @@ file goes on to mean what it says. No numbers.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+
+from msgspec.structs import replace
 
 from potto.checking.check import absolute, definition_diagnostics, has_errors
 from potto.diagnostics import Diagnostic

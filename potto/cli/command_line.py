@@ -6,7 +6,6 @@ Owns the parser of arguments and what all commands share. Only the module of the
 from __future__ import annotations
 
 import argparse
-import difflib
 import importlib
 import sys
 from collections.abc import Callable
@@ -33,8 +32,19 @@ def dispatch(arguments: list[str]) -> int:
         prepare: Callable[[list[str]], list[str]] = getattr(module, "prepare", list)
         options = parser.parse_intermixed_args(prepare(arguments[1:]))
         run: Callable[[argparse.Namespace, Console], int] = module.run
-        return run(options, standard_console(options.color))
+        console = standard_console(options.color)
+        status = run(options, console)
+        _tell_of_the_store(console)
+        return status
     return _without_command(arguments)
+
+
+def _tell_of_the_store(console: Console) -> None:
+    from potto.store import refused
+
+    complaint = refused()
+    if complaint is not None:
+        console.complain(f"warning: {complaint}")
 
 
 def _without_command(arguments: list[str]) -> int:
@@ -48,6 +58,8 @@ def _without_command(arguments: list[str]) -> int:
     if word.startswith("-"):
         sys.stderr.write(f"potto: there is no option {word}\ntry `potto --help`\n")
         return 2
+    import difflib
+
     near = difflib.get_close_matches(word, COMMANDS, 1)
     hint = f"; did you mean `{near[0]}`?" if near else ""
     sys.stderr.write(f"potto: there is no command `{word}`{hint}\ntry `potto --help`\n")

@@ -6,8 +6,9 @@ import json
 import os
 import sys
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, TextIO
+
+from msgspec import Struct
 
 if TYPE_CHECKING:
     from potto.reports.render import Located, Palette, Sources
@@ -25,8 +26,7 @@ def wants_color(choice: str, stream: TextIO) -> bool:
     return stream.isatty()
 
 
-@dataclass(slots=True)
-class Console:
+class Console(Struct):
     """The two streams of a command."""
 
     out: TextIO

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 import difflib
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
+
+from msgspec import to_builtins
+from msgspec.structs import asdict
 
 from potto.cli.calling import argument_in, arguments_in, assignment, function_in
 from potto.cli.console import Console
@@ -60,7 +62,7 @@ def _symbols(options: argparse.Namespace, console: Console) -> int:
     except ProgramError as error:
         return fail(error, options, console)
     if options.json:
-        console.answer_json({**asdict(facts), **others_json(world, file)})
+        console.answer_json({**to_builtins(facts), **others_json(world, file)})
     else:
         console.answer(facts.text)
     return report_others(world, file, options, console)

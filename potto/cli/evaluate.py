@@ -9,7 +9,7 @@ from potto.cli.console import Console
 from potto.cli.numbers import accounts, add_options, settings_of, show_stats, totals
 
 SUMMARY = "evaluate an expression with a file's names in scope"
-EXAMPLE = "  potto eval examples/paper/renderer.po 'deriv(renderer)((-0.7, 1), \\(x, y) . c . 1)'"
+EXAMPLE = "  potto eval examples/paper/renderer.po 'deriv(renderer)((-0.7, 1), deriv(\\(x, y) . \\c . c))'"
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

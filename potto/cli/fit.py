@@ -6,8 +6,9 @@ import argparse
 import csv
 import json
 import time
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
+
+from msgspec.structs import asdict
 
 from potto.cli.calling import argument_in, arguments_in, assignment, function_in
 from potto.cli.console import Console

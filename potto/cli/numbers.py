@@ -6,8 +6,9 @@ import argparse
 import os
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any
+
+from msgspec.structs import replace
 
 from potto.cli.console import Console
 from potto.projects.project import Projects
@@ -66,7 +67,7 @@ def _help(what: str, name: str) -> str:
 
 def settings_of(options: argparse.Namespace, console: Console) -> Settings | None:
     """The settings that the options ask for, over those of the project; None after a complaint."""
-    given = {field.name: getattr(options, field.name) for field in fields(Settings)}
+    given = {name: getattr(options, name) for name in Settings.__struct_fields__}
     chosen = {name: value for name, value in given.items() if value is not None}
     for name, value in chosen.items():
         complaint = problem(name, value)

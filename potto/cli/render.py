@@ -6,8 +6,9 @@ import argparse
 import os
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
+
+from msgspec import Struct
 
 from potto.cli.calling import arguments_in, assignment, function_in
 from potto.cli.console import Console
@@ -80,8 +81,7 @@ def prepare(arguments: list[str]) -> list[str]:
     return joined
 
 
-@dataclass(slots=True)
-class Picture:
+class Picture(Struct):
     """What was drawn: the numbers of the value, of each derivative and of the errors, and the files."""
 
     function: Function
@@ -89,7 +89,7 @@ class Picture:
     axes: tuple[str, ...]
     wrt: tuple[str, ...]
     width: int = 0  # parts of the value
-    files: list[dict[str, Any]] = field(default_factory=list)
+    files: list[dict[str, Any]] = []
 
     def call(self, *places: Any) -> tuple[Sequence[Any], Estimate]:
         """The value, the derivatives and the errors at places, as parts one after the other."""
@@ -162,7 +162,7 @@ def _picture(world: World, file: str, options: argparse.Namespace) -> Picture:
 
 def _sampled(picture: Picture, grid: Grid, chosen: Settings, workers: int | None, console: Console) -> Sampled:
     """All pixels, with progress for a person who waits."""
-    from dataclasses import asdict
+    from msgspec.structs import asdict
 
     from potto.applications.images import sampled
     from potto.projects.settings import settings

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field
 from fractions import Fraction
+
+from msgspec import Struct
 
 from potto.core.polynomials import number
 from potto.core.terms import ONE, ZERO, Const, Prim, Term, add, const, div, mul, neg, pow_, prim
@@ -28,11 +29,10 @@ def sum_of(node: Prim) -> Term:
     return best.written()
 
 
-@dataclass
-class _Collected:
+class _Collected(Struct):
     """Coefficients by what they multiply, in the order in which they were met."""
 
-    terms: dict[tuple[Term, ...], tuple[Fraction, Term]] = field(default_factory=dict)
+    terms: dict[tuple[Term, ...], tuple[Fraction, Term]] = {}
 
     def place(self, value: Fraction) -> tuple[Term, ...]:
         """Where a number is added: numbers whose sum is not exact stay apart."""
@@ -105,12 +105,11 @@ def _scaled(coefficient: Fraction, core: Term) -> Term:
 # Products
 
 
-@dataclass
-class _Factors:
+class _Factors(Struct):
     """A product taken apart: coefficient * product of base^exponent, and how many factors there were."""
 
     coefficient: Fraction = Fraction(1)
-    powers: dict[Term, list[Fraction]] = field(default_factory=dict)
+    powers: dict[Term, list[Fraction]] = {}
     numbers: int = 0
     levels: int = 0
 

@@ -10,14 +10,15 @@ import hashlib
 import threading
 import weakref
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
+from msgspec import Struct
+from msgspec.structs import force_setattr
 
-@dataclass(frozen=True, eq=False, slots=True, weakref_slot=True, repr=False)
-class Base:
-    free: frozenset[str] = field()
-    _digest: bytes | None = field()
+
+class Base(Struct, frozen=True, eq=False, weakref=True):
+    free: frozenset[str]
+    _digest: bytes | None
 
     @property
     def digest(self) -> bytes:
@@ -39,10 +40,9 @@ class Base:
 T = TypeVar("T", bound=Base)
 
 
-def own_fields(kind: type) -> tuple[str, ...]:
+def own_fields(kind: type[Base]) -> tuple[str, ...]:
     """The names of the fields that make a term of this kind what it is."""
-    names: tuple[str, ...] = kind.__slots__  # type: ignore[attr-defined]
-    return names
+    return kind.__struct_fields__[len(Base.__struct_fields__) :]
 
 
 class _Entry(weakref.ref[Any]):
@@ -96,7 +96,7 @@ def _digested(term: Base) -> bytes:
         fed = [type(node).__name__.encode()]
         for value in values:
             _feed(value, fed)
-        object.__setattr__(node, "_digest", hashlib.blake2b(b"\x00".join(fed), digest_size=16).digest())
+        force_setattr(node, "_digest", hashlib.blake2b(b"\x00".join(fed), digest_size=16).digest())
     assert term._digest is not None
     return term._digest
 

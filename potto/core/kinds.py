@@ -9,29 +9,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Any
 
 from potto.core.consing import Base, made, make
 
 
-@dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Const(Base):
+class Const(Base, frozen=True, eq=False):
     """A number. `name` is set for named ones (`pi`), which the oracle evaluates to more digits."""
 
     value: float
     name: str | None
 
 
-@dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Var(Base):
+class Var(Base, frozen=True, eq=False):
     """A parameter, a variable of integration or the index of a sum. Binders in one definition have distinct names."""
 
     name: str
 
 
-@dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Prim(Base):
+class Prim(Base, frozen=True, eq=False):
     """A builtin applied to terms. `op` names an entry of `potto.primitives`.
 
     add and mul take any number of arguments; neg, div, pow as named. lt le eq ne and or not make truth values, which
@@ -42,8 +38,7 @@ class Prim(Base):
     args: tuple[Term, ...]
 
 
-@dataclass(frozen=True, eq=False, slots=True, repr=False)
-class If(Base):
+class If(Base, frozen=True, eq=False):
     """A plain conditional: the condition varies with no variable of integration."""
 
     condition: Term
@@ -51,8 +46,7 @@ class If(Base):
     orelse: Term
 
 
-@dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Branch(Base):
+class Branch(Base, frozen=True, eq=False):
     """A diffeomorphic conditional: `then` where the first coordinate is >= 0 (> 0 when strict), else `orelse`.
 
     `coordinates` are the components of the diffeomorphism that the author wrote: only the first decides. Over no
@@ -69,50 +63,43 @@ class Branch(Base):
         return self.coordinates[0]
 
 
-@dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Tuple(Base):
+class Tuple(Base, frozen=True, eq=False):
     items: tuple[Term, ...]
 
 
-@dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Proj(Base):
+class Proj(Base, frozen=True, eq=False):
     """Component `index` (from 0) of a tuple of `size` components (0 where the size is not known)."""
 
     term: Term
     index: int
 
 
-@dataclass(frozen=True, eq=False, slots=True, repr=False)
-class ListOf(Base):
+class ListOf(Base, frozen=True, eq=False):
     items: tuple[Term, ...]
 
 
-@dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Lam(Base):
+class Lam(Base, frozen=True, eq=False):
     """A function of one group of parameters."""
 
     params: tuple[str, ...]
     body: Term
 
 
-@dataclass(frozen=True, eq=False, slots=True, repr=False)
-class App(Base):
+class App(Base, frozen=True, eq=False):
     """One group of arguments given to a function. A group of n parameters also takes one tuple of n, and back."""
 
     function: Term
     args: tuple[Term, ...]
 
 
-@dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Global(Base):
+class Global(Base, frozen=True, eq=False):
     """Another definition, by module (the key of its file) and name."""
 
     module: str
     name: str
 
 
-@dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Integral(Base):
+class Integral(Base, frozen=True, eq=False):
     """The iterated integral of `body`, `variables[0]` outermost; bounds may use variables further out.
 
     `hints` are, per variable, points where a density is concentrated: the integrator cuts there, nothing depends on it.
@@ -124,15 +111,13 @@ class Integral(Base):
     hints: tuple[tuple[Term, ...], ...]
 
 
-@dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Delta(Base):
+class Delta(Base, frozen=True, eq=False):
     """The Dirac delta of a diffeomorphism's first coordinate."""
 
     coordinates: tuple[Term, ...]
 
 
-@dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Sum(Base):
+class Sum(Base, frozen=True, eq=False):
     """The sum of `body` for the integers `variable` from `lo` to `hi`, both included; 0 when there are none."""
 
     variable: str
@@ -141,15 +126,13 @@ class Sum(Base):
     body: Term
 
 
-@dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Deriv(Base):
+class Deriv(Base, frozen=True, eq=False):
     """The derivative of a function: takes duals `(value, tangent)`, gives a dual."""
 
     function: Term
 
 
-@dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Hole(Base):
+class Hole(Base, frozen=True, eq=False):
     """Where the program is wrong: evaluating it raises the diagnostic that said so.
 
     measure: the program is fine, but these parameters give a measure no density.

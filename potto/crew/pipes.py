@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import pickle
-from dataclasses import dataclass
 from typing import IO, Any
+
+from msgspec import Struct
 
 from potto.query.travel import Parcel
 
 LENGTH = 4  # bytes
 
 
-@dataclass(frozen=True, slots=True)
-class Task:
+class Task(Struct, frozen=True):
     """Files to check, and what has changed since the last task: roots, and texts of open files (None: closed)."""
 
     files: tuple[str, ...]
@@ -20,8 +20,7 @@ class Task:
     texts: tuple[tuple[str, str | None], ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Found:
+class Found(Struct, frozen=True):
     """What was found out about a file; no parcel if that failed. `round`: after an edit both ends begin anew."""
 
     file: str

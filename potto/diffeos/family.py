@@ -8,7 +8,8 @@ which the inverter recognizes it inside a larger map. Property tests run over th
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from potto.core.terms import Prim, Term, add, const, div, mul, pow_, prim, sub
 
@@ -19,8 +20,7 @@ _TWO = const(2.0)
 _HALF = const(0.5)
 
 
-@dataclass(frozen=True, slots=True)
-class Recognition:
+class Recognition(Struct, frozen=True):
     """How a family shows inside a term.
 
     anchor: what the inputs of the family may be if a builtin applied to terms belongs to it.
@@ -33,8 +33,7 @@ class Recognition:
     nonnegative: tuple[int, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class DiffeoFamily:
+class DiffeoFamily(Struct, frozen=True):
     """One family of invertible, differentiable maps.
 
     params, domain: an interval for each parameter and each coordinate in which the family is invertible.

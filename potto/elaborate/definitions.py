@@ -7,7 +7,8 @@ signatures only.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from potto.core.terms import App, Global, Term, hole, tuple_, var
 from potto.elaborate import binders, calls, expressions  # noqa: F401  (imported for their rules)
@@ -23,8 +24,7 @@ Locals = Iterable[str | tuple[str, Term]]
 Names = tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Elaborated:
+class Elaborated(Struct, frozen=True):
     """A core term, and where its branches, plain conditionals, deltas, calls and integrals were written.
 
     Spans are relative to the chunk. What is wrong is a `Hole` in the term: the checkers say it.
@@ -34,16 +34,14 @@ class Elaborated:
     origins: tuple[tuple[Term, Span], ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class InverseCore:
+class InverseCore(Struct, frozen=True):
     """The author's inverse: the variables as terms over names for the components (and the map's parameters)."""
 
     values: Names
     components: tuple[Term, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class DiffeoCore:
+class DiffeoCore(Struct, frozen=True):
     """A diffeomorphism's parts over the names of its parameters.
 
     `where` are truth-valued terms that select a branch.
@@ -135,23 +133,20 @@ def _diffeo(elaboration: Elaboration, item: nodes.DiffeoDefinition) -> DiffeoCor
 # Statements of scripts
 
 
-@dataclass(frozen=True, slots=True)
-class ShowCore:
+class ShowCore(Struct, frozen=True):
     """`print(e, …)` or a bare expression: the terms of what is shown."""
 
     values: tuple[Elaborated, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class BindCore:
+class BindCore(Struct, frozen=True):
     """`a = e` or `(a, b) = e`: the names and the whole of what is bound."""
 
     names: Names
     value: Elaborated
 
 
-@dataclass(frozen=True, slots=True)
-class ForCore:
+class ForCore(Struct, frozen=True):
     """`for v in list`: the list; the body is elaborated once for each item, with `(variable, item)` as a local."""
 
     variable: str

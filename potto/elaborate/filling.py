@@ -8,31 +8,29 @@ checker of types has the same rules and reports what does not fit; here that giv
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Generic, TypeVar
+
+from msgspec import Struct
 
 from potto.elaborate.values import Groups
 
 V = TypeVar("V")
 
 
-@dataclass(frozen=True, slots=True)
-class Given(Generic[V]):
+class Given(Struct, Generic[V], frozen=True):
     """One argument of a call."""
 
     name: str | None
     value: V
 
 
-@dataclass(frozen=True, slots=True)
-class Spread(Generic[V]):
+class Spread(Struct, Generic[V], frozen=True):
     """One argument that fills a whole group."""
 
     value: V
 
 
-@dataclass(frozen=True, slots=True)
-class Packed(Generic[V]):
+class Packed(Struct, Generic[V], frozen=True):
     """Several arguments that fill one parameter, a tuple."""
 
     values: tuple[V, ...]

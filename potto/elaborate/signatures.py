@@ -7,7 +7,7 @@ front of each name.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from potto.core.terms import App, Deriv, Global, Lam, Term
 from potto.elaborate.values import Groups, Slot
@@ -18,8 +18,7 @@ from potto.types import interface
 from potto.types.types import Diffeo, TupleOf, Type, dual_name, groups_of, resolve, result_of
 
 
-@dataclass(frozen=True, slots=True)
-class Signature:
+class Signature(Struct, frozen=True):
     """The parameters of a definition, group by group; `dims` is the size of its result if that is a tuple."""
 
     groups: Groups

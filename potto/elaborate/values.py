@@ -7,14 +7,14 @@ elaborating its body, with no substitution and no capture. It becomes a `Lam` on
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from potto.core.terms import Term
 from potto.syntax import nodes
 
 
-@dataclass(frozen=True, slots=True)
-class Slot:
+class Slot(Struct, frozen=True):
     """One parameter as callers see it: its name, if it has one, and how many numbers make it if it is a tuple."""
 
     name: str | None
@@ -24,8 +24,7 @@ class Slot:
 Groups = tuple[tuple[Slot, ...], ...]
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Closure:
+class Closure(Struct, frozen=True, eq=False):
     """A function written in the definition at hand. `scope` has the names around it and parameters already given."""
 
     groups: tuple[tuple[str, ...], ...]
@@ -34,8 +33,7 @@ class Closure:
     scope: Scope
 
 
-@dataclass(frozen=True, slots=True)
-class Builtin:
+class Builtin(Struct, frozen=True):
     """A builtin or one of the special forms, not applied."""
 
     name: str
@@ -44,8 +42,7 @@ class Builtin:
 Value = Term | Closure | Builtin
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Scope:
+class Scope(Struct, frozen=True, eq=False):
     """The local names, with what they stand for."""
 
     names: Mapping[str, Value]

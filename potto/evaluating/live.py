@@ -7,8 +7,9 @@ written. Who shows the outcome is left to the faces.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
+
+from msgspec import Struct
 
 from potto.diagnostics import declare
 from potto.evaluating.world import World
@@ -21,8 +22,7 @@ from potto.syntax import live_expressions, nodes
 DOES_NOT_HOLD = declare("P0530", "a live expression that does not give what is written behind it")
 
 
-@dataclass(frozen=True, slots=True)
-class Outcome:
+class Outcome(Struct, frozen=True):
     """What became of one live expression; `line` counts from 1. `message` says why it does not hold."""
 
     file: str

@@ -10,7 +10,8 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from potto.checking.check import absolute
 from potto.evaluating.world import Answer, World
@@ -31,8 +32,7 @@ PROMPT = "<prompt>"
 _ANSWER = re.compile("_[0-9]*")
 
 
-@dataclass(frozen=True, slots=True)
-class Defined:
+class Defined(Struct, frozen=True):
     """A definition joined the session. `shadows` says what its name meant before, in the middle of a sentence."""
 
     name: str
@@ -46,16 +46,14 @@ class Defined:
         return f"{self.name} : {self.type}"
 
 
-@dataclass(frozen=True, slots=True)
-class Imported:
+class Imported(Struct, frozen=True):
     """An import joined the session, or a file was loaded: the names that are there now."""
 
     module: str
     names: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Valued:
+class Valued(Struct, frozen=True):
     """A statement showed something. `type` is set for a bare expression, the names under which it stays at hand too."""
 
     text: str
@@ -64,8 +62,7 @@ class Valued:
     names: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Said:
+class Said(Struct, frozen=True):
     """A diagnostic about an entry or a file; an error ends the entry."""
 
     located: Located

@@ -10,8 +10,10 @@ import os
 import threading
 import weakref
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
 from typing import Any, TypeVar
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from potto.checking.check import absolute, definition_diagnostics, has_errors
 from potto.checking.library import Library
@@ -39,8 +41,7 @@ T = TypeVar("T")
 _owners: weakref.WeakValueDictionary[str, World] = weakref.WeakValueDictionary()
 
 
-@dataclass(frozen=True, slots=True)
-class Answer:
+class Answer(Struct, frozen=True):
     """What an expression evaluates to, its type, and what a reader should know about the number."""
 
     estimate: Estimate
@@ -169,8 +170,7 @@ def _identity(located: Located) -> tuple[str | None, Diagnostic]:
     return located.file, replace(located.diagnostic, notes=())
 
 
-@dataclass(frozen=True)
-class _Sources:
+class _Sources(Struct, frozen=True):
     world: World
     expression: SourceText
 

@@ -6,16 +6,16 @@ files are the keys of the database. Texts for people are markdown. Nothing here 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
+
+from msgspec import Struct
 
 from potto.source import Span
 
 # Places and changes
 
 
-@dataclass(frozen=True, slots=True)
-class Location:
+class Location(Struct, frozen=True):
     """A place to go to: `span` is what to select, `full` all that belongs to it (a whole definition)."""
 
     file: str
@@ -23,48 +23,42 @@ class Location:
     full: Span
 
 
-@dataclass(frozen=True, slots=True)
-class Links:
+class Links(Struct, frozen=True):
     """Where one may go from `origin`, the word under the cursor."""
 
     origin: Span
     targets: tuple[Location, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Edit:
+class Edit(Struct, frozen=True):
     """Put `text` in the place of `span`; edits of one file do not overlap and are in order."""
 
     span: Span
     text: str
 
 
-@dataclass(frozen=True, slots=True)
-class FileEdits:
+class FileEdits(Struct, frozen=True):
     """The edits of one file, in order."""
 
     file: str
     edits: tuple[Edit, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class FileRename:
+class FileRename(Struct, frozen=True):
     """A file that moves, after its edits were made."""
 
     old: str
     new: str
 
 
-@dataclass(frozen=True, slots=True)
-class Change:
+class Change(Struct, frozen=True):
     """A change of the workspace: edits first, then moves of files."""
 
     files: tuple[FileEdits, ...]
     renames: tuple[FileRename, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Refused:
+class Refused(Struct, frozen=True):
     """Why something that was asked for is not done, for the user to read."""
 
     message: str
@@ -73,8 +67,7 @@ class Refused:
 # Hover, completion, signatures
 
 
-@dataclass(frozen=True, slots=True)
-class Hover:
+class Hover(Struct, frozen=True):
     """What to show about the word at `span`."""
 
     span: Span
@@ -87,8 +80,7 @@ CompletionKind = Literal[
 ]  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
-class Completion:
+class Completion(Struct, frozen=True):
     """One proposal. It replaces `span` by `insert` (with `$1`, `${2:name}`, `$0` in it if `snippet`).
 
     `sort` orders proposals; `filter` is what is matched against the typed word. `detail` and `documentation` may be
@@ -111,8 +103,7 @@ class Completion:
     retrigger: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Completions:
+class Completions(Struct, frozen=True):
     """Proposals for the word at `span`. `incomplete`: ask again when more is typed."""
 
     span: Span
@@ -120,16 +111,14 @@ class Completions:
     incomplete: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class ParameterText:
+class ParameterText(Struct, frozen=True):
     """One parameter: where it stands in the signature's label, and what is to say about it."""
 
     span: Span
     documentation: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Signature:
+class Signature(Struct, frozen=True):
     """A function's signature; `active` is the parameter that is being filled, or None."""
 
     label: str
@@ -138,8 +127,7 @@ class Signature:
     active: int | None
 
 
-@dataclass(frozen=True, slots=True)
-class SignatureHelp:
+class SignatureHelp(Struct, frozen=True):
     """The signatures of the call at hand, one for each group of parameters; `active` is the group being filled."""
 
     signatures: tuple[Signature, ...]
@@ -151,8 +139,7 @@ class SignatureHelp:
 SymbolKind = Literal["function", "constant", "diffeo", "module", "variable", "parameter", "local", "statement"]
 
 
-@dataclass(frozen=True, slots=True)
-class DocumentSymbol:
+class DocumentSymbol(Struct, frozen=True):
     """A definition (or a local name in one) for an outline."""
 
     name: str
@@ -163,8 +150,7 @@ class DocumentSymbol:
     children: tuple[DocumentSymbol, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class WorkspaceSymbol:
+class WorkspaceSymbol(Struct, frozen=True):
     """A definition anywhere in the workspace; `container` is its module."""
 
     name: str
@@ -173,16 +159,14 @@ class WorkspaceSymbol:
     location: Location
 
 
-@dataclass(frozen=True, slots=True)
-class Highlight:
+class Highlight(Struct, frozen=True):
     """An occurrence of the name at hand in this file."""
 
     span: Span
     kind: Literal["read", "write", "text"]
 
 
-@dataclass(frozen=True, slots=True)
-class CallItem:
+class CallItem(Struct, frozen=True):
     """A definition in a hierarchy of calls; `data` is `(file, name)`."""
 
     name: str
@@ -192,16 +176,14 @@ class CallItem:
     data: tuple[str, str]
 
 
-@dataclass(frozen=True, slots=True)
-class Call:
+class Call(Struct, frozen=True):
     """Who calls or is called, and the places of the calls (in the caller's file)."""
 
     item: CallItem
     spans: tuple[Span, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Renaming:
+class Renaming(Struct, frozen=True):
     """What a rename would change: the word and the text to start from."""
 
     span: Span
@@ -215,8 +197,7 @@ ActionKind = Literal[
 ]  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
-class CodeAction:
+class CodeAction(Struct, frozen=True):
     """Something that can be done here. `change` is None until `resolve_code_action` was asked.
 
     `codes` are those of the diagnostics that it fixes, `spans` their places. `preferred`: the obvious one. `disabled`
@@ -234,8 +215,7 @@ class CodeAction:
     data: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class CodeLens:
+class CodeLens(Struct, frozen=True):
     """A line above a definition that can be clicked. `command` is run with `arguments`; no title: ask to resolve."""
 
     span: Span
@@ -244,8 +224,7 @@ class CodeLens:
     title: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class InlayHint:
+class InlayHint(Struct, frozen=True):
     """A text that is shown but not written. `edits` would write it. `tooltip` may come with `resolve_inlay_hint`."""
 
     offset: int
@@ -267,8 +246,7 @@ TOKEN_MODIFIERS = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
-class SemanticToken:
+class SemanticToken(Struct, frozen=True):
     """A coloured word: a type of `TOKEN_TYPES` and modifiers of `TOKEN_MODIFIERS`. Never over a line's end."""
 
     span: Span
@@ -279,16 +257,14 @@ class SemanticToken:
 # The rest
 
 
-@dataclass(frozen=True, slots=True)
-class Fold:
+class Fold(Struct, frozen=True):
     """Something that can be folded: from the end of its first line to the end of `span`."""
 
     span: Span
     kind: Literal["region", "comment", "imports"]
 
 
-@dataclass(frozen=True, slots=True)
-class DocumentLink:
+class DocumentLink(Struct, frozen=True):
     """The module of an import, and the file that it means."""
 
     span: Span
@@ -296,8 +272,7 @@ class DocumentLink:
     tooltip: str
 
 
-@dataclass(frozen=True, slots=True)
-class InlineValue:
+class InlineValue(Struct, frozen=True):
     """A text to show at the end of a line, or an expression for an evaluator to show there."""
 
     span: Span

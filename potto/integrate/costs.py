@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from potto.core.terms import Term
 from potto.kernels.cells import Array
@@ -36,8 +36,7 @@ def books() -> Costs | None:
     return Costs() if _wanted.get() else None
 
 
-@dataclass(slots=True)
-class Surface:
+class Surface(Struct):
     """What became of a surface: whether it met the domain, whether it moved there, whether anyone asked if it does."""
 
     met: bool = False
@@ -57,8 +56,7 @@ class Surface:
         return "it moves: it has a boundary term" if self.moves else "nothing that is differentiated moves it"
 
 
-@dataclass(slots=True)
-class Costs:
+class Costs(Struct):
     """The books of one evaluation.
 
     interior: evaluations of integrands at nodes. boundary: at places that move, where boundary terms are read off.
@@ -73,7 +71,7 @@ class Costs:
     cells: int = 0
     empty: int = 0
     whole: int = 0
-    surfaces: dict[Term, Surface] = field(default_factory=dict)
+    surfaces: dict[Term, Surface] = {}
     _apart: int | None = None
 
     def add(self, evaluations: int) -> None:

@@ -8,10 +8,11 @@ looked into before an answer leaves (`runtime/integration/solving`): a fold, a s
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from potto.core.printer import format_term
 from potto.core.terms import Term
@@ -23,8 +24,7 @@ Members = Ints | None
 INNER = -1
 
 
-@dataclass(frozen=True)
-class Event:
+class Event(Struct, frozen=True):
     """Something that integration met. Events with one key are one; the first stands for all."""
 
     @property
@@ -40,8 +40,7 @@ class Event:
         return self
 
 
-@dataclass(frozen=True)
-class TwoSided(Event):
+class TwoSided(Event, frozen=True):
     """Why derivatives on the two sides differ: a surface lies on a bound of a variable, or on another surface.
 
     fold: or its sections along the variable appear or merge just here. Without a surface: some run along the variable.
@@ -53,8 +52,7 @@ class TwoSided(Event):
     fold: bool = False
 
 
-@dataclass(frozen=True)
-class Fold(Event):
+class Fold(Event, frozen=True):
     """Sections of a surface appear or merge: at which variable, of which of its cuts, where, and for which members.
 
     outer: where that is in the variables further out. owner: None where for all. Of an integral inside of another one
@@ -76,22 +74,19 @@ class Fold(Event):
         return Fold(self.cause, INNER, 0, 0.0, None)
 
 
-@dataclass(frozen=True)
-class Degenerate(Event):
+class Degenerate(Event, frozen=True):
     """Surfaces run along a variable and have no section in it: another order of the variables may do."""
 
     variable: str
 
 
-@dataclass(frozen=True)
-class Unsearched(Event):
+class Unsearched(Event, frozen=True):
     """The search for the places at which a variable is to be cut was given up."""
 
     variable: str
 
 
-@dataclass(frozen=True)
-class OneSidedDerivatives(Event):
+class OneSidedDerivatives(Event, frozen=True):
     """The derivatives backward and forward, and how far off each may be: (..., members) each."""
 
     cause: TwoSided
@@ -122,8 +117,7 @@ BESIDE = "more evaluations change nothing: ask at parameters beside these"
 JOIN = "write both integrals as one: `integral ([..], [..]) .. d(x, y)`"
 
 
-@dataclass(frozen=True)
-class Shortfall(Event):
+class Shortfall(Event, frozen=True):
     """Why an answer is not as accurate as was asked for, and what helps.
 
     blind: where integration did not look nothing is known of the answer, whatever the rules on its panels say. alike:
@@ -131,9 +125,15 @@ class Shortfall(Event):
     """
 
     message: str
-    advice: str = field(default=MORE, compare=False)
-    blind: bool = field(default=False, compare=False)
-    alike: str = field(default="", compare=False)
+    advice: str = MORE
+    blind: bool = False
+    alike: str = ""
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Shortfall) and self.message == other.message
+
+    def __hash__(self) -> int:
+        return hash(self.message)
 
     @property
     def key(self) -> object:

@@ -5,17 +5,17 @@ Owns `LevelPlan` and `Group`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
+
+from msgspec import Struct
 
 from potto.calculus.decomposition.surface_cuts import Cut
 from potto.calculus.decomposition.sweep import Level
 from potto.core.terms import Lam, function_of, tuple_
 
 
-@dataclass(frozen=True)
-class LevelPlan:
+class LevelPlan(Struct, frozen=True, dict=True):
     """One variable: its frame (bounds, then candidate cuts, as one tuple term) and what the cuts are."""
 
     level: Level
@@ -48,8 +48,7 @@ class LevelPlan:
         return function_of(tuple_((self.level.lo, self.level.hi)))
 
 
-@dataclass(frozen=True)
-class Group:
+class Group(Struct, frozen=True):
     """A surface with jumps: which branches it decides, and along which traces."""
 
     number: int

@@ -6,10 +6,10 @@ Owns `Sums`, `Pieces` and `Evaluator`, the integrator's view of the machine.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
+from msgspec import Struct, field
 
 from potto.core.terms import Lam
 from potto.integrate.columns import Columns, joined
@@ -18,8 +18,8 @@ from potto.integrate.events import Event, Events, Members
 from potto.integrate.rules import substitution
 from potto.integrate.rules.gauss import gauss, leaning
 from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Number, Pattern, Trace, Value, map_arrays, map_cells
-from potto.kernels.compile import Kernel
 from potto.kernels.errors import not_a_number
+from potto.kernels.written import Kernel
 
 STRAY = 8
 TELLING = 4  # nodes, from which on values tell where a singularity is; a polynomial may need fewer
@@ -59,7 +59,6 @@ class Evaluator(Protocol):
     def note(self, event: Event, members: Members = None) -> None: ...
 
 
-@dataclass
 class Sums(Columns):
     """Integrals of a batch: value (m, B) and tangents (m, k, B) with their error bounds; m components.
 
@@ -72,8 +71,8 @@ class Sums(Columns):
     e: Array
     t: Array
     et: Array
-    gross: Array | None = field(default=None, kw_only=True)
-    common: Array | None = field(default=None, kw_only=True)
+    gross: Array | None = None
+    common: Array | None = None
 
     @staticmethod
     def zeros(m: int, k: int, batch: int) -> Sums:
@@ -92,8 +91,8 @@ class Sums(Columns):
         missing = m - self.v.shape[0]
         if missing <= 0:
             return self
-        parts = (np.concatenate([x] + [x[:1]] * missing) for x in (self.v, self.e, self.t, self.et))
-        return Sums(*parts, gross=self.gross)
+        v, e, t, et = (np.concatenate([x] + [x[:1]] * missing) for x in (self.v, self.e, self.t, self.et))
+        return Sums(v, e, t, et, gross=self.gross)
 
     def lose(self, members: Any) -> None:
         """Some of the integrals have no value."""
@@ -120,8 +119,7 @@ class Sums(Columns):
         return joined([part.widened(m) for part in parts])
 
 
-@dataclass(frozen=True)
-class Crossing:
+class Crossing(Struct, frozen=True):
     """What crosses faces, (m, k, B): the tangents and their errors. counted: what of it ends of segments and nodes that
     move with the cuts tell already, with errors."""
 
@@ -136,7 +134,6 @@ class Crossing:
         return (value - self.counted, bound + self.uncertain) if moving else (value, bound)
 
 
-@dataclass
 class Pieces(Columns):
     """Pieces of segments under refinement, and what is known of each: integrals and errors per channel (C, P).
 
@@ -216,8 +213,7 @@ def all_of(parts: list[Pieces]) -> Pieces:
     return parts[0] if len(parts) == 1 else joined([part.settled() for part in parts])
 
 
-@dataclass(frozen=True)
-class Ends:
+class Ends(Struct, frozen=True):
     """The integrand at both ends of every segment, sides as on the segment, and its rounding there: (m, S) each."""
 
     low: Array

@@ -8,11 +8,11 @@ those decisions come out the same.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from potto.calculus.algebra.degree import degree, plane
 from potto.calculus.algebra.polytopes import Number
@@ -57,8 +57,7 @@ from potto.integrate.levels import Group, LevelPlan
 from potto.kernels.cells import Mask, Trace
 
 
-@dataclass(frozen=True)
-class Plan:
+class Plan(Struct, frozen=True, dict=True):
     """An integral, ready to be evaluated for any parameters.
 
     decisions: plain terms and the values that they had when the plan was made; it holds where they are the same.

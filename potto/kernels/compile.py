@@ -1,22 +1,24 @@
 """Terms to kernels: one definition, compiled alone, for one pattern of what its arguments carry.
 
-Owns `Kernel` and the cache of compiled ones. A kernel is a Python function over numpy arrays,
+Owns the cache of compiled ones (`written`). A kernel is a Python function over numpy arrays,
 `k(rt, trace, *values) -> value`; what it does not compute itself (calls, integrals, sums, lazy sides) it asks of the
 runtime `rt`, which it knows by the methods of `Runtime` only. The cache is keyed by content: the digest of the term,
 the pattern, and what the term's callees say of themselves through their interfaces; editing a function compiles that
-function, and editing it back compiles nothing.
+function, and editing it back compiles nothing. What one process has written the next one finds on disk.
 """
 
 from __future__ import annotations
 
+import marshal
 import threading
 from collections import OrderedDict
-from collections.abc import Callable
-from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, Protocol
 
+from msgspec import Struct
+
 from potto.calculus.surfaces.trace import CallSite, Layout, immediate, integrating, is_lazy, layout
+from potto.core.packing import keep, recall
 from potto.core.terms import (
     App,
     Branch,
@@ -38,11 +40,11 @@ from potto.core.terms import (
     postorder,
     postorder_by,
 )  # fmt: skip
-from potto.kernels import support
-from potto.kernels.cells import Cell, Pattern, Trace, Value, scalar_parts
+from potto.kernels.cells import Pattern, Trace, Value
 from potto.kernels.emit import Lines, Scalar
 from potto.kernels.making import counts, making
 from potto.kernels.taping import TapeLines
+from potto.kernels.written import Kernel, Written
 
 MOST_KERNELS = 4096
 
@@ -67,21 +69,6 @@ class Runtime(Protocol):
     def fail(self, term: Hole | Delta) -> Value: ...
 
 
-@dataclass(frozen=True, slots=True)
-class Kernel:
-    """A compiled kernel: its function, its text (for `potto dump kernel`), and the parameters that it takes.
-
-    plain: whether it works point by point, without asking anything of the runtime but how conditions fall. native: what
-    there is of it in machine code (`native.points`).
-    """
-
-    run: Callable[..., Value]
-    text: str
-    params: tuple[str, ...]
-    plain: bool = False
-    native: dict[Any, Any] = field(default_factory=dict, compare=False, repr=False)
-
-
 _cache: OrderedDict[Any, Kernel] = OrderedDict()
 _cache_lock = threading.Lock()
 
@@ -102,10 +89,17 @@ def kernel(lam: Lam, patterns: tuple[Pattern, ...], directions: int, rounding: b
             counts.reused += 1
             return found
     with making:
-        made = _Compiler(lam, patterns, directions, rounding, rt).compile()
+        name = repr(key).encode()
+        written: Written | None = recall("kernels", name)
+        if written is None:
+            written = _Compiler(lam, patterns, directions, rounding, rt).written()
+            keep("kernels", name, written)
+            counts.compiled += 1
+        else:
+            counts.recalled += 1
+        made = written.linked(lam)
     with _cache_lock:
         _cache[key] = made
-        counts.compiled += 1
         if len(_cache) > MOST_KERNELS:
             _cache.popitem(last=False)
     return made
@@ -117,16 +111,14 @@ def clear() -> None:
         _cache.clear()
 
 
-@dataclass(frozen=True, slots=True)
-class Structure:
+class Structure(Struct, frozen=True):
     """A tuple or a list whose parts are known while compiling."""
 
     parts: tuple[Known, ...]
     is_list: bool
 
 
-@dataclass(frozen=True, slots=True)
-class Dynamic:
+class Dynamic(Struct, frozen=True):
     """A value whose kind is known only at run time: the variable that holds it and what it may carry."""
 
     name: str
@@ -146,23 +138,26 @@ class _Compiler:
         self.layout: Layout = layout(lam.body)
         self.values: dict[Term, Known] = {}
         self.env: dict[str, Known] = {}
-        self.objects: dict[str, object] = {}
+        self.objects: dict[str, Term | tuple[Term, ...]] = {}
         self.arguments = [f"arg{i}" for i in range(len(lam.params))]
         for param, argument, pattern in zip(lam.params, self.arguments, patterns, strict=True):
             self.env[param] = self.unpack(argument, pattern)
 
-    def compile(self) -> Kernel:
+    def written(self) -> Written:
         for node in postorder_by(self.lam.body, _at_once):
             self.values[node] = self.emit(node)
         result = self.pack(self.values[self.lam.body])
         body = [*self.out.lines, f"return {result}"]
         text = f"def kernel(rt, trace, {', '.join(self.arguments)}):\n    " + "\n    ".join(body) + "\n"
-        scope: dict[str, Any] = {name: support.function(path) for name, path in self.out.functions.items()}
-        scope.update(Cell=Cell, parts=scalar_parts, **self.objects)
-        exec(compile(text, "<kernel>", "exec"), scope)
         plain = "rt." not in text.replace("rt.falls(", "")
         plain = plain and not any(isinstance(known, Dynamic) for known in self.env.values())
-        return Kernel(scope["kernel"], text, self.lam.params, plain)
+        places = {term: place for place, term in enumerate(postorder(self.lam.body))}
+        objects = {
+            name: tuple(places[term] for term in kept) if isinstance(kept, tuple) else places[kept]
+            for name, kept in self.objects.items()
+        }
+        code = marshal.dumps(compile(text, "<kernel>", "exec"))
+        return Written(text, code, dict(self.out.functions), objects, plain)
 
     # Arguments in, results out
 
@@ -228,7 +223,7 @@ class _Compiler:
         self.values[term] = scalar
         return scalar
 
-    def keep(self, value: object) -> str:
+    def keep(self, value: Term | tuple[Term, ...]) -> str:
         """A name under which generated code finds an object (a term, a tuple of names)."""
         name = f"o{len(self.objects)}"
         self.objects[name] = value

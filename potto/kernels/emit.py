@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache, reduce
+
+from msgspec import Struct
 
 from potto.calculus.differentiation.derivative import partial
 from potto.core.terms import Branch, Const, If, Prim, Term, Var, postorder, var
@@ -29,8 +30,7 @@ _HOLDS = {"lt": operator.lt, "le": operator.le, "gt": operator.gt, "ge": operato
           "ne": operator.ne}  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
-class Scalar:
+class Scalar(Struct, frozen=True):
     """Names of the variables that hold a cell's parts; None where a part is exactly zero, "1.0" where it is one."""
 
     v: str

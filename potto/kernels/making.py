@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import threading
 import time
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 
-@dataclass(slots=True)
-class Counts:
+class Counts(Struct):
     compiled: int = 0
+    recalled: int = 0  # found on disk
     reused: int = 0
     seconds: float = 0.0
     native: int = 0
@@ -21,8 +22,9 @@ class Counts:
     native_seconds: float = 0.0
     native_points: int = 0
 
-    def so_far(self) -> tuple[int, int, float, int, int, int]:
-        return self.compiled, self.reused, self.seconds, self.native, self.kept, self.native_points
+    def so_far(self) -> tuple[int, int, int, float, int, int, int]:
+        made = self.compiled, self.reused, self.recalled, self.seconds
+        return *made, self.native, self.kept, self.native_points
 
 
 counts = Counts()

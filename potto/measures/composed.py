@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
 from functools import lru_cache
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from potto.core.terms import (
     ONE,
@@ -35,8 +37,7 @@ from potto.measures.registry import MEASURES, Condition, Terms
 Tree = tuple[str, tuple["Tree | None", ...]]  # a measure and what it is given: None for a number, else a measure
 
 
-@dataclass(frozen=True, slots=True)
-class Part:
+class Part(Struct, frozen=True):
     """A part of a measure over one variable: its weight, and as in `Measure` support, hints and density."""
 
     weight: Term
@@ -47,8 +48,7 @@ class Part:
     discrete: bool = False
 
 
-@dataclass(frozen=True)
-class Composition:
+class Composition(Struct, frozen=True):
     """A way to make measures of measures.
 
     parameters: as a person writes them. takes: whether it may be given numbers and measures like these. parts: its
@@ -104,8 +104,7 @@ def tree_of(shape: str) -> Tree:
     return name, tuple(found)
 
 
-@dataclass(frozen=True, slots=True)
-class Misuse:
+class Misuse(Struct, frozen=True):
     """What is wrong with a shape: of which measure in it (counted in the order of the text), and what it takes."""
 
     place: int

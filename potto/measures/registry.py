@@ -7,7 +7,8 @@ support. An entry is all that there is to say about a measure; elaboration, chec
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+
+from msgspec import Struct, field
 
 from potto.core.terms import Term
 
@@ -19,8 +20,7 @@ def _none(*parameters: Term) -> Terms:
     return ()
 
 
-@dataclass(frozen=True)
-class Measure:
+class Measure(Struct, frozen=True):
     """One measure. All callables take terms: the parameters, for some after the variable.
 
     name: as programs call it.

@@ -14,20 +14,19 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Hashable, Iterable
-from dataclasses import dataclass
 
 from potto.modules.folders import Programs, list_folder
 from potto.modules.lookup import SUFFIXES
 from potto.modules.texts import Unreadable
 from potto.query import Database
-from potto.quick import quick
+from potto.quick import quick, value
 
 MAX_BYTES = 16_000_000
 DISK, OPEN = 1, 0
 Stamp = tuple[int, int, int] | None
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Loaded:
     """A file as it was read, and how to see that it changed since."""
 

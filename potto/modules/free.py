@@ -7,20 +7,19 @@ recursion. Knows no files. Types have no names that could be free: `Real[x]` tal
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
-from potto.quick import quick
+from potto.quick import quick, value
 from potto.syntax import nodes
 from potto.syntax.nodes import Expr, Item, Node, Statement
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class _Bind:
     names: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class _Unbind:
     names: tuple[str, ...]
 

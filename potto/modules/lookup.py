@@ -10,12 +10,11 @@ from __future__ import annotations
 
 import os.path
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from potto.modules.texts import exists, imports, names
 from potto.query import Database, query
-from potto.quick import quick
+from potto.quick import quick, value
 from potto.syntax import nodes
 
 SUFFIXES = (".po", ".diffeo")
@@ -28,7 +27,7 @@ class DefinitionTarget(NamedTuple):
     name: str
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class ModuleTarget:
     """A module: its file, and how it was written."""
 
@@ -39,7 +38,7 @@ class ModuleTarget:
 Target = DefinitionTarget | ModuleTarget
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Imported:
     """What an import binds a name to: `name` of `module`, or the module itself."""
 
@@ -47,12 +46,12 @@ class Imported:
     name: str | None
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Defined:
     """What a definition of the file itself binds a name to."""
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Found:
     """The file that a module name means, and another one that it could mean as well."""
 
@@ -149,7 +148,7 @@ def written_names(item: nodes.FromImport) -> tuple[nodes.ImportedName, ...]:
     return tuple(imported for imported in item.names if imported.name)
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Trail:
     """Where the search for a name went, file by file, and what it found. `circular`: it came back to where it was."""
 

@@ -10,20 +10,19 @@ and `starts`, read by entry, so that an edit of one definition is no change to w
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 from typing import Literal
 
 from potto.diagnostics import Diagnostic
 from potto.modules.free import Reference, references_in
 from potto.query import Database, query
-from potto.quick import quick
+from potto.quick import quick, replace, value
 from potto.source import SourceText, Span
 from potto.syntax import Chunk, ParsedChunk, defined_name, nodes, parse_chunk, split
 
 Importing = nodes.FromImport | nodes.Import
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Unreadable:
     """A file that is there but has no text for us. `offset` counts bytes (for "not text")."""
 
@@ -33,7 +32,7 @@ class Unreadable:
 
 
 ChunkRef = Chunk
-@dataclass(frozen=True, slots=True)
+@value
 class StatementRef:
     """A top-level statement of a script; its spans are relative to `start`."""
 
@@ -41,7 +40,7 @@ class StatementRef:
     statement: nodes.Print | nodes.For | nodes.ExpressionStatement
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Head:
     """What others need to know of a chunk without its tree. `importing` has spans relative to the chunk."""
 
@@ -51,7 +50,7 @@ class Head:
     importing: Importing | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Place:
     """The chunk that defines a name; `span` is the name's, relative to the chunk."""
 
@@ -135,7 +134,7 @@ def chunk_references(db: Database, text: str, diffeo: bool) -> tuple[Reference, 
     return () if item is None else references_in(item)
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Layout:
     """A file cut into chunks by what they are; all positions are absolute. Runs again at every edit."""
 
@@ -147,7 +146,7 @@ class Layout:
     nameless: bool
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Outline:
     """What of a file's layout no body edit and no move changes. `nameless`: a broken chunk might define anything."""
 

@@ -9,12 +9,11 @@ from __future__ import annotations
 import os.path
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 from potto.modules.lookup import SUFFIXES, bindings, find_module, folders
 from potto.modules.texts import chunk_references, chunks, content, imports, is_diffeo, names
 from potto.query import Database, query
-from potto.quick import quick
+from potto.quick import quick, value
 from potto.syntax import nodes
 
 _HEADS = re.compile(
@@ -61,7 +60,7 @@ def _table(db: Database, words: Callable[[str], frozenset[str]]) -> dict[str, li
     return table
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class _Words:
     """Words of a file by where they stand: where a definition's name does, and in imports."""
 

@@ -11,8 +11,9 @@ import builtins
 import math
 import operator
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import Any, Protocol
+
+from msgspec import Struct, field
 
 from potto.core.terms import Prim, Term, Var, var
 
@@ -37,8 +38,7 @@ def _none(*args: Term) -> Terms:
     return ()
 
 
-@dataclass(frozen=True)
-class Primitive:
+class Primitive(Struct, frozen=True):
     """One builtin. What it does in a domain is a rule of its own, or else read off its `formula` (see `walking`).
 
     name: as core terms (and, unless `surface` is False, programs) call it.

@@ -16,8 +16,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
 from typing import Any
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from potto.diagnostics import Severity, declare
 from potto.projects.settings import DEFAULTS, Settings, problem
@@ -32,14 +34,13 @@ BAD_PROJECT = declare("P0231", "a project file that says what is not understood"
 _SEVERITIES: Mapping[str, Severity] = {"error": "error", "warning": "warning", "info": "info", "hint": "hint"}
 
 
-@dataclass(frozen=True, slots=True)
-class Project:
+class Project(Struct, frozen=True):
     """A folder with a project file, or one that is a root by itself. `problems` are pairs of a line (from 0) and a
     sentence."""
 
     folder: str
     roots: tuple[str, ...]
-    lints: Mapping[str, str] = field(default_factory=dict)
+    lints: Mapping[str, str] = {}
     settings: Settings = DEFAULTS
     problems: tuple[tuple[int, str], ...] = ()
 

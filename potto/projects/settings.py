@@ -10,9 +10,11 @@ import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal, get_args
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from potto.diagnostics import PottoError, declare
 from potto.source import Span
@@ -37,8 +39,7 @@ class Unasked(float):
     """A tolerance that nobody asked for."""
 
 
-@dataclass(frozen=True, slots=True)
-class Settings:
+class Settings(Struct, frozen=True):
     """What an evaluation is asked for.
 
     method: how integrals are estimated; "auto" cuts and integrates by quadrature where the dimension allows it.
@@ -74,7 +75,7 @@ _executor: ContextVar[Executor | None] = ContextVar("potto_executor", default=No
 def current(base: Settings = DEFAULTS) -> Settings:
     """The settings in force in this thread or task; `base` counts where nothing is set, as a project says it."""
     changes = _changes.get()
-    return replace(base, **changes) if changes else base  # type: ignore[arg-type]
+    return replace(base, **changes) if changes else base
 
 
 def executor() -> Executor | None:
@@ -96,8 +97,8 @@ def problem(name: str, value: object) -> str | None:
         if value == "native" and find_spec("llvmlite") is None:
             return "machine code needs llvmlite: pip install 'potto[jit]'"
         return None
-    if name not in {field.name for field in fields(Settings)}:
-        known = (*(field.name for field in fields(Settings)), "executor")
+    if name not in Settings.__struct_fields__:
+        known = (*Settings.__struct_fields__, "executor")
         return f"there is no setting `{name}`; there are {', '.join(known)}"
     if isinstance(value, bool) or not isinstance(value, int | float):
         return f"{name} must be a number, not {value!r}"

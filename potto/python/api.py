@@ -13,11 +13,13 @@ import itertools
 import os
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from types import MappingProxyType
 from typing import Any
 
+from msgspec.structs import replace
+
+from potto import store
 from potto.diagnostics import Diagnostic, PottoError
 from potto.evaluating.world import World
 from potto.kernels.cells import Value
@@ -126,6 +128,9 @@ def _compile(world: World, key: str, text: str) -> Module:
 
 
 def _module(world: World, file: str) -> Module:
+    complaint = store.complaint()
+    if complaint is not None:
+        warnings.warn(complaint, stacklevel=4)  # told once for each place that loads
     wrong = world.errors(file)
     if wrong:
         error = ProgramError(wrong, world.source)

@@ -9,10 +9,11 @@ from __future__ import annotations
 import math
 import numbers
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from potto.diagnostics import PottoError, declare
 from potto.kernels.cells import Cell, Value
@@ -28,8 +29,7 @@ NO_KIND = declare("P0523", "a Python value that is no value of Potto")
 ToFunction = Callable[[Any], Value | None]
 
 
-@dataclass(frozen=True, slots=True)
-class Batch:
+class Batch(Struct, frozen=True):
     """What arrays a call was given: the shape that they broadcast to; None when there are only numbers."""
 
     shape: tuple[int, ...] | None

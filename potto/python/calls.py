@@ -7,7 +7,8 @@ parameters are resolved by elaboration, as in a program. Conversion of Python va
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+
+from msgspec import Struct
 
 from potto.core.terms import Lam, Term
 from potto.elaborate import elaborate_expression
@@ -28,15 +29,14 @@ NOWHERE = Span(0, 0)
 Form = tuple[tuple[int, tuple[str, ...]], ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Call:
+class Call(Struct, frozen=True, eq=False):
     """An expression with the file whose names it uses, and the form in which it is called."""
 
     world: World
     file: str
     expr: nodes.Expr
     form: Form
-    _known: dict[int, Term] = field(default_factory=dict, compare=False, repr=False)
+    _known: dict[int, Term] = {}
 
     def run(self, values: Sequence[Value], batch: Batch) -> Estimate:
         """The estimate of the call for these arguments. Raises PottoError."""

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
+from msgspec.structs import asdict, replace
 
 from potto.kernels.cells import Cell, Number, Value, all_cells, map_cells, pad
 from potto.kernels.chunks import POINTS
@@ -35,8 +35,7 @@ NOTHING: Swept = (None, None)
 Names = Sequence[str] | str | None
 
 
-@dataclass(frozen=True, repr=False)
-class Gradient(Estimate):
+class Gradient(Estimate, frozen=True):
     """An estimate with derivatives by several parameters: `gradient["c"]`, or `tangent` for all of them."""
 
     wrt: tuple[str, ...] = ()
@@ -272,7 +271,7 @@ class _Run:
         bounds = [told(moving, lambda cell, d=d: cell.et[d]) for d in directions]  # type: ignore[misc]
         forms = (_by_name(part, wrt, self.given) for part in (tangents, bounds))
         found = self.answer(value, *(form[0] if len(wrt) == 1 else form for form in forms))
-        return Gradient(**{item.name: getattr(found, item.name) for item in fields(Estimate)}, wrt=wrt)
+        return Gradient(**asdict(found), wrt=wrt)
 
 
 def _swept(answers: Sequence[tuple[Cell, Any]], seeds: Sequence[Node]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
@@ -283,7 +282,7 @@ def _swept(answers: Sequence[tuple[Cell, Any]], seeds: Sequence[Node]) -> tuple[
 
 
 def _plain(found: Estimate) -> Estimate:
-    return Estimate(**{item.name: getattr(found, item.name) for item in fields(Estimate)})
+    return Estimate(**{name: getattr(found, name) for name in Estimate.__struct_fields__})
 
 
 def _numbers(value: Value) -> bool:

@@ -14,8 +14,10 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
-from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
+
+from msgspec import Struct, field
+from msgspec.structs import asdict, replace
 
 from potto.diagnostics import PottoError
 from potto.kernels.cells import Value, all_arrays, map_arrays
@@ -50,8 +52,7 @@ class Interrupted(KeyboardInterrupt):
         self.estimate = estimate
 
 
-@dataclass(frozen=True)
-class Task:
+class Task(Struct, frozen=True):
     """Blocks of a batch as they travel: the function, its arguments in one row of members for each block, what it is
     differentiated by, and how numbers are asked for."""
 
@@ -110,8 +111,7 @@ def in_tiles(
 _sizes: dict[Any, int] = {}  # of blocks, for functions called before
 
 
-@dataclass
-class _Tiles:
+class _Tiles(Struct):
     """One batch. key: for whom the size of blocks is kept. done: the answers so far, by the first member of their
     block. again: how many blocks were lost. spent: seconds of the last block that was evaluated here."""
 

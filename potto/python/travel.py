@@ -11,9 +11,10 @@ import hashlib
 import os
 import threading
 from collections import OrderedDict
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
+
+from msgspec import Struct
 
 from potto.evaluating.world import World
 from potto.modules.graph import imported_files
@@ -23,8 +24,7 @@ from potto.syntax import nodes, print_expression
 MOST_WORLDS = 64
 
 
-@dataclass(frozen=True)
-class Content:
+class Content(Struct, frozen=True, dict=True):
     """The texts of programs under the paths of their files, where modules are looked for, and how numbers are asked
     for where nobody says."""
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass
 from typing import Any, Final, Literal
 
-from potto.quick import quick
+from potto.quick import quick, value
 
 DURABILITIES: Final = 3  # of inputs: 0, 1, 2; a memo that reads no input has this one
 FOREVER: Final = sys.maxsize  # the revision up to which such a memo is verified
@@ -23,7 +22,7 @@ class CycleError(Exception):
     """A query needs its own answer and has no fallback: an internal error that names the cycle."""
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Event:
     """What happened to a query (`reused`: verified after an edit, not run) or an input (`query` is then "input")."""
 

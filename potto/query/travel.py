@@ -12,14 +12,13 @@ here, so nothing is ever taken over that would not have been found here.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass
 from hashlib import blake2b
 from importlib import import_module
 from typing import Any
 
 from potto.query.database import Database
 from potto.query.nodes import Entry, Input, Memo, Node, Query, entry_of
-from potto.quick import quick
+from potto.quick import quick, value
 
 Args = tuple[Hashable, ...]
 # Everything is called by its number in the order of sending. What was read: an input and the digest of its value; an
@@ -31,7 +30,7 @@ Sent = InputSent | AnswerSent | EntrySent
 MOST_BELOW = 5_000_000  # memos on the way down: more than there are in any database
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Parcel:
     """The answer of number `root`, with the values and the nodes that were not sent before."""
 

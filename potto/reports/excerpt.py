@@ -10,7 +10,8 @@ from __future__ import annotations
 import textwrap
 import unicodedata
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+
+from msgspec import Struct
 
 from potto.source import SourceText, Span
 
@@ -20,8 +21,7 @@ WIDTH = 100  # cells of source shown of one line
 ALL_LINES_UP_TO = 4  # a span over more lines shows its first two and its last
 
 
-@dataclass(frozen=True, slots=True)
-class Mark:
+class Mark(Struct, frozen=True):
     """A place to underline: with carets when primary, with dashes otherwise."""
 
     span: Span
@@ -29,8 +29,7 @@ class Mark:
     primary: bool
 
 
-@dataclass(frozen=True, slots=True)
-class _Piece:
+class _Piece(Struct, frozen=True):
     """The part of a mark on one line, in columns of code points; the label stands at its last piece."""
 
     start: int
@@ -39,8 +38,7 @@ class _Piece:
     primary: bool
 
 
-@dataclass(slots=True)
-class _Row:
+class _Row(Struct):
     """One line on the screen: a line number (or none), text, and whether it belongs to the source."""
 
     number: int | None
@@ -48,11 +46,10 @@ class _Row:
     style: str = "source"
 
 
-@dataclass(slots=True)
-class Excerpt:
+class Excerpt(Struct):
     """The rows of an excerpt, before the width of the gutter is known."""
 
-    rows: list[_Row] = field(default_factory=list)
+    rows: list[_Row] = []
 
     @property
     def gutter_width(self) -> int:

@@ -6,8 +6,9 @@ Owns finding and reading the pages (`docs/errors/P*.md`, in an installed Potto `
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
+
+from msgspec import Struct
 
 HERE = Path(__file__).resolve().parent.parent
 FOLDERS = (HERE / "_docs" / "errors", HERE.parent / "docs" / "errors")  # installed; in a clone
@@ -16,8 +17,7 @@ FOLDERS = (HERE / "_docs" / "errors", HERE.parent / "docs" / "errors")  # instal
 TOPICS = ("limits",)  # pages beside those of codes
 
 
-@dataclass(frozen=True, slots=True)
-class Example:
+class Example(Struct, frozen=True):
     """A program of a page. `heading` is what it stands under: `Wrong`, `Right`, `Wrong (run)`, …"""
 
     heading: str
@@ -32,8 +32,7 @@ class Example:
         return tuple(zip(parts[1::2], parts[2::2], strict=True))
 
 
-@dataclass(frozen=True, slots=True)
-class Page:
+class Page(Struct, frozen=True):
     """The page of one code."""
 
     code: str

@@ -10,8 +10,9 @@ import os
 import re
 import textwrap
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from typing import Any
+
+from msgspec import Struct
 
 from potto.diagnostics import Diagnostic, PottoError, Related
 from potto.reports.excerpt import WIDTH, Excerpt, Mark, excerpt, printable
@@ -22,16 +23,14 @@ BESIDE, LEAST = 6, 14  # columns beside an excerpt, for its gutter; the least th
 NARROW = 60  # columns of a screen on which what goes on is not indented as far as it began
 
 
-@dataclass(frozen=True, slots=True)
-class Located:
+class Located(Struct, frozen=True):
     """A diagnostic and the file that it is about; None for one that has no place in a file."""
 
     file: str | None
     diagnostic: Diagnostic
 
 
-@dataclass(frozen=True, slots=True)
-class Palette:
+class Palette(Struct, frozen=True):
     """How to switch colours on, per role; `off` ends any of them. Empty strings: no colours."""
 
     error: str = ""

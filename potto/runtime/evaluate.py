@@ -111,9 +111,10 @@ class Clock:
         return self
 
     def __exit__(self, *exc: object) -> None:
-        compiled, reused, spent, native, kept, points = self.before
+        compiled, reused, recalled, spent, native, kept, points = self.before
         self.seconds = time.perf_counter() - self.start
         self.compiled, self.reused = counts.compiled - compiled, counts.reused - reused
+        self.recalled = counts.recalled - recalled
         self.spent = counts.seconds - spent
         self.native, self.kept = counts.native - native, counts.kept - kept
         self.native_points = counts.native_points - points
@@ -125,6 +126,7 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
     method = "exact" if not record.methods else "+".join(sorted(record.methods))
     stats: dict[str, Any] = {
         "kernels compiled": clock.compiled,
+        "kernels from disk": clock.recalled,
         "kernels reused": clock.reused,
         "integrals": record.integrals,
         "evaluations": record.evaluations,

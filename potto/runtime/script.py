@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from typing import Any
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from potto.checking.spoiled import statement_errors
 from potto.diagnostics import Diagnostic, PottoError, declare
@@ -36,8 +38,7 @@ ONE_SIDED = declare("P0522", "a derivative that differs on the two sides of the 
 Environment = dict[str, Value]
 
 
-@dataclass(frozen=True, slots=True)
-class Shown:
+class Shown(Struct, frozen=True):
     """What one statement printed: its text, and the numbers behind it. A single value without functions is kept."""
 
     span: Span

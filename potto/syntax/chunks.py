@@ -11,9 +11,8 @@ follows.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 
-from potto.quick import quick
+from potto.quick import quick, value
 from potto.syntax.tokens import FIRST_NAME, normalized
 
 _LINE = re.compile(r"\n(?:#.*\n)*\f*([^\s])")
@@ -28,7 +27,7 @@ _INDENTED = re.compile(r"\n[^\S\n]+[^\s]")
 MOST_WASTED = 200_000
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Chunk:
     """`text` from the offset `start` of the file, without the blank lines after it."""
 

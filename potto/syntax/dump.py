@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from typing import Any
 
 from potto.syntax.nodes import Node
@@ -24,5 +23,5 @@ def dump_tree(node: Node) -> str:
 
 def _plain(node: Node) -> list[tuple[str, Any]]:
     """The fields that hold words and numbers."""
-    fields = ((field.name, getattr(node, field.name)) for field in dataclasses.fields(node))
+    fields = ((name, getattr(node, name)) for name in node.__match_args__)
     return [(name, value) for name, value in fields if isinstance(value, (str, int, float, bool))]

@@ -11,7 +11,7 @@ import re
 from dataclasses import dataclass, field
 
 from potto.diagnostics import Diagnostic
-from potto.quick import quick
+from potto.quick import quick, value
 from potto.source import Span
 from potto.syntax import kinds
 from potto.syntax.head import BlockTracker
@@ -42,7 +42,7 @@ _ENDS_OPERAND = frozenset({"NAME", "NUMBER", "MEMBER", "RPAR", "RSQB"})
 _LINE = re.compile(r"([ \t\f\v]*)([^\n]?)")
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Lexed:
     """What `lex` found: tokens (the last is `$END`), comments, diagnostics; which brackets are never closed."""
 

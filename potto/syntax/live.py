@@ -6,16 +6,15 @@ Owns `Live` and `live_expressions`.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 
-from potto.quick import quick
+from potto.quick import quick, value
 from potto.source import Span
 from potto.syntax.tokens import normalized
 
 _ASKED = re.compile(r"^[ \t]*#>[ \t]?(?P<text>[^\n]*)$(?:\n[ \t]*#=[ \t]?(?P<expected>[^\n]*)$)?", re.MULTILINE)
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Live:
     """One `#> e`: spans are absolute. `span` is from `#>` to its line's end; `text_span` is where e itself stands."""
 

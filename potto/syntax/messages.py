@@ -6,8 +6,9 @@ user's words.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
+
+from msgspec import Struct
 
 from potto.diagnostics import Diagnostic, Related
 from potto.source import Span
@@ -43,8 +44,7 @@ _OPENING = frozenset(
 _WORDS = {"RPAR": ")", "RSQB": "]", "LPAR": "(", "LSQB": "[", "COMMA": ",", "EQ": "=", "DOT": ".", "DOTDOT": ".."}
 
 
-@dataclass(frozen=True, slots=True)
-class Stop:
+class Stop(Struct, frozen=True):
     """Where a parse stopped: the values on the stack, the kinds of tokens that could follow, and the tokens."""
 
     values: list[Any]

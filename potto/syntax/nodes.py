@@ -6,10 +6,9 @@ flat, so that a sum of thousands of terms is no deeper than one of two.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
-from potto.quick import quick
+from potto.quick import quick, value
 from potto.source import Span
 from potto.syntax.type_nodes import DiffeoType as DiffeoType
 from potto.syntax.type_nodes import FunctionType as FunctionType
@@ -20,20 +19,20 @@ from potto.syntax.type_nodes import TupleType as TupleType
 from potto.syntax.type_nodes import TypeExpr as TypeExpr
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Number:
     span: Span
     text: str
     value: float
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Name:
     span: Span
     id: str
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Member:
     """`module.name`, written without blanks; `path` is the dotted module (`pkg.m`), `path_span` its place."""
 
@@ -44,14 +43,14 @@ class Member:
     name_span: Span
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Unary:
     span: Span
     op: Literal["-", "+", "not"]
     operand: Expr
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Operand:
     """One further operand of a chain, with the operator in front of it."""
 
@@ -60,7 +59,7 @@ class Operand:
     value: Expr
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Chain:
     """`a + b - c` or `a * b / c`: left-associative operators of one precedence (`rest` is never empty)."""
 
@@ -69,14 +68,14 @@ class Chain:
     rest: tuple[Operand, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Power:
     span: Span
     base: Expr
     exponent: Expr
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Compare:
     """`a <= x < b`: a chained comparison (`rest` is never empty; ops: < <= > >= == !=)."""
 
@@ -85,7 +84,7 @@ class Compare:
     rest: tuple[Operand, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Logic:
     """`p and q and r` or `p or q`, flat."""
 
@@ -94,7 +93,7 @@ class Logic:
     operands: tuple[Expr, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Bracket:
     """The Iverson bracket `[p]`: 1 where p holds, else 0. p is a Compare, a Logic or a `not`."""
 
@@ -102,13 +101,13 @@ class Bracket:
     condition: Expr
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class ListLiteral:
     span: Span
     items: tuple[Expr, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Tuple:
     """`(a, b)`, two items or more."""
 
@@ -116,7 +115,7 @@ class Tuple:
     items: tuple[Expr, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Paren:
     """`(e)`: kept so that the formatter prints what was written."""
 
@@ -124,7 +123,7 @@ class Paren:
     inner: Expr
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class If:
     """`if p then a else b` or `p ? a : b`."""
 
@@ -135,7 +134,7 @@ class If:
     style: Literal["if", "?:"]
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Lambda:
     """`\\(x, y) . \\c . e` is two Lambdas; `\\(x, y) . c . e` is one with two groups. Each group is one call."""
 
@@ -144,7 +143,7 @@ class Lambda:
     body: Expr
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Argument:
     span: Span
     name: str | None
@@ -152,7 +151,7 @@ class Argument:
     value: Expr
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Apply:
     """One group of arguments given to a function: `f(a, b)`, `f (a, b)`, `f x`. `f x y` is two Applys."""
 
@@ -162,7 +161,7 @@ class Apply:
     parenthesized: bool
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Interval:
     """`[lo, hi]` as the bounds of one variable of integration."""
 
@@ -171,7 +170,7 @@ class Interval:
     hi: Expr
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class MeasureBound:
     """`x ~ normal(m, s)` among the bounds of an integral.
 
@@ -189,7 +188,7 @@ class MeasureBound:
     inner: tuple[tuple[str, Span], ...]
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Binder:
     """A variable where it is bound, here after `d`."""
 
@@ -197,7 +196,7 @@ class Binder:
     name: str
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Integral:
     """`integral (bounds) body d(variables)`: the first variable is the outermost."""
 
@@ -207,7 +206,7 @@ class Integral:
     variables: tuple[Binder, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Sum:
     """`sum i in lo..hi (body)`."""
 
@@ -218,7 +217,7 @@ class Sum:
     body: Expr
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Binding:
     """`name = e` or `(a, b) = e`; in a definition's block or in a `let`."""
 
@@ -227,7 +226,7 @@ class Binding:
     value: Expr
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Let:
     """`let a = e; (b, c) = f in body`."""
 
@@ -236,7 +235,7 @@ class Let:
     body: Expr
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class InlineDiffeo:
     """`diffeo(e, f)`: the condition holds where the first component is >= 0."""
 
@@ -244,7 +243,7 @@ class InlineDiffeo:
     components: tuple[Expr, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class ErrorExpr:
     """A place where the text could not be read as an expression. A diagnostic has said why."""
 
@@ -279,7 +278,7 @@ Expr = (
 # Top-level items: one per chunk
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class ImportedName:
     span: Span
     name: str
@@ -288,7 +287,7 @@ class ImportedName:
     alias_span: Span | None
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class FromImport:
     """`from pkg.m import a, b as c`."""
 
@@ -298,7 +297,7 @@ class FromImport:
     names: tuple[ImportedName, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Import:
     """`import pkg.m` or `import pkg.m as k`."""
 
@@ -309,7 +308,7 @@ class Import:
     alias_span: Span | None
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Definition:
     """`def f(a, b)(c) body` (groups not empty) or `name = e` (groups empty).
 
@@ -326,7 +325,7 @@ class Definition:
     keyword: bool
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Inverse:
     """`inverse (u, v) . (x, y)`: the author's inverse of a diffeomorphism."""
 
@@ -335,7 +334,7 @@ class Inverse:
     components: tuple[Expr, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class DiffeoDefinition:
     """`diffeo name(x, y; c) = (u, v)` in a .po, or `name = \\(x, y) . \\c . (u, v)` in a .diffeo file.
 
@@ -356,13 +355,13 @@ class DiffeoDefinition:
     keyword: bool
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Print:
     span: Span
     arguments: tuple[Expr, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class For:
     """`for v in list: statements`."""
 
@@ -372,13 +371,13 @@ class For:
     body: tuple[Statement, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class ExpressionStatement:
     span: Span
     value: Expr
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class BrokenItem:
     """A chunk whose head could not be read. `name` is the best guess at what it was to define."""
 

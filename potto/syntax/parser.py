@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from potto.diagnostics import Diagnostic
-from potto.quick import quick
+from potto.quick import quick, value
 from potto.source import Span
 from potto.syntax import kinds
 from potto.syntax.chunks import split
@@ -33,7 +33,7 @@ LONG = 20_000
 """Tokens beyond which a chunk is not read again to find a better repair."""
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class ParsedChunk:
     """The item of a chunk (None if it has only comments), with spans and diagnostics relative to the chunk."""
 
@@ -42,7 +42,7 @@ class ParsedChunk:
     comments: tuple[Comment, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class ParsedExpression:
     """An expression by itself."""
 

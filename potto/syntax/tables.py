@@ -11,10 +11,11 @@ import hashlib
 import json
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
+
+from msgspec import Struct
 
 from potto.store import cache_folder
 
@@ -22,8 +23,7 @@ STARTS = ("chunk", "expression")
 _FORMAT = 2
 
 
-@dataclass(frozen=True, slots=True)
-class Rule:
+class Rule(Struct, frozen=True):
     """A reduction: `size` symbols become one `origin`; `action` names what builds its value, None passes it on."""
 
     origin: str
@@ -31,8 +31,7 @@ class Rule:
     action: str | None
 
 
-@dataclass(frozen=True, slots=True)
-class Tables:
+class Tables(Struct, frozen=True):
     """`rows[state][symbol]` is a state to go to (>= 0) or `~rule` to reduce by (< 0)."""
 
     rules: tuple[Rule, ...]

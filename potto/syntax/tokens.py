@@ -6,10 +6,9 @@ Owns `Token`, `Comment` and the tables of words. Knows no layout: that is `lexer
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from typing import NamedTuple
 
-from potto.quick import quick
+from potto.quick import quick, value
 from potto.source import Span
 
 
@@ -26,7 +25,7 @@ class Token(NamedTuple):
         return Span(self.start, self.end)
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Comment:
     """A comment from its `#` to the end of its line; `own_line` when nothing else stands on the line."""
 

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
-from potto.quick import quick
+from potto.quick import quick, value
 from potto.source import Span
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Parameter:
     span: Span
     name: str
     annotation: TypeExpr | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class RealType:
     """`Real`, `Real*` (accepts what varies) or `Real[x, y]`, `Dist[x]`."""
 
@@ -26,19 +25,19 @@ class RealType:
     variables: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class TupleType:
     span: Span
     items: tuple[TypeExpr, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class ListType:
     span: Span
     item: TypeExpr
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class FunctionType:
     """`(A, name: B) -> C`; parameters in one group."""
 
@@ -47,7 +46,7 @@ class FunctionType:
     result: TypeExpr
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class DiffeoType:
     """`Diffeo[2]`."""
 

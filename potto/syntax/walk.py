@@ -5,7 +5,6 @@ Owns `children`, `walk`, `deeper_than`, `extent`, `node_at` and `without_spans`.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterator
 from typing import Any, TypeVar
 
@@ -15,7 +14,7 @@ from potto.syntax.nodes import Node
 
 _Any = TypeVar("_Any")
 _CLASSES: frozenset[type] = frozenset(
-    found for found in vars(nodes).values() if isinstance(found, type) and dataclasses.is_dataclass(found)
+    found for found in vars(nodes).values() if isinstance(found, type) and hasattr(found, "__match_args__")
 ) - {Span}
 NOWHERE = Span(0, 0)
 
@@ -24,9 +23,9 @@ def _inner_fields(kind: Any) -> tuple[str, ...]:
     """The fields of a kind of node that can hold nodes."""
     plain = ("Span", "str", "float", "int", "bool", "Span | None", "str | None")
     return tuple(
-        found.name
-        for found in dataclasses.fields(kind)
-        if found.type not in plain and not str(found.type).startswith(("Literal", "tuple[str"))
+        name
+        for name, told in kind.__annotations__.items()
+        if told not in plain and not str(told).startswith(("Literal", "tuple[str"))
     )
 
 
@@ -99,5 +98,5 @@ def without_spans(node: _Any) -> _Any:
         return NOWHERE  # type: ignore[return-value]
     if type(node) not in _CLASSES:
         return node
-    changes = {found.name: without_spans(getattr(node, found.name)) for found in dataclasses.fields(node)}  # type: ignore[arg-type]
-    return type(node)(**changes)
+    names: tuple[str, ...] = type(node).__match_args__  # type: ignore[attr-defined]
+    return type(node)(*(without_spans(getattr(node, name)) for name in names))

@@ -8,11 +8,10 @@ walked again until they stand still (they only grow, and there are finitely many
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Set
-from dataclasses import dataclass, replace
 
 from potto.diagnostics import Diagnostic
 from potto.modules.lookup import DefinitionTarget
-from potto.quick import quick
+from potto.quick import quick, replace, value
 from potto.source import Span
 from potto.syntax import nodes
 from potto.types import calls, conditions, flow_binders, flow_calls, flow_rules, integrals  # noqa: F401  (imported for their rules)
@@ -37,7 +36,7 @@ MAX_ROUNDS = 20
 Written = nodes.Definition | nodes.DiffeoDefinition
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Typed:
     """A name where it is bound or used inside a definition, with its type there."""
 
@@ -46,7 +45,7 @@ class Typed:
     type: Type
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Analysis:
     """What is known about one definition. Its parts are read through queries, which stand still when they do."""
 

@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Literal, TypeVar
 
 from potto.diagnostics import Diagnostic, Related
 from potto.modules.lookup import DefinitionTarget
-from potto.quick import quick
+from potto.quick import quick, value
 from potto.source import Span
 from potto.syntax import nodes
 from potto.types import kinds
@@ -67,7 +66,7 @@ def ensure_stack() -> None:
         sys.setrecursionlimit(STACK)
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Plan:
     """Which arguments fill which parameters: per group its slots, or None if it stays open. A slot lists the arguments
     that fill the parameter (several make up its tuple). `spread`: the only argument is a tuple for the whole group."""
@@ -76,7 +75,7 @@ class Plan:
     spread: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class _Pending:
     """A type that is not known yet, and what is to be its dual; `node` is what is derived.
 

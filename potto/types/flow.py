@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 from potto.diagnostics import Diagnostic
 from potto.modules.lookup import DefinitionTarget
-from potto.quick import quick
+from potto.quick import quick, value
 from potto.source import Span
 from potto.syntax import nodes
 from potto.types.algebra import (
@@ -67,7 +67,7 @@ class Frame:
     noted: set[tuple[object, Source]] = field(default_factory=set)
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Surfaces:
     """A diffeomorphic condition that was met: for the lints on what moves it."""
 

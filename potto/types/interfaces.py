@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import copyreg
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from operator import attrgetter
 from typing import Any
 
 from potto.modules.lookup import DefinitionTarget
-from potto.quick import quick
+from potto.quick import quick, replace
 from potto.types.algebra import flat, inputs_of, inputs_of_ports, join, ports_in
 from potto.types.types import (
     REAL,

@@ -8,9 +8,9 @@ function that was called in part has been given before.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from potto.diagnostics import Diagnostic
+from potto.quick import replace
 from potto.source import Span
 from potto.syntax import nodes
 from potto.syntax.printer import print_expression

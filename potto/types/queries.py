@@ -9,7 +9,6 @@ is analysed once more.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from potto.diagnostics import Diagnostic
 from potto.modules.free import free_references
@@ -17,7 +16,7 @@ from potto.modules.graph import refer, references, strongly_connected
 from potto.modules.lookup import DefinitionTarget, ModuleTarget
 from potto.modules.texts import chunk_text, definition, is_diffeo, parsed
 from potto.query import Database, query
-from potto.quick import quick
+from potto.quick import quick, value
 from potto.syntax import nodes
 from potto.types import motionless
 from potto.types.algebra import symbolic
@@ -35,7 +34,7 @@ from potto.types.unify import open_type
 from potto.types.values import Port, Source, Value
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Inferred:
     """The type of an expression (or of none), and what is wrong with it. Spans are the expression's."""
 

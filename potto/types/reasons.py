@@ -5,15 +5,13 @@ Not part of the interface, because edits move it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from potto.modules.lookup import DefinitionTarget
-from potto.quick import quick
+from potto.quick import quick, value
 from potto.source import Span
 from potto.types.values import SinkKind, Step
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Reason:
     """Why an input must not vary: what it is ("its parameter `y`"), the place in the definition, and the way there.
 
@@ -29,7 +27,7 @@ class Reason:
     further: tuple[DefinitionTarget, int] | None
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Given:
     """Which variable of integration a definition gives to a function that is its parameter."""
 
@@ -39,7 +37,7 @@ class Given:
     further: tuple[DefinitionTarget, int] | None
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Reasons:
     """What a definition demands and why, with places. Not part of the interface: edits move it."""
 

@@ -8,11 +8,10 @@ which are looked up only now (`Reasons`).
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from potto.diagnostics import Diagnostic, Kind, Related
 from potto.modules.lookup import DefinitionTarget
-from potto.quick import quick
+from potto.quick import quick, value
 from potto.source import Span
 from potto.syntax import nodes
 from potto.syntax.printer import print_expression
@@ -34,7 +33,7 @@ KINDS: dict[SinkKind, Kind] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Violation:
     """A sink reached by variables of integration, the ways there, and where to show it for want of a better place."""
 

@@ -18,7 +18,7 @@ from potto.modules.lookup import Defined, DefinitionTarget, find_module, meaning
 from potto.modules.texts import imports, names
 from potto.primitives import PRIMITIVES
 from potto.query import Database, query
-from potto.quick import quick
+from potto.quick import quick, value
 from potto.source import Span
 from potto.syntax import nodes
 from potto.types.interfaces import Interface
@@ -44,7 +44,7 @@ class Local:
     used: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Global:
     """Another definition, through its interface."""
 
@@ -52,21 +52,21 @@ class Global:
     interface: Interface
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Member:
     """A definition of the group that is inferred right now: recursion."""
 
     target: DefinitionTarget
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Builtin:
     """A builtin, a constant or one of the special forms."""
 
     name: str
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Module:
     """A module's name, which is no value."""
 

@@ -11,10 +11,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import assert_never
 
-from potto.quick import quick
+from potto.quick import quick, value
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Real:
     """A number. `star`: a parameter that accepts what varies. `variables`: the variables of integration it varies with.
 
@@ -27,14 +27,14 @@ class Real:
     jumps: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Dist:
     """A distribution over variables (or parameters): only an integral over them makes a number of it."""
 
     variables: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class TupleOf:
     """A tuple. `dual`: a value and its tangent, for which a plain number may be given."""
 
@@ -42,12 +42,12 @@ class TupleOf:
     dual: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class ListOf:
     item: Type
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Parameter:
     """A parameter of a function type; the name is None where it is not known (a function that is a parameter)."""
 
@@ -55,7 +55,7 @@ class Parameter:
     type: Type
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Function:
     """A function of one group of parameters. A group of n also accepts one tuple of n, and back."""
 
@@ -63,26 +63,26 @@ class Function:
     result: Type
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Diffeo:
     """What a diffeomorphism gives: a tuple of `dims` numbers that may stand as a condition. None: any number."""
 
     dims: int | None
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Truth:
     """What a comparison gives. Local names may hold one; parameters and results may not."""
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Var:
     """A type variable of a finished type: any type, the same wherever the name stands."""
 
     name: str
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Unknown:
     """The type of what is wrong. It fits everything, so that one mistake gives one message."""
 

@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from potto.quick import quick
+from potto.quick import quick, value
 from potto.source import Span
 
 SourceKind = Literal["variable", "input", "other"]  # other: the index of a sum, or what is wrong
@@ -39,7 +39,7 @@ class Source:
         return f"<{self.kind} {self.name}>"
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Step:
     """One step on the way of a dependence: a place and what happens there."""
 
@@ -48,7 +48,7 @@ class Step:
     argument: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Joined:
     """A way made of two ways."""
 
@@ -61,7 +61,7 @@ Sources = Mapping[Source, Trail]
 Surface = frozenset[Source]
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Spike:
     """A delta: what its surface varies with, and a key that is the same for the same surface."""
 
@@ -69,7 +69,7 @@ class Spike:
     key: str
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Scalar:
     """A number, a truth value or anything whose inside is not known.
 
@@ -84,12 +84,12 @@ class Scalar:
     carriers: frozenset[Source] = frozenset()
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class TupleValue:
     items: tuple[Value, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class ListValue:
     item: Value
 
@@ -103,12 +103,12 @@ class Port:
     origin: Any = None
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class PortTuple:
     items: tuple[PortTree, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class PortFunction:
     """A function is given: `inputs` is what it will be called with, `result` gets what it gives."""
 
@@ -116,7 +116,7 @@ class PortFunction:
     result: PortTree
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class NoPort:
     """What is given here is not looked at (a tangent)."""
 
@@ -135,7 +135,7 @@ class Sink:
     node: Any = None
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Effect:
     """`value` goes to `to` when the function is called."""
 
@@ -143,7 +143,7 @@ class Effect:
     value: Value
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Closure:
     inputs: tuple[Value, ...]
     result: Value
@@ -159,7 +159,7 @@ class Abstract:
     taint: Sources = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
+@value
 class Choice:
     """One of several functions (the items of a list)."""
 

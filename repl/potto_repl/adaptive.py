@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from potto_repl.pictures import Curve
 
@@ -31,8 +32,7 @@ def followed(evaluate: Evaluate, lo: float, hi: float) -> list[Curve]:
     return work.curves()
 
 
-@dataclass(slots=True)
-class _Work:
+class _Work(Struct):
     """Points so far, by their place: whole numbers of the finest distance, so that none is asked for twice."""
 
     evaluate: Evaluate

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import replace
+
+from msgspec.structs import replace
 
 from potto.calculus.differentiation.higher_order import NoText, first_derivative
 from potto.calculus.explanation.explain import describe

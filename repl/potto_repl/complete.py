@@ -9,7 +9,8 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from potto.ide import completions, resolve_completion
 from potto.projects.settings import CHOICES, METHODS
@@ -28,8 +29,7 @@ COMPLETING = "<completing>"  # the pseudo file that what is typed stands in
 PROGRAMS = (".po", ".diffeo")
 
 
-@dataclass(frozen=True, slots=True)
-class Candidate:
+class Candidate(Struct, frozen=True):
     """What could be inserted: it replaces `length` characters before the cursor."""
 
     text: str

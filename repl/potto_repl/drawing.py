@@ -9,8 +9,9 @@ from __future__ import annotations
 import base64
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from typing import Literal
+
+from msgspec.structs import replace
 
 from potto.runtime.answers.printing import format_digits
 from potto_repl.pictures import Color, Curve, Image, Plot, line

@@ -6,8 +6,9 @@ shown with carets.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import cast
+
+from msgspec import Struct
 
 from potto.checking.check import absolute
 from potto.evaluating.world import EXPRESSION
@@ -19,8 +20,7 @@ from potto_repl.reply import Refusal
 from potto_repl.session import Conversation, plain_names
 
 
-@dataclass(frozen=True, slots=True)
-class Asked:
+class Asked(Struct, frozen=True):
     """An expression and its type."""
 
     text: str
@@ -52,8 +52,7 @@ def without_parens(expr: nodes.Expr) -> nodes.Expr:
     return expr
 
 
-@dataclass(frozen=True, slots=True)
-class Called:
+class Called(Struct, frozen=True):
     """A call of a function: its head, and what each parameter is given, all groups in a row."""
 
     head: Asked

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import os
 import time
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from potto.core.terms import Global, postorder
 from potto.elaborate import core, core_term
@@ -102,8 +103,7 @@ def _stamp(file: str) -> tuple[int, ...] | None:
     return (found.st_mtime_ns, found.st_size, found.st_ino, found.st_mode)
 
 
-@dataclass(frozen=True, slots=True)
-class _State:
+class _State(Struct, frozen=True):
     """The texts of the files and of their definitions."""
 
     files: dict[str, str]

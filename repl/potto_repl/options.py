@@ -5,15 +5,16 @@ Owns `Options` and the reading of their values.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
 from typing import Any
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 THEMES = ("dark", "light", "none")
 KEYS = ("emacs", "vi")
 
 
-@dataclass(frozen=True, slots=True)
-class Options:
+class Options(Struct, frozen=True):
     """What `:set` knows besides the settings of numbers.
 
     unicode: symbols such as ± and braille; off where the locale cannot write them.
@@ -30,7 +31,7 @@ class Options:
 
 
 CHOICES: dict[str, tuple[str, ...]] = {"theme": THEMES, "keys": KEYS}
-NAMES = tuple(field.name for field in fields(Options))
+NAMES = Options.__struct_fields__
 
 
 def choices(name: str) -> tuple[str, ...]:

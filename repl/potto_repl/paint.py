@@ -5,7 +5,7 @@ Owns `painted` and `Look`. What a screen cannot show is written in another way: 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from potto.reports.render import COLORS, PLAIN, Palette
 from potto_repl.drawing import Protocol, braille, half_blocks, inline, room_for_curves, shrunk
@@ -16,8 +16,7 @@ from potto_repl.symbols import ascii_only
 DIM, OFF = "\x1b[2m", "\x1b[0m"
 
 
-@dataclass(frozen=True, slots=True)
-class Look:
+class Look(Struct, frozen=True):
     """What the screen can do.
 
     answers: whether an answer says under which name it stays at hand. breaks: whether prose is broken to its width.

@@ -9,7 +9,8 @@ import html
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from potto.applications.png import encode
 from potto.runtime.answers.printing import format_digits
@@ -19,8 +20,7 @@ COLORS: tuple[Color, ...] = ((31, 119, 180), (214, 39, 40), (44, 160, 44), (148,
 WHITE: Color = (255, 255, 255)
 
 
-@dataclass(frozen=True, slots=True)
-class Curve:
+class Curve(Struct, frozen=True):
     """Values and their errors over places in order, nan where there is none.
 
     breaks: numbers of the points after which the curve jumps. height: what is to be seen of it; beyond it go poles.
@@ -64,8 +64,7 @@ class Curve:
         return [*found, range(start, len(self.ys))] if start is not None else found
 
 
-@dataclass(frozen=True, slots=True)
-class Plot:
+class Plot(Struct, frozen=True):
     """Curves over one stretch."""
 
     labels: tuple[str, ...]
@@ -167,8 +166,7 @@ class Plot:
         return png(pixels)
 
 
-@dataclass(frozen=True, slots=True)
-class Image:
+class Image(Struct, frozen=True):
     """Pixels row by row from the top, the least and the largest value; whether zero is white between two colours."""
 
     pixels: tuple[tuple[Color, ...], ...]

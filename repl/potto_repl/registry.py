@@ -9,8 +9,9 @@ from __future__ import annotations
 import difflib
 import inspect
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
+
+from msgspec import Struct
 
 from potto_repl.reply import Part, Refusal
 
@@ -22,8 +23,7 @@ Run = Callable[["Conversation", str], Result]
 Completes = Literal["expression", "name", "file", "code", "setting", "method", "command", "nothing"]
 
 
-@dataclass(frozen=True, slots=True)
-class Command:
+class Command(Struct, frozen=True):
     """A command: `name` and a `short` form, what its argument is called, and how that is completed."""
 
     name: str

@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 PROMPT, CONTINUED = "po> ", "... "
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e-?\d+)?")
@@ -20,8 +21,7 @@ _MEASURED = re.compile(
 _DOUBT = re.compile(r"(?:±|\+/-|error at most) *(\([^)]*\)|[\d.e-]+)")
 
 
-@dataclass(frozen=True, slots=True)
-class Recorded:
+class Recorded(Struct, frozen=True):
     """An entry, the line where it stands, and what was answered; nothing where only the entry was kept."""
 
     line: int
@@ -29,8 +29,7 @@ class Recorded:
     answer: str
 
 
-@dataclass(frozen=True, slots=True)
-class Difference:
+class Difference(Struct, frozen=True):
     """An entry whose answer is another one now."""
 
     entry: Recorded

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
 from typing import Any, Literal
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from potto.reports.render import Located, Palette, Sources, broken, render, to_json
 from potto.source import SourceText
@@ -19,8 +21,7 @@ _GOES_ON = re.compile(r"(?!\w+ : )[\w`(\"'\[$]")  # how a line begins that may b
 COMPLAINTS: frozenset[Kind] = frozenset(("error", "help", "diagnostic"))
 
 
-@dataclass(frozen=True, slots=True)
-class Part:
+class Part(Struct, frozen=True):
     """One part of a reply.
 
     answer: what was asked for. output: what a program printed. note: what is good to know. tail: what it cost; shown
@@ -32,7 +33,7 @@ class Part:
     text: str = ""
     data: Mapping[str, Any] | None = None
     located: Located | None = None
-    sources: Mapping[str, SourceText] = field(default_factory=dict)
+    sources: Mapping[str, SourceText] = {}
     prose: bool = False
 
     @property
@@ -75,8 +76,7 @@ class Part:
         return {"error" if self.kind == "error" else "text": self.text}
 
 
-@dataclass(frozen=True, slots=True)
-class Reply:
+class Reply(Struct, frozen=True):
     """The answer to one entry or command."""
 
     parts: tuple[Part, ...] = ()

@@ -9,8 +9,10 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, replace
 from typing import Any
+
+from msgspec import Struct
+from msgspec.structs import asdict, replace
 
 from potto.applications.images import flat, sampled
 from potto.modules.builtins import is_builtin
@@ -35,8 +37,7 @@ BANDS = 16  # of an image, one after the other, where somebody watches
 RTOL = 1e-5  # of a picture: finer than any pixel
 
 
-@dataclass(frozen=True, slots=True)
-class Axes:
+class Axes(Struct, frozen=True):
     """A function of the axes, and of what is fixed after them.
 
     dual: its parameters are duals, and what is drawn is the derivative by the parameter `by`.
@@ -184,7 +185,7 @@ def _sampled(session: Conversation, axes: Axes, places: list[Any]) -> list[list[
 
 def _coarse(chosen: Settings) -> dict[str, Any]:
     rough = replace(chosen, rtol=max(chosen.rtol, RTOL), atol=max(chosen.atol, 1e-9))
-    return {field.name: getattr(rough, field.name) for field in fields(Settings)}
+    return asdict(rough)
 
 
 def _call(axes: Axes, places: list[Any]) -> Estimate:

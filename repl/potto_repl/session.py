@@ -9,8 +9,9 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
+
+from msgspec import Struct
 
 from potto.diagnostics import Diagnostic
 from potto.evaluating.session import Defined, Imported, Outcome, Session
@@ -25,17 +26,15 @@ TYPING = "<typing>"
 _OUT = re.compile(r"\bOut\[(\d+)\]")
 
 
-@dataclass(slots=True)
-class Entry:
+class Entry(Struct):
     """One entry that was read: its number, its text and what became of it."""
 
     number: int
     text: str
-    outcomes: list[Outcome] = field(default_factory=list)
+    outcomes: list[Outcome] = []
 
 
-@dataclass(frozen=True, slots=True)
-class Before:
+class Before(Struct, frozen=True):
     """What was in scope before an entry: what `:undo` goes back to."""
 
     label: str

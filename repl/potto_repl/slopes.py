@@ -6,7 +6,8 @@ Owns `Slope` and `slopes`. It is written in Potto itself, so that it means what 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.shown import as_dual
@@ -20,8 +21,7 @@ from potto_repl.values import Parts, parts_of
 _NO_NUMBERS = (Function, Diffeo, TupleOf, ListOf)
 
 
-@dataclass(frozen=True, slots=True)
-class Slope:
+class Slope(Struct, frozen=True):
     """The derivative by one parameter: the call that gives it, its value, and its parts."""
 
     name: str

@@ -188,7 +188,7 @@ class Terminal:
         if self._attached:
             return
         session = self.loader.session
-        from dataclasses import replace
+        from msgspec.structs import replace
 
         keys = "vi" if self.vi else "emacs"
         session.options = replace(session.options, theme=self.theme, keys=keys, unicode=self.unicode)

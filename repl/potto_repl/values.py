@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from typing import Any
+
+from msgspec import Struct
 
 from potto.core.terms import App, Delta, Global, Integral, Term, postorder
 from potto.diagnostics import PottoError
@@ -28,8 +29,7 @@ MANY = 2_000_000  # evaluations; fewer that took long waited for something else,
 TINY = 1e-13
 
 
-@dataclass(frozen=True, slots=True)
-class Parts:
+class Parts(Struct, frozen=True):
     """The two parts of a tangent, each with its error."""
 
     interior: Any
@@ -67,7 +67,7 @@ def parts_of(world: World, file: str, expr: nodes.Expr, dual: Estimate, settings
     program = world.program
     if term is None or not program.linker.inexact(term):
         return None  # no integral, no parts
-    machine = replace(program.machine(settings), frozen=True)
+    machine = program.machine(settings).changed(frozen=True)
     try:
         with Clock() as clock:
             value = program.value(machine, term)

@@ -120,6 +120,6 @@ def test_what_is_not_set_comes_from_the_base() -> None:
 
 
 def api_settings(**changes: object):
-    from dataclasses import replace
+    from msgspec.structs import replace
 
     return replace(DEFAULTS, **changes)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import potto
 from potto.kernels import compile as kernels
@@ -15,6 +16,11 @@ def renderer(c, shader)
 """
 FIRST = "def shader(x, y)(c) 1/(x + y + c + 2)\n"
 SECOND = "def shader(x, y)(c) exp(-x*y)*(c + 2)\n"
+
+
+@pytest.fixture(autouse=True)
+def nothing_on_disk(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("POTTO_CACHE", "off")
 
 
 def workspace(folder: Path) -> potto.Workspace:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import random
 from typing import Any
 
@@ -38,9 +37,9 @@ def bare(tree: Any) -> Any:
         return bare(tree.inner)
     if isinstance(tree, tuple):
         return tuple(bare(item) for item in tree)
-    if not dataclasses.is_dataclass(tree) or isinstance(tree, type):
+    if not hasattr(tree, "__match_args__") or isinstance(tree, type):
         return tree
-    return type(tree)(**{f.name: bare(getattr(tree, f.name)) for f in dataclasses.fields(tree)})
+    return type(tree)(*(bare(getattr(tree, name)) for name in tree.__match_args__))
 
 
 @LAW

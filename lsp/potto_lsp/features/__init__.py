@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
+
+from msgspec import Struct
 
 if TYPE_CHECKING:
     from potto_lsp.asking import Ask
@@ -27,13 +28,12 @@ TOKEN_MODIFIERS = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Feature:
+class Feature(Struct, frozen=True, dict=True):
     """A method, the adapter (`module.function`) and the capability that announces it."""
 
     method: str
     adapter: str
-    announces: Mapping[str, Any] = field(default_factory=dict)
+    announces: Mapping[str, Any] = {}
     pace: Literal["quick", "diagnosis", "slow"] = "quick"
 
     def load(self) -> None:

@@ -7,8 +7,9 @@ vanishes for particular parameters is a question of run time; here it is a term.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from fractions import Fraction
+
+from msgspec import Struct
 
 from potto.calculus.algebra.polynomial_in import collect
 from potto.calculus.algebra.radicals import quotient
@@ -20,8 +21,7 @@ Matrix = tuple[tuple[Term, ...], ...]
 LARGEST = 8
 
 
-@dataclass(frozen=True, slots=True)
-class Affine:
+class Affine(Struct, frozen=True):
     """sum of coefficient_i * variable_i + rest."""
 
     coefficients: tuple[Term, ...]

@@ -7,15 +7,15 @@ factors: the numerator of `(p/w)^2 + (q/w)^2 - v` is `p^2 + q^2 - v*w^2`, of the
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from potto.core.terms import ONE, Const, Prim, Term, add, const, mul, neg, postorder, pow_
 
 _HIGHEST = 12  # powers of a fraction that are carried out, as of a polynomial in `polynomial_in`
 
 
-@dataclass(frozen=True)
-class _Fraction:
+class _Fraction(Struct, frozen=True):
     """top over a product of powers of factors."""
 
     top: Term

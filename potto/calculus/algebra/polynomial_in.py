@@ -8,8 +8,9 @@ exp(x)^(-2). Coefficients stay terms, so that nothing is rounded here.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from fractions import Fraction
+
+from msgspec import Struct
 
 from potto.core.terms import ONE, Const, Prim, Term, Var, add, const, div, mul, neg, postorder, pow_, prim
 
@@ -20,8 +21,7 @@ _LARGEST = 64  # monomials; a larger expansion helps nobody
 _HIGHEST = 12  # powers that are expanded
 
 
-@dataclass(frozen=True)
-class Collected:
+class Collected(Struct, frozen=True):
     """sum of coefficient * product of atom^degree; the empty monomial is the part without the variable."""
 
     parts: dict[Monomial, Term]

@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Hashable, Iterator, Mapping
-from dataclasses import dataclass, field
+
+from msgspec import Struct
 
 from potto.calculus.algebra.ranges import range_of
 from potto.core.terms import (
@@ -38,8 +39,7 @@ Number = Callable[[Term], float]  # what a plain term is now; nan if that is not
 MARGIN = 1e-12  # how much of its parts a bound must amount to, to be told from rounding
 
 
-@dataclass(frozen=True, slots=True)
-class Coefficient:
+class Coefficient(Struct, frozen=True):
     """A plain term and the number that it is now."""
 
     term: Term
@@ -49,8 +49,7 @@ class Coefficient:
 NONE = Coefficient(ZERO, 0.0)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Form:
+class Form(Struct, frozen=True, eq=False):
     """rest + sum of slopes[name] * name."""
 
     rest: Coefficient
@@ -168,22 +167,20 @@ def _quotient(a: Coefficient, b: Coefficient) -> Coefficient:
 Premises = tuple[Term, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Extent:
+class Extent(Struct, frozen=True):
     """The bounds of one variable."""
 
     lo: Coefficient
     hi: Coefficient
 
 
-@dataclass(slots=True, eq=False)
-class Region:
+class Region(Struct, eq=False):
     """What conditions leave of a box: each a form that is >= 0 there. decided: sides, by what they are known by."""
 
     box: Mapping[str, Extent]
     conditions: tuple[Form, ...] = ()
-    decided: Mapping[Hashable, bool] = field(default_factory=dict)
-    further: dict[tuple[Hashable, bool], tuple[Region | None, Premises]] = field(default_factory=dict)
+    decided: Mapping[Hashable, bool] = {}
+    further: dict[tuple[Hashable, bool], tuple[Region | None, Premises]] = {}
 
     def side(self, key: Hashable, form: Form | None, up: bool) -> tuple[Region | None, Premises]:
         """The part where a form is >= 0 (up) or <= 0: None if it is proved to be empty, with the proof's premises.

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from functools import lru_cache
 from weakref import WeakKeyDictionary
+
+from msgspec import Struct
 
 from potto.calculus.algebra.floats import OPS
 from potto.core.terms import Branch, Const, If, Prim, Term, unknown
@@ -20,8 +21,7 @@ from potto.primitives.registry import Primitive
 from potto.primitives.walking import Domain
 
 
-@dataclass(frozen=True, slots=True)
-class Range:
+class Range(Struct, frozen=True):
     """Values lie in [lo, hi]; `zero` says whether 0 may be one of them (exp never is)."""
 
     lo: float

@@ -12,9 +12,10 @@ uses no identity between atoms. What is decided and solved here may be defined a
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
+
+from msgspec import Struct
 
 from potto.calculus.algebra.point_values import not_zero
 from potto.core import polynomials
@@ -58,8 +59,7 @@ from potto.core.terms import (
 _LARGEST = 400
 
 
-@dataclass(frozen=True)
-class Rational:
+class Rational(Struct, frozen=True):
     """top / below."""
 
     top: Polynomial

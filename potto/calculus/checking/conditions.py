@@ -13,7 +13,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+
+from msgspec import Struct
 
 from potto.calculus.algebra.point_values import sample_value
 from potto.calculus.inlining.currying import arguments_of, groups_of, sizes_of, uncurry
@@ -56,8 +57,7 @@ MOST_CALLS = 1000  # that are entered for one definition: calls with ever new ar
 _TWICE = 2  # how often one definition may stand on the path of calls: a recursion repeats its conditions
 
 
-@dataclass(frozen=True, slots=True)
-class Condition:
+class Condition(Struct, frozen=True):
     """A branch or a delta over variables of integration.
 
     coordinates: as the definition sees them, calls of known functions carried out.
@@ -69,8 +69,12 @@ class Condition:
     strict: bool
     anchor: Term
     delta: bool
-    box: Mapping[str, tuple[float, float]] = field(hash=False)
+    box: Mapping[str, tuple[float, float]]
     calls: tuple[str, ...] = ()
+
+    def __hash__(self) -> int:
+        """Without the box, which cannot be hashed."""
+        return hash((self.coordinates, self.strict, self.anchor, self.delta, self.calls))
 
     @property
     def surface(self) -> Term:
@@ -160,8 +164,7 @@ def conditions_of(term: Term, skeletons: Resolve, whole: Resolve) -> tuple[Condi
     return tuple({(c.coordinates, c.anchor): c for c in reversed(found) if c is not None}.values())
 
 
-@dataclass(frozen=True, slots=True)
-class _Place:
+class _Place(Struct, frozen=True):
     """Where the walk is: what parameters stand for, which functions were passed, the calls that led here.
 
     `caller`: the variables of integration around the call that was entered first, or around that of a function that was

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import lru_cache
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from potto.calculus.checking.conditions import Condition, conditions_of, has_conditions, skeleton
 from potto.calculus.checking.map_shapes import many, unknown_call, wrong_shape
@@ -63,8 +65,7 @@ Box = Mapping[str, tuple[float, float]]
 _Bounds = tuple[tuple[str, tuple[float, float]], ...]
 
 
-@dataclass(frozen=True, slots=True)
-class DiffeoInfo:
+class DiffeoInfo(Struct, frozen=True):
     """What is known of a diffeomorphism, for hover and `potto deriv`.
 
     branches: the variables over the values of the components, once for each branch; empty if there is none.
@@ -84,8 +85,7 @@ class DiffeoInfo:
     notes: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class _Study:
+class _Study(Struct, frozen=True):
     diagnostics: tuple[Diagnostic, ...]
     info: DiffeoInfo | None
 
@@ -263,8 +263,7 @@ def _studied(db: Database, file: str, name: str) -> _Study:
     return _authors(item, item.inverse.span, what, found, parts.inverse.values, inverse)
 
 
-@dataclass(frozen=True, slots=True)
-class _Map:
+class _Map(Struct, frozen=True):
     components: tuple[Term, ...]
     variables: tuple[str, ...]
     parameters: tuple[tuple[str, ...], ...]

@@ -10,8 +10,9 @@ one.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Literal
+
+from msgspec import Struct
 
 from potto.calculus.algebra.affine import determinant
 from potto.calculus.algebra.ranges import ranges
@@ -37,8 +38,7 @@ SEARCHED = declare("P0616", "a surface that is searched for", "hint")
 Box = Mapping[str, tuple[float, float]]
 
 
-@dataclass(frozen=True, slots=True)
-class Problem:
+class Problem(Struct, frozen=True):
     """What is wrong with a condition, for a diagnostic to be made of."""
 
     kind: Kind
@@ -48,8 +48,7 @@ class Problem:
     help: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Verdict:
+class Verdict(Struct, frozen=True):
     """A condition that can be integrated over.
 
     pivot: the variable that its first coordinate is solved for.

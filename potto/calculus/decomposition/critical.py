@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
+
+from msgspec import Struct
 
 from potto.calculus.algebra.affine import determinant
 from potto.calculus.algebra.point_values import not_zero, sample_value
@@ -25,8 +26,7 @@ from potto.core.terms import Prim, Term, mul, sub, substitute
 MOST_EQUATIONS = 3  # a search takes about 2^n times as long for n of them
 
 
-@dataclass(frozen=True, slots=True)
-class Within:
+class Within(Struct, frozen=True):
     """A variable further in, and its bounds, which may depend on those between."""
 
     variable: str
@@ -34,8 +34,7 @@ class Within:
     hi: Term
 
 
-@dataclass(frozen=True, slots=True)
-class Critical:
+class Critical(Struct, frozen=True):
     """Where all equations are 0 for some values of the variables of `within`, innermost first: one fewer than those.
 
     turning: what is integrated further in changes there like a square root, or worse. steps: it jumps there, or is

@@ -13,9 +13,10 @@ a function of one number that can be tabulated, so that n variables take n times
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache, partial, reduce
+
+from msgspec import Struct
 
 from potto.core.collecting import split
 from potto.core.polynomials import number
@@ -48,8 +49,7 @@ Names = frozenset[str]
 Scaled = Callable[[Term], Term]
 
 
-@dataclass(frozen=True, slots=True)
-class Step:
+class Step(Struct, frozen=True):
     """V(state) = integral over [lo, hi] of weight * V_next(passed) d(variable).
 
     state: the name of the number that is handed on from further out; None where there is none. passed: the number that
@@ -186,8 +186,7 @@ def _over(below: Term, above: Term) -> Term:
     return div(above, below)
 
 
-@dataclass
-class _Handed:
+class _Handed(Struct):
     """The one number that terms depend on variables `here` through, as far as they have been put.
 
     written: that number as a sum, as it comes first; core: the same by what it is a sum of; name: what it is called

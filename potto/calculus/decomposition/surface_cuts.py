@@ -6,9 +6,11 @@ Owns `Cut`, `Face` and `Product`.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import islice
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from potto.calculus.algebra.radicals import minus
 from potto.calculus.algebra.ranges import positive
@@ -21,8 +23,7 @@ RATIONAL = frozenset(("add", "neg", "mul", "div"))
 MOST_CENTERS = 6
 
 
-@dataclass(frozen=True, slots=True)
-class Jump:
+class Jump(Struct, frozen=True):
     """A branch of the integrand: the path of its trace, and which side of its group's canonical surface it takes."""
 
     path: tuple[int, ...]
@@ -30,16 +31,14 @@ class Jump:
     strict: bool
 
 
-@dataclass(frozen=True, slots=True)
-class Face:
+class Face(Struct, frozen=True):
     """A surface as it was written, and the canonical form, of the same sign, by which it is known."""
 
     form: Term
     key: Term
 
 
-@dataclass(frozen=True, slots=True)
-class Cut:
+class Cut(Struct, frozen=True):
     """A surface that cuts one variable.
 
     surface: as it was written, on the side of its canonical form: multiplied out, (x - 1e8)^2 + (y - 1e8)^2 - t^2 would
@@ -67,8 +66,7 @@ class Cut:
         return bool(self.jumps) or self.steps
 
 
-@dataclass(frozen=True, slots=True)
-class Product:
+class Product(Struct, frozen=True):
     """A surface as a product: (sign) * along * outer factors, up to a positive scale.
 
     along: what varies with the variable that the surface cuts. outer: factors that do not.
@@ -79,14 +77,13 @@ class Product:
     sign: int
 
 
-@dataclass(slots=True)
-class Placed:
+class Placed(Struct):
     """A surface, what it is a product of (up to `sign`), and what is known of it."""
 
     face: Face
     factors: tuple[Face, ...]
     sign: int
-    jumps: list[Jump] = field(default_factory=list)
+    jumps: list[Jump] = []
     turning: bool = False
     steps: bool = False
 

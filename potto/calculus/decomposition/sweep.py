@@ -9,7 +9,8 @@ decomposition in the manner of Collins, of the surfaces that a scene has, and of
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+
+from msgspec import Struct
 
 from potto.calculus.algebra.rational_form import settled
 from potto.calculus.decomposition.critical import Critical, Within
@@ -34,8 +35,7 @@ from potto.core.terms import Integral, Term
 MOST_CUTS = 1200  # per variable; refinement doesn't see every weak kink that is left out
 
 
-@dataclass(frozen=True, slots=True)
-class Level:
+class Level(Struct, frozen=True):
     """One variable of the iteration, with everything that cuts it.
 
     critical: where what lies further in meets, appears or turns, if that has no closed form there. complete: whether
@@ -50,11 +50,10 @@ class Level:
     complete: bool = True
 
 
-@dataclass(slots=True)
-class _Pool:
+class _Pool(Struct):
     """Surfaces still to be placed, the same ones merged."""
 
-    surfaces: dict[Term, Placed] = field(default_factory=dict)
+    surfaces: dict[Term, Placed] = {}
 
     def put(self, surface: Term, jump: tuple[tuple[int, ...], bool] | None, turning: bool, steps: bool = False) -> None:
         face, orientation = face_of(surface)
@@ -80,8 +79,7 @@ class _Pool:
         return taken
 
 
-@dataclass(frozen=True, slots=True)
-class Sweep:
+class Sweep(Struct, frozen=True):
     """The levels of an integral, outermost first, and what is left over for the variables around it."""
 
     levels: tuple[Level, ...]

@@ -10,7 +10,8 @@ brackets, so that they can be differentiated again.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from potto.calculus.algebra.radicals import NAN
 from potto.calculus.algebra.ranges import range_of
@@ -275,8 +276,7 @@ def scaled(value: Term, factor: Term) -> Term:
 # Without an integral
 
 
-@dataclass(frozen=True, slots=True)
-class JumpTerm:
+class JumpTerm(Struct, frozen=True):
     """What a surface contributes to the derivative of an integrand: jump * rate * delta(surface), for each value of the
     indices of `sums`."""
 

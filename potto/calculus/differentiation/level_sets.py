@@ -16,8 +16,9 @@ implicit function theorem: -v is how the level set moves along its normal.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from functools import lru_cache
+
+from msgspec import Struct
 
 from potto.calculus.algebra.ranges import range_of
 from potto.calculus.differentiation.boundary_terms import Rate, finite, jumps, remaining, scaled
@@ -54,8 +55,7 @@ from potto.core.terms import (
 Slope = Callable[[Term, str], Term]
 
 
-@dataclass(frozen=True, slots=True)
-class LevelSet:
+class LevelSet(Struct, frozen=True):
     """The integral of `factor` over `surface = 0`, along `shares[0]` if numbers are to integrate it.
 
     shares: the variables among which it is divided.

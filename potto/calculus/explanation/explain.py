@@ -9,7 +9,8 @@ what moves each. Functions that are parameters stay symbols: `shader (x, y) c` a
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+
+from msgspec.structs import replace
 
 from potto.calculus.checking.guards import unguarded
 from potto.calculus.differentiation.boundary_terms import at_bounds, at_surfaces, jumps

@@ -6,13 +6,12 @@ text already.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 WIDTH = 100
 
 
-@dataclass(frozen=True, slots=True)
-class SurfaceText:
+class SurfaceText(Struct, frozen=True):
     """One surface of an integral: its equation, the parameters that move it, and where it is in one variable."""
 
     equation: str
@@ -20,8 +19,7 @@ class SurfaceText:
     roots: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class IntegralText:
+class IntegralText(Struct, frozen=True):
     """The derivative of one integral.
 
     integrand: what is integrated. interior: its derivative between the surfaces. deltas: its derivative on them.
@@ -39,8 +37,7 @@ class IntegralText:
     reason: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class DerivativeText:
+class DerivativeText(Struct, frozen=True):
     """The derivative of a definition in symbols. `text` is all of it; the fields are for those who lay it out anew.
 
     tangent: the whole of it, deltas integrated out. alone: the definition is its one integral and nothing else.

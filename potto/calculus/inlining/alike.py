@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from potto.calculus.inlining.deciding import deciding
 from potto.calculus.surfaces.discontinuities import Resolve
@@ -36,8 +37,7 @@ MOST_PARTS = 4096
 Leaf = Const | Var
 
 
-@dataclass(frozen=True)
-class Alike:
+class Alike(Struct, frozen=True):
     """Terms of one shape. function: what they have in common, over parameters. columns: per parameter what it is in
     each of them, or the one name that it is in all. places: which terms they are."""
 

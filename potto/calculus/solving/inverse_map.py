@@ -9,7 +9,8 @@ recognizes inside the map (polar and the like) by its own inverse; everything el
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from potto.calculus.algebra.affine import affine, determinant, solve_affine
 from potto.calculus.algebra.radicals import NAN, guarded
@@ -36,8 +37,7 @@ MOST_BRANCHES = 16
 _EFFORT = 200
 
 
-@dataclass(frozen=True, slots=True)
-class Inverse:
+class Inverse(Struct, frozen=True):
     """The variables over the coordinates' values `values`; several branches where the map folds.
 
     determinant: of the derivative of the coordinates by the variables, over the variables.
@@ -50,8 +50,7 @@ class Inverse:
     method: str
 
 
-@dataclass(frozen=True, slots=True)
-class Failure:
+class Failure(Struct, frozen=True):
     """Why there is no inverse. `singular`: there is none at all; else only none was found."""
 
     reason: str

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from potto.calculus.algebra.radicals import TWO, even_root, guarded, minus, odd_root, quotient
 from potto.calculus.algebra.ranges import range_of
@@ -33,16 +34,14 @@ from potto.core.terms import (
 from potto.primitives import PRIMITIVES
 
 
-@dataclass(frozen=True, slots=True)
-class Guard:
+class Guard(Struct, frozen=True):
     """A root counts only where `surface` >= 0 (> 0 when strict). The surface may contain the variable solved for."""
 
     surface: Term
     strict: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Step:
+class Step(Struct, frozen=True):
     """One equation `inner = value` that the step leads to. With `period` set, also value + k period for integers k."""
 
     inner: Term
@@ -51,8 +50,7 @@ class Step:
     period: Term | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Stuck:
+class Stuck(Struct, frozen=True):
     """Why a step is not possible, in the user's words."""
 
     reason: str

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from potto.calculus.algebra.affine import affine
 from potto.calculus.algebra.ranges import range_of
@@ -20,8 +21,7 @@ class NoClosedForm(Exception):
     """A boundary that cannot be written with the builtins; evaluation finds it by numbers."""
 
 
-@dataclass(frozen=True, slots=True)
-class Root:
+class Root(Struct, frozen=True):
     """A root of a surface in a variable of integration; `index` and `counts` when it is one of a periodic family."""
 
     variable: str
@@ -30,8 +30,7 @@ class Root:
     counts: tuple[Term, Term] | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Pivot:
+class Pivot(Struct, frozen=True):
     """The roots of a surface in one variable of integration; taken where the plain `condition` holds."""
 
     roots: list[Root]

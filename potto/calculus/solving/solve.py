@@ -9,8 +9,10 @@ given up with the reason. Nothing here looks at numbers.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
 from fractions import Fraction
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from potto.calculus.algebra.polynomial_in import collect
 from potto.calculus.algebra.radicals import NAN, guarded
@@ -46,8 +48,7 @@ _LONGEST = 4096  # equations on the way from one surface to its roots
 _MOST = 256  # equations that lead to several others, for one surface
 
 
-@dataclass(frozen=True, slots=True)
-class Family:
+class Family(Struct, frozen=True):
     """One root for each integer `index`, because a periodic builtin was undone.
 
     `inner` is the index as a function of the variable solved for: the roots between lo and hi belong to the integers
@@ -61,8 +62,7 @@ class Family:
     stops: tuple[Term, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Sections:
+class Sections(Struct, frozen=True):
     """Where a surface is 0 along one variable.
 
     roots: terms over the other variables; nan where that root does not exist.
@@ -83,15 +83,13 @@ class Sections:
     reason: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Unsolvable:
+class Unsolvable(Struct, frozen=True):
     """No root was found; `reason` says why, in the user's words."""
 
     reason: str
 
 
-@dataclass(frozen=True, slots=True)
-class Goal:
+class Goal(Struct, frozen=True):
     """Still to solve: inner = value, where `inner` contains the variable and `value` does not."""
 
     inner: Term

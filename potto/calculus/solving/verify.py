@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
+
+from msgspec import Struct
 
 from potto.calculus.algebra.affine import affine
 from potto.calculus.algebra.point_values import points, sample_value
@@ -32,16 +33,14 @@ _ROUNDED = 1e-12
 Box = Mapping[str, tuple[float, float]]
 
 
-@dataclass(frozen=True, slots=True)
-class Verified:
+class Verified(Struct, frozen=True):
     """The inverse holds: `proven` by symbols, else at `tested` points."""
 
     proven: bool
     tested: int = 0
 
 
-@dataclass(frozen=True, slots=True)
-class Refuted:
+class Refuted(Struct, frozen=True):
     """A point that does not come back: variables and parameters there, what comes back, and by how much it is off."""
 
     point: Mapping[str, float]
@@ -49,13 +48,11 @@ class Refuted:
     off: float = math.inf
 
 
-@dataclass(frozen=True, slots=True)
-class Untested:
+class Untested(Struct, frozen=True):
     """No point was found at which map and inverse are both defined."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Passed:
+class _Passed(Struct, frozen=True):
     """Points at which doubles found nothing wrong."""
 
     points: tuple[Mapping[str, float], ...]

@@ -7,7 +7,8 @@ just left and just right of it, every other branch as it falls.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from potto.calculus.algebra.radicals import NAN
 from potto.calculus.algebra.ranges import range_of
@@ -53,8 +54,7 @@ def summed_over(body: Term, branch_: Branch) -> list[Sum]:
     return [node for node in postorder(body) if isinstance(node, Sum) and node.variable in branch_.surface.free]
 
 
-@dataclass(frozen=True, slots=True)
-class Flip:
+class Flip(Struct, frozen=True):
     """A branch whose surface is 0 at a root, and terms with the signs of that surface just left and right of it."""
 
     branch: Branch

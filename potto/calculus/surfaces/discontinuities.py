@@ -9,9 +9,11 @@ only as deep as its values go.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from potto.calculus.algebra.ranges import nonnegative
 from potto.calculus.decomposition.critical import Critical
@@ -50,8 +52,7 @@ Resolve = Callable[[Term], "Lam | Deriv | None"]
 Decide = Callable[[Term], "float | None"]
 
 
-@dataclass(frozen=True, slots=True)
-class Finding:
+class Finding(Struct, frozen=True):
     """One surface `surface = 0`, over the variables of the term that was searched.
 
     kind: a jump (a branch), a kink (abs, max), an edge, where the term stops being smooth or defined (sqrt at 0), or a
@@ -126,8 +127,7 @@ def carried_out(term: Term, resolve: Resolve, rounds: int = 1) -> Term:
     return expanded(substitute(term, passed), resolve, rounds=rounds)
 
 
-@dataclass(frozen=True, slots=True)
-class _Search:
+class _Search(Struct, frozen=True):
     resolve: Resolve
     decide: Decide
 

@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from potto.calculus.algebra.point_values import sample_value
 from potto.calculus.algebra.polytopes import Coefficient, Extent, Form, Forms, Number, Region, region_of, scaled
@@ -44,8 +45,7 @@ class TooManyCases(Exception):
     """More cases than an integrand is worth."""
 
 
-@dataclass(frozen=True, slots=True)
-class Lifted:
+class Lifted(Struct, frozen=True):
     """An equal integral, and the terms that have to be positive for it to be one."""
 
     term: Integral
@@ -91,13 +91,11 @@ def _of_integral(
     return with_integrand(term, body)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Leaf:
+class Leaf(Struct, frozen=True, eq=False):
     term: Term
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Split:
+class Split(Struct, frozen=True, eq=False):
     """A decision: `then` where the first coordinate is >= 0 (> 0 when strict). Equal surfaces have one key, and `up`
     says whether `then` is where that is true of the key's own form."""
 

@@ -7,8 +7,9 @@ sites is a property of the term alone, so a caller and a separately compiled cal
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
+
+from msgspec import Struct
 
 from potto.core.terms import (
     App,
@@ -29,15 +30,13 @@ from potto.core.terms import (
 )  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
-class Side:
+class Side(Struct, frozen=True):
     """A site whose sides are evaluated everywhere and selected: the branch itself."""
 
     branch: Branch
 
 
-@dataclass(frozen=True, slots=True)
-class Part:
+class Part(Struct, frozen=True):
     """A site that is a kernel of its own: the then (or else) side of a lazy conditional, or a sum's body.
 
     `owner` is the If, Branch or Sum; `body` the part as a function of its free variables, in sorted order.
@@ -48,8 +47,7 @@ class Part:
     body: Lam
 
 
-@dataclass(frozen=True, slots=True)
-class CallSite:
+class CallSite(Struct, frozen=True):
     """A call: `head` applied to groups of arguments."""
 
     call: App
@@ -60,8 +58,7 @@ class CallSite:
 Site = Side | Part | CallSite
 
 
-@dataclass(frozen=True, slots=True)
-class Layout:
+class Layout(Struct, frozen=True):
     """The sites of one term, and the terms evaluated at once (not inside a part, a function or an integral)."""
 
     sites: tuple[Site, ...]

@@ -7,10 +7,10 @@ tangents. The derivative of a function maps families to families; only a number 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 from mpmath import mp
+from msgspec import Struct
 
 Value = Any
 Family = Callable[[Any], Value]
@@ -19,8 +19,7 @@ Family = Callable[[Any], Value]
 _WEIGHTS = ((4, 5), (-1, 5), (4, 105), (-1, 280))
 
 
-@dataclass(frozen=True)
-class Dual:
+class Dual(Struct, frozen=True):
     """The derivative of a function, as a family of functions; called with duals it gives a dual."""
 
     family: Family
@@ -58,8 +57,7 @@ def family_of(value: Value) -> Family:
     return lambda h: value
 
 
-@dataclass(frozen=True)
-class _Moved:
+class _Moved(Struct, frozen=True):
     """A function from duals to duals, given by hand, as the function of numbers that it is at h."""
 
     function: Value

@@ -8,11 +8,11 @@ extremum is looked at too, so that two roots between two points of the grid are 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from mpmath import mp
+from msgspec import Struct
 
 from potto.core.terms import Delta, Integral
 
@@ -28,12 +28,11 @@ class NotAccurate(ArithmeticError):
     """The oracle cannot vouch for the digits asked for."""
 
 
-@dataclass
-class Trace:
+class Trace(Struct):
     """What was decided in one evaluation, in order, and the numbers that decided."""
 
-    sides: list[object] = field(default_factory=list)
-    values: list[Any] = field(default_factory=list)
+    sides: list[object] = []
+    values: list[Any] = []
 
 
 def integrate(oracle: Oracle, term: Integral, env: Environment) -> Value:

@@ -9,11 +9,11 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 from mpmath import mp
+from msgspec import Struct
 
 from potto.core.reference import differences, integrals
 from potto.core.reference.functions import function
@@ -188,8 +188,7 @@ def _kinks(op: str, arity: int) -> tuple[Term, ...]:
     return PRIMITIVES[op].kinks(*map(var, _PLACES[:arity]))
 
 
-@dataclass(frozen=True)
-class _Closure:
+class _Closure(Struct, frozen=True):
     oracle: Oracle
     term: Lam
     env: Environment

@@ -7,7 +7,8 @@ place to offers. An action is listed without its change; to resolve it looks its
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+
+from msgspec.structs import replace
 
 from potto.ide.actions.extract import extractions
 from potto.ide.actions.inline import inlinings

@@ -6,8 +6,9 @@ Owns `Offer`, `At` (where actions are asked for) and helpers that all of them ne
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import Any
+
+from msgspec import Struct, field
 
 from potto.checking.check import absolute, definition_diagnostics
 from potto.diagnostics import Diagnostic
@@ -25,8 +26,7 @@ from potto.syntax.nodes import Node
 from potto.types import check_statement, interface
 
 
-@dataclass(frozen=True)
-class Offer:
+class Offer(Struct, frozen=True):
     """A code action that is not carried out yet. `rename_at` is where the new name is in the text after the change."""
 
     title: str
@@ -37,8 +37,7 @@ class Offer:
     rename_at: Callable[[], int | None] = field(default=lambda: None)
 
 
-@dataclass(frozen=True)
-class At:
+class At(Struct, frozen=True):
     """Where actions are asked for: the selection, and the chunk that it begins in."""
 
     db: Database
@@ -100,7 +99,7 @@ def bare(node: Any) -> Any:
         return tuple(bare(item) for item in node)
     if isinstance(node, Span):
         return None
-    fields = getattr(node, "__dataclass_fields__", None)
+    fields = getattr(node, "__match_args__", None)
     if fields is None:
         return node
     return (type(node).__name__, *(bare(getattr(node, name)) for name in fields if name not in ("style",)))

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import replace
+
+from msgspec.structs import replace
 
 from potto.ide.actions.imports import import_edit, importable, new_line
 from potto.ide.completion.modules import member_items, module_items, name_items

@@ -6,7 +6,8 @@ Owns `call_at` (`call_in` in a chunk) and `juxtaposed_at`.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from potto.ide.names.places import ChunkAt, chunk_at, text_of
 from potto.query import Database
@@ -17,8 +18,7 @@ _KEYWORD = re.compile(r"\s*([^\W\d]\w*)\s*=(?!=)")
 _PAIRS = {")": "(", "]": "["}
 
 
-@dataclass(frozen=True, slots=True)
-class PendingCall:
+class PendingCall(Struct, frozen=True):
     """A call whose parentheses are open at the cursor.
 
     function: what is called; `function_span` where it stands (absolute). open, close: the places of the parentheses

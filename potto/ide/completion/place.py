@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from typing import Literal
+
+from msgspec import Struct
 
 from potto.ide.names.places import line_start
 from potto.source import Span
@@ -29,8 +30,7 @@ _NUMBER = re.compile(r"(?:^|[^\w.])[0-9][\w.]*$")
 _IMPORT_LINES = re.compile(r"(?:^|\n)(from\s[^\n]*(?:,|import)[ \t]*(?:\r?\n[ \t]+[^\n]*)*)$")
 
 
-@dataclass(frozen=True, slots=True)
-class Place:
+class Place(Struct, frozen=True):
     """`span` is the word so far, absolute; `path` the module in front of it, where there is one."""
 
     kind: Kind

@@ -6,7 +6,7 @@ Derivatives take duals under names with a `d` in front.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from potto.ide.completion.pending_calls import PendingCall, call_at, juxtaposed_at
 from potto.ide.hover.hovers import typed_parameters
@@ -26,8 +26,7 @@ from potto.syntax import nodes
 from potto.types import Function, Parameter, Type, derivative_type, format_type, groups_of, interface, result_of
 
 
-@dataclass(frozen=True, slots=True)
-class Called:
+class Called(Struct, frozen=True):
     """What a call is of: its name, its type, how many groups were given before."""
 
     name: str

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+
+from msgspec.structs import replace
 
 from potto.ide.hover.derivatives import derivative_text
 from potto.ide.model import CodeLens

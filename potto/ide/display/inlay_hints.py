@@ -6,7 +6,8 @@ Owns `inlay_hints` and `resolve_inlay_hint`.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+
+from msgspec.structs import replace
 
 from potto.ide.hover.derivatives import ConditionInfo, condition_infos, condition_markdown, fence
 from potto.ide.model import Edit, InlayHint

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
 from typing import Literal
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from potto.ide.names.function_arguments import fits, numbers, of_numbers
 from potto.ide.names.live_expressions import lives, wrong_with
@@ -25,8 +27,7 @@ from potto.types.types import resolve
 _PAIRS = (("x", "y"), ("u", "v"), ("i", "j"))
 
 
-@dataclass(frozen=True, slots=True)
-class Given:
+class Given(Struct, frozen=True):
     """What a call gives to a parameter: the numbers, if they are written out, and its text."""
 
     value: tuple[float, ...] = ()
@@ -36,8 +37,7 @@ class Given:
 Arguments = tuple[tuple[str | int, Given], ...]
 
 
-@dataclass(frozen=True, slots=True)
-class SceneParameter:
+class SceneParameter(Struct, frozen=True):
     """A parameter. `size`: how many numbers it has, 0 for a function; `fits`: texts of functions that it could be
     given, the one to begin with first."""
 
@@ -49,8 +49,7 @@ class SceneParameter:
     fits: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Scene:
+class Scene(Struct, frozen=True):
     """A function that can be drawn: `components` numbers at each place, over the parameters in `axes` to begin with."""
 
     name: str

@@ -7,7 +7,8 @@ coordinates of conditions with inverse and determinant. What is true is said by 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from potto.calculus.checking.conditions import conditions_of
 from potto.calculus.checking.diffeo import DiffeoInfo, diffeo_info, exported
@@ -50,8 +51,7 @@ def derivative_text(db: Database, file: str, name: str) -> DerivativeText | None
     return explain_derivative(db, file, name) if sound(db, file, name) else None
 
 
-@dataclass(frozen=True, slots=True)
-class ConditionInfo:
+class ConditionInfo(Struct, frozen=True):
     """What is known of a condition over variables of integration. `span` is relative to the definition's chunk.
 
     `problem` says why it can't be integrated over; then the rest is empty. `missing` are the coordinates that were left

@@ -10,8 +10,9 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
 from typing import Any, Literal
+
+from msgspec import Struct
 
 from potto.modules import parsed
 from potto.query import Database, query
@@ -24,8 +25,7 @@ Role = Literal["bind", "use", "member", "path", "keyword", "define", "module", "
 _WORD = re.compile(r"[^\W\d]\w*")
 
 
-@dataclass(frozen=True, slots=True)
-class Binder:
+class Binder(Struct, frozen=True):
     """A name that is bound inside a chunk; `scope` is where it can be used."""
 
     name: str
@@ -34,8 +34,7 @@ class Binder:
     scope: Span
 
 
-@dataclass(frozen=True, slots=True)
-class Occurrence:
+class Occurrence(Struct, frozen=True):
     """A name in the text. `binder` counts the binders of the chunk; -1: it means something outside of it.
 
     `path` is the module of a member, or the module of an import. `callee` is the function of a keyword argument.
@@ -46,11 +45,14 @@ class Occurrence:
     role: Role
     binder: int = -1
     path: str = ""
-    callee: nodes.Expr | None = field(default=None, hash=False)
+    callee: nodes.Expr | None = None
+
+    def __hash__(self) -> int:
+        """Without the callee, which may be a large tree."""
+        return hash((self.span, self.name, self.role, self.binder, self.path))
 
 
-@dataclass(frozen=True, slots=True)
-class Index:
+class Index(Struct, frozen=True):
     """The names of a chunk, in the order of the text."""
 
     binders: tuple[Binder, ...]
@@ -98,13 +100,11 @@ def index(db: Database, text: str, diffeo: bool) -> Index:
     return Index(tuple(walk.binders), unique, tuple(o.span.start for o in unique))
 
 
-@dataclass(frozen=True, slots=True)
-class _Bind:
+class _Bind(Struct, frozen=True):
     numbers: tuple[int, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class _Unbind:
+class _Unbind(Struct, frozen=True):
     names: tuple[str, ...]
 
 

@@ -6,11 +6,11 @@ Owns `live_in` and `live_diagnostics`. What they give is for who evaluates.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 from potto.diagnostics import Diagnostic
 from potto.ide.names.places import ChunkAt, all_chunks
 from potto.query import Database, query
+from potto.quick import replace
 from potto.source import Span
 from potto.syntax import live_expressions, parse_expression
 from potto.syntax.live import Live

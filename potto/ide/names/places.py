@@ -6,8 +6,9 @@ Owns the way from absolute offsets to what is memoized relative to chunks, and b
 from __future__ import annotations
 
 from bisect import bisect_right
-from dataclasses import dataclass
 from typing import Literal
+
+from msgspec import Struct
 
 from potto.ide.names.index import Index, index
 from potto.modules import ChunkRef, chunks, is_diffeo, parsed, source
@@ -18,8 +19,7 @@ from potto.syntax import ParsedChunk, nodes
 NOWHERE = Span(0, 0)
 
 
-@dataclass(frozen=True, slots=True)
-class Sketch:
+class Sketch(Struct, frozen=True):
     """What a chunk is, the name that it defines, and where the name and all of it are, relative to the chunk."""
 
     kind: Literal["definition", "import", "statement", "other"]
@@ -42,8 +42,7 @@ def sketch(db: Database, text: str, diffeo: bool) -> Sketch:
             return Sketch("other")
 
 
-@dataclass(frozen=True, slots=True)
-class ChunkAt:
+class ChunkAt(Struct, frozen=True):
     """A chunk of a file with what is known about it; `start` is its place in the file."""
 
     file: str
@@ -104,8 +103,7 @@ def writing_at(db: Database, file: str, offset: int) -> tuple[ChunkAt, int] | No
     return chunk, len(chunk.text)
 
 
-@dataclass(frozen=True, slots=True)
-class Site:
+class Site(Struct, frozen=True):
     """Where something is being typed: `offset` in `text`, seen from the names of `file`.
 
     `chunk` is what the offset is in or follows; `writing` what goes on if something is typed here, and the place in it.

@@ -6,7 +6,8 @@ Owns `Point`, `points` and `point_of`. Only texts are made here; numbers are for
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from potto.ide.names.documents import kind_of
 from potto.ide.names.function_arguments import fits, numbers
@@ -22,8 +23,7 @@ MOST = 3  # points of one definition
 USUAL = "0.5"  # where nothing is said
 
 
-@dataclass(frozen=True, slots=True)
-class Point:
+class Point(Struct, frozen=True):
     """A call with all its arguments. `slopes`: parameters, each with an expression whose tangent is the derivative by
     it. `chosen`: nobody wrote this call, it stands for one."""
 

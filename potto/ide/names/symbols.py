@@ -5,7 +5,7 @@ Owns `symbol_at` and `meaning_of`. Names that a chunk binds itself come from `in
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from potto.ide.names.index import Binder, Occurrence, call_head
 from potto.ide.names.places import ChunkAt, chunk_at
@@ -30,8 +30,7 @@ from potto.syntax import nodes
 MOST_ALIASES = 20
 
 
-@dataclass(frozen=True, slots=True)
-class LocalSymbol:
+class LocalSymbol(Struct, frozen=True):
     """A name that the chunk at `start` of a file binds; `number` counts its binders, `prefix` are the `d`s in front of
     the name where a call of a derivative names a parameter."""
 
@@ -41,31 +40,27 @@ class LocalSymbol:
     prefix: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class DefinitionSymbol:
+class DefinitionSymbol(Struct, frozen=True):
     """A definition. `known`: there is one."""
 
     file: str
     name: str
 
 
-@dataclass(frozen=True, slots=True)
-class ModuleSymbol:
+class ModuleSymbol(Struct, frozen=True):
     """A module."""
 
     file: str
     dotted: str
 
 
-@dataclass(frozen=True, slots=True)
-class BuiltinSymbol:
+class BuiltinSymbol(Struct, frozen=True):
     """A builtin, a constant or a special form."""
 
     name: str
 
 
-@dataclass(frozen=True, slots=True)
-class MeasureSymbol:
+class MeasureSymbol(Struct, frozen=True):
     """A measure."""
 
     name: str
@@ -74,8 +69,7 @@ class MeasureSymbol:
 Symbol = LocalSymbol | DefinitionSymbol | ModuleSymbol | BuiltinSymbol | MeasureSymbol
 
 
-@dataclass(frozen=True, slots=True)
-class Found:
+class Found(Struct, frozen=True):
     """A name at a place (absolute), and what it means; None if nothing."""
 
     span: Span
@@ -149,8 +143,7 @@ def imported(db: Database, file: str, module: str, name: str) -> Symbol | None:
 # Calls
 
 
-@dataclass(frozen=True, slots=True)
-class Callee:
+class Callee(Struct, frozen=True):
     """The definition that a call is of: how many groups were given before, and how often it was derived."""
 
     file: str

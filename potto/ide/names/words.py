@@ -5,14 +5,14 @@ Owns `KEYWORDS`, `SPECIALS` and `LETTERS`. Builtins and measures say for themsel
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
+
+from msgspec import Struct
 
 Where = Literal["top", "expression", "clause"]
 
 
-@dataclass(frozen=True, slots=True)
-class Keyword:
+class Keyword(Struct, frozen=True):
     """A keyword: what it means, how it is used, and the snippet that writes it. `where`: what it may begin."""
 
     name: str
@@ -67,8 +67,7 @@ _ALL = (
 KEYWORDS: dict[str, Keyword] = {keyword.name: keyword for keyword in _ALL}
 
 
-@dataclass(frozen=True, slots=True)
-class Special:
+class Special(Struct, frozen=True):
     """A builtin that is no function of numbers: its type as people read it, and what it does."""
 
     name: str

@@ -6,13 +6,14 @@ leaves out the segments on which the integrand vanishes, and hands the rest to `
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from potto.core.terms import Term
 from potto.integrate.adaptive.refining import integrated
 from potto.integrate.adaptive.root_sums import Rows, over_roots
+from potto.integrate.columns import distinct
 from potto.integrate.decomposition.critical_places import critical_rows
 from potto.integrate.decomposition.cuts import Cuts, at_rest, frame_rows, segments, standing
 from potto.integrate.decomposition.effective_range import concentrated
@@ -37,20 +38,18 @@ from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value
 NARROW = 1e-4  # the part of the range of a variable up to which a stretch may lie on either side of a surface
 
 
-@dataclass(frozen=True)
-class Settled:
+class Settled(Struct, frozen=True):
     """The sides of surfaces, per segment, and by group the segments on which a surface is not defined, so that it has
     none. unsure: the members, if any, of which that is rounding for a stretch that matters. doubtful: by group, the
     narrow stretches of which it is."""
 
     sides: dict[int, Mask]
-    undefined: dict[int, Bools] = field(default_factory=dict)
+    undefined: dict[int, Bools] = {}
     unsure: Ints | None = None
-    doubtful: dict[int, Bools] = field(default_factory=dict)
+    doubtful: dict[int, Bools] = {}
 
 
-@dataclass
-class Iteration:
+class Iteration(Struct):
     """One plan being evaluated by one machine. `order` is the number of nodes per piece to start with.
 
     still: surfaces that don't move here, since someone else counts what their motion does. tracked: whether the
@@ -124,7 +123,7 @@ class Iteration:
         if machine.directions and (cuts.meetings or cuts.edges):
             if self.plan.hides:
                 places = [*(place.owner for place in cuts.meetings), *(place.owner for place in cuts.edges)]
-                met = np.unique(np.concatenate(places))
+                met = distinct(np.concatenate(places))
                 machine.note(UNSEEN_MEETING, scene.below(met))
                 sums.et[:, :, met] = np.inf
             else:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from potto.integrate.adaptive.reynolds import Totals
+from potto.integrate.columns import distinct
 from potto.integrate.events import LATE
 from potto.integrate.panels.iterated import siblings
 from potto.integrate.panels.panel_batch import PanelBatch
@@ -136,7 +137,7 @@ def stragglers(work: PanelBatch, p: Pieces, bad: Bools) -> Bools:
     members = work.below(work.seg.owner[p.segment])
     if members is None:
         return late
-    few = np.unique(members[bad])
+    few = distinct(members[bad])
     if STRAGGLERS * few.size <= int(members.max()) + 1:
         work.machine.note(LATE, few)
         late |= np.isin(members, few)

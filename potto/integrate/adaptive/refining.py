@@ -18,6 +18,7 @@ import numpy as np
 from potto.integrate.adaptive.divergence import endless, given_up
 from potto.integrate.adaptive.refinement import Tally, doubtful, filled, missed_peak, stragglers, too_coarse
 from potto.integrate.adaptive.reynolds import Totals, sums, totals
+from potto.integrate.columns import distinct
 from potto.integrate.degenerate.degeneracies import steps_at_cuts
 from potto.integrate.events import BUDGET_SPENT
 from potto.integrate.panels.panel_batch import PanelBatch
@@ -92,7 +93,7 @@ def refine(work: PanelBatch, fresh: Pieces, ends: Any, tally: Tally) -> Pieces:
             break
         if work.machine.exhausted():
             owners = work.seg.owner[fresh.segment[found[0] | found[1]]]
-            work.machine.note(BUDGET_SPENT, work.below(np.unique(owners)))
+            work.machine.note(BUDGET_SPENT, work.below(distinct(owners)))
             if ends is not None:  # what is known to be missing
                 fresh.error[:, missed_peak(work, fresh, ends)] = np.inf
             break

@@ -6,9 +6,8 @@ Owns `Totals`. The fixed form adds what the moving ends of segments sweep to the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
+from msgspec import Struct
 
 from potto.integrate.panels.panel_batch import PanelBatch
 from potto.integrate.panels.roundoff import hidden_steps
@@ -17,8 +16,7 @@ from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array
 
 
-@dataclass
-class Totals:
+class Totals(Struct):
     """Pieces added up per integral, (m, channels, B) each: integrals, errors with their rounding, magnitudes.
 
     moving, fixed: (value, bound) of the tangents in the two forms, (m, k, B) each; apart: how far they differ, 0 where

@@ -11,6 +11,7 @@ import numpy as np
 from potto.calculus.differentiation.derivative import partial
 from potto.calculus.differentiation.level_sets import LevelSet
 from potto.core.terms import function_of, tuple_
+from potto.integrate.columns import distinct
 from potto.integrate.decomposition.meetings import SEARCHED, Row, as_array, tangents
 from potto.integrate.events import at_a_fold, root_on_a_bound
 from potto.integrate.pieces import Evaluator, Sums, components, gather, take
@@ -124,4 +125,4 @@ def _note(
 ) -> None:
     for where, what in ((folded, at_a_fold), (unsure, root_on_a_bound)):
         if where.any():
-            machine.note(what(over.surface, variable), np.unique(owner[where]) if batch > 1 else None)
+            machine.note(what(over.surface, variable), distinct(owner[where]) if batch > 1 else None)

@@ -10,10 +10,10 @@ integrated is continuous there; where it is not, they do as the implicit functio
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from potto.calculus.decomposition.critical import Critical, slopes_of
 from potto.core.terms import Term, function_of, tuple_
@@ -107,8 +107,7 @@ def _none(n: int) -> tuple[Ints, Array, Array]:
     return np.zeros(0, dtype=np.int64), np.zeros((n, 0)), np.zeros(0)
 
 
-@dataclass
-class _Search:
+class _Search(Struct):
     """A search for all solutions, over boxes (n, 2, P): the variable that is cut, then those further in."""
 
     names: tuple[str, ...]
@@ -116,7 +115,7 @@ class _Search:
     equations: Sequence[Term]
     slopes: Sequence[Term]
     ends: Sequence[Term]
-    found: list[tuple[Ints, Array, Array]] = field(default_factory=list)
+    found: list[tuple[Ints, Array, Array]] = []
 
     def solved(self, low: Array, high: Array) -> tuple[Ints, Array, Array] | None:
         """Whose the solutions are, where they are, and how far off along the variable that is cut.

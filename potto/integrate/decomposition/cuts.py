@@ -8,10 +8,11 @@ then differ.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from potto.integrate.decomposition.meetings import (
     SEARCHED,
@@ -40,8 +41,7 @@ NARROW = 16 * EPS
 BLUR = 8
 
 
-@dataclass
-class Cuts:
+class Cuts(Struct):
     """The outcome for one variable: orientation (B,), segments, whether anything moves, edges.
 
     brushes: edges at which only something further in changes. folds: where roots of one surface are at one place.
@@ -55,10 +55,10 @@ class Cuts:
     edges: list[Edge]
     bound_nan: Bools | None
     conflict: bool = False
-    meetings: list[Meeting] = field(default_factory=list)
-    brushes: list[Edge] = field(default_factory=list)
-    folds: list[Fold] = field(default_factory=list)
-    slivers: list[Sliver] = field(default_factory=list)
+    meetings: list[Meeting] = []
+    brushes: list[Edge] = []
+    folds: list[Fold] = []
+    slivers: list[Sliver] = []
     lost: Array | None = None
 
 

@@ -5,10 +5,10 @@ Owns `Row`, `Edge`, `Meeting`, `Sliver` and `Fold`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from potto.integrate.columns import Columns
 from potto.integrate.levels import LevelPlan
@@ -22,8 +22,7 @@ SEARCHED = 4
 FLAT = 2.0**-30
 
 
-@dataclass
-class Row:
+class Row(Struct):
     """One candidate cut for the whole batch: where it is, how it moves, which cut of the level it belongs to.
 
     e, et: how far off the place, and its speeds, may be by rounding; None where that is not known.
@@ -39,7 +38,6 @@ class Row:
     hides: Any = None
 
 
-@dataclass
 class Edge(Columns):
     """A surface that lies on a bound, for some of the batch: `owner` (m,), at the upper bound or not, its speeds."""
 
@@ -52,7 +50,6 @@ class Edge(Columns):
 
 
 
-@dataclass
 class Meeting(Columns):
     """Jumps at one place that move apart, for some of the batch: `owner` (B,), place (B,), speeds (n, k, B).
 
@@ -67,7 +64,6 @@ class Meeting(Columns):
 
 
 
-@dataclass
 class Sliver(Columns):
     """Jumps that rounding does not tell apart, from one another or from a bound, for some of the batch.
 
@@ -86,8 +82,7 @@ class Sliver(Columns):
 
 
 
-@dataclass
-class Fold:
+class Fold(Struct):
     """Sections of a surface that appear, merge or turn just here, for some of the batch: `owner` (m,), place (m,)."""
 
     cut: int

@@ -7,9 +7,8 @@ no root is missed, however narrow what brings it forth; what is given up on, onc
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
+from msgspec import Struct
 
 from potto.core.terms import Branch, Proj, Term, Var, children, postorder, rebuild, var
 from potto.integrate.rules.intervals import Interval, enclosure, everywhere
@@ -26,8 +25,7 @@ SHALLOW = 2.0
 _Stretches = tuple[Ints, Array, Array]  # whose, from where, to where
 
 
-@dataclass
-class Brackets:
+class Brackets(Struct):
     """owner: (r,) whose; a, b: (r,) ends of cells with a sign change each. complete: whether these are all.
 
     hidden: whose, and from where to where, the surface is 0 to rounding, so that there may be any number of them.
@@ -148,8 +146,7 @@ def at_label(low: Array, high: Array, s: Array) -> Array:
     return np.where(s == 0, low, np.where(s == 1, high, x))
 
 
-@dataclass
-class _Cells:
+class _Cells(Struct, dict=True):
     surface: Term
     slope: Term
     variable: str

@@ -8,11 +8,12 @@ crossing it. Each is polished; how a root moves follows from the surface's own d
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from potto.calculus.solving.enclosable import slope_of
 from potto.core.terms import Lam, Term, function_of
@@ -93,8 +94,7 @@ def _family(
     return rows
 
 
-@dataclass(frozen=True)
-class _Along:
+class _Along(Struct, frozen=True, dict=True):
     """A surface along one variable, for a batch: the number of its cut, and whether something jumps there.
 
     Places are (B,), or (r, B) for several of each member.

@@ -16,9 +16,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 
 from potto.core.terms import Term
 from potto.integrate.decomposition.cuts import NARROW, Cuts
@@ -37,8 +37,7 @@ SURE = 1.001  # what rounding may add to a bound
 BESIDE, CLEAR = 1e-7, 4.0
 
 
-@dataclass(frozen=True)
-class Scene:
+class Scene(Struct, frozen=True):
     """One variable of an iteration as it is being integrated: everything that is needed to evaluate its integrand."""
 
     parent: Iterated

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from potto.integrate.columns import distinct
 from potto.integrate.decomposition.cuts import NARROW, Cuts
 from potto.integrate.degenerate.coincidences import Scene, around, placed
 from potto.integrate.degenerate.faces import THIN, Place, crossing, several
@@ -61,7 +62,7 @@ def steps_at_cuts(work: PanelBatch, whole: Pieces) -> Crossing | None:
                  for i, j in zip(left, right, strict=True))  # fmt: skip
     found = crossing(scene, place, DISCONTINUITY * size[:, jumps]) if as_one else None
     if found is None:
-        work.machine.note(Degenerate(work.level.variable), scene.below(np.unique(owner[jumps])))
+        work.machine.note(Degenerate(work.level.variable), scene.below(distinct(owner[jumps])))
         return None
     for i, j in zip(left, right, strict=True):  # what moves there is what crosses
         for part in (whole.integral, whole.error, whole.floor):
@@ -73,7 +74,8 @@ def _between(scene: Scene, seg: Segments, left: Ints, right: Ints) -> Ints:
     """The members for which several surfaces run along what is further in between two segments, where neither says
     what lies between them."""
     owner, x = seg.owner[right], seg.a[right]
-    return np.unique(owner[several(scene, owner, x, np.maximum(seg.ea[right], x - seg.b[left]))])
+    members: Ints = distinct(owner[several(scene, owner, x, np.maximum(seg.ea[right], x - seg.b[left]))])
+    return members
 
 
 def _neighbours(seg: Segments) -> tuple[Ints, Ints]:

@@ -8,10 +8,11 @@ integrand to be taken between the surfaces). Where growing and shrinking paramet
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from potto.integrate.decomposition.meetings import SEARCHED, Row, as_array, tangents
 from potto.integrate.degenerate.coincidences import MOST_AT_ONE_PLACE, Scene, picked
@@ -25,8 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 
-@dataclass(frozen=True)
-class Collapsed:
+class Collapsed(Struct, frozen=True):
     """Ranges of length zero of some members: `owner` (m,), place x (m,), and the cuts that jump there.
 
     low, high: how the bounds move, (k, m); speeds: how the cuts do, (n, k, m); off: how far apart the bounds may be by

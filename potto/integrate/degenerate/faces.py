@@ -12,12 +12,13 @@ It is integrated as the tangents of a vector that stands still, by the same rule
 from __future__ import annotations
 
 from contextlib import nullcontext
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from msgspec import Struct
 
 from potto.core.terms import Lam, Term, children, function_of
+from potto.integrate.columns import distinct
 from potto.integrate.degenerate.coincidences import CLEAR, Scene
 from potto.integrate.pieces import Crossing, Evaluator, components, gather, still, take
 from potto.integrate.plan import Plan
@@ -31,8 +32,7 @@ THIN = 1e-13
 FRACTIONS = (0.137, 0.483, 0.829)
 
 
-@dataclass(frozen=True)
-class Place:
+class Place(Struct, frozen=True):
     """Places of one variable at which what is further in jumps: whose they are, where, how far off that may be, with
     what speeds (k, P) they were integrated; the sides of the surfaces so far, and the jumps (m, P)."""
 
@@ -44,8 +44,7 @@ class Place:
     jump: Array
 
 
-@dataclass(frozen=True)
-class Face:
+class Face(Struct, frozen=True, dict=True):
     """A face as an integrand: the group of its surface, that surface, the variable it is a place of."""
 
     group: int
@@ -94,7 +93,7 @@ def crossing(scene: Scene, place: Place, tolerance: Array) -> Crossing | None:
     if which is None or (which < 0).any() or not np.isfinite(place.speed).all():
         return None
     found = Crossing(*np.zeros((4, place.jump.shape[0], scene.machine.directions, scene.batch)))
-    for group in np.unique(which).tolist():
+    for group in distinct(which).tolist():
         here = which == group
         jump, e, t, et = _crossed(scene, place, group, here)
         if not (np.abs(jump - place.jump[:, here]) <= tolerance[:, here] + e).all():

@@ -12,6 +12,7 @@ from collections.abc import Container, Iterator
 import numpy as np
 
 from potto.core.terms import function_of
+from potto.integrate.columns import distinct
 from potto.integrate.decomposition.vanishing import vanishes
 from potto.integrate.degenerate.coincidences import Scene, placed, surfaces_at
 from potto.integrate.events import undefined
@@ -74,7 +75,7 @@ def lost_members(scene: Scene, seg: Segments, undefined: dict[int, Bools], alive
             lost.append(seg.owner[part[bad]])
             members = scene.below(lost[-1])
             _tell(scene.parent.plan, gone[0], here, int(bad[0]), scene.machine, members)
-    return np.unique(np.concatenate(lost)) if lost else np.zeros(0, dtype=np.int64)
+    return distinct(np.concatenate(lost)) if lost else np.zeros(0, dtype=np.int64)
 
 
 def fallen(

@@ -7,9 +7,10 @@ move with the parameters; each is halved until its Legendre coefficients say tha
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
 
 import numpy as np
+from msgspec import Struct, field
+from msgspec.structs import replace
 
 from potto.integrate.pieces import Sums
 from potto.integrate.rules import substitution
@@ -28,8 +29,7 @@ SEEN = 0.1  # of the largest value
 Function = Callable[[Array, Array], Sums]
 
 
-@dataclass(frozen=True)
-class Table:
+class Table(Struct, frozen=True):
     """V(s) for s in [x0[0], x1[-1]].
 
     Each piece runs from u0 to u1 of the map of its segment, and from x0 to x1. coefficients: (2 + k, P, n) of shifted

@@ -8,11 +8,12 @@ its table, and the cuts of the next step.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from potto.calculus.algebra.affine import affine
 from potto.calculus.algebra.ranges import range_of
@@ -66,8 +67,7 @@ LOW, HIGH = "#low", "#high"
 Place = tuple[Term, Kind]
 
 
-@dataclass(frozen=True)
-class Eliminated:
+class Eliminated(Struct, frozen=True):
     """The steps, outermost first: the plan of each, and the state that it depends on as a variable from LOW to HIGH,
     cut where its integral is not smooth, with hints where it has a peak; None where it depends on none."""
 
@@ -155,7 +155,6 @@ def _centers(term: Integral, variable: str, resolve: Resolve) -> list[Finding]:
     return [f for f in findings(term.body, resolve) if f.kind == "center" and f.surface.free & names == {variable}]
 
 
-@dataclass
 class _Tabled(Iteration):
     """The integral of one step: weight times what is further in, by its table, or the number that it is."""
 

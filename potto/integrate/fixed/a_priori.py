@@ -13,11 +13,11 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from potto.core.terms import (
     Branch,
@@ -63,8 +63,7 @@ UNKNOWN = object()
 Path = tuple[tuple[int, int], ...]
 
 
-@dataclass(frozen=True)
-class Straight:
+class Straight(Struct, frozen=True, dict=True, eq=False):
     """The terms of an integral for this way: frames per variable (bounds, then cuts), the integrand without calls.
 
     jumps: per variable the surfaces that it crosses, with the rows of the frame that are their places. turning: the
@@ -80,10 +79,10 @@ class Straight:
     body: Term
     surfaces: Lam
     names: tuple[str, ...]
-    faces: dict[tuple[bool, ...], Term] = field(default_factory=dict, compare=False)
-    regions: dict[Any, object] = field(default_factory=dict, compare=False)
-    lowered: dict[Any, Any] = field(default_factory=dict, compare=False)
-    settled: dict[Any, Region] = field(default_factory=dict, compare=False)
+    faces: dict[tuple[bool, ...], Term] = {}
+    regions: dict[Any, object] = {}
+    lowered: dict[Any, Any] = {}
+    settled: dict[Any, Region] = {}
 
     @cached_property
     def items(self) -> tuple[tuple[Term, ...], ...]:

@@ -6,16 +6,15 @@ Owns `Axis` and `Raw`, which the ways to work out a rule (`nodes`, `lowered`) sh
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 
 from potto.integrate.rules.gauss import gauss
 from potto.kernels.cells import Array, Bools
 
 
-@dataclass(frozen=True)
-class Axis:
+class Axis(Struct, frozen=True):
     """Nodes of a variable on [0, 1].
 
     speeds: how fast they run, as they crowd at turning points, where roots are. transform: (n, rows) from numbers at
@@ -49,8 +48,7 @@ class Axis:
         return cls(nodes, speeds, rule.weights, transform, nodes[picked], speeds[picked])
 
 
-@dataclass(frozen=True)
-class Raw:
+class Raw(Struct, frozen=True):
     """Sums over the nodes of cells, for each of M members.
 
     number: (1 + k, M), the integrals. coefficients: per variable (1 + k, M, rows), the sizes of Legendre coefficients

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from msgspec import Struct, field
 
 from potto.core.terms import Term
 from potto.integrate.fixed.a_priori import Straight
@@ -29,14 +29,13 @@ from potto.kernels.native.straight import Part
 from potto.kernels.native.vectors import LANES
 
 
-@dataclass(frozen=True)
-class Lowered:
+class Lowered(Struct, frozen=True):
     """The rule for one integrand, for parameters with these parts."""
 
     plan: Straight
     face: Term
     places: tuple[Place, ...]
-    promotion: Promotion = field(default_factory=lambda: Promotion(NAME), compare=False)
+    promotion: Promotion = field(default_factory=lambda: Promotion(NAME))
 
     def function(self, machine: Evaluator) -> Loaded | None:
         """The function, if it is to be used now."""

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from msgspec import Struct
 
 from potto.core.terms import Lam, function_of
 from potto.integrate.pieces import Evaluator, gather
@@ -32,8 +32,7 @@ def evaluated(function: Lam, machine: Evaluator, env: dict[str, Value]) -> tuple
     return values  # type: ignore[return-value]
 
 
-@dataclass(frozen=True)
-class _Layout:
+class _Layout(Struct, frozen=True):
     """What nodes of a region do not depend on numbers for.
 
     ends: per variable, for every node of the outermost one, where the ends of its cell are among the values of the
@@ -69,8 +68,7 @@ def _layout(region: Region) -> _Layout:
     )
 
 
-@dataclass(frozen=True)
-class Totals:
+class Totals(Struct, frozen=True):
     """Values and tangents (1 + k,), the rounding of each, and what each is when nothing cancels."""
 
     number: list[float]

@@ -8,9 +8,9 @@ the outermost one's next to the members.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 
 from potto.core.terms import Term, function_of, tuple_
 from potto.integrate.fixed.a_priori import Straight
@@ -22,8 +22,7 @@ from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays
 
 
-@dataclass(frozen=True)
-class Nodes:
+class Nodes(Struct, frozen=True):
     """Numbers at some nodes of cells. value, off: of the integrand and its rounding, (1 + k, ..., n1, M).
 
     widths: per variable those of its stretches, and how far they may be off, with its own axis left out.
@@ -57,8 +56,7 @@ def at_once(
     return Raw(number, coefficients, most, off, every.clear & some.clear, *largest)
 
 
-@dataclass(frozen=True)
-class _Cells:
+class _Cells(Struct, frozen=True):
     plan: Straight
     face: Term
     env: dict[str, Value]

@@ -7,9 +7,9 @@ follows from it is said here.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 
 from potto.integrate.fixed.a_priori import Straight
 from potto.integrate.fixed.axes import Axis, Raw
@@ -34,8 +34,7 @@ FEW = 64
 CANCELS = 1e-13
 
 
-@dataclass(frozen=True)
-class Measured:
+class Measured(Struct, frozen=True):
     """Integrals over cells (1 + k, M), how far rules and rounding put them off, and what is added up for them."""
 
     number: Array
@@ -44,8 +43,7 @@ class Measured:
     gross: Array
 
 
-@dataclass(frozen=True)
-class Rule:
+class Rule(Struct, frozen=True):
     """A product rule for cells of one shape, with so many nodes for each variable; exact: for polynomials."""
 
     plan: Straight

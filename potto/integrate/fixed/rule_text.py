@@ -8,10 +8,10 @@ outermost loop in which all that it needs is known.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from potto.core.terms import Lam, Term, function_of
 from potto.integrate.fixed.a_priori import Straight
@@ -28,8 +28,7 @@ ONE = "1.0"
 PER_AXIS = 9  # numbers of the frame: how many nodes, coefficients and nodes with rounding, then where tables are
 
 
-@dataclass(frozen=True, slots=True)
-class Place:
+class Place(Struct, frozen=True):
     """A part of a parameter, and what is there: an "array", a "number" for all members, or ONE."""
 
     name: str
@@ -37,8 +36,7 @@ class Place:
     kind: str
 
 
-@dataclass(frozen=True, slots=True)
-class Symbol:
+class Symbol(Struct, frozen=True):
     """A cell whose parts are names of vectors; None where a part is 0, ONE where a tangent is 1."""
 
     v: str

@@ -12,11 +12,11 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Mapping
 from contextlib import nullcontext
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from potto.calculus.algebra.degree import degree, plane
 from potto.calculus.solving.enclosable import enclosable
@@ -40,8 +40,7 @@ NEAR = 1e-9
 NODE_ROUNDING = 0.5
 
 
-@dataclass(frozen=True)
-class Box:
+class Box(Struct, frozen=True):
     """Bounds and surfaces of an integral over a box, as functions of parameters, and of parameters and variables.
 
     surfaces: those that are affine in each variable. curved: the others. exact: the nodes per variable that do for what

@@ -9,11 +9,11 @@ in the middle of a cell, is not plain, and is left to the general way.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
+from msgspec import Struct
 
 from potto.core.terms import Const, Term, children
+from potto.integrate.columns import distinct
 from potto.integrate.fixed.a_priori import CLEAR, Straight
 from potto.integrate.fixed.moving_sums import evaluated
 from potto.integrate.pieces import Evaluator, gather
@@ -22,8 +22,7 @@ from potto.kernels.cells import Array, Bools, Cell, Ints, Number, Value
 Turning = tuple[tuple[bool, bool], ...]
 
 
-@dataclass(frozen=True)
-class Alike:
+class Alike(Struct, frozen=True):
     """Cells of one integrand.
 
     turning: per variable whether the ends of their stretches are like square roots. rows: (variables, 2, N), the rows
@@ -36,8 +35,7 @@ class Alike:
     members: Ints
 
 
-@dataclass
-class _Cells:
+class _Cells(Struct):
     """Stretches of the variables so far, (N,) each: their rows, whose they are, and numbers, variables at middles."""
 
     rows: Ints
@@ -103,13 +101,13 @@ def _gathered(plan: Straight, machine: Evaluator, cells: _Cells, sides: Ints) ->
         if turning:
             ends = np.isin(cells.rows[i], list(turning))
             turns |= (ends[0].astype(np.int64) << 2 * i) | (ends[1].astype(np.int64) << 2 * i + 1)
-    for code in np.unique(sides):
+    for code in distinct(sides):
         face = plan.face(tuple(bool(code >> bit & 1) for bit in range(len(children(plan.surfaces.body)))))
         own = sides == code
         dark = isinstance(face, Const) and face.value == 0
         if machine.costs is not None:
             machine.costs.stretches(int(own.sum()), 0 if dark else int(own.sum()))
-        for turn in () if dark else np.unique(turns[own]):
+        for turn in () if dark else distinct(turns[own]):
             index = np.nonzero(own & (turns == turn))[0]
             turning_ends = tuple((bool(turn >> 2 * i & 1), bool(turn >> 2 * i + 1 & 1)) for i in range(count))
             found.append(Alike(face, turning_ends, cells.rows[:, :, index], cells.members[index]))

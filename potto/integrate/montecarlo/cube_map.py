@@ -13,10 +13,10 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Container, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from potto.core.terms import Term, function_of, mul, var
 from potto.integrate.decomposition.cuts import frame_rows
@@ -30,16 +30,14 @@ from potto.kernels.cells import Array, Bools, Cell, Number, Value, map_arrays, p
 PRODUCT = function_of(mul(var("a"), var("b")))
 
 
-@dataclass
-class Point:
+class Point(Struct):
     """A chunk of points: the environment with the variables put in, and dx/du as a cell."""
 
     env: dict[str, Value]
     volume: Cell
 
 
-@dataclass(frozen=True)
-class Chart:
+class Chart(Struct, frozen=True):
     """The chart of one plan, for one set of parameters. share: the least part of the points for a stretch of labels."""
 
     plan: Plan

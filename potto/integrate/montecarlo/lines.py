@@ -5,10 +5,10 @@ Owns `Line` and `line`. Bounds further in may change along the line; there the s
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from msgspec import Struct
 
 from potto.calculus.decomposition.surface_cuts import cut_along
 from potto.calculus.decomposition.sweep import Level
@@ -19,8 +19,7 @@ from potto.integrate.plan import level_plan
 from potto.kernels.cells import Array
 
 
-@dataclass(frozen=True)
-class Line:
+class Line(Struct, frozen=True):
     """A surface along one variable, with the labels of the others given.
 
     follows: the variables further in whose bounds change along the line; in the surface they are written by their

@@ -17,10 +17,10 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from potto.calculus.algebra.ranges import range_of
 from potto.core.terms import Integral, Term
@@ -40,11 +40,10 @@ SLACK = 1.5
 NEAREST, POINTS = 48, 8
 
 
-@dataclass
-class Largest:
+class Largest(Struct):
     """The largest magnitudes among samples: arrays (..., FEW) for values and tangents."""
 
-    most: dict[str, Array] = field(default_factory=dict)
+    most: dict[str, Array] = {}
 
     def add(self, samples: Sums) -> None:
         for name in ("v", "t"):

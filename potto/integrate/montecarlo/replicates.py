@@ -6,10 +6,10 @@ spread of their means). Samples are `Sums`, the last axis the samples; what come
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from potto.integrate.pieces import Sums
 from potto.kernels.cells import Array
@@ -19,13 +19,12 @@ LOOK_BACK = 5
 HIDDEN = 0.58
 
 
-@dataclass
-class _Spread:
+class _Spread(Struct):
     """Mean and variance of one part, put together from those of the chunks (Chan, Golub and LeVeque)."""
 
-    counts: list[int] = field(default_factory=list)
-    means: list[Array] = field(default_factory=list)
-    variances: list[Array] = field(default_factory=list)
+    counts: list[int] = []
+    means: list[Array] = []
+    variances: list[Array] = []
 
     def add(self, x: Array, spread: bool) -> None:
         n = x.shape[-1]

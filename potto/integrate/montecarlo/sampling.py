@@ -10,11 +10,12 @@ independent scramblings of Sobol points. Samples that fall nowhere count as zero
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
 
 from potto.integrate.adaptive.iterated import Iteration
 from potto.integrate.degenerate.undefined import guarded_samples
@@ -183,15 +184,14 @@ def _enough(sums: Sums, settings: Any, rtol: float) -> bool:
     )
 
 
-@dataclass
-class _Run:
+class _Run(Struct, dict=True):
     """One integral, for one set of parameters; `exact`: how many of its innermost variables are left to quadrature."""
 
     plan: Plan
     machine: Any
     env: dict[str, Value]
     exact: int
-    largest: list[Largest] = field(default_factory=list)
+    largest: list[Largest] = []
 
     @cached_property
     def chart(self) -> Chart:

@@ -19,12 +19,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import zip_longest
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from potto.calculus.decomposition.surface_cuts import Face, Product
 from potto.core.terms import App, Const, Prim, Term, const, function_of, mul, postorder, sub, var
@@ -82,8 +82,7 @@ def _rest(product: Product, factor: Face | None) -> Term:
     return mul(const(product.sign), *rest, *(() if factor is None else (product.along,)))
 
 
-@dataclass
-class Surface:
+class Surface(Struct, dict=True):
     """The boundary term of one surface.
 
     number: the level of its innermost variable. forces: the groups that it decides, and what tells which way round

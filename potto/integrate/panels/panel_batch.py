@@ -7,9 +7,9 @@ comes from the same procedure one level down (`Iterated`). Refinement is not its
 from __future__ import annotations
 
 from contextlib import nullcontext
-from dataclasses import dataclass, field
 
 import numpy as np
+from msgspec import Struct
 
 from potto.integrate.levels import LevelPlan
 from potto.integrate.panels.iterated import Iterated
@@ -26,8 +26,7 @@ MOST_SLACK = 1e6  # how many times the error of a node may be larger that hardly
 BESIDE = 1e-9  # how far from the ends of a segment, in parts of it, it is looked at just inside
 
 
-@dataclass
-class PanelBatch:
+class PanelBatch(Struct, dict=True):
     """The integrals of one batch over one variable."""
 
     parent: Iterated
@@ -44,9 +43,6 @@ class PanelBatch:
     conflict: bool = False
     width: int = 1
     ends: Ends | None = None
-    # How many times what it comes to an integral further in adds up: for values, for tangents.
-    cancels: Array = field(init=False)
-    hidden: Array = field(init=False)  # what is added up further in, on the average, where it comes to nothing
     endless: Array | None = None  # (k, B) the tangents that are infinite, with their signs; 0 for others
     filled: Array | None = None  # (B,) which part of the range integrands take up, where that is known
     steps: Crossing | None = None  # what crosses faces at which cuts only bends were expected
@@ -55,7 +51,10 @@ class PanelBatch:
 
     def __post_init__(self) -> None:
         self.k = self.machine.directions
-        self.cancels, self.hidden = np.ones((2, self.batch)), np.zeros((2, self.batch))
+        # How many times what it comes to an integral further in adds up: for values, for tangents.
+        self.cancels: Array = np.ones((2, self.batch))
+        # What is added up further in, on the average, where it comes to nothing.
+        self.hidden: Array = np.zeros((2, self.batch))
         self.last = self.number + 1 == len(self.parent.plan.levels)
         # Without forced sides there are no values on a surface: only the moving form does without them.
         self.both = self.moving and not self.parent.plan.hides

@@ -7,10 +7,10 @@ is needed. (Decay of coefficients against analyticity: Trefethen, Approximation 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from msgspec import Struct
 
 from potto.kernels.cells import Array, Ints
 
@@ -18,8 +18,7 @@ EPS = 2.0**-52
 AHEAD = 0.7
 
 
-@dataclass(frozen=True)
-class Rule:
+class Rule(Struct, frozen=True):
     """The Gauss rule with n nodes on [0, 1].
 
     nodes: (n,), weights: (n,). transform: (n, n), values at the nodes times it are the coefficients of the shifted

@@ -20,10 +20,10 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from msgspec import Struct
 
 from potto.core.terms import Term
 from potto.integrate.rules.complex_enclosures import Form, enclosed
@@ -38,16 +38,14 @@ BOXES = {1: 1, 2: 6, 3: 3}
 SURE = 1.001
 
 
-@dataclass(frozen=True)
-class Cell:
+class Cell(Struct, frozen=True):
     """A stretch between two rows of the frame for every variable, outermost first, and the integrand on it."""
 
     rows: tuple[tuple[int, int], ...]
     body: Term
 
 
-@dataclass(frozen=True, eq=False)
-class Region:
+class Region(Struct, frozen=True, eq=False):
     """What was proved for all parameters near those given.
 
     cells: what it was proved of. outer: nodes for the outermost variable, per cell; inner: for each of the others.

@@ -7,11 +7,9 @@ the segment's two ends when these move.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from potto.integrate.columns import Columns
+from potto.integrate.columns import Columns, distinct
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Ints
 
@@ -25,7 +23,6 @@ FARTHEST = 1e-150
 TYPICAL = 0.25
 
 
-@dataclass
 class Segments(Columns):
     """Stretches between neighbouring cuts, for a batch of integrals.
 
@@ -81,7 +78,7 @@ def points(seg: Segments, u: Array, rest: Array | None = None) -> tuple[Array, A
     u = np.broadcast_to(u, (seg.a.size, u.shape[1]))
     rest = 1.0 - u if rest is None else rest
     x, slope, label = np.empty_like(u), np.empty_like(u), np.empty_like(u)
-    for kind in np.unique(seg.kind):
+    for kind in distinct(seg.kind):
         rows = np.nonzero(seg.kind == kind)[0]
         part = seg.pick(rows)
         x[rows], slope[rows], label[rows] = _MAPS[int(kind)](part, u[rows], rest[rows])

@@ -9,26 +9,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from potto.kernels.cells import Array, Cell, Value
-from potto.kernels.compile import Kernel, Runtime
+from potto.kernels.compile import Runtime
 from potto.kernels.making import counts
 from potto.kernels.native.elementary import module
 from potto.kernels.native.objects import Loaded
 from potto.kernels.native.promotion import Promotion
 from potto.kernels.native.straight import NotStraight, Operation, Packed, Part, Result, Straight, needed, packed, read
 from potto.kernels.native.vectors import LANES, Vectors
+from potto.kernels.written import Kernel
 
 NAME = "points"
 Parts = tuple[bool, ...]  # of all parts of all arguments, which are arrays
 
 
-@dataclass(frozen=True, slots=True)
-class Layout:
+class Layout(Struct, frozen=True):
     """What is done where. prelude: of the parts in `uniform`, gives what is in `given`; the function takes that and the
     parts in `arrays`, and gives `outputs`."""
 

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
-from potto.kernels.compile import Kernel
+from msgspec import Struct
+
 from potto.kernels.whole import UNIT_ROUNDOFF
+from potto.kernels.written import Kernel
 
 ARITHMETIC: dict[type, str] = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul"}
 RELATIONS: dict[type, str] = {ast.Lt: "lt", ast.LtE: "le", ast.Gt: "gt", ast.GtE: "ge", ast.Eq: "eq", ast.NotEq: "ne"}
@@ -35,8 +36,7 @@ class NotStraight(Exception):
     """A kernel does something that has no form as operations on numbers."""
 
 
-@dataclass(frozen=True, slots=True)
-class Part:
+class Part(Struct, frozen=True):
     """A part of an argument: which one (and which item of it, where it is a tuple), and "v", "e", "t" or "et" of it."""
 
     path: tuple[int, ...]
@@ -44,8 +44,7 @@ class Part:
     direction: int = 0
 
 
-@dataclass(frozen=True, slots=True)
-class Operation:
+class Operation(Struct, frozen=True):
     """`name` = `code` of arguments, which are names or numbers as text."""
 
     name: str
@@ -62,8 +61,7 @@ class Operation:
         return self.args if self.code in ("and", "or", "not") else self.args[:1] if self.code == "select" else ()
 
 
-@dataclass(frozen=True, slots=True)
-class Packed:
+class Packed(Struct, frozen=True):
     """A cell that a kernel makes: the names of its parts, numbers as text; None for what is not there."""
 
     v: str
@@ -78,8 +76,7 @@ class Packed:
 Result = Packed | tuple[Any, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Line:
+class Line(Struct, frozen=True):
     """A statement of a kernel: the names it sets, those it reads, and itself."""
 
     sets: tuple[str, ...]
@@ -87,8 +84,7 @@ class Line:
     node: ast.stmt
 
 
-@dataclass(frozen=True)
-class Straight:
+class Straight(Struct, frozen=True):
     """A kernel as lines. parts: of arguments, by the names that the lines have for them."""
 
     kernel: Kernel

@@ -6,10 +6,10 @@ Owns `joined` and `unfinished`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from msgspec.structs import replace
 
 from potto.integrate.events import Shortfall
 from potto.runtime.answers.convergence import converged_members

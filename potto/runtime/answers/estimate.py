@@ -7,17 +7,16 @@ None with its text in `text`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from potto.integrate.events import Shortfall
 from potto.runtime.answers.printing import concisely, format_number, format_seconds, format_tuple
 
 
-@dataclass(frozen=True)
-class OneSided:
+class OneSided(Struct, frozen=True):
     """A surface lies on an edge of the domain, or on another surface that moves otherwise, or folds just here.
 
     The derivatives on the two sides of the parameters differ, or are infinite. other: the other surface, if there is
@@ -63,8 +62,7 @@ def _number(x: Any, error: Any) -> str:
 UNSHOWN = ("notes", "stats", "shortfalls")
 
 
-@dataclass(frozen=True, repr=False)
-class Estimate:
+class Estimate(Struct, frozen=True):
     """The outcome of an evaluation.
 
     value, error: the number and a bound of its absolute error; arrays for a batch, tuples for tuples.
@@ -87,10 +85,10 @@ class Estimate:
     compile_seconds: float = 0.0
     method: str = "exact"
     notes: tuple[OneSided, ...] = ()
-    stats: dict[str, Any] = field(default_factory=dict)
+    stats: dict[str, Any] = {}
     text: str | None = None
     member_converged: Any = None
-    shortfalls: Mapping[Shortfall, Any] = field(default_factory=dict)
+    shortfalls: Mapping[Shortfall, Any] = {}
 
     @property
     def reasons(self) -> tuple[str, ...]:
@@ -108,7 +106,7 @@ class Estimate:
 
     def summary(self) -> str:
         """All that is known, a line each."""
-        shown = {item.name: getattr(self, item.name) for item in fields(self) if item.name not in UNSHOWN}
+        shown = {name: getattr(self, name) for name in self.__struct_fields__ if name not in UNSHOWN}
         shown["reasons"] = self.reasons
         lines = [f"{name}: {value}" for name, value in shown.items() if value is not None and not _empty(value)]
         return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])

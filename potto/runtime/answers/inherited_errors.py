@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 
 import numpy as np
 
@@ -53,7 +52,7 @@ def _at(machine: Machine, key: tuple[str, str], held: Value, again: Callable[[Ma
     """The value if the answer were another one; None where it has none then."""
     linker = copy.copy(machine.linker)
     linker.held, linker.constants = {**linker.held, key: held}, {}
-    other = replace(machine, linker=linker, events=Events(), record=Record(gauge=machine.record.gauge))
+    other = machine.changed(linker=linker, events=Events(), record=Record(gauge=machine.record.gauge))
     try:
         return again(other)
     except PottoError:

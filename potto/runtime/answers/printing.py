@@ -12,9 +12,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
+
+from msgspec import Struct
 
 ROUNDING = 8 * 2.0**-52  # a few rounding errors: what remains of an error estimate of zero
 MOST_ITEMS = 12  # of an array that are shown
@@ -77,8 +78,7 @@ def format_concise(value: float, error: float) -> str:
     return format_number(value, error) if found is None else found.concise
 
 
-@dataclass(frozen=True, slots=True)
-class _Interval:
+class _Interval(Struct, frozen=True):
     """count * 10^place, off by at most error * 10^place; the error has at most two digits."""
 
     count: int

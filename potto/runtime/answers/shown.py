@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from msgspec.structs import replace
 
 from potto.core.terms import App, Deriv, Global, If, Lam, Term, Var
 from potto.kernels.cells import Cell, Value

@@ -7,8 +7,6 @@ formula misses a part, and nothing is known of its derivative.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from potto.diagnostics import PottoError
@@ -32,7 +30,7 @@ def compared(machine: Machine, inner: Derivative, groups: Groups, value: Value) 
     wrong, and the error of the second one without bound then."""
     if not (isinstance(value, tuple) and len(value) == 2) or machine.frozen or not machine.root:
         return value
-    other = replace(machine, events=Events(), record=Record(costs=None, gauge=machine.record.gauge))
+    other = machine.changed(events=Events(), record=Record(costs=None, gauge=machine.record.gauge))
     try:
         first = other.call(inner, tuple(tuple(map(_value, group)) for group in groups), None)
     except (PottoError, _ByHand):

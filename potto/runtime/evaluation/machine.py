@@ -26,8 +26,9 @@ from potto.integrate.pieces import STRAY
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Ints, Number, Pattern, Trace, Value, pad, pattern
 from potto.kernels.chunks import at_points, many
-from potto.kernels.compile import Kernel, kernel
+from potto.kernels.compile import kernel
 from potto.kernels.making import counts
+from potto.kernels.written import Kernel
 from potto.projects.settings import Settings
 from potto.runtime.evaluation.functions import Closure, Derivative, Paired
 from potto.runtime.evaluation.reach import Reach

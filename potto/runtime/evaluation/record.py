@@ -9,10 +9,10 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from msgspec import Struct, field
 
 from potto.integrate import costs
 from potto.integrate.costs import Costs
@@ -21,8 +21,7 @@ from potto.kernels.cells import Array, Value
 from potto.runtime.answers.convergence import Shortfalls, merged
 
 
-@dataclass(slots=True)
-class Gauge:
+class Gauge(Struct):
     """How far the evaluation that goes on has come. Another thread may look at any time.
 
     start: when it began, by `time.perf_counter`. evaluations: of integrands so far. share: how much of the work is
@@ -92,8 +91,7 @@ def _begun() -> Gauge | None:
     return gauge
 
 
-@dataclass
-class Record:
+class Record(Struct):
     """What one evaluation has done so far. used: answers of before that it is made of.
 
     shortfalls, edges: why answers are not what was asked for, and where they are one-sided, as masks and numbers over
@@ -104,15 +102,15 @@ class Record:
 
     evaluations: int = 0
     depth: int = 0
-    shortfalls: Shortfalls = field(default_factory=dict)
-    edges: list[OneSidedDerivatives] = field(default_factory=list)
-    methods: set[str] = field(default_factory=set)
+    shortfalls: Shortfalls = {}
+    edges: list[OneSidedDerivatives] = []
+    methods: set[str] = set()
     second: bool = False
     within: Any = 0.0
     start: int = 0
     members: int = 1
     integrals: int = 0
-    used: dict[tuple[str, str], Value] = field(default_factory=dict)
+    used: dict[tuple[str, str], Value] = {}
     costs: Costs | None = field(default_factory=costs.books)
     gauge: Gauge | None = field(default_factory=_begun)
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from msgspec.structs import replace
 
 from potto.calculus.surfaces.discontinuities import TooDeep
 from potto.core.terms import Integral, function_of

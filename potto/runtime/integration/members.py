@@ -10,9 +10,9 @@ one.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
+from msgspec.structs import replace
 
 from potto.core.terms import Integral
 from potto.integrate.events import Degenerate, Events, Fold, Shortfall, TwoSided, Unsearched

@@ -10,15 +10,17 @@ import math
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from potto.calculus.algebra.point_values import sample_value
 from potto.calculus.inlining.deciding import deciding
+from potto.core.packing import keep, packed, recall, unpacked
 from potto.core.terms import Deriv, Integral, Lam, Term, Var, deriv, substitute, var
 from potto.diagnostics import PottoError
 from potto.integrate.elimination.recursion import Eliminated, eliminated
@@ -62,18 +64,35 @@ def linked(env: dict[str, Value]) -> tuple[Functions, dict[str, Value]]:
     return functions, extended
 
 
-@dataclass
-class Known:
+class Known(Struct):
     """What was found out about an integral and all that it calls: plans, one for each course that it may take; the
-    steps that eliminate its variables; the parameters that decide its course. Empty where nobody has asked."""
+    steps that eliminate its variables; the parameters that decide its course. Empty where nobody has asked.
 
-    plans: list[Plan] = field(default_factory=list)
-    steps: list[Eliminated | None] = field(default_factory=list)
-    deciding: list[frozenset[str]] = field(default_factory=list)
+    key: what it is kept under on disk. packed: the plans as they are kept.
+    """
+
+    key: bytes = b""
+    plans: list[Plan] = []
+    packed: list[bytes] = []
+    steps: list[Eliminated | None] = []
+    deciding: list[frozenset[str]] = []
 
 
 _known: OrderedDict[Any, Known] = OrderedDict()
 _lock = threading.Lock()
+
+
+def _recalled(key: tuple[object, ...]) -> Known:
+    """What an earlier process has found out about an integral; the digests in the key are those of contents."""
+    name = repr(key).encode()
+    plans = recall("plans", name) or []
+    return Known(name, [unpacked(plan) for plan in plans], plans)
+
+
+def clear() -> None:
+    """Forget what is known of integrals in this process (for tests and measurements)."""
+    with _lock:
+        _known.clear()
 
 
 class Mixed(Exception):
@@ -170,6 +189,10 @@ class Problem:
         with making:
             plan = make(self.term, self.function, self.decided, self.plain_function, _Sampled(self))
         known.append(plan)
+        # Each as it was made: evaluation adds to what a plan knows, in forms that are for this process alone.
+        with suppress(TypeError):  # what is no data is not kept
+            self.known.packed.append(packed(plan))
+            keep("plans", self.known.key, self.known.packed)
         fits = self.fitting(plan)
         if not fits.all():
             raise Mixed(fits)
@@ -202,7 +225,9 @@ class Problem:
         functions = tuple((name, f.digest) for name, f in sorted(self.functions.items()))
         key = (self.term.digest, functions, self.machine.linker.reached(self.term, *self.functions.values()))
         with _lock:
-            found = _known.setdefault(key, Known())
+            found = _known.get(key)
+            if found is None:
+                found = _known[key] = _recalled(key)
             _known.move_to_end(key)
             if len(_known) > MOST_INTEGRALS:
                 _known.popitem(last=False)

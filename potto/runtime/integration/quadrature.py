@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import math
 from contextlib import AbstractContextManager
-from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from msgspec.structs import replace
 
 from potto.integrate.adaptive.iterated import Iteration
 from potto.integrate.fixed.alike import together

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import replace
 
 import numpy as np
+from msgspec.structs import replace
 
 from potto.core.terms import Integral
 from potto.integrate.events import Degenerate, Fold, Shortfall, TwoSided, Unsearched

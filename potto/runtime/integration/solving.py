@@ -7,9 +7,9 @@ an answer, and what was met on the way to it, to one that is no worse; each says
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
+from msgspec.structs import replace
 
 from potto.calculus.differentiation.level_sets import placed_along
 from potto.core.terms import Integral

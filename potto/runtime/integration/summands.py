@@ -8,14 +8,15 @@ are not accurate, that they have two derivatives) are evaluated as they are writ
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from potto.calculus.inlining.alike import Alike, Leaf, alike
 from potto.core.terms import Const, Integral, Lam, Term, Var
 from potto.diagnostics import PottoError
+from potto.integrate.columns import distinct
 from potto.kernels import errors
 from potto.kernels.cells import Array, Bools, Cell, Number, Value, all_arrays, combined, map_arrays, pad
 from potto.kernels.tape import Node
@@ -32,8 +33,7 @@ SUM = 8 * UNIT_ROUNDOFF  # what numpy's pairwise sums round off, as a part of al
 FUNCTION = "function"
 
 
-@dataclass(frozen=True)
-class Batch:
+class Batch(Struct, frozen=True):
     """Summands of one shape, as `Alike` has them, with columns of nothing but numbers as arrays."""
 
     function: Lam
@@ -45,8 +45,7 @@ class Batch:
         return Batch(self.function, columns, self.places[index])
 
 
-@dataclass(frozen=True)
-class Grouped:
+class Grouped(Struct, frozen=True):
     """Summands that are alike, with the names that each group needs, and the places of those that are not."""
 
     batches: tuple[tuple[Batch, frozenset[str]], ...]
@@ -240,7 +239,7 @@ class _Parts:
         ends = np.searchsorted(into[order], np.arange(self.directions + 2))
         numbers, off = (x[..., keep].reshape(*self.batch, -1)[..., order] for x in (self.numbers, self.off))
         found: list[tuple[Number | None, Number | None]] = [(None, None)] * (self.directions + 1)
-        for place in np.unique(into[into <= self.directions]).tolist():
+        for place in distinct(into[into <= self.directions]).tolist():
             here = slice(ends[place], ends[place + 1])
             size = np.abs(numbers[..., here])
             sums = numbers[..., here].sum(axis=-1), (off[..., here] + SUM * size).sum(axis=-1)

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from typing import Any
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from potto.core.terms import Delta, Global, Term, postorder
 from potto.diagnostics import PottoError
@@ -31,8 +33,7 @@ DIGITS = 12  # of the reference evaluator's differences
 STEPS = 7
 
 
-@dataclass(frozen=True, slots=True)
-class Difference:
+class Difference(Struct, frozen=True):
     """A derivative by finite differences, how far it may be off, and how it was computed."""
 
     value: float

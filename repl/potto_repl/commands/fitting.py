@@ -9,7 +9,8 @@ import math
 import re
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
+
+from msgspec.structs import asdict
 
 from potto.applications.fitting import Step
 from potto.applications.fitting import fit as fitted

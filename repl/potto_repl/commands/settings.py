@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from dataclasses import fields, replace
+
+from msgspec.structs import replace
 
 from potto.projects.settings import CHOICES, METHODS, Settings, problem
 from potto_repl import options
@@ -11,7 +12,7 @@ from potto_repl.registry import command
 from potto_repl.reply import Part, Refusal, answer
 from potto_repl.session import Conversation
 
-NUMBERS = tuple(field.name for field in fields(Settings))
+NUMBERS = Settings.__struct_fields__
 
 
 @command("set", "s", argument="[NAME VALUE]", completes="setting")
@@ -47,7 +48,7 @@ def _number(session: Conversation, name: str, text: str) -> Part:
         complaint = problem(name, value)
         if complaint is not None:
             raise Refusal(complaint)
-        session.settings = replace(session.settings, **{name: value})  # type: ignore[arg-type]
+        session.settings = replace(session.settings, **{name: value})
     value = getattr(session.settings, name)
     return answer(f"{name} {value}", **{name: value})
 
