@@ -179,7 +179,7 @@ def one_by_one(known: Eliminated, machine: Any, env: dict[str, Value]) -> Sums |
     settings = machine.settings
     most = min(settings.max_evals, int(machine.record.spent) + AFFORDABLE)
     finer = replace(settings, rtol=max(SHARE * settings.rtol, FINEST), atol=0.0, max_evals=most)
-    fine = replace(machine, settings=finer)
+    fine = machine.changed(settings=finer)
     spans = _spans(known.steps, env)
     further: Table | Cell | None = None
     sums: Sums | None = None

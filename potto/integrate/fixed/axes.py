@@ -10,6 +10,7 @@ import math
 import numpy as np
 from msgspec import Struct
 
+from potto.integrate.columns import distinct
 from potto.integrate.rules.gauss import gauss
 from potto.kernels.cells import Array, Bools
 
@@ -43,7 +44,7 @@ class Axis(Struct, frozen=True):
                 nodes, speeds = u * (2 - u), 2 * (1 - u)
             case _:
                 nodes, speeds = u, np.ones_like(u)
-        picked = np.unique([0, order // 2, order - 1]) if several else np.arange(order)
+        picked = distinct([0, order // 2, order - 1]) if several else np.arange(order)
         transform = np.ascontiguousarray(rule.weights[:, None] if exact else rule.transform)
         return cls(nodes, speeds, rule.weights, transform, nodes[picked], speeds[picked])
 
