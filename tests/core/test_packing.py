@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 from potto.core.packing import keep, packed, recall, unpacked
 from potto.core.terms import const, lam, prim, var
+from potto.kernels.written import Written
 from potto.projects.settings import BAD_SETTING as KIND
-from potto.source import Span
 
 plain = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text() | st.binary() | st.fractions(),
@@ -49,7 +49,10 @@ def test_a_shared_subterm_is_packed_once() -> None:
     assert len(packed(term)) < 201 * 20 and unpacked(packed(term)) is term
 
 
-@pytest.mark.parametrize("value", [Span(1, 2), KIND, frozenset({"a"}), 2**200, -(2**200), Fraction(1, 3)])
+WRITTEN = Written("a", b"", {"f": "sqrt"}, {"o": (1, 2)}, True)
+
+
+@pytest.mark.parametrize("value", [WRITTEN, KIND, frozenset({"a"}), 2**200, -(2**200), Fraction(1, 3)])
 def test_structs_kinds_sets_and_long_numbers(value: object) -> None:
     found = unpacked(packed(value))
     assert found == value and type(found) is type(value)

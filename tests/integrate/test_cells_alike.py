@@ -148,3 +148,11 @@ def test_a_cut_that_starts_in_a_corner_of_the_bounds() -> None:
         slope = mp.quad(lambda s, a=a[i]: mp.exp(a * mp.sin(2 * s) / 2) / 2, [0, mp.pi / 4])
         assert abs(answer.value[i] - float(value)) <= answer.error[i] + 1e-15
         assert abs(answer.tangent[i] - float(slope)) <= answer.tangent_error[i] + 1e-15
+
+
+def test_a_polynomial_from_a_turning_point_on() -> None:
+    """The roots of x^2 < t merge where x = 0, the lower bound; x^2 takes two nodes where Gauss has them."""
+    t = np.linspace(0.1, 0.9, 401)
+    answer = answered("def f(t) integral [0, 1] x^2*[x^2 < t] d(x)", t)
+    assert (np.abs(answer.value - t**1.5 / 3) <= answer.error + 1e-16).all()
+    assert (np.abs(answer.tangent - t**0.5 / 2) <= answer.tangent_error + 2e-16).all()

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 import random
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from how_many import examples
 from mpmath import mp
+from msgspec.structs import replace
 
 import potto
 from potto.core import terms as core

@@ -32,10 +32,11 @@ class Axis(Struct, frozen=True):
 
     @classmethod
     def of(cls, order: int, exact: bool, turning: tuple[bool, bool], several: bool) -> Axis:
-        """turning: whether an end of the stretch is like a square root. several: rounding is followed at few nodes."""
+        """exact: for a polynomial of the degree that the rule is for, with nodes where Gauss has them. turning: whether an
+        end of the stretch is like a square root. several: rounding is followed at few nodes."""
         rule = gauss(order)
         u = rule.nodes
-        match turning:
+        match (False, False) if exact else turning:
             case (True, True):
                 nodes, speeds = np.sin(0.5 * math.pi * u) ** 2, 0.5 * math.pi * np.sin(math.pi * u)
             case (True, False):
