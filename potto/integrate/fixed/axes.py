@@ -32,8 +32,8 @@ class Axis(Struct, frozen=True):
 
     @classmethod
     def of(cls, order: int, exact: bool, turning: tuple[bool, bool], several: bool) -> Axis:
-        """exact: for a polynomial of the degree that the rule is for, with nodes where Gauss has them. turning: whether an
-        end of the stretch is like a square root. several: rounding is followed at few nodes."""
+        """exact: for a polynomial of the degree that the rule is for, at Gauss nodes. turning: whether an end of the
+        stretch is like a square root. several: rounding is followed at few nodes."""
         rule = gauss(order)
         u = rule.nodes
         match (False, False) if exact else turning:
