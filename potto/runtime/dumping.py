@@ -7,6 +7,7 @@ from potto.kernels.cells import Pattern
 from potto.kernels.compile import kernel
 from potto.projects.settings import DEFAULTS
 from potto.runtime.evaluate import Program
+from potto.runtime.evaluation.arguments import uncurried
 
 
 def kernel_text(program: Program, file: str, name: str) -> str | None:
@@ -21,7 +22,7 @@ def kernel_text(program: Program, file: str, name: str) -> str | None:
     while isinstance(inner, Lam):
         sizes.append(len(inner.params))
         inner = inner.body
-    whole, _ = machine.linker_shape(term, tuple(sizes))
+    whole, _ = uncurried(term, tuple(sizes))
     patterns = tuple(_pattern(parameter, body) for parameter in whole.params)
     return kernel(lam(whole.params, whole.body), patterns, 1, True, machine).text
 

@@ -13,9 +13,10 @@ from potto.integrate.pieces import still
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Trace, Value
 from potto.kernels.tape import Untaped
+from potto.runtime.evaluation.arguments import fit, uncurried
 from potto.runtime.evaluation.compared import compared
 from potto.runtime.evaluation.functions import Closure, Derivative, Paired
-from potto.runtime.evaluation.machine import Machine, fit
+from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.second_derivatives import dual_function
 
 
@@ -29,7 +30,7 @@ def call_derivative(
     if machine.directions or isinstance(primal, Paired):
         machine.record.second = machine.record.second or machine.directions > 0
         return machine.call(dual_function(machine, primal), groups, None)
-    _, arities = machine.linker_shape(primal.lam, sizes_of(groups))
+    _, arities = uncurried(primal.lam, sizes_of(groups))
     carrying = machine.with_directions(1)
     dual_groups = tuple(
         tuple(merge(arg) for arg in fit(group, arity)) for group, arity in zip(groups, arities, strict=False)

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from potto.calculus.differentiation.deltas import PRODUCT_OF_DELTAS
-from potto.calculus.inlining.currying import sizes_of, uncurry
+from potto.calculus.inlining.currying import sizes_of
 from potto.calculus.surfaces.branch_cuts import opened
-from potto.core.terms import Branch, Deriv, Global, Hole, If, Integral, Lam, Sum, Term, function_of, lam, postorder
+from potto.core.terms import Branch, Deriv, Global, Hole, If, Integral, Lam, Sum, Term, function_of, postorder
 from potto.core.terms import Delta as DeltaTerm
 from potto.diagnostics import PottoError
 from potto.integrate.costs import Costs
@@ -30,6 +30,7 @@ from potto.kernels.compile import kernel
 from potto.kernels.making import counts
 from potto.kernels.written import Kernel
 from potto.projects.settings import Settings
+from potto.runtime.evaluation.arguments import fit, uncurried
 from potto.runtime.evaluation.functions import Closure, Derivative, Paired
 from potto.runtime.evaluation.reach import Reach
 from potto.runtime.evaluation.record import Record
@@ -323,32 +324,13 @@ class Machine:
         if isinstance(function, Paired):
             return self.linker.semantics.paired(self, function, groups, trace)
         self.enter()
-        whole, arities = self.linker_shape(function.lam, sizes_of(groups))
+        whole, arities = uncurried(function.lam, sizes_of(groups))
         args = [function.captured[n] for n in sorted(function.captured)]
         for group, arity in zip(groups, arities):
             args.extend(fit(group, arity))
         value = self.run(whole, args, trace)
         self.record.depth -= 1
         return value
-
-    def linker_shape(self, function: Lam, sizes: tuple[int, ...]) -> tuple[Lam, tuple[int, ...]]:
-        """The function with captured names and as many groups of parameters as are given at once; with the size of
-        each group."""
-        key = (function, sizes)
-        found = _shapes.get(key)
-        if found is None:
-            params, body = uncurry(function, sizes)
-            arities: list[int] = []
-            inner: Term = function
-            for size in sizes:
-                arities.append(len(inner.params) if isinstance(inner, Lam) else size)
-                inner = inner.body if isinstance(inner, Lam) else inner
-            captured = tuple(sorted(function.free))
-            found = (lam(captured + params, body), tuple(arities))
-            if len(_shapes) > 10_000:
-                _shapes.clear()
-            _shapes[key] = found
-        return found
 
     # Branches, sums
 
@@ -385,9 +367,6 @@ class Machine:
         return self.linker.semantics.integral(self, term, env)
 
 
-_shapes: dict[tuple[Lam, tuple[int, ...]], tuple[Lam, tuple[int, ...]]] = {}
-
-
 def _any_inexact(values: dict[str, Value]) -> bool:
     def inexact(value: Value) -> bool:
         if isinstance(value, Cell):
@@ -399,15 +378,4 @@ def _any_inexact(values: dict[str, Value]) -> bool:
     return any(map(inexact, values.values()))
 
 
-def fit(group: tuple[Value, ...], arity: int) -> tuple[Value, ...]:
-    """A group of arguments as the parameters take it: a tuple spread out, or several made into one tuple."""
-    if len(group) == arity:
-        return group
-    if len(group) == 1 and isinstance(group[0], tuple) and len(group[0]) == arity:
-        return group[0]
-    if arity == 1 and len(group) > 1:
-        return (tuple(group),)
-    raise errors.wrong_call(f"{len(group)} argument(s) given to a function that takes {arity}")
-
-
-__all__ = ["Linker", "Machine", "Record", "fit"]
+__all__ = ["Linker", "Machine", "Record"]
