@@ -15,6 +15,7 @@ import pytest
 
 import potto
 from potto.kernels.making import counts
+from potto.kernels.native import objects, promotion
 
 needs_llvm = pytest.mark.skipif(importlib.util.find_spec("llvmlite") is None, reason="llvmlite is not installed")
 TEXT = "def f(c) integral ([0, 1], [0, 1]) 1/(x + y + c + 2)^2*[x + y + c >= 0] d(x, y)"
@@ -53,6 +54,22 @@ def test_numpy_answers_first_and_machine_code_takes_over() -> None:
             if counts.native_points > before:
                 return
     raise AssertionError("machine code never took over")
+
+
+@needs_llvm
+def test_numpy_goes_on_where_llvm_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    def failing(text: str, name: str) -> objects.Loaded:
+        raise RuntimeError("LLVM knows no such processor")
+
+    monkeypatch.setattr(objects, "made", failing)
+    monkeypatch.setattr(promotion, "FUNCTION", 0.0)
+    monkeypatch.setattr(promotion, "LLVM", 0.0)
+    d, before = 2.03125, counts.native_points
+    function = potto.compile(TEXT.replace("2)", f"{d})")).f
+    with potto.settings(backend="auto"):
+        for _ in range(20):
+            held(function(WHERE), d)
+    assert counts.native_points == before
 
 
 @needs_llvm

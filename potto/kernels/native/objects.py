@@ -11,6 +11,7 @@ import ctypes
 import ctypes.util
 import itertools
 import os
+import sys
 import threading
 from functools import lru_cache
 from importlib.util import find_spec
@@ -47,7 +48,7 @@ class _Compiler:
         target = binding.Target.from_default_triple()
         self.machine = target.create_target_machine(cpu=self.cpu, features=self.features, opt=2, jit=True)
         self.jit = binding.create_lljit_compiler(self.machine)
-        mathematics = ctypes.CDLL(ctypes.util.find_library("m"))
+        mathematics = ctypes.CDLL("ucrtbase" if sys.platform == "win32" else ctypes.util.find_library("m"))
         self.symbols = {name: ctypes.cast(getattr(mathematics, name), ctypes.c_void_p).value for name in LIBRARY}
 
     @property

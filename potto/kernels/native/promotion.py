@@ -63,8 +63,9 @@ class Promotion:
                     written = text()
                 self._coming = _worker(os.getpid()).submit(_made, written, self.name)
             if now or self._coming.done():
-                self._ready = self._coming.result()
-                self._coming = None
+                coming, self._coming = self._coming, None
+                self.impossible = not now and coming.exception() is not None  # numpy goes on where LLVM can't
+                self._ready = None if self.impossible else coming.result()
         except NotStraight:
             self.impossible = True
 
