@@ -76,7 +76,8 @@ def test_many_points_are_what_few_are(name: str, shape: tuple[int, ...]) -> None
     f = potto.grad(getattr(POINTS, name), ["c"])
     random = np.random.default_rng(5)
     x, y = random.normal(size=shape), random.normal(size=shape)
-    whole = f(x=x, y=y, c=0.7)
+    with potto.settings(backend="numpy"):  # machine code, which takes over at some time, has an exp of its own
+        whole = f(x=x, y=y, c=0.7)
 
     def numbers(found: Any) -> list[Any]:
         parts = [found.value, found.error, found.tangent, found.tangent_error]
@@ -86,7 +87,8 @@ def test_many_points_are_what_few_are(name: str, shape: tuple[int, ...]) -> None
     size = x.size
     for start in (0, 16_000, size - 1000):
         part = slice(start, start + 1000)
-        few = f(x=x.reshape(-1)[part], y=y.reshape(-1)[part], c=0.7)
+        with potto.settings(backend="numpy"):
+            few = f(x=x.reshape(-1)[part], y=y.reshape(-1)[part], c=0.7)
         for a, b in zip(flat, numbers(few), strict=True):
             assert np.array_equal(a[part], b)
 
