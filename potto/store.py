@@ -21,7 +21,7 @@ import stat
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from functools import lru_cache
 from hashlib import blake2b
@@ -177,12 +177,17 @@ def bound() -> int:
 
 @lru_cache(maxsize=1)
 def program() -> bytes:
-    """A digest of Potto: its version, the names, sizes and times of its files, and the Python that runs it."""
+    """A digest of Potto: its version, its files, and the Python that runs it."""
     import potto
 
-    digest = blake2b(f"{potto.__version__} {sys.version}".encode(), digest_size=16)
-    for root in potto.__path__:
-        for name, status in _sources(root):
+    return blake2b(potto.__version__.encode() + digest_of(potto.__path__), digest_size=16).digest()
+
+
+def digest_of(folders: Iterable[str]) -> bytes:
+    """A digest of programs in folders: the names, sizes and times of their files, and the Python that runs them."""
+    digest = blake2b(sys.version.encode(), digest_size=16)
+    for folder in folders:
+        for name, status in _sources(folder):
             digest.update(f"{name}:{status.st_size}:{status.st_mtime_ns}\n".encode())
     return digest.digest()
 

@@ -16,17 +16,17 @@ import re
 import stat
 import sys
 import tempfile
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Hashable, Mapping
 from hashlib import blake2b
 from pathlib import Path
 from typing import Any
 
+from potto import store
 from potto.diagnostics import Diagnostic, Related
 from potto.modules.texts import content
 from potto.query import Database
 from potto.reports.render import Located
 from potto.source import Span
-from potto.store import cache_folder
 
 logger = logging.getLogger(__name__)
 FOLDER = "checked-"
@@ -72,7 +72,7 @@ class Verdicts:
 
     def _path(self, file: str) -> Path | None:
         if self._folder is None:
-            kept = cache_folder()
+            kept = store.cache_folder()
             if kept is None:
                 return None
             self._folder = kept / f"{FOLDER}{program_digest()}"
@@ -106,26 +106,11 @@ def _hashed(value: object) -> str:
 
 
 def program_digest() -> str:
-    """A digest of this program: the names, sizes and times of its files, and the Python that runs it."""
+    """A digest of this program."""
     import potto
     import potto_lsp
 
-    digest = blake2b(sys.version.encode(), digest_size=8)
-    for package in (potto, potto_lsp):
-        for root in package.__path__:
-            for name, status in _sources(root):
-                digest.update(f"{name}:{status.st_size}:{status.st_mtime_ns}\n".encode())
-    return digest.hexdigest()
-
-
-def _sources(folder: str) -> Iterator[tuple[str, os.stat_result]]:
-    with os.scandir(folder) as listed:
-        entries = sorted(listed, key=lambda entry: entry.name)
-    for entry in entries:
-        if entry.name.endswith((".py", ".lark")):
-            yield entry.path, entry.stat()
-        elif entry.is_dir() and entry.name != "__pycache__":
-            yield from _sources(entry.path)
+    return store.digest_of((*potto.__path__, *potto_lsp.__path__)).hex()
 
 
 def _is_ours(folder: Path) -> bool:

@@ -44,8 +44,6 @@ from potto.kernels.cells import Cell, Value
 from potto.kernels.making import making
 
 MOST_VARIABLES, MOST_CUTS, MOST_CELLS, MOST_NODES, MOST_TERMS = 3, 13, 24, 60_000, 600
-# Up to how many rows of a frame orders are proved: beyond, whether a proof is found hangs on the order of terms.
-MOST_PROVED = 10
 # The truncation error that is proved for the value, as a part of the accuracy that is asked for; nobody gains by less
 # than LOOSEST.
 MARGIN = 1e-3
@@ -324,7 +322,7 @@ def _region(
 
 def certain(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Sums | None:
     """The integral for one set of parameters; None where something about it is not plain."""
-    if machine.frozen or machine.side or any(len(items) > MOST_PROVED for items in plan.items):
+    if machine.frozen or machine.side:
         return None
     values: dict[str, float] = {}
     for name in plan.names:

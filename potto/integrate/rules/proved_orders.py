@@ -92,12 +92,9 @@ def proved(
     """
     count, names = len(variables), sorted(middle)
     centres, reach, rho = _probes(count)
-    h = np.concatenate((reach, np.empty((len(names), reach.shape[1]))))
+    h = np.concatenate((reach, np.outer([2.0 * radius[name] for name in names], np.ones(reach.shape[1]))))
     unit = np.eye(count + len(names))[:, :, None]
-    start: dict[str, Form] = {}
-    for i, name in enumerate(names, count):
-        h[i] = 2 * radius[name]
-        start[name] = Form(np.float64(middle[name]), unit[i], 0.0, h)
+    start = {name: Form(np.float64(middle[name]), unit[i], 0.0, h) for i, name in enumerate(names, count)}
     n = np.arange(2, MOST_NODES + 1)[:, None]
     powers = np.maximum(SURE * 32 / 15 * rho ** (-2.0 * n) / (1 - rho**-2.0), 1e-300)  # (orders, radii)
     errors, total = np.zeros((len(cells), count, n.size)), 0.0
