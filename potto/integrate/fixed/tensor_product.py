@@ -169,7 +169,7 @@ def _product(
     size, k = high - low, machine.directions
     far, exact = np.maximum(np.abs(low), np.abs(high)) / size, order == box.exact
     volume = size.prod(axis=0)
-    way = lowered(box.plan, box.plan.body, k, env) if exact_values(env, box.plan) else None
+    way = lowered(box.plan, box.plan.body, k, env) if _exact(env, box.plan) else None
     function = None if way is None else way.function(machine)
     if way is not None and function is not None:
         axis = Axis.of(order, False, (False, False), True)
@@ -224,7 +224,7 @@ def _at_nodes(
     return h[:, 0], means, most, (*numbers.shape[:2], low.shape[1])
 
 
-def exact_values(env: Mapping[str, Value], plan: Straight) -> bool:
+def _exact(env: Mapping[str, Value], plan: Straight) -> bool:
     """Whether all parameters are numbers without errors."""
     cells = [env[name] for name in plan.names]
     return all(isinstance(cell, Cell) and cell.e is None and not any(cell.et) for cell in cells)

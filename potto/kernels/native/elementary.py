@@ -1,10 +1,11 @@
 """Elementary functions of eight numbers at a time: exp, log, sin, cos by polynomials, the others by the C library.
 
-Owns `module`. The four are within 0.68, 0.81, 0.78 and 0.77 units in the last place at a million places, and held to 1
-by `tests/properties/test_machine_code.py`; the C library's within 0.52, but one number takes it two to five times as
-long. The argument is reduced by multiples of log 2 or pi/2 in parts whose products are exact, what is lost is
-kept, and the last addition is that of a small number to a large one. Series are those of Taylor, long enough for 2^-58
-on the reduced range. (Method: Muller, Elementary Functions, ch. 11; Cody and Waite, 1980.)
+Owns `module`. The four are within 0.78, 0.83, 0.78 and 0.77 units in the last place at three million places each
+(`benchmarks/calibration.py elementary`), and held to 1 by `tests/properties/test_machine_code.py`; the C library's are
+within 0.52, but take two to three times as long. The argument is reduced by multiples of log 2 or pi/2 in parts whose
+products are exact, what is lost is kept, and the last addition is that of a small number to a large one. Series are
+those of Taylor, long enough for 2^-58 on the reduced range. (Method: Muller, Elementary Functions, ch. 11; Cody and
+Waite, 1980.)
 """
 
 from __future__ import annotations

@@ -57,13 +57,13 @@ class Promotion:
         )
 
     def _get(self, text: Callable[[], str], now: bool) -> None:
+        coming = self._coming  # other threads may be here as well
         try:
-            if self._coming is None:
+            if coming is None:
                 with making:
                     written = text()
-                self._coming = _worker(os.getpid()).submit(_made, written, self.name)
-            if now or self._coming.done():
-                coming, self._coming = self._coming, None
+                coming = self._coming = _worker(os.getpid()).submit(_made, written, self.name)
+            if now or coming.done():
                 self.impossible = not now and coming.exception() is not None  # numpy goes on where LLVM can't
                 self._ready = None if self.impossible else coming.result()
         except NotStraight:
