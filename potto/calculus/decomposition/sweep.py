@@ -51,9 +51,22 @@ class Level(Struct, frozen=True):
 
 
 class _Pool(Struct):
-    """Surfaces still to be placed, the same ones merged."""
+    """Findings still to be placed: surfaces, the same ones merged, centers of peaks, and critical places."""
 
+    variables: tuple[str, ...]
     surfaces: dict[Term, Placed] = {}
+    centers: dict[Term, None] = {}
+    critical: dict[Critical, None] = {}
+
+    def find(self, finding: Finding) -> None:
+        if finding.critical is not None:
+            self.critical[finding.critical] = None
+        elif finding.kind == "center":
+            self.centers[finding.surface] = None
+        else:
+            surface = settled(finding.surface, frozenset(self.variables))
+            jump = (finding.path, finding.strict) if finding.kind == "jump" else None
+            self.put(surface, jump, finding.kind == "edge")
 
     def put(self, surface: Term, jump: tuple[tuple[int, ...], bool] | None, turning: bool, steps: bool = False) -> None:
         face, orientation = face_of(surface)
@@ -79,6 +92,24 @@ class _Pool(Struct):
         return taken
 
 
+    def take_points(self, variable: str) -> tuple[list[Term], tuple[Critical, ...]]:
+        """The centers and critical places that depend on a variable."""
+        here = [c for c in self.centers if variable in c.free]
+        systems = tuple(c for c in self.critical if variable in c.free)
+        for center in here:
+            del self.centers[center]
+        for system in systems:
+            del self.critical[system]
+        return here, systems
+
+    def left(self) -> tuple[Finding, ...]:
+        return (
+            *(Finding(_kind(placed), placed.face.form) for placed in self.surfaces.values()),
+            *(Finding("center", surface) for surface in self.centers),
+            *(Finding("critical", c.equations[0], critical=c) for c in self.critical),
+        )
+
+
 class Sweep(Struct, frozen=True):
     """The levels of an integral, outermost first, and what is left over for the variables around it."""
 
@@ -94,61 +125,49 @@ def sweep(
 
     over: the level set over which the innermost variable is not integrated but summed.
     """
-    pool = _Pool()
-    centers: dict[Term, None] = {}
-    critical: dict[Critical, None] = {}
-
-    def place(f: Finding) -> None:
-        if f.critical is not None:
-            critical[f.critical] = None
-        elif f.kind != "center":
-            surface = settled(f.surface, frozenset(term.variables))
-            pool.put(surface, (f.path, f.strict) if f.kind == "jump" else None, f.kind == "edge")
-
-    for f in found:
-        place(f)
-        if f.kind == "center":
-            centers[f.surface] = None
+    pool = _Pool(term.variables)
+    for finding in found:
+        pool.find(finding)
     levels: list[Level] = []
     rows = list(zip(term.variables, term.bounds, term.hints, strict=True))
-    for variable, (lo, hi), hints in reversed(rows):
-        cuts = tuple(cut_of(placed, variable) for placed in pool.take(variable))
-        decisive, others = [c for c in cuts if c.decides], [c for c in cuts if not c.decides]
-        further = frozenset(term.variables[: term.variables.index(variable)])
-        complete = len(others) <= MOST_CUTS and crossing(cuts, variable, further)[1]
-        cuts = (*decisive, *others[:MOST_CUTS])
-        here = [c for c in centers if variable in c.free]
-        centers = {c: None for c in centers if variable not in c.free}
-        systems = tuple(c for c in critical if variable in c.free)
-        critical = {c: None for c in critical if variable not in c.free}
-        peaks = (*hints, *points_of(here, variable)[:MOST_CENTERS])
-        own = cut_along(over.surface, variable) if over is not None and variable == term.variables[-1] else None
-        placed = (*cuts, *around_centers(here, variable)) if own is None else (own,)
-        levels.append(Level(variable, lo, hi, peaks, placed, systems, complete))
-        if not (outermost and variable == term.variables[0]):
-            within = Within(variable, lo, hi)
-            if over is None or own is None:
-                found_here = shadows_of_cuts(cuts, within, further)
+    for variable, bounds, hints in reversed(rows):
+        last = outermost and variable == term.variables[0]
+        levels.append(_level(pool, variable, bounds, hints, over if not levels else None, last))
+        for bound in bounds:
+            for finding in findings(bound, resolve, decide):
+                if finding.kind == "jump":
+                    pool.put(finding.surface, None, False)
+                elif finding.kind != "center":
+                    pool.find(finding)
+    return Sweep(tuple(reversed(levels)), pool.left())
+
+
+def _level(
+    pool: _Pool, variable: str, bounds: tuple[Term, Term], hints: tuple[Term, ...], over: LevelSet | None, last: bool
+) -> Level:
+    """One variable with what cuts it; what that leaves further out goes into the pool, unless nobody asks for it."""
+    cuts = tuple(cut_of(placed, variable) for placed in pool.take(variable))
+    decisive, others = [c for c in cuts if c.decides], [c for c in cuts if not c.decides]
+    further = frozenset(pool.variables[: pool.variables.index(variable)])
+    complete = len(others) <= MOST_CUTS and crossing(cuts, variable, further)[1]
+    cuts = (*decisive, *others[:MOST_CUTS])
+    here, systems = pool.take_points(variable)
+    own = None if over is None else cut_along(over.surface, variable)
+    if not last:
+        within = Within(variable, *bounds)
+        if over is None or own is None:
+            shadows = shadows_of_cuts(cuts, within, further)
+        else:
+            shadows = shadows_of_roots(own, cuts, within, further, len(over.shares) == 1)
+        for shadow in shadows:
+            if isinstance(shadow, Critical):
+                pool.critical[shadow] = None
             else:
-                found_here = shadows_of_roots(own, cuts, within, further, len(over.shares) == 1)
-            for shadow in found_here:
-                if isinstance(shadow, Critical):
-                    critical[shadow] = None
-                else:
-                    pool.put(shadow[0], None, *shadow[1:])
-            critical.update(dict.fromkeys(further_systems(systems, cuts, variable, lo, hi)))
-        for bound in (lo, hi):
-            for f in findings(bound, resolve, decide):
-                if f.kind != "jump":
-                    place(f)
-                else:
-                    pool.put(f.surface, None, False)
-    outer = (
-        *(Finding(_kind(placed), placed.face.form) for placed in pool.surfaces.values()),
-        *(Finding("center", surface) for surface in centers),
-        *(Finding("critical", c.equations[0], critical=c) for c in critical),
-    )
-    return Sweep(tuple(reversed(levels)), outer)
+                pool.put(shadow[0], None, *shadow[1:])
+        pool.critical.update(dict.fromkeys(further_systems(systems, cuts, variable, *bounds)))
+    peaks = (*hints, *points_of(here, variable)[:MOST_CENTERS])
+    placed = (*cuts, *around_centers(here, variable)) if own is None else (own,)
+    return Level(variable, *bounds, peaks, placed, systems, complete)
 
 
 def _kind(placed: Placed) -> Kind:
