@@ -75,7 +75,38 @@ class Proj(Base, frozen=True, eq=False):
 
 
 class ListOf(Base, frozen=True, eq=False):
+    """An array whose elements are written one by one."""
+
     items: tuple[Term, ...]
+
+
+class Array(Base, frozen=True, eq=False):
+    """The array of `body` for the places `variable` from 0 to `size - 1`."""
+
+    variable: str
+    size: Term
+    body: Term
+
+
+class Index(Base, frozen=True, eq=False):
+    """The element of an array at a place, counted from 0."""
+
+    array: Term
+    index: Term
+
+
+class Length(Base, frozen=True, eq=False):
+    """How many elements an array has."""
+
+    array: Term
+
+
+class Data(Base, frozen=True, eq=False):
+    """What a file holds: a number, an array, or one `column` of it ("" for the whole); `content` is the file's digest."""
+
+    path: str
+    content: str
+    column: str
 
 
 class Lam(Base, frozen=True, eq=False):
@@ -126,6 +157,18 @@ class Sum(Base, frozen=True, eq=False):
     body: Term
 
 
+class Fold(Base, frozen=True, eq=False):
+    """The last of the states that begin with `start`, each `body` of the one before, for the integers `variable` from
+    `lo` to `hi`; `start` when there are none. `body` sees `variable` and `state`."""
+
+    variable: str
+    lo: Term
+    hi: Term
+    state: str
+    start: Term
+    body: Term
+
+
 class Deriv(Base, frozen=True, eq=False):
     """The derivative of a function: takes duals `(value, tangent)`, gives a dual."""
 
@@ -151,12 +194,17 @@ Term = (
     | Tuple
     | Proj
     | ListOf
+    | Array
+    | Index
+    | Length
+    | Data
     | Lam
     | App
     | Global
     | Integral
     | Delta
     | Sum
+    | Fold
     | Deriv
     | Hole
 )
@@ -220,6 +268,26 @@ def list_of(items: Iterable[Term]) -> ListOf:
     return make(ListOf, union_of(items), items)
 
 
+def array(variable: str, size: Term, body: Term) -> Array:
+    return make(Array, size.free | body.free.difference((variable,)), variable, size, body)
+
+
+def index(array: Term, place: Term) -> Term:
+    if isinstance(array, ListOf) and isinstance(place, Const) and place.value in range(len(array.items)):
+        return array.items[int(place.value)]
+    return make(Index, array.free | place.free, array, place)
+
+
+def length(array: Term) -> Term:
+    if isinstance(array, ListOf):
+        return const(len(array.items))
+    return array.size if isinstance(array, Array) else make(Length, array.free, array)
+
+
+def data(path: str, content: str, column: str) -> Data:
+    return make(Data, _NOTHING, path, content, column)
+
+
 def lam(params: tuple[str, ...], body: Term) -> Lam:
     return make(Lam, body.free.difference(params), params, body)
 
@@ -259,6 +327,11 @@ def sum_(variable: str, lo: Term, hi: Term, body: Term) -> Sum:
     return make(Sum, lo.free | hi.free | body.free.difference((variable,)), variable, lo, hi, body)
 
 
+def fold(variable: str, lo: Term, hi: Term, state: str, start: Term, body: Term) -> Fold:
+    free = lo.free | hi.free | start.free | body.free.difference((variable, state))
+    return make(Fold, free, variable, lo, hi, state, start, body)
+
+
 def deriv(function: Term) -> Deriv:
     return make(Deriv, function.free, function)
 
@@ -280,12 +353,17 @@ _REBUILD: dict[type, Any] = {
     Tuple: tuple_,
     Proj: proj,
     ListOf: list_of,
+    Array: array,
+    Index: index,
+    Length: length,
+    Data: data,
     Lam: lam,
     App: app,
     Global: global_,
     Integral: integral,
     Delta: delta,
     Sum: sum_,
+    Fold: fold,
     Deriv: deriv,
     Hole: hole,
 }

@@ -12,15 +12,20 @@ from typing import Any, TypeVar
 from potto.core.folding import apply
 from potto.core.kinds import (
     App,
+    Array,
     Branch,
     Const,
+    Data,
     Delta,
     Deriv,
+    Fold,
     Global,
     Hole,
     If,
+    Index,
     Integral,
     Lam,
+    Length,
     ListOf,
     Prim,
     Proj,
@@ -29,12 +34,16 @@ from potto.core.kinds import (
     Tuple,
     Var,
     app,
+    array,
     branch,
     delta,
     deriv,
+    fold,
     if_,
+    index,
     integral,
     lam,
+    length,
     list_of,
     proj,
     sum_,
@@ -65,6 +74,7 @@ _CHILDREN: dict[type, Callable[[Any], tuple[Term, ...]]] = {
     Var: _none,
     Global: _none,
     Hole: _none,
+    Data: _none,
     Prim: attrgetter("args"),
     If: attrgetter("condition", "then", "orelse"),
     Branch: lambda term: (*term.coordinates, term.then, term.orelse),
@@ -76,6 +86,10 @@ _CHILDREN: dict[type, Callable[[Any], tuple[Term, ...]]] = {
     Integral: _of_integral,
     Delta: attrgetter("coordinates"),
     Sum: attrgetter("lo", "hi", "body"),
+    Fold: attrgetter("lo", "hi", "start", "body"),
+    Array: attrgetter("size", "body"),
+    Index: attrgetter("array", "index"),
+    Length: lambda term: (term.array,),
     Deriv: lambda term: (term.function,),
 }
 
@@ -88,7 +102,7 @@ def rebuild(term: Term, parts: tuple[Term, ...]) -> Term:
     if all(map(is_, parts, old)):
         return term
     match term:
-        case Const() | Var() | Global() | Hole():
+        case Const() | Var() | Global() | Hole() | Data():
             return term
         case Prim():
             return apply(term.op, *parts)
@@ -116,6 +130,15 @@ def rebuild(term: Term, parts: tuple[Term, ...]) -> Term:
             return delta(parts)
         case Sum():
             return sum_(term.variable, *parts)
+        case Fold():
+            lo, hi, start, body = parts
+            return fold(term.variable, lo, hi, term.state, start, body)
+        case Array():
+            return array(term.variable, *parts)
+        case Index():
+            return index(*parts)
+        case Length():
+            return length(*parts)
         case Deriv():
             return deriv(parts[0])
 
@@ -207,8 +230,10 @@ def bound_names(term: Term) -> tuple[str, ...]:
             return params
         case Integral(variables=variables):
             return variables
-        case Sum(variable=variable):
+        case Sum(variable=variable) | Array(variable=variable):
             return (variable,)
+        case Fold(variable=variable, state=state):
+            return (variable, state)
         case _:
             return ()
 
@@ -291,6 +316,13 @@ def _in_scopes(term: Term, mapping: Mapping[str, Term], names: Mapping[str, str]
         case Sum():
             lo, hi = substitute(term.lo, seen), substitute(term.hi, seen)
             return sum_(enter(term.variable), lo, hi, substitute(term.body, seen))
+        case Fold():
+            lo, hi, start = (substitute(part, seen) for part in (term.lo, term.hi, term.start))
+            variable, state = enter(term.variable), enter(term.state)
+            return fold(variable, lo, hi, state, start, substitute(term.body, seen))
+        case Array():
+            size = substitute(term.size, seen)
+            return array(enter(term.variable), size, substitute(term.body, seen))
         case Integral():
             variables, bounds, hints = list[str](), list[tuple[Term, Term]](), list[tuple[Term, ...]]()
             for name, (lo, hi), points in zip(term.variables, term.bounds, term.hints, strict=True):

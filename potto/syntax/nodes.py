@@ -10,11 +10,13 @@ from typing import Literal
 
 from potto.quick import quick, value
 from potto.source import Span
+from potto.syntax.type_nodes import ArrayType as ArrayType
 from potto.syntax.type_nodes import DiffeoType as DiffeoType
 from potto.syntax.type_nodes import FunctionType as FunctionType
-from potto.syntax.type_nodes import ListType as ListType
+from potto.syntax.type_nodes import NamedType as NamedType
 from potto.syntax.type_nodes import Parameter as Parameter
 from potto.syntax.type_nodes import RealType as RealType
+from potto.syntax.type_nodes import Size as Size
 from potto.syntax.type_nodes import TupleType as TupleType
 from potto.syntax.type_nodes import TypeExpr as TypeExpr
 
@@ -207,14 +209,87 @@ class Integral:
 
 
 @value
-class Sum:
-    """`sum i in lo..hi (body)`."""
+class Range:
+    """`lo..hi`, both included: what an index goes through."""
+
+    span: Span
+    lo: Expr
+    hi: Expr
+
+
+@value
+class Clause:
+    """`i in lo..hi` or `p in points`: what a reduction, a comprehension or a fold goes through."""
 
     span: Span
     variable: Binder
-    lo: Expr
-    hi: Expr
+    over: Range | Expr
+
+
+@value
+class Reduction:
+    """`sum i in lo..hi (body)`, and the like with `product`, `min`, `max`; over several clauses, the last the fastest."""
+
+    span: Span
+    op: Literal["sum", "product", "min", "max"]
+    clauses: tuple[Clause, ...]
     body: Expr
+
+
+@value
+class Fold:
+    """`fold s = start for i in lo..hi (body)`: the state after every step; `(a, b) = …` for a tuple's parts."""
+
+    span: Span
+    targets: tuple[Binder, ...]
+    start: Expr
+    clauses: tuple[Clause, ...]
+    body: Expr
+
+
+@value
+class Comprehension:
+    """`[body for i in 0..n-1, j in 0..m-1]`: an array with a dimension for each clause."""
+
+    span: Span
+    body: Expr
+    clauses: tuple[Clause, ...]
+
+
+@value
+class Index:
+    """`xs[i]`, `xs[i, j]`: the element at these places, counted from 0."""
+
+    span: Span
+    array: Expr
+    indices: tuple[Expr, ...]
+
+
+@value
+class Field:
+    """`c.focal` of a record, `u.x` or `u.1` of a tuple; written without a blank before the dot."""
+
+    span: Span
+    value: Expr
+    name: str
+    name_span: Span
+
+
+@value
+class With:
+    """`c with focal = 2`, `c with (focal = 2, eye = e)`: the record with other values of some fields."""
+
+    span: Span
+    record: Expr
+    arguments: tuple[Argument, ...]
+
+
+@value
+class Text:
+    """The name of a file between quotes, as `load` takes it."""
+
+    span: Span
+    text: str
 
 
 @value
@@ -268,7 +343,13 @@ Expr = (
     | Lambda
     | Apply
     | Integral
-    | Sum
+    | Reduction
+    | Fold
+    | Comprehension
+    | Index
+    | Field
+    | With
+    | Text
     | Let
     | InlineDiffeo
     | ErrorExpr
@@ -323,6 +404,16 @@ class Definition:
     bindings: tuple[Binding, ...]
     body: Expr
     keyword: bool
+
+
+@value
+class RecordDefinition:
+    """`record Camera(eye: (Real, Real, Real), focal: Real)`: every field has a type."""
+
+    span: Span
+    name: str
+    name_span: Span
+    fields: tuple[Parameter, ...]
 
 
 @value
@@ -386,8 +477,8 @@ class BrokenItem:
 
 
 Statement = Print | For | ExpressionStatement | Binding
-Item = FromImport | Import | Definition | DiffeoDefinition | Print | For | ExpressionStatement | BrokenItem
-Part = Binding | Binder | Argument | Parameter | Operand | Interval | MeasureBound | Inverse | ImportedName
+Item = FromImport | Import | Definition | DiffeoDefinition | RecordDefinition | Print | For | ExpressionStatement | BrokenItem
+Part = Binding | Binder | Argument | Parameter | Size | Operand | Range | Clause | Interval | MeasureBound | Inverse | ImportedName
 Node = Expr | TypeExpr | Item | Part
 
 quick(*(kind for kind in globals().values() if isinstance(kind, type) and kind.__module__ == __name__))

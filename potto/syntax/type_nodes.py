@@ -32,9 +32,29 @@ class TupleType:
 
 
 @value
-class ListType:
+class Size:
+    """How many elements: a number (`name` None), a name, a name and a number (`n - 1`), or `_` for any."""
+
     span: Span
+    name: str | None
+    offset: int
+
+
+@value
+class ArrayType:
+    """`[3] Real`, `[n, m] Real`; `[T]`, with no sizes written, has one of any size (its span is empty)."""
+
+    span: Span
+    sizes: tuple[Size, ...]
     item: TypeExpr
+
+
+@value
+class NamedType:
+    """A record by its name, or by that of its module and its own (`scene.Camera`)."""
+
+    span: Span
+    name: str
 
 
 @value
@@ -54,7 +74,7 @@ class DiffeoType:
     dims: int
 
 
-TypeExpr = RealType | TupleType | ListType | FunctionType | DiffeoType
+TypeExpr = RealType | TupleType | ArrayType | NamedType | FunctionType | DiffeoType
 
 
-quick(Parameter, RealType, TupleType, ListType, FunctionType, DiffeoType)
+quick(Parameter, RealType, TupleType, Size, ArrayType, NamedType, FunctionType, DiffeoType)
