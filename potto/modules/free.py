@@ -93,6 +93,18 @@ def _integral_steps(node: nodes.Integral) -> Sequence[_Step]:
     return (*steps, *_scoped(inner, (node.body,)), _Unbind(tuple(bound)))
 
 
+def _ranges(clauses: Sequence[nodes.Clause], rest: Sequence[_Step]) -> Sequence[_Step]:
+    """Clauses one after the other, each seeing the variables before it."""
+    steps: list[_Step] = []
+    for clause in clauses:
+        steps += (clause, _Bind((clause.variable.name,)))
+    return (*steps, *rest, _Unbind(tuple(clause.variable.name for clause in clauses)))
+
+
+def _targets(targets: Sequence[nodes.Binder]) -> tuple[str, ...]:
+    return tuple(target.name for target in targets)
+
+
 def _diffeo_steps(node: nodes.DiffeoDefinition) -> Sequence[_Step]:
     inverse: Sequence[_Step] = () if node.inverse is None else (node.inverse,)
     block = _block(node.bindings, (*node.components, *inverse, *node.where))
@@ -154,7 +166,14 @@ _STEPS: dict[type, Callable[[Any], Sequence[_Step]]] = {
     nodes.Interval: lambda node: (node.lo, node.hi),
     nodes.MeasureBound: lambda node: node.arguments,
     nodes.Lambda: lambda node: _scoped(_parameters(node.groups), (node.body,)),
-    nodes.Sum: lambda node: (node.lo, node.hi, *_scoped((node.variable.name,), (node.body,))),
+    nodes.Range: lambda node: (node.lo, node.hi),
+    nodes.Clause: lambda node: (node.over,),
+    nodes.Reduction: lambda node: _ranges(node.clauses, (node.body,)),
+    nodes.Fold: lambda node: (node.start, *_ranges(node.clauses, _scoped(_targets(node.targets), (node.body,)))),
+    nodes.Comprehension: lambda node: _ranges(node.clauses, (node.body,)),
+    nodes.Index: lambda node: (node.array, *node.indices),
+    nodes.Field: lambda node: (node.value,),
+    nodes.With: lambda node: (node.record, *_values(node.arguments)),
     nodes.Let: lambda node: _block(node.bindings, (node.body,)),
     nodes.Integral: _integral_steps,
     nodes.Binding: lambda node: (node.value,),

@@ -12,14 +12,26 @@ from typing import Any
 
 from potto.source import Span
 from potto.syntax import kinds
-from potto.syntax.groups import Context, Group, Values, Written, as_arguments, as_expr, as_parameters, distinct, plain
+from potto.syntax.groups import (
+    Context,
+    Group,
+    Suffixed,
+    Values,
+    Written,
+    as_arguments,
+    as_expr,
+    as_parameters,
+    distinct,
+    is_condition,
+    plain,
+    suffixed,
+)
 from potto.syntax.nodes import (
     Apply,
     Argument,
     Binder,
     Binding,
     Bracket,
-    Compare,
     ErrorExpr,
     Expr,
     If,
@@ -27,15 +39,12 @@ from potto.syntax.nodes import (
     Lambda,
     Let,
     ListLiteral,
-    Logic,
     Member,
     Name,
     Number,
     Parameter,
     Paren,
-    Sum,
     Tuple,
-    Unary,
 )
 from potto.syntax.operators import Item, Prefix, climb
 from potto.syntax.tokens import RESERVED
@@ -103,13 +112,6 @@ def empty_list(_: Context, v: Values) -> ListLiteral:
     return ListLiteral(Span(v[0].start, v[1].end), ())
 
 
-def is_condition(expr: Expr) -> bool:
-    """Whether brackets around a single expression make it an Iverson bracket."""
-    while isinstance(expr, Paren):
-        expr = expr.inner
-    return isinstance(expr, (Compare, Logic)) or (isinstance(expr, Unary) and expr.op == "not")
-
-
 def bracket(_: Context, v: Values) -> Expr:
     span, items = Span(v[0].start, v[-1].end), v[1]
     if len(items) == 1 and is_condition(items[0]):
@@ -160,6 +162,8 @@ def paren_comma(_: Context, v: Values) -> Group:
 
 def application(context: Context, v: Values) -> Expr:
     function, value = as_expr(context, v[0]), v[1]
+    if isinstance(value, Suffixed):
+        return suffixed(application(context, [function, value.group]), value.suffixes)
     if isinstance(value, Group):
         span = Span(function.span.start, value.span.end)
         return Apply(span, function, as_arguments(context, value), True)
@@ -273,11 +277,3 @@ def inline_diffeo(context: Context, v: Values) -> InlineDiffeo:
         context.report(kinds.MISSING_EXPRESSION(group.span, "a `diffeo` needs at least one coordinate"))
     components = tuple(plain(context, written) for written in group.written)
     return InlineDiffeo(Span(v[0].start, group.span.end), components)
-
-
-def sum(context: Context, v: Values) -> Sum:
-    variable = Binder(v[1].span, v[1].text)
-    body = as_expr(context, v[7])
-    if isinstance(body, Paren):
-        body = body.inner
-    return Sum(Span(v[0].start, v[7].span.end), variable, v[3], v[5], body)

@@ -30,6 +30,7 @@ from potto.syntax.nodes import (
     Parameter,
     Paren,
     Print,
+    RecordDefinition,
     Statement,
     Tuple,
 )
@@ -162,6 +163,21 @@ def _called(left: Expr) -> tuple[Expr, Groups | None]:
         groups.append(tuple(found))
         left = left.function
     return left, tuple(reversed(groups)) if groups else None
+
+
+def record(context: Context, v: Values) -> Item:
+    """`record Camera(eye: (Real, Real, Real), focal: Real)`."""
+    name, group = v[1], v[2]
+    fields = as_parameters(context, group, "field")
+    if not fields and not group.virtual:
+        message = "a record needs at least one field"
+        context.report(kinds.MISSING_EXPRESSION(group.span, message, help="write `x: Real`"))
+    for found in fields:
+        if found.annotation is None and found.name:
+            help = f"write `{found.name}: Real`"
+            context.report(kinds.BAD_TYPE(found.span, f"the field `{found.name}` has no type", help=help))
+    span = Span(v[0].start, group.span.end)
+    return RecordDefinition(span, name.text, name.span, fields) if name.text else BrokenItem(span, None)
 
 
 # Diffeomorphisms

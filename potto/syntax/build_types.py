@@ -7,10 +7,20 @@ from typing import NamedTuple
 from potto.source import Span
 from potto.syntax import kinds
 from potto.syntax.groups import Context, Values, Written
-from potto.syntax.nodes import DiffeoType, FunctionType, ListType, Parameter, RealType, TupleType, TypeExpr
+from potto.syntax.nodes import (
+    ArrayType,
+    DiffeoType,
+    FunctionType,
+    NamedType,
+    Parameter,
+    RealType,
+    Size,
+    TupleType,
+    TypeExpr,
+)
 from potto.syntax.tokens import Token
 
-_KNOWN = "types are `Real`, `Real*`, `Real[x]`, `Dist[x]`, `(T, U)`, `[T]`, `T -> U` and `Diffeo[n]`"
+_KNOWN = "types are `Real`, `Real*`, `Real[x]`, `Dist[x]`, `(T, U)`, `[n] T`, `T -> U`, `Diffeo[n]` and records"
 
 
 class _Parens(NamedTuple):
@@ -20,8 +30,14 @@ class _Parens(NamedTuple):
     parameters: tuple[Parameter, ...]
 
 
-def type_name(context: Context, v: Values) -> RealType:
+def type_name(context: Context, v: Values) -> TypeExpr:
+    if v[0].text and v[0].text not in ("Real", "Dist", "Diffeo"):
+        return NamedType(v[0].span, v[0].text)
     return _real(context, v[0], False, (), v[0].end)
+
+
+def type_member(_: Context, v: Values) -> NamedType:
+    return NamedType(v[0].span, v[0].text)
 
 
 def type_star(context: Context, v: Values) -> RealType:
@@ -84,8 +100,48 @@ def type_parameter_named(context: Context, v: Values) -> Parameter:
     return Parameter(Span(v[0].start, written.span.end), v[0].text, written)
 
 
-def list_type(context: Context, v: Values) -> ListType:
-    return ListType(Span(v[0].start, v[2].end), as_type(context, v[1]))
+def size(context: Context, v: Values) -> Size | TypeExpr:
+    """What stands between the brackets of an array's type: a number, or a type that may be the name of a size."""
+    if not isinstance(v[0], Token):
+        return as_type(context, v[0])
+    token: Token = v[0]
+    if token.text.isdigit():
+        return Size(token.span, None, int(token.text[:9]))
+    context.report(kinds.BAD_TYPE(token.span, "a size is a whole number or a name, as in `[3] Real` and `[n] Real`"))
+    return Size(token.span, None, 0)
+
+
+def size_shifted(context: Context, v: Values) -> Size:
+    name, sign, number = v
+    if not number.text.isdigit():
+        context.report(kinds.BAD_TYPE(number.span, "sizes differ by a whole number, as in `[n - 1] Real`"))
+    offset = int(number.text[:9]) if number.text.isdigit() else 0
+    return Size(Span(name.start, number.end), name.text, -offset if sign.text in "-−" else offset)
+
+
+def list_type(context: Context, v: Values) -> ArrayType:
+    """`[T]`: an array of any size."""
+    span = Span(v[0].start, v[2].end)
+    items: list[Size | TypeExpr] = v[1]
+    last = items[-1]
+    if len(items) > 1 or isinstance(last, Size):
+        context.report(kinds.BAD_TYPE(span, "the type of the elements is missing", help="write it behind: `[n] Real`"))
+    item = RealType(span, "Real", False, ()) if isinstance(last, Size) else last
+    return ArrayType(span, (Size(Span(v[0].end, v[0].end), "", 0),), item)
+
+
+def array_type(context: Context, v: Values) -> ArrayType:
+    """`[n, m] T`."""
+    sizes: list[Size] = []
+    for found in v[1]:
+        if isinstance(found, NamedType):
+            found = Size(found.span, found.name, 0)
+        elif not isinstance(found, Size):
+            context.report(kinds.BAD_TYPE(found.span, "a size is a whole number or a name, as in `[n] Real`"))
+            found = Size(found.span, "_", 0)
+        sizes.append(found)
+    item = as_type(context, v[3])
+    return ArrayType(Span(v[0].start, item.span.end), tuple(sizes), item)
 
 
 def function_type(context: Context, v: Values) -> FunctionType:

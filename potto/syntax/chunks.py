@@ -19,7 +19,10 @@ _LINE = re.compile(r"\n(?:#.*\n)*\f*([^\s])")
 """A line with code or a comment in its first column, and the comment lines directly above it. It begins with the end of
 the line before, so that blank and indented lines are passed over as fast as memory is read."""
 _BRACKETS = re.compile(r"""[(\[]|[)\]]|"[^"\n]*"?|\#[^\n]*|\n""")
-_ITEM = re.compile(rf"(?:def|diffeo|from|import|for|print)\b|{FIRST_NAME.pattern}[ \t]*=(?!=)")
+_ITEM = re.compile(
+    rf"(?:def|diffeo|from|import|for|print)\b|record[ \t]+{FIRST_NAME.pattern}[ \t]*\("
+    rf"|{FIRST_NAME.pattern}[ \t]*=(?!=)"
+)
 """The start of a line in the first column that is no part of an expression."""
 _LET, _IN = re.compile(r"\blet\b"), re.compile(r"(?<![\w.])in\Z")
 _INDENTED = re.compile(r"\n[^\S\n]+[^\s]")

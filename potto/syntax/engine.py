@@ -10,7 +10,7 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
-from potto.syntax import build, build_integrals, build_items, build_types
+from potto.syntax import build, build_arrays, build_integrals, build_items, build_types
 from potto.syntax.groups import Context
 from potto.syntax.tables import Tables, tables
 from potto.syntax.tokens import Token
@@ -26,7 +26,9 @@ def _reductions() -> tuple[tuple[int, str, Action | None], ...]:
         action: Action | None = None
         if rule.action is not None:
             home = next(
-                home for home in (build, build_integrals, build_items, build_types) if hasattr(home, rule.action)
+                home
+                for home in (build, build_arrays, build_integrals, build_items, build_types)
+                if hasattr(home, rule.action)
             )
             action = getattr(home, rule.action)
         out.append((rule.size, rule.origin, action))

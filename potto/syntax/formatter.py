@@ -18,7 +18,7 @@ from potto.syntax.walk import without_spans
 WIDTH = 100
 _INDENT = 4
 _CLOSERS = frozenset({"RPAR", "RSQB"})
-_OPENERS = frozenset({"LPAR", "LSQB"})
+_OPENERS = frozenset({"LPAR", "LSQB", "ADJACENT"})
 _CLAUSES = frozenset({"INVERSE", "WHERE"})
 
 

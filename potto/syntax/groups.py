@@ -16,15 +16,20 @@ from potto.syntax.nodes import (
     Apply,
     Argument,
     Binder,
+    Bracket,
     Compare,
     ErrorExpr,
     Expr,
+    Field,
+    Index,
+    Logic,
     Name,
     Operand,
     Parameter,
     Paren,
     Tuple,
     TypeExpr,
+    Unary,
 )
 from potto.syntax.tokens import Token
 
@@ -62,8 +67,47 @@ class Group(NamedTuple):
     virtual: bool
 
 
+class Suffixed(NamedTuple):
+    """Parentheses with what stands directly behind: `(x)[i]` by itself is an index, `f(x)[i]` one of the call."""
+
+    group: Group
+    suffixes: tuple[Suffix, ...]
+
+
+class Suffix(NamedTuple):
+    """`[i, j]` or `.name` behind a value: the items between the brackets, or the token."""
+
+    end: int
+    items: tuple[Expr, ...]
+    name: Token | None
+
+
+def suffixed(value: Expr, suffixes: tuple[Suffix, ...]) -> Expr:
+    """A value with what stands behind it; brackets with a condition in them are an argument."""
+    for end, items, name in suffixes:
+        span = Span(value.span.start, end)
+        if name is not None:
+            value = Field(span, value, name.text[1:], Span(name.start + 1, name.end))
+        elif len(items) == 1 and is_condition(items[0]):
+            inner = items[0].span
+            bracket = Bracket(Span(min(value.span.end, inner.start), end), items[0])
+            value = Apply(span, value, (Argument(bracket.span, None, None, bracket),), False)
+        else:
+            value = Index(span, value, items)
+    return value
+
+
+def is_condition(expr: Expr) -> bool:
+    """Whether brackets around a single expression make it an Iverson bracket."""
+    while isinstance(expr, Paren):
+        expr = expr.inner
+    return isinstance(expr, (Compare, Logic)) or (isinstance(expr, Unary) and expr.op == "not")
+
+
 def as_expr(context: Context, value: Any) -> Expr:
     """Parentheses that stand for a value: `(e)` or a tuple; anything but parentheses as it is."""
+    if isinstance(value, Suffixed):
+        return suffixed(as_expr(context, value.group), value.suffixes)
     if not isinstance(value, Group):
         return value  # type: ignore[no-any-return]
     items = [plain(context, written) for written in value.written]

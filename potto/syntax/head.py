@@ -10,8 +10,8 @@ from typing import Literal
 
 from potto.syntax.tokens import Token
 
-_State = Literal["start", "name", "groups", "type", "typed", "for", "diffeo", "ready", "body"]
-_PENDING = frozenset({"groups", "typed", "for", "ready"})
+_State = Literal["start", "name", "groups", "type", "sized", "typed", "for", "diffeo", "ready", "body"]
+_PENDING = frozenset({"groups", "sized", "typed", "for", "ready"})
 
 
 @dataclass(slots=True)
@@ -59,9 +59,12 @@ class BlockTracker:
             case "groups" if kind in ("LPAR", "ARROW", "COLON", "EQ"):
                 return {"LPAR": "groups", "ARROW": "type"}.get(kind, "ready")  # type: ignore[return-value]
             case "type":
-                return "typed"
-            case "typed" if kind in ("STAR", "LSQB", "ARROW", "COLON", "EQ"):
-                return {"STAR": "typed", "LSQB": "typed", "ARROW": "type"}.get(kind, "ready")  # type: ignore[return-value]
+                return "sized" if kind == "LSQB" else "typed"
+            case "sized" if kind in ("NAME", "LPAR", "LSQB", "MEMBER"):  # the elements of an array
+                return "sized" if kind == "LSQB" else "typed"
+            case "sized" | "typed" if kind in ("STAR", "ADJACENT", "LSQB", "ARROW", "COLON", "EQ"):
+                more = {"STAR": "typed", "ADJACENT": "typed", "LSQB": "typed", "ARROW": "type"}
+                return more.get(kind, "ready")  # type: ignore[return-value]
             case "for":
                 return self._in_for(kind)
             case "diffeo":

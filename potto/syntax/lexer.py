@@ -38,8 +38,22 @@ _RETURNED = re.compile(r"[ \t]+[^\s=]")
 _DEFINES = re.compile(rf"[ \t]+{FIRST_NAME.pattern}")
 _CONTINUES = re.compile(r"(?:then|else|in|and|or)\b|[*/^?:,)\].=<>≤≥≠+]|!=|->")
 _CLAUSE = re.compile(r"(?:inverse|where)\b(?![ \t]*=(?!=))")
-_ENDS_OPERAND = frozenset({"NAME", "NUMBER", "MEMBER", "RPAR", "RSQB"})
+_ENDS_OPERAND = frozenset({"NAME", "NUMBER", "MEMBER", "FIELD", "RPAR", "RSQB"})
 _LINE = re.compile(r"([ \t\f\v]*)([^\n]?)")
+_BEHIND = _ENDS_OPERAND - {"NUMBER"} | {"FIELD"}
+"""What a bracket or a dot belongs to that stands directly behind it."""
+_FIELD = re.compile(rf"\.(?:{FIRST_NAME.pattern}|[0-9]+)")
+_THROUGH = re.compile(rf"[ \t\n]+{FIRST_NAME.pattern}[ \t\n]+in\b")
+_ALSO = re.compile(rf"[ \t\n]*{FIRST_NAME.pattern}[ \t\n]+in\b")
+_CONTEXTUAL = {
+    "fold": ("FOLD", re.compile(rf"[ \t\n]*(?:[ \t\n]{FIRST_NAME.pattern}|\([^()]*\))[ \t\n]*=(?!=)")),
+    "with": ("WITH", re.compile(rf"[ \t\n]+(?:\([ \t\n]*)?{FIRST_NAME.pattern}[ \t\n]*=(?!=)")),
+    "record": ("RECORDDEF", re.compile(rf"[ \t]+{FIRST_NAME.pattern}[ \t]*\(")),
+    "product": ("SUM", _THROUGH),
+    "min": ("SUM", _THROUGH),
+    "max": ("SUM", _THROUGH),
+}
+"""Words where this follows them, and names elsewhere."""
 
 
 @value
@@ -69,6 +83,12 @@ class _Lexer:
     has_sum: bool = False
     let_in: int = -1
     """Where the last `in` of a `let` stands."""
+    head_end: int = -1
+    """Where the parameters of a lambda end that were read last: the dot behind them is the lambda's."""
+    head_dot: int = -1
+    """Where that dot stands."""
+    heads: set[int] = field(default_factory=set)
+    """Where parentheses begin that may be parameters of a lambda."""
     too_deep: bool = False
 
     def run(self) -> None:
@@ -84,7 +104,7 @@ class _Lexer:
             if kind == "NAME":
                 position = self._name(word, start, position)
             elif kind == "OPERATOR":
-                self._operator(word, start, position)
+                position = self._operator(word, start, position)
             elif kind == "NUMBER":
                 tokens.append(_new(Token, ("NUMBER", word, start, position)))
                 if not brackets and blocks.state != "body":
@@ -108,7 +128,7 @@ class _Lexer:
             # In `\x.x` the dot is the lambda's.
             word = word.partition(".")[0]
             end = start + len(word)
-        kind = KEYWORDS.get(word)
+        kind = KEYWORDS.get(word) or self._contextual(word, end)
         if kind is not None and len(tokens) == 1 and tokens[0].kind == "DEF":
             nesting.report(reserved_word(word, Span(start, end)))
             kind = "NAME"
@@ -121,9 +141,11 @@ class _Lexer:
                 kind = "D"
             elif self.clauses and self._starts_clause(start):
                 kind = word.upper()
-        elif kind in ("LET", "SUM", "INTEGRAL"):
+        elif kind in ("LET", "SUM", "FOR", "INTEGRAL"):
             nesting.open_word(kind, start)
             self.has_sum = self.has_sum or kind == "SUM"
+        elif kind == "FOLD":
+            self.has_sum = True
         elif kind == "IN":
             if nesting.close_in():
                 self.let_in = start
@@ -131,6 +153,16 @@ class _Lexer:
             kind, self.clauses = "DIFFEODEF", True
         self._add(kind, word, start, end)
         return end
+
+    def _contextual(self, word: str, end: int) -> str | None:
+        """The kind of a word that is one only where the right thing follows."""
+        found = _CONTEXTUAL.get(word)
+        if found is None or found[1].match(self.text, end) is None:
+            return None
+        tokens = self.tokens
+        if word == "record" and tokens:
+            return None
+        return found[0] if word != "with" or (tokens and tokens[-1].kind in _BEHIND) else None
 
     def _starts_clause(self, start: int) -> bool:
         """Whether `inverse` or `where` stands after the components of a diffeomorphism; elsewhere they are names."""
@@ -150,6 +182,8 @@ class _Lexer:
             self.blocks.see(token)
         if kind == "INTEGRAL":
             self._expect_bounds(word, start, end)
+        elif kind == "NAME" and len(self.tokens) > 1 and self._in_head(self.tokens[-2]):
+            self.head_end = end
 
     def _returns(self, end: int) -> bool:
         """Whether `return` starts a line or a body, as it does in other languages."""
@@ -163,8 +197,25 @@ class _Lexer:
         self.nesting.report(kinds.UNFINISHED(Span(start, end), message, help="write `integral [lo, hi] body d(x)`"))
         self.tokens.append(Token("NOBOUNDS", "", end, end))
 
-    def _operator(self, word: str, start: int, end: int) -> None:
+    def _in_head(self, before: Token) -> bool:
+        """Whether what follows a token may be parameters of a lambda, or of an inverse."""
+        return before.kind in ("LAMBDA", "INVERSE") or (before.kind == "DOT" and before.start == self.head_dot)
+
+    def _is_behind(self, start: int) -> bool:
+        """Whether what starts here stands directly behind a value."""
+        tokens = self.tokens
+        return bool(tokens) and tokens[-1].end == start and tokens[-1].kind in _BEHIND and bool(tokens[-1].text)
+
+    def _operator(self, word: str, start: int, end: int) -> int:
+        """An operator or a bracket; gives where to go on."""
         kind = OPERATORS.get(word)
+        if kind == "DOT" and self.tokens and self.tokens[-1].end == self.head_end:
+            self.head_dot = start
+        elif kind == "DOT" and self._is_behind(start):
+            found = _FIELD.match(self.text, start)
+            if found is not None:
+                self._add("FIELD", found.group(), start, found.end())
+                return found.end()
         if kind is None:
             word, diagnostic = foreign_operator(word, Span(start, end))
             self.nesting.report(diagnostic)
@@ -172,22 +223,32 @@ class _Lexer:
         if kind == "LPAR" or kind == "LSQB":
             if not self.nesting.brackets and kind == "LPAR" and self.blocks.separates(self.tokens, start):
                 self.tokens.append(Token("COLON", "", start, start))
-            self._add(kind, word, start, end)
+            if kind == "LPAR" and self.tokens and self._in_head(self.tokens[-1]):
+                self.heads.add(start)
+            self._add("ADJACENT" if kind == "LSQB" and self._is_behind(start) else kind, word, start, end)
             self.too_deep = not self.nesting.open_bracket(kind, start, self.indent)
-            return
+            return end
         if kind == "RPAR" or kind == "RSQB":
+            if self.nesting.brackets and self.nesting.brackets[-1].start in self.heads:
+                self.head_end = end
             self.nesting.close_bracket(kind, word, start, end)
-            return
-        if kind == "COMMA":
+            return end
+        if kind == "COMMA" and self.nesting.in_ranges() and _ALSO.match(self.text, end):
+            kind = "ALSO"
+            self.nesting.open_word("SUM", start)
+        elif kind == "COMMA":
             self.nesting.end_words()
         elif word == "∫":
             self.nesting.open_word(kind, start)
         self._add(kind, word, start, end)
+        return end
 
     def _odd(self, kind: str, word: str, start: int, end: int) -> int:
         """What is no word of the language; gives where to go on."""
         if kind == "BADNUMBER":
             self._bad_number(word, start, end)
+        elif kind == "STRING" and self._is_loaded(word):
+            self._add("STRING", word, start, end)
         elif kind == "STRING":
             self.nesting.report(string_literal(word, Span(start, end)))
             self._add("NAME", "", start, end)
@@ -200,6 +261,12 @@ class _Lexer:
             if diagnostic is not None:
                 self.nesting.report(diagnostic)
         return end
+
+    def _is_loaded(self, word: str) -> bool:
+        """Whether a text stands where the name of a file belongs: `load("heights.csv")`."""
+        tokens = self.tokens
+        loads = len(tokens) > 1 and tokens[-1].kind == "LPAR" and tokens[-2].text == "load"
+        return loads and len(word) > 1 and word[-1] == word[0]
 
     def _bad_number(self, word: str, start: int, end: int) -> None:
         prefix = NUMBER_PREFIX.match(word)

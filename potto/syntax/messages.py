@@ -36,12 +36,16 @@ _OPENING = frozenset(
         "IMPORT",
         "LPAR",
         "LSQB",
+        "ADJACENT",
+        "FOLD",
+        "WITH",
         "ARROW",
         "INVERSE",
         "WHERE",
     ]
 )
 _WORDS = {"RPAR": ")", "RSQB": "]", "LPAR": "(", "LSQB": "[", "COMMA": ",", "EQ": "=", "DOT": ".", "DOTDOT": ".."}
+_BRACKETS = ("LPAR", "LSQB", "ADJACENT")
 
 
 class Stop(Struct, frozen=True):
@@ -215,7 +219,7 @@ def _inserted(stop: Stop, kind: str) -> Diagnostic:
 
 def _open_bracket(stop: Stop) -> tuple[Related, ...]:
     opened = stop.opened
-    return (Related(opened.span, "opened here"),) if opened is not None and opened.kind in ("LPAR", "LSQB") else ()
+    return (Related(opened.span, "opened here"),) if opened is not None and opened.kind in _BRACKETS else ()
 
 
 def _missing_expression(stop: Stop) -> Diagnostic:

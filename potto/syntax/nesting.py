@@ -1,4 +1,4 @@
-"""What is open while a chunk is read: brackets, and the `let`, `sum` and `integral` that wait for their ends.
+"""What is open while a chunk is read: brackets, and the `let`, `sum`, `for` and `integral` that wait for their ends.
 
 Owns `Nesting`. It closes what the text never closes, so that the tokens it leaves are always balanced and every
 integral has its `d(...)`: the parser need not guess at brackets.
@@ -43,6 +43,8 @@ class Nesting:
     brackets: list[_Open] = field(default_factory=list)
     words: list[_Open] = field(default_factory=list)
     never_closed: set[int] = field(default_factory=set)
+    ranges: set[int] = field(default_factory=set)
+    """Within how many brackets a range has begun that another may follow."""
 
     def report(self, diagnostic: Diagnostic) -> None:
         """Note a message, unless there are so many that one more helps nobody."""
@@ -70,8 +72,15 @@ class Nesting:
     def close_in(self) -> bool:
         """`in` belongs to the innermost `let` or `sum` at this depth; whether it is that of a `let`."""
         if self.words and self.words[-1].kind != "INTEGRAL" and self.words[-1].depth == len(self.brackets):
-            return self.words.pop().kind == "LET"
+            let = self.words.pop().kind == "LET"
+            if not let:
+                self.ranges.add(len(self.brackets))
+            return let
         return False
+
+    def in_ranges(self) -> bool:
+        """Whether what a sum, a fold or an array goes through was read at this depth last: another range may follow."""
+        return len(self.brackets) in self.ranges
 
     def in_let(self) -> bool:
         """Whether what comes next at this depth could be a further binding of a `let`."""
@@ -140,6 +149,7 @@ class Nesting:
                 )
             )
         self.end_words()
+        self.ranges.discard(len(self.brackets))
         self.brackets.pop()
         self.tokens.append(Token(wanted, word, start, end))
 

@@ -12,22 +12,29 @@ from typing import assert_never
 from potto.syntax.nodes import (
     Apply,
     Argument,
+    ArrayType,
+    Binder,
     Binding,
     Bracket,
     BrokenItem,
     Chain,
+    Clause,
     Compare,
+    Comprehension,
     Definition,
     DiffeoDefinition,
     DiffeoType,
     ErrorExpr,
     Expr,
     ExpressionStatement,
+    Field,
+    Fold,
     For,
     FromImport,
     FunctionType,
     If,
     Import,
+    Index,
     InlineDiffeo,
     Integral,
     Interval,
@@ -35,23 +42,28 @@ from potto.syntax.nodes import (
     Lambda,
     Let,
     ListLiteral,
-    ListType,
     Logic,
     MeasureBound,
     Member,
     Name,
+    NamedType,
     Number,
     Parameter,
     Paren,
     Power,
     Print,
+    Range,
     RealType,
+    RecordDefinition,
+    Reduction,
+    Size,
     Statement,
-    Sum,
+    Text,
     Tuple,
     TupleType,
     TypeExpr,
     Unary,
+    With,
 )
 
 _OPEN, _OR, _AND, _NOT, _COMPARE, _SUM, _PRODUCT, _UNARY, _POWER, _APPLY, _ATOM = range(11)
@@ -72,8 +84,14 @@ def print_type(type: TypeExpr) -> str:
             return head + ("*" if star else "") + (f"[{', '.join(variables)}]" if variables else "")
         case TupleType(items=items):
             return f"({', '.join(print_type(item) for item in items)})"
-        case ListType(item=item):
-            return f"[{print_type(item)}]"
+        case ArrayType(sizes=sizes, item=item):
+            if sizes[0].name == "":
+                return f"[{print_type(item)}]"
+            inner = print_type(item)
+            inner = f"({inner})" if isinstance(item, FunctionType) else inner
+            return f"[{', '.join(map(_size, sizes))}] {inner}"
+        case NamedType(name=name):
+            return name
         case DiffeoType(dims=dims):
             return f"Diffeo[{dims}]"
         case FunctionType(parameters=parameters, result=result):
@@ -97,6 +115,8 @@ def print_item(item: Item) -> str:
             return _definition(item)
         case DiffeoDefinition():
             return _diffeo(item)
+        case RecordDefinition(name=name, fields=fields):
+            return f"record {name}{_group(fields)}"
         case BrokenItem():
             return ""
         case Print() | For() | ExpressionStatement():
@@ -161,8 +181,7 @@ def _statement(item: Statement, indent: str) -> str:
 
 
 def _binding(binding: Binding) -> str:
-    names = ", ".join(target.name for target in binding.targets)
-    return f"{names if len(binding.targets) == 1 else f'({names})'} = {print_expression(binding.value)}"
+    return f"{_names(binding.targets)} = {print_expression(binding.value)}"
 
 
 def _parameter(parameter: Parameter) -> str:
@@ -213,15 +232,25 @@ def _form(expr: Expr) -> tuple[int, str]:
         case Integral(bounds=bounds, body=body, variables=variables):
             names = ", ".join(variable.name for variable in variables)
             return _ATOM, f"integral {_bounds(bounds)} {_text(body, _OPEN)} d({names})"
-        case Sum():
-            return _ATOM, _sum(expr)
+        case Reduction(op=word, clauses=clauses, body=body):
+            return _ATOM, f"{word} {_clauses(clauses)} {_wrapped(body)}"
+        case Fold(targets=targets, start=start, clauses=clauses, body=body):
+            return _ATOM, f"fold {_names(targets)} = {_text(start, _OPEN)} for {_clauses(clauses)} {_wrapped(body)}"
+        case Comprehension(body=body, clauses=clauses):
+            return _ATOM, f"[{_text(body, _OPEN)} for {_clauses(clauses)}]"
+        case Index(array=array, indices=indices):
+            return _ATOM, f"{_behind(array)}[{_list(indices)}]"
+        case Field(value=value, name=name):
+            return _ATOM, f"{_behind(value)}.{name}"
+        case Text(text=text):
+            return _ATOM, f'"{text}"'
         case Apply():
             return _APPLY, _apply(expr)
         case _:
             return _operator_form(expr)
 
 
-def _operator_form(expr: Power | Unary | Chain | Compare | Logic | If | Lambda | Let) -> tuple[int, str]:
+def _operator_form(expr: Power | Unary | Chain | Compare | Logic | If | Lambda | Let | With) -> tuple[int, str]:
     match expr:
         case Power(base=base, exponent=exponent):
             signed = isinstance(exponent, Unary) and exponent.op != "not"
@@ -246,6 +275,9 @@ def _operator_form(expr: Power | Unary | Chain | Compare | Logic | If | Lambda |
             return _OPEN, f"\\{''.join(f'{_lambda_group(group)} . ' for group in groups)}{_text(body, _OPEN)}"
         case Let(bindings=bindings, body=body):
             return _OPEN, f"let {'; '.join(_binding(b) for b in bindings)} in {_text(body, _OPEN)}"
+        case With(record=record, arguments=arguments):
+            given = ", ".join(_argument(argument, " = ") for argument in arguments)
+            return _OPEN, f"{_text(record, _APPLY)} with {given if len(arguments) == 1 else f'({given})'}"
         case _:
             assert_never(expr)
 
@@ -261,17 +293,44 @@ def _apply(expr: Apply) -> str:
     return f"{function}{blank}({', '.join(_argument(argument) for argument in expr.arguments)})"
 
 
-def _sum(expr: Sum) -> str:
-    lo, body = _bound(expr.lo), _text(expr.body, _OPEN)
-    blank = " " if lo.endswith(".") else ""
-    return f"sum {expr.variable.name} in {lo}{blank}..{_bound(expr.hi)} " + (
-        body if isinstance(expr.body, Tuple) else f"({body})"
-    )
+def _clauses(clauses: tuple[Clause, ...]) -> str:
+    return ", ".join(f"{clause.variable.name} in {_over(clause.over)}" for clause in clauses)
 
 
-def _argument(argument: Argument) -> str:
+def _over(over: Range | Expr) -> str:
+    if not isinstance(over, Range):
+        return _bound(over)
+    lo = _bound(over.lo)
+    return f"{lo}{' ' if lo.endswith('.') else ''}..{_bound(over.hi)}"
+
+
+def _wrapped(body: Expr) -> str:
+    text = _text(body, _OPEN)
+    return text if isinstance(body, Tuple) else f"({text})"
+
+
+def _names(targets: tuple[Binder, ...]) -> str:
+    names = ", ".join(target.name for target in targets)
+    return names if len(targets) == 1 else f"({names})"
+
+
+def _behind(value: Expr) -> str:
+    """What a bracket or a field stands directly behind."""
+    if isinstance(value, Apply) and value.parenthesized and not isinstance(value.function, Apply):
+        return _apply(value)
+    plain = isinstance(value, (Name, Member, Paren, Tuple, Index, Field))
+    return _text(value, _ATOM) if plain else f"({_text(value, _OPEN)})"
+
+
+def _size(size: Size) -> str:
+    if size.name is None:
+        return str(size.offset)
+    return size.name + (f" {'-' if size.offset < 0 else '+'} {abs(size.offset)}" if size.offset else "")
+
+
+def _argument(argument: Argument, equals: str = "=") -> str:
     value = _text(argument.value, _OPEN)
-    return value if argument.name is None else f"{argument.name}={value}"
+    return value if argument.name is None else f"{argument.name}{equals}{value}"
 
 
 def _bounds(bounds: tuple[Interval | MeasureBound, ...]) -> str:
@@ -304,6 +363,10 @@ def _plain_bound(expr: Expr) -> bool:
     match expr:
         case Number() | Name() | Member() | Paren():
             return True
+        case Field(value=value):
+            return _plain_bound(value)
+        case Index(array=array):
+            return _plain_bound(array)
         case Apply(function=function, parenthesized=parenthesized):
             return parenthesized and isinstance(function, (Name, Member))
         case Chain(first=first, rest=rest):

@@ -10,9 +10,12 @@ from dataclasses import dataclass
 
 from potto.syntax.tokens import KEYWORDS, Token
 
-_ENDS_OPERAND = frozenset({"NAME", "NUMBER", "MEMBER", "RPAR", "RSQB"})
-_OPENERS = frozenset({"LPAR", "LSQB"})
+_ENDS_OPERAND = frozenset({"NAME", "NUMBER", "MEMBER", "FIELD", "RPAR", "RSQB"})
+_OPENERS = frozenset({"LPAR", "LSQB", "ADJACENT"})
 _CLOSERS = frozenset({"RPAR", "RSQB"})
+_CONDITIONS = frozenset({"<", "<=", ">", ">=", "==", "!=", "≤", "≥", "≠", "and", "or", "&&", "||"})
+_OPEN_ENDED = frozenset({"IF", "QMARK", "LAMBDA", "LET", "COMMA", "FOR", "WITH"})
+"""What makes something else of what is in brackets than a condition."""
 _TYPES = frozenset({"Real", "Dist", "Diffeo"})
 _BREAK_BEFORE = frozenset({"THEN", "ELSE", "QMARK", "D", "INVERSE", "WHERE"})
 
@@ -56,6 +59,7 @@ class _Pass:
         self.bounds_closed = False
         self.head = tokens[0].kind in ("DEF", "DIFFEODEF") if tokens else False
         self.loop = False
+        self.conditions = _conditions(tokens)
         self.out: list[Spaced] = []
 
     def run(self) -> list[Spaced]:
@@ -75,7 +79,7 @@ class _Pass:
     def _written(self, token: Token) -> None:
         before = self.out[-1].token if self.out else None
         if self.starts:
-            self.loop = token.kind == "FOR"
+            self.loop = token.kind == "FOR" and len(self.brackets) == 1
         kind = token.kind
         if kind in _CLOSERS:
             closed = self.brackets.pop()
@@ -108,7 +112,7 @@ class _Pass:
 
     def _may_break(self, before: Token, token: Token) -> bool:
         kind = token.kind
-        if before.kind == "COMMA" or kind in _BREAK_BEFORE:
+        if before.kind in ("COMMA", "ALSO") or kind in _BREAK_BEFORE:
             return True
         if kind == "COLON":
             return self.brackets[-1].questions > 0
@@ -123,8 +127,10 @@ class _Pass:
         kind, last = token.kind, before.kind
         if last in _OPENERS or kind in _CLOSERS or kind in ("COMMA", "SEMI"):
             return False
-        if last in ("COMMA", "SEMI"):
+        if last in ("COMMA", "SEMI", "ALSO"):
             return True
+        if kind in ("ADJACENT", "FIELD", "ALSO"):
+            return token.start in self.conditions
         if kind == "DOTDOT" or last == "DOTDOT":
             return kind == "DOTDOT" and before.text.endswith(".")
         if kind == "COLON":
@@ -158,6 +164,22 @@ class _Pass:
             return False
         # `f(x)` and `f (x)` are both good style, for calls and for juxtaposition: the author's choice stands.
         return token.start > before.end
+
+
+def _conditions(tokens: list[Token]) -> frozenset[int]:
+    """Where brackets begin that stand directly behind a value and hold a condition: these are arguments."""
+    found: list[int] = []
+    open_: list[tuple[Token, set[str]]] = []
+    for token in tokens:
+        if token.kind in _OPENERS:
+            open_.append((token, set()))
+        elif token.kind in _CLOSERS and open_:
+            opener, kinds = open_.pop()
+            if opener.kind == "ADJACENT" and "condition" in kinds and not kinds & _OPEN_ENDED:
+                found.append(opener.start)
+        elif open_:
+            open_[-1][1].add("condition" if token.kind == "NOT" or token.text in _CONDITIONS else token.kind)
+    return frozenset(found)
 
 
 def spaced(tokens: list[Token], text: str) -> list[Spaced]:

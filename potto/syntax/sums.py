@@ -1,4 +1,4 @@
-"""Where the body of `sum i in lo..hi (body)` begins: `n (body)` would otherwise read as a call.
+"""Where the body of `sum i in lo..hi (body)` begins, or that of a fold: `n (body)` would otherwise read as a call.
 
 Owns `mark_bodies`. A `(` set off by a blank begins the body; where there is none, the last of the first run of groups
 does: `1..n(i^2)`, `1..f(n)(i)`.
@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from potto.syntax.tokens import Token
 
-_ENDS_OPERAND = frozenset({"NAME", "NUMBER", "MEMBER", "RPAR", "RSQB"})
+_ENDS_OPERAND = frozenset({"NAME", "NUMBER", "MEMBER", "FIELD", "RPAR", "RSQB"})
+_OPENERS = frozenset({"LPAR", "LSQB", "ADJACENT"})
 _STOPS = frozenset(
     {
         "COMMA",
@@ -24,17 +25,22 @@ _STOPS = frozenset(
         "D",
         "EQ",
         "DOTDOT",
+        "ALSO",
+        "SUM",
+        "FOLD",
+        "FOR",
         "$END",
     }
 )
 
 
 def mark_bodies(tokens: list[Token]) -> list[Token]:
-    """The tokens with an empty SUMBODY before the body of each `sum`."""
+    """The tokens with an empty SUMBODY before the body of each `sum` and each `fold`."""
     marks: set[int] = set()
     for index, token in enumerate(tokens):
-        if token.kind == "DOTDOT":
-            body = _body(tokens, index + 1)
+        if token.kind == "SUM" or token.kind == "FOLD":
+            start = _last_range(tokens, index)
+            body = None if start is None else _body(tokens, start)
             if body is not None:
                 marks.add(body)
     if not marks:
@@ -47,13 +53,38 @@ def mark_bodies(tokens: list[Token]) -> list[Token]:
     return out
 
 
+def _last_range(tokens: list[Token], index: int) -> int | None:
+    """The index at which the last operand begins of what a sum or a fold goes through."""
+    depth, start, waiting = 0, None, tokens[index].kind == "FOLD"  # for the `for` of a fold
+    for place in range(index + 1, len(tokens)):
+        kind = tokens[place].kind
+        if kind in _OPENERS:
+            depth += 1
+        elif kind == "RPAR" or kind == "RSQB":
+            depth -= 1
+            if depth < 0:
+                break
+        elif depth == 0:
+            if waiting:
+                if kind == "NEWLINE" or kind == "SEMI" or kind == "COMMA":
+                    break
+                waiting = kind != "FOR"
+            elif kind == "IN" or kind == "DOTDOT":
+                if kind == "IN" and start is not None and tokens[place - 2].kind != "ALSO":
+                    break
+                start = place + 1
+            elif kind in _STOPS and kind != "ALSO":
+                break
+    return start
+
+
 def _body(tokens: list[Token], index: int) -> int | None:
-    """The index of the `(` that opens the body of the sum whose upper bound starts at `index`."""
+    """The index of the `(` that opens the body of the sum whose last range ends with the operand that starts here."""
     depth, run_ended, best = 0, False, None
     previous = tokens[index - 1]
     while index < len(tokens):
         token = tokens[index]
-        if token.kind in ("LPAR", "LSQB"):
+        if token.kind in _OPENERS:
             if depth == 0 and token.kind == "LPAR" and previous.kind in _ENDS_OPERAND:
                 if token.start > previous.end:
                     return index

@@ -53,7 +53,8 @@ KEYWORDS: dict[str, str] = {
     "as": "AS",
 }
 """Words that can't be names. `inverse` and `where` are words only among the clauses of a diffeomorphism, and `d` only
-before `(` after the body of an integral."""
+before `(` after the body of an integral; `record`, `fold`, `with`, `product`, `min` and `max` only where what follows
+makes them so (`lexer`)."""
 
 RESERVED = frozenset(KEYWORDS)
 

@@ -33,7 +33,7 @@ class TupleType:
 
 @value
 class Size:
-    """How many elements: a number (`name` None), a name, a name and a number (`n - 1`), or `_` for any."""
+    """How many elements: a number (`name` None), a name, a name and a number (`n - 1`), `_` for any, "" not written."""
 
     span: Span
     name: str | None
@@ -42,7 +42,7 @@ class Size:
 
 @value
 class ArrayType:
-    """`[3] Real`, `[n, m] Real`; `[T]`, with no sizes written, has one of any size (its span is empty)."""
+    """`[3] Real`, `[n, m] Real`; `[T]`, with no size written, is of any."""
 
     span: Span
     sizes: tuple[Size, ...]

@@ -7,22 +7,28 @@ from hypothesis import strategies as st
 from potto.syntax.nodes import (
     Apply,
     Argument,
+    ArrayType,
     Binder,
     Binding,
     Bracket,
     Chain,
+    Clause,
     Compare,
+    Comprehension,
     Definition,
     DiffeoDefinition,
     DiffeoType,
     Expr,
     ExpressionStatement,
+    Field,
+    Fold,
     For,
     FromImport,
     FunctionType,
     If,
     Import,
     ImportedName,
+    Index,
     InlineDiffeo,
     Integral,
     Interval,
@@ -31,23 +37,27 @@ from potto.syntax.nodes import (
     Lambda,
     Let,
     ListLiteral,
-    ListType,
     Logic,
     MeasureBound,
     Member,
     Name,
+    NamedType,
     Number,
     Operand,
     Parameter,
     Power,
     Print,
+    Range,
     RealType,
+    RecordDefinition,
+    Reduction,
+    Size,
     Statement,
-    Sum,
     Tuple,
     TupleType,
     TypeExpr,
     Unary,
+    With,
 )
 from potto.syntax.walk import NOWHERE as O
 
@@ -71,6 +81,16 @@ def _function_type(parts: st.SearchStrategy[TypeExpr]) -> st.SearchStrategy[Type
     return st.tuples(st.lists(parameter, max_size=3).map(tuple), parts).map(lambda p: FunctionType(O, *p))
 
 
+sizes = st.one_of(
+    st.integers(0, 99).map(lambda n: Size(O, None, n)),
+    st.tuples(st.sampled_from(["n", "m", "_"]), st.integers(-3, 3)).map(lambda p: Size(O, *p)),
+)
+
+
+def _array_type(found: tuple[list[Size], TypeExpr]) -> TypeExpr:
+    return ArrayType(O, tuple(found[0]), found[1])
+
+
 type_trees: st.SearchStrategy[TypeExpr] = st.recursive(
     st.sampled_from(
         [
@@ -79,11 +99,14 @@ type_trees: st.SearchStrategy[TypeExpr] = st.recursive(
             RealType(O, "Real", False, ("x", "y")),
             RealType(O, "Dist", False, ("x",)),
             DiffeoType(O, 2),
+            NamedType(O, "Camera"),
+            NamedType(O, "scene.Camera"),
         ]
     ),
     lambda parts: st.one_of(
         st.lists(parts, min_size=2, max_size=3).map(lambda ts: TupleType(O, tuple(ts))),
-        parts.map(lambda t: ListType(O, t)),
+        parts.map(lambda t: ArrayType(O, (Size(O, "", 0),), t)),
+        st.tuples(st.lists(sizes, min_size=1, max_size=2), parts).map(_array_type),
         _function_type(parts),
     ),
     max_leaves=4,
@@ -133,6 +156,28 @@ def _integral(parts: st.SearchStrategy[Expr]) -> st.SearchStrategy[Expr]:
     return distinct_names.flatmap(whole)
 
 
+_targets = distinct_names.map(lambda found: tuple(Binder(O, n) for n in found))
+
+
+def _clauses(parts: st.SearchStrategy[Expr]) -> st.SearchStrategy[tuple[Clause, ...]]:
+    ranges = st.tuples(parts, parts).map(lambda p: Range(O, *p))
+    one = st.tuples(names, parts | ranges).map(lambda p: Clause(O, Binder(O, p[0]), p[1]))
+    return st.lists(one, min_size=1, max_size=2).map(tuple)
+
+
+def _given(parts: st.SearchStrategy[Expr]) -> st.SearchStrategy[tuple[Argument, ...]]:
+    return distinct_names.flatmap(
+        lambda found: st.tuples(*(parts.map(lambda e, n=n: Argument(O, n, O, e)) for n in found))
+    )
+
+
+def _fields(parts: st.SearchStrategy[Expr]) -> st.SearchStrategy[Expr]:
+    """Of what is no bare name: `a.x` is a member."""
+    whole = parts.filter(lambda e: not isinstance(e, Name | Member))
+    digits = st.tuples(parts, st.sampled_from(["0", "12"]))
+    return (digits | st.tuples(whole, st.sampled_from(["x", "focal"]))).map(lambda p: Field(O, p[0], p[1], O))
+
+
 def _inner(parts: st.SearchStrategy[Expr]) -> st.SearchStrategy[Expr]:
     lists = st.lists(parts, max_size=3).map(lambda items: ListLiteral(O, tuple(items)))
     groups = st.lists(_parameters(), min_size=1, max_size=2).map(tuple)
@@ -152,7 +197,16 @@ def _inner(parts: st.SearchStrategy[Expr]) -> st.SearchStrategy[Expr]:
         st.tuples(groups, parts).map(lambda p: Lambda(O, *p)),
         _call(parts),
         _integral(parts),
-        st.tuples(names, parts, parts, parts).map(lambda p: Sum(O, Binder(O, p[0]), *p[1:])),
+        st.tuples(st.sampled_from(["sum", "product", "min", "max"]), _clauses(parts), parts).map(
+            lambda p: Reduction(O, *p)
+        ),
+        st.tuples(_targets, parts, _clauses(parts), parts).map(lambda p: Fold(O, *p)),
+        st.tuples(parts, _clauses(parts)).map(lambda p: Comprehension(O, *p)),
+        st.tuples(parts, st.lists(parts.filter(lambda e: not is_condition(e)), min_size=1, max_size=2)).map(
+            lambda p: Index(O, p[0], tuple(p[1]))
+        ),
+        _fields(parts),
+        st.tuples(parts, _given(parts)).map(lambda p: With(O, *p)),
         st.tuples(_bindings(parts), parts).map(lambda p: Let(O, *p)),
         st.lists(parts, min_size=1, max_size=2).map(lambda items: InlineDiffeo(O, tuple(items))),
     )
@@ -177,6 +231,12 @@ def _statements() -> st.SearchStrategy[Statement]:
 
 def _definitions() -> st.SearchStrategy[Item]:
     groups = distinct_names.map(lambda found: tuple((Parameter(O, n),) for n in found))
+    typed = distinct_names.flatmap(
+        lambda found: st.tuples(*(type_trees.map(lambda t, n=n: Parameter(O, n, t)) for n in found))
+    )
+    records = st.tuples(st.sampled_from(["Camera", "record", "a"]), typed).map(
+        lambda p: RecordDefinition(O, p[0], O, p[1])
+    )
     blocks = st.just(()) | _bindings(expressions)
     keyword = st.tuples(names, groups, st.none() | type_trees, blocks, expressions).map(
         lambda p: Definition(O, p[0], O, p[1], p[2], p[3], p[4], True)
@@ -184,7 +244,7 @@ def _definitions() -> st.SearchStrategy[Item]:
     plain = st.tuples(names, st.none() | type_trees, expressions).map(
         lambda p: Definition(O, p[0], O, (), p[1], (), p[2], False)
     )
-    return keyword | plain
+    return keyword | plain | records
 
 
 def _diffeos() -> st.SearchStrategy[Item]:

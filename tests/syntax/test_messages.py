@@ -95,8 +95,6 @@ def test_unfinished() -> None:
         #       ^ error[P0104]: expected `:` after the first choice of `? :`
         x = sum i in 1..n i
         #                 ^ error[P0104]: expected the body of `sum` in parentheses
-        x = sum i in n (i)
-        #                ^ error[P0104]: expected `..` and the last value of the variable of `sum`
         x = integral x d(x)
         #   ^^^^^^^^ error[P0104]: expected the bounds after `integral`
         x = integral [0] x d(x)
@@ -274,8 +272,10 @@ def test_names() -> None:
 
 def test_types() -> None:
     check_messages("""
-        def f(a: Foo) a
-        #        ^^^ error[P0116]: there is no type `Foo`
+        def f(a: [1.5] Real) a
+        #         ^^^ error[P0116]: a size is a whole number or a name
+        def f(a: [3]) a
+        #        ^^^ error[P0116]: the type of the elements is missing
         def f(a: Dist) a
         #        ^^^^ error[P0116]: a distribution names its variables
         def f(a: Diffeo[x]) a

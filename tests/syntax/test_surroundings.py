@@ -144,6 +144,9 @@ def test_node_at() -> None:
     assert node_at(parsed.item, 40) == ()
 
 
+_CONFLICTS = ("ADJACENT", "BINOP", "LPAR", "LSQB", "MEMBER", "NAME", "QMARK", "SIGN", "STAR")
+
+
 class TestCache:
     @pytest.fixture(autouse=True)
     def folder(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
@@ -180,9 +183,10 @@ class TestCache:
 
         with caplog.at_level(logging.DEBUG, logger.name):
             tables.lark_parser(tables.grammar_text())
-        # Operators and `?` after an open-ended form go into it; a bracket after a type or a group belongs to it.
+        # Operators and `?` after an open-ended form go into it; a bracket after a type or a group belongs to it, a
+        # type after the size of an array, and a bracket to what it stands directly behind.
         conflicts = {str(record.args) for record in caplog.records if "conflict" in str(record.msg)}
-        assert conflicts == {f"('{kind}',)" for kind in ("BINOP", "LPAR", "LSQB", "QMARK", "SIGN", "STAR")}
+        assert conflicts == {f"('{kind}',)" for kind in _CONFLICTS}
 
 
 def test_the_programs_of_the_grammar_page_parse() -> None:

@@ -37,8 +37,9 @@ from potto.syntax.nodes import (
     Paren,
     Power,
     Print,
+    Range,
     RealType,
-    Sum,
+    Reduction,
     Tuple,
     TupleType,
     Unary,
@@ -138,7 +139,7 @@ def test_precedence(text: str, reads: str) -> None:
         ("f x", Apply),
         ("p ? a : b", If),
         ("diffeo(u, v)", InlineDiffeo),
-        ("sum i in 1..n (i)", Sum),
+        ("sum i in 1..n (i)", Reduction),
         ("let a = 1 in a", Let),
         ("integral [0, 1] x d(x)", Integral),
         ("delta(x - t)", Apply),
@@ -231,8 +232,10 @@ class TestIntegrals:
 )
 def test_sum(text: str, hi: str, body: str) -> None:
     found = expression(text)
-    assert isinstance(found, Sum)
-    assert (print_expression(found.hi), print_expression(found.body)) == (hi, body)
+    assert isinstance(found, Reduction)
+    (clause,) = found.clauses
+    assert isinstance(clause.over, Range)
+    assert (print_expression(clause.over.hi), print_expression(found.body)) == (hi, body)
 
 
 def test_let_goes_on_at_lines_within_brackets() -> None:
