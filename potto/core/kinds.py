@@ -102,7 +102,7 @@ class Length(Base, frozen=True, eq=False):
 
 
 class Data(Base, frozen=True, eq=False):
-    """What a file holds: a number, an array, or one `column` of it ("" for the whole); `content` is the file's digest."""
+    """What a file holds: a number, an array, or one `column` of it ("" for the whole); `content` is its digest."""
 
     path: str
     content: str

@@ -15,15 +15,20 @@ from potto.core.terms import (
     ONE,
     ZERO,
     App,
+    Array,
     Branch,
     Const,
+    Data,
     Delta,
     Deriv,
+    Fold,
     Global,
     Hole,
     If,
+    Index,
     Integral,
     Lam,
+    Length,
     ListOf,
     Prim,
     Proj,
@@ -31,6 +36,8 @@ from potto.core.terms import (
     Term,
     Tuple,
     Var,
+    array,
+    fold,
     integral,
     lam,
     postorder,
@@ -94,8 +101,10 @@ def _names(node: Term) -> tuple[str, ...]:
             return (name,)
         case Lam(params=names) | Integral(variables=names):
             return names
-        case Sum(variable=name):
+        case Sum(variable=name) | Array(variable=name):
             return (name,)
+        case Fold(variable=name, state=state):
+            return name, state
         case _:
             return ()
 
@@ -111,6 +120,10 @@ def _renamed(node: Term, names: Mapping[str, str]) -> Term:
             return integral(tuple(names.get(v, v) for v in variables), bounds, node.body, node.hints)
         case Sum(variable=name):
             return sum_(names.get(name, name), node.lo, node.hi, node.body)
+        case Array(variable=name):
+            return array(names.get(name, name), node.size, node.body)
+        case Fold(variable=name, state=state):
+            return fold(names.get(name, name), node.lo, node.hi, names.get(state, state), node.start, node.body)
         case _:
             return node
 
@@ -141,11 +154,17 @@ def _node(node: Term, texts: _Texts) -> _Text:
             return _Text(f"deriv({texts[function].text})", _ATOM)
         case Hole():
             return _Text("?", _ATOM)
-        case Lam() | App() | Integral() | Sum():
+        case Index(array=whole, index=place):
+            return _Text(f"{texts[whole].at(_ATOM)}[{texts[place].text}]", _ATOM)
+        case Length(array=whole):
+            return _Text(f"len({texts[whole].text})", _ATOM)
+        case Data(path=path, column=column):
+            return _Text(f'load("{path}")' + (f".{column}" if column else ""), _ATOM)
+        case Lam() | App() | Integral() | Sum() | Array() | Fold():
             return _binder(node, texts)
 
 
-def _binder(node: Lam | App | Integral | Sum, texts: _Texts) -> _Text:
+def _binder(node: Lam | App | Integral | Sum | Array | Fold, texts: _Texts) -> _Text:
     match node:
         case Lam(params=params):
             group = params[0] if len(params) == 1 else f"({', '.join(params)})"
@@ -159,6 +178,13 @@ def _binder(node: Lam | App | Integral | Sum, texts: _Texts) -> _Text:
         case Sum():
             limits = f"{texts[node.lo].at(_ADD)}..{texts[node.hi].at(_ADD)}"
             return _Text(f"sum {node.variable} in {limits} ({texts[node.body].text})", _SIGN)
+        case Array():
+            last = f"{texts[node.size].at(_ADD)} - 1"
+            return _Text(f"[{texts[node.body].text} for {node.variable} in 0..{last}]", _ATOM)
+        case Fold():
+            limits = f"{texts[node.lo].at(_ADD)}..{texts[node.hi].at(_ADD)}"
+            head = f"fold {node.state} = {texts[node.start].text} for {node.variable} in {limits}"
+            return _Text(f"{head} ({texts[node.body].text})", _SIGN)
 
 
 def _list(items: tuple[Term, ...], texts: _Texts) -> str:

@@ -1,4 +1,4 @@
-"""Binders of numbers: integrals, expectations and sums.
+"""Integrals and expectations.
 
 The first variable of an integral is the outermost, and a bound sees the variables before its own. A measure gives the
 bounds of its variable, its density as a factor, and hints where that is concentrated; where it is a sum of parts, so is
@@ -12,13 +12,10 @@ from itertools import groupby, product
 from potto.core.simplify import simplify
 from potto.core.terms import (
     ONE,
-    App,
     Branch,
     Const,
     If,
-    Integral,
     Prim,
-    Sum,
     Term,
     Tuple,
     add,
@@ -33,8 +30,9 @@ from potto.core.terms import (
     var,
 )
 from potto.core.terms import integral as integral_term
+from potto.elaborate.arrays import combined
 from potto.elaborate.context import Elaboration, rule
-from potto.elaborate.signatures import dims_of_term
+from potto.elaborate.shapes import dims_of as size_of_tuple
 from potto.elaborate.values import Scope, Value
 from potto.measures.composed import Part, parts_of, problem
 from potto.syntax import nodes
@@ -139,34 +137,13 @@ def scaled(elaboration: Elaboration, factor: Term, term: Term) -> Term:
                 elaboration.note(made, elaboration.origins[term])
             return made
         case _:
-            dims = dims_of(elaboration, term)
-            if dims is None:
-                return mul(factor, term)
-            return tuple_(scaled(elaboration, factor, proj(term, place)) for place in range(dims))
+            return combined(elaboration, "*", factor, term)
 
 
 def dims_of(elaboration: Elaboration, term: Term) -> int | None:
     """The size of the tuple that a term stands for; None for a number or what is not known."""
-    while True:
-        match term:
-            case Tuple(items=items):
-                return len(items)
-            case If() | Branch():
-                term = term.then
-            case Integral(body=body) | Sum(body=body):
-                term = body
-            case App():
-                return dims_of_term(elaboration.db, term)
-            case _:
-                return None
+    return size_of_tuple(elaboration.shapes.of(term))
 
 
 def _gives_tuple(elaboration: Elaboration, term: Term) -> bool:
     return dims_of(elaboration, term) is not None
-
-
-@rule(nodes.Sum)
-def _sum(elaboration: Elaboration, node: nodes.Sum, scope: Scope) -> Value:
-    lo, hi = elaboration.term(node.lo, scope), elaboration.term(node.hi, scope)
-    name, inner = elaboration.bind_number(node.variable.name, scope)
-    return sum_(name, lo, hi, elaboration.term(node.body, inner))

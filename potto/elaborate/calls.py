@@ -29,10 +29,12 @@ from potto.core.terms import (
     tuple_,
 )
 from potto.elaborate import builtins
+from potto.elaborate.arrays import of_vectors
 from potto.elaborate.context import Elaboration, rule
 from potto.elaborate.filling import Filling, Given, Packed, Spread, fill
 from potto.elaborate.signatures import groups_of_term
 from potto.elaborate.values import Builtin, Closure, Groups, Scope, Value, counted
+from potto.modules.builtins import VECTORS
 from potto.source import Span
 from potto.syntax import nodes
 
@@ -54,6 +56,8 @@ def call(elaboration: Elaboration, function: Value, given: Arguments, span: Span
         case Builtin(name):
             if any(argument.name is not None for argument in given):
                 return hole(f"the parameters of `{name}` have no names")
+            if name in VECTORS:
+                return of_vectors(elaboration, name, [elaboration.as_term(a.value) for a in given])
             found = builtins.applied(elaboration.db, name, [elaboration.as_term(a.value) for a in given])
             return elaboration.note(found, span) if isinstance(found, Delta) else found
         case Hole():
@@ -134,7 +138,7 @@ def _call_closure(elaboration: Elaboration, closure: Closure, given: Arguments, 
         scope = scope.bind(dict(zip(names, values)))
         arguments += values
     if len(filled) < own:
-        return Closure(closure.groups[len(filled) :], closure.bindings, closure.body, scope)
+        return Closure(closure.groups[len(filled) :], closure.bindings, closure.body, scope, closure.annotated)
     key = (closure, tuple(arguments))
     result = elaboration.applied.get(key)  # once for the same arguments, so that sharing is kept
     if result is None:

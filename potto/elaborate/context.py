@@ -11,12 +11,15 @@ from typing import Any, TypeVar
 
 from potto.core.terms import INF, PI, Lam, Term, Tuple, app, fresh, global_, hole, lam, proj, var
 from potto.elaborate import builtins
-from potto.elaborate.values import Builtin, Closure, Scope, Value
+from potto.elaborate.shapes import Shapes
+from potto.elaborate.values import Builtin, Closure, Scope, Value, sizes
 from potto.modules.builtins import is_builtin
+from potto.modules.graph import owner
 from potto.modules.lookup import DefinitionTarget, resolve, resolve_member
 from potto.query import Database
 from potto.source import Span
 from potto.syntax import nodes
+from potto.types.types import Real, Type
 
 MAX_DEPTH = 300  # calls of local functions within each other: deeper ones never end
 MAX_CALLS = 100_000
@@ -43,6 +46,7 @@ class Elaboration:
         self.db, self.file = db, file
         self.taken = set(taken)
         self.numbers: set[str] = set()  # binders that stand for one number each: variables of integration, indices
+        self.shapes = Shapes(db)
         self.origins: dict[Term, Span] = {}
         self.places: dict[Term, Span] = {}  # where conditions were written
         self.made: dict[Closure, Term] = {}
@@ -93,9 +97,19 @@ class Elaboration:
 
     def member(self, path: str, name: str, scope: Scope) -> Value:
         """What `path.name` stands for; a local name hides a module."""
-        hidden = scope.find(path.partition(".")[0]) is not None
+        head, *inner = path.split(".")
+        hidden = scope.find(head) is not None
         target = None if hidden else resolve_member(self.db, self.file, path, name)
-        return hole(f"`{path}.{name}` is not defined") if target is None else global_(target.file, target.name)
+        if target is not None:
+            return global_(target.file, target.name)
+        if not hidden and owner(self.db, self.file, path) is None:
+            return hole(f"`{path}.{name}` is not defined")
+        from potto.elaborate.arrays import field
+
+        found = self.as_term(self.name(head, scope))
+        for part in (*inner, name):
+            found = field(found, part)
+        return found
 
     # Binders
 
@@ -125,18 +139,22 @@ class Elaboration:
             case Closure():
                 found = self.made.get(value)
                 if found is None:
-                    found = self.made[value] = self._lambda(value)
+                    found = self.made[value] = self.function(value)
                 return found
             case Builtin(name):
                 return self.builtin_lambda(name)
             case _:
                 return value
 
-    def _lambda(self, closure: Closure) -> Term:
+    def function(self, closure: Closure, types: Sequence[Sequence[Type]] = ()) -> Term:
+        """A function as a term; `types` of its parameters, where they are known."""
         scope, groups = closure.scope, []
-        for group in closure.groups:
+        for number, group in enumerate(closure.groups):
             names, scope = self.bind(group, scope)
             groups.append(names)
+            for name, type in zip(names, types[number] if number < len(types) else ()):
+                if not isinstance(type, Real):
+                    self.shapes.names[name] = type
         return lambdas(groups, self.whole(self.as_term(self.body(closure, scope))))
 
     def whole(self, term: Term) -> Term:
@@ -156,6 +174,11 @@ class Elaboration:
         if self.depth >= MAX_DEPTH or self.calls > MAX_CALLS:
             return hole("a local function that is applied to itself never ends")
         self.depth += 1
+        for parameter in closure.annotated:
+            value = scope.find(parameter.name)
+            if parameter.annotation is not None and value is not None and not isinstance(value, Closure | Builtin):
+                known = {name: size for name, size in sizes(parameter.annotation, value) if scope.find(name) is None}
+                scope = scope.bind(known)
         try:
             return self.value(closure.body, self.block(closure.bindings, scope))
         finally:

@@ -11,14 +11,16 @@ from collections.abc import Iterable
 from msgspec import Struct
 
 from potto.core.terms import App, Global, Term, hole, tuple_, var
-from potto.elaborate import binders, calls, expressions  # noqa: F401  (imported for their rules)
+from potto.elaborate import arrays, binders, calls, expressions  # noqa: F401  (imported for their rules)
 from potto.elaborate.context import Elaboration, lambdas
-from potto.elaborate.values import EMPTY, Closure, Scope
+from potto.elaborate.values import EMPTY, Closure, Scope, annotated
 from potto.modules.texts import definition
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import nodes
+from potto.types import interface
 from potto.types.context import ensure_stack
+from potto.types.types import groups_of
 
 Locals = Iterable[str | tuple[str, Term]]
 Names = tuple[str, ...]
@@ -67,7 +69,9 @@ def core(db: Database, file: str, name: str) -> Elaborated:
         return _finished(elaboration, lambdas((parts.variables, *parts.groups), tuple_(parts.components)))
     groups = tuple(tuple(parameter.name for parameter in group) for group in item.groups)
     if groups:
-        return _finished(elaboration, elaboration.as_term(Closure(groups, item.bindings, item.body, EMPTY)))
+        closure = Closure(groups, item.bindings, item.body, EMPTY, annotated(item.groups))
+        types = [[p.type for p in group] for group in groups_of(interface(db, file, name).type)]
+        return _finished(elaboration, elaboration.function(closure, types))
     value = elaboration.term(item.body, elaboration.block(item.bindings, EMPTY))
     return _finished(elaboration, elaboration.whole(value) if _is_call(value) else value)
 

@@ -23,9 +23,11 @@ from potto.core.terms import (
     prim,
     tuple_,
 )
+from potto.elaborate.arrays import combined, negated
 from potto.elaborate.conditions import choose, compare, is_truth, logic
 from potto.elaborate.context import Elaboration, rule
-from potto.elaborate.values import Closure, Scope, Value
+from potto.elaborate.shapes import is_vector
+from potto.elaborate.values import Closure, Scope, Value, annotated
 from potto.syntax import nodes
 
 
@@ -62,7 +64,7 @@ def _unary(elaboration: Elaboration, node: nodes.Unary, scope: Scope) -> Value:
     operand = elaboration.term(node.operand, scope)
     match node.op:
         case "-":
-            return neg(operand)
+            return negated(elaboration, operand)
         case "+":
             return operand
         case "not":
@@ -73,6 +75,10 @@ def _unary(elaboration: Elaboration, node: nodes.Unary, scope: Scope) -> Value:
 def _chain(elaboration: Elaboration, node: nodes.Chain, scope: Scope) -> Value:
     first = elaboration.term(node.first, scope)
     rest = [(operand.op, elaboration.term(operand.value, scope)) for operand in node.rest]
+    if any(is_vector(elaboration.shapes.of(term)) for term in (first, *(term for _, term in rest))):
+        for op, term in rest:
+            first = combined(elaboration, op, first, term)
+        return first
     if node.rest[0].op in "+-":
         if len(rest) == 1 and rest[0][0] == "-" and rest[0][1] is first:
             return prim("add", first, neg(first))  # not 0 where it is not finite
@@ -163,7 +169,7 @@ def _list(elaboration: Elaboration, node: nodes.ListLiteral, scope: Scope) -> Va
 @rule(nodes.Lambda)
 def _lambda(elaboration: Elaboration, node: nodes.Lambda, scope: Scope) -> Value:
     groups = tuple(tuple(parameter.name for parameter in group) for group in node.groups)
-    return Closure(groups, (), node.body, scope)
+    return Closure(groups, (), node.body, scope, annotated(node.groups))
 
 
 @rule(nodes.Let)

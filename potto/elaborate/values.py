@@ -6,11 +6,11 @@ elaborating its body, with no substitution and no capture. It becomes a `Lam` on
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from msgspec import Struct
 
-from potto.core.terms import Term
+from potto.core.terms import ZERO, Term, const, index, length, proj, sub
 from potto.syntax import nodes
 
 
@@ -25,12 +25,16 @@ Groups = tuple[tuple[Slot, ...], ...]
 
 
 class Closure(Struct, frozen=True, eq=False):
-    """A function written in the definition at hand. `scope` has the names around it and parameters already given."""
+    """A function written in the definition at hand. `scope` has the names around it and parameters already given.
+
+    annotated: parameters whose types name sizes.
+    """
 
     groups: tuple[tuple[str, ...], ...]
     bindings: tuple[nodes.Binding, ...]
     body: nodes.Expr
     scope: Scope
+    annotated: tuple[nodes.Parameter, ...] = ()
 
 
 class Builtin(Struct, frozen=True):
@@ -55,6 +59,30 @@ class Scope(Struct, frozen=True, eq=False):
 
 
 EMPTY = Scope({})
+
+
+def annotated(groups: tuple[tuple[nodes.Parameter, ...], ...]) -> tuple[nodes.Parameter, ...]:
+    """The parameters whose types may name sizes."""
+    return tuple(p for group in groups for p in group if p.annotation is not None and _has_size(p.annotation))
+
+
+def _has_size(annotation: nodes.TypeExpr) -> bool:
+    if isinstance(annotation, nodes.ArrayType):
+        return True
+    return isinstance(annotation, nodes.TupleType) and any(map(_has_size, annotation.items))
+
+
+def sizes(annotation: nodes.TypeExpr, value: Term) -> Iterator[tuple[str, Term]]:
+    """The sizes that the type of a value names."""
+    if isinstance(annotation, nodes.TupleType):
+        for place, item in enumerate(annotation.items):
+            yield from sizes(item, proj(value, place))
+    elif isinstance(annotation, nodes.ArrayType):
+        for size in annotation.sizes:
+            if size.name:
+                yield size.name, sub(length(value), const(float(size.offset)))
+            value = index(value, ZERO)
+        yield from sizes(annotation.item, value)
 
 
 def counted(names: tuple[tuple[str, ...], ...]) -> Groups:

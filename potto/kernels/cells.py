@@ -2,7 +2,7 @@
 
 Owns `Cell`. A cell is a number for every point of a batch, with an absolute error bound and one tangent per direction
 of differentiation, each again with an error bound. A missing part (None) is exactly zero. Values of a program are
-cells, tuples and lists of values, and functions (anything with the methods of `FunctionLike`).
+cells, tuples, arrays (`rows`) and lists of values, and functions (anything with the methods of `FunctionLike`).
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Union
 import numpy as np
 
 from potto.kernels.errors import not_a_number, wrong_call
+from potto.kernels.rows import Rows, listed
 from potto.kernels.tape import Node
 
 if TYPE_CHECKING:
@@ -86,7 +87,7 @@ class FunctionLike(Protocol):
     def change(self, how: Callable[[Value], Value]) -> FunctionLike: ...
 
 
-Value = Union[Cell, "tuple[Value, ...]", "list[Value]", FunctionLike]
+Value = Union[Cell, "tuple[Value, ...]", "list[Value]", Rows, FunctionLike]
 
 
 def pattern(value: Value, directions: int) -> Pattern:
@@ -100,6 +101,10 @@ def pattern(value: Value, directions: int) -> Pattern:
         return (inexact, tuple(tangents) or (0,) * directions)
     if isinstance(value, tuple):
         return ("tuple", *(pattern(item, directions) for item in value))
+    if isinstance(value, Rows):
+        cells = all_cells(value)
+        inexact = any(c.e is not None or any(x is not None for x in c.et) for c in cells)
+        return ("rows", inexact, *(any(c.t and c.t[d] is not None for c in cells) for d in range(directions)))
     if isinstance(value, list):
         return ("list",)
     return ("function", *value.pattern(directions))
@@ -123,6 +128,8 @@ def map_cells(value: Value, change: Callable[[Cell], Cell]) -> Value:
         return tuple([map_cells(item, change) for item in value])
     if isinstance(value, list):
         return [map_cells(item, change) for item in value]
+    if isinstance(value, Rows):
+        return Rows(map_cells(value.item, change), value.size)
     return value.change(lambda inner: map_cells(inner, change))
 
 
@@ -130,6 +137,8 @@ def all_cells(value: Value) -> list[Cell]:
     """Every number in a value."""
     if isinstance(value, Cell):
         return [value]
+    if isinstance(value, Rows):
+        return all_cells(value.item)
     items = value if isinstance(value, tuple | list) else value.captured.values()
     return [cell for item in items for cell in all_cells(item)]
 
@@ -145,12 +154,27 @@ def pad(value: Value, directions: int) -> Value:
 
 
 def map_arrays(value: Value, change: Callable[[Array], Number]) -> Value:
-    """The value with `change` done to every array in it (a gather, a reshape)."""
-    return map_cells(value, lambda cell: cell.map(change))
+    """The value with `change` done to every batch in it (a gather, a reshape); an array of Potto is one for each of its
+    elements."""
+    if isinstance(value, Cell):
+        return value.map(change)
+    if isinstance(value, tuple):
+        return tuple([map_arrays(item, change) for item in value])
+    if isinstance(value, list):
+        return [map_arrays(item, change) for item in value]
+    if isinstance(value, Rows):
+        return listed([map_arrays(row, change) for row in value.rows()]) if value.batched else value
+    return value.change(lambda inner: map_arrays(inner, change))
 
 
 def all_arrays(value: Value) -> list[Array]:
-    return [a for cell in all_cells(value) for a in cell.arrays()]
+    """Every batch in a value."""
+    if isinstance(value, Cell):
+        return value.arrays()
+    if isinstance(value, Rows):
+        return value.batches()
+    items = value if isinstance(value, tuple | list) else value.captured.values()
+    return [a for item in items for a in all_arrays(item)]
 
 
 def combined(change: Callable[..., Number], *values: Value) -> Value:
@@ -171,6 +195,9 @@ def combined(change: Callable[..., Number], *values: Value) -> Value:
         return Cell(v, e, tuple(rest[:k]), tuple(rest[k:]))
     if isinstance(first, tuple | list) and all(type(x) is type(first) and len(x) == len(first) for x in values):
         return type(first)([combined(change, *items) for items in zip(*values)])
+    arrays = [value for value in values if isinstance(value, Rows)]
+    if len(arrays) == len(values) and len({value.size for value in arrays}) == 1:
+        return listed([combined(change, *items) for items in zip(*(value.rows() for value in arrays), strict=True)])
     if all(value is first for value in values):
         return first
     raise wrong_call("the members of a batch of points have values of different kinds")

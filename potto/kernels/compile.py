@@ -21,15 +21,20 @@ from potto.calculus.surfaces.trace import CallSite, Layout, immediate, integrati
 from potto.core.packing import keep, recall
 from potto.core.terms import (
     App,
+    Array,
     Branch,
     Const,
+    Data,
     Delta,
     Deriv,
+    Fold,
     Global,
     Hole,
     If,
+    Index,
     Integral,
     Lam,
+    Length,
     ListOf,
     Prim,
     Proj,
@@ -62,6 +67,11 @@ class Runtime(Protocol):
     def integral(self, term: Integral, env: dict[str, Value]) -> Value: ...
     def added(self, terms: tuple[Term, ...], env: dict[str, Value]) -> Value: ...
     def sum(self, term: Sum, lo: Value, hi: Value, env: dict[str, Value], trace: Trace | None) -> Value: ...
+    def array(self, term: Array, size: Value, env: dict[str, Value]) -> Value: ...
+    def index(self, array: Value, place: Value) -> Value: ...
+    def length(self, array: Value) -> Value: ...
+    def fold(self, term: Fold, lo: Value, hi: Value, start: Value, env: dict[str, Value]) -> Value: ...
+    def data(self, term: Data) -> Value: ...
     def lazy(self, mask: Any, term: If | Branch, env: dict[str, Value], traces: tuple[Any, Any]) -> Value: ...
     def falls(self, surface: Any, strict: bool) -> Any: ...
     def project(self, value: Value, index: int) -> Value: ...
@@ -167,6 +177,8 @@ class _Compiler:
                 names = [self.out.name("p") for _ in parts]
                 self.out.lines.append(f"({', '.join(names)},) = {name}")
                 return Structure(tuple(map(self.unpack, names, parts)), False)
+            case ("rows", inexact, *moves):
+                return Dynamic(name, inexact, tuple(moves))
             case ("list",):
                 return Dynamic(name, True, (True,) * self.directions)
             case ("function", inexact, *moves):
@@ -193,7 +205,7 @@ class _Compiler:
             return known.name
         if isinstance(known, Structure):
             items = "".join(f"{self.pack(p)}, " for p in known.parts)
-            return f"[{items}]" if known.is_list else f"({items})"
+            return f"listed([{items}])" if known.is_list else f"({items})"
         t = "".join(f"{x}, " for x in known.t)
         if known.exact:
             return f"Cell({known.v}, None, ({t}))"
@@ -265,6 +277,10 @@ class _Compiler:
                 return self.integral(term)
             case Sum():
                 return self.sum(term)
+            case Fold():
+                return self.fold(term)
+            case Array() | Index() | Length() | Data():
+                return self.array(term)
             case Hole() | Delta():
                 return self.dynamic(f"rt.fail({self.keep(term)})", False, ())
 
@@ -371,6 +387,29 @@ class _Compiler:
         inexact = self.out.rounding or self.rt.inexact(term.body) or any(map(_inexact, known))
         text = f"rt.sum({self.keep(term)}, {lo}, {hi}, {env}, {self.trace(term, 0)})"
         return self.dynamic(text, inexact, known)
+
+
+    def fold(self, term: Fold) -> Known:
+        env, known = self.environment(term.body.free - {term.variable, term.state})
+        lo, hi, start = (self.known(part) for part in (term.lo, term.hi, term.start))
+        text = f"rt.fold({self.keep(term)}, {self.pack(lo)}, {self.pack(hi)}, {self.pack(start)}, {env})"
+        return self.dynamic(text, True, (start, *known))
+
+    def array(self, term: Array | Index | Length | Data) -> Known:
+        match term:
+            case Array():
+                env, known = self.environment(term.body.free - {term.variable})
+                inexact = self.rt.inexact(term.body) or any(map(_inexact, known))
+                return self.dynamic(
+                    f"rt.array({self.keep(term)}, {self.pack(self.known(term.size))}, {env})", inexact, known
+                )
+            case Index():
+                array, place = self.known(term.array), self.known(term.index)
+                return self.dynamic(f"rt.index({self.pack(array)}, {self.pack(place)})", _inexact(array), (array,))
+            case Length():
+                return self.dynamic(f"rt.length({self.pack(self.known(term.array))})", False, ())
+            case Data():
+                return self.dynamic(f"rt.data({self.keep(term)})", False, ())
 
 
 def _at_once(term: Term) -> tuple[Term, ...]:

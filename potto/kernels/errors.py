@@ -7,6 +7,8 @@ from potto.source import Span
 
 NOWHERE = Span(0, 0)
 
+_KINDS = {"tuple": "a tuple", "list": "an array", "Rows": "an array"}
+
 NOT_A_NUMBER = declare("P0502", "a value of the wrong kind where a number is needed")
 TOO_DEEP = declare("P0503", "a recursion that does not end")
 BROKEN = declare("P0504", "a program with errors cannot be evaluated")
@@ -17,7 +19,7 @@ WRONG_CALL = declare("P0509", "a function called with values that do not fit it"
 
 
 def not_a_number(value: object) -> PottoError:
-    kind = "a tuple" if isinstance(value, tuple) else "a list" if isinstance(value, list) else "a function"
+    kind = _KINDS.get(type(value).__name__, "a function")
     return PottoError([NOT_A_NUMBER(NOWHERE, f"{kind} stands where a number is needed")])
 
 

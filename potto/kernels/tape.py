@@ -79,6 +79,9 @@ class Node:
         shape = np.broadcast_to(0.0, self.shape)[index].shape
 
         def pull(adjoint: Any) -> Any:
+            if self.ndim == 1 and isinstance(index, np.ndarray) and index.dtype.kind == "i":
+                weights = np.broadcast_to(adjoint, shape).ravel()
+                return np.bincount(index.ravel() % self.size, weights, self.size)
             whole = np.zeros(self.shape)
             np.add.at(whole, index, adjoint)
             return whole
@@ -167,11 +170,31 @@ def _broadcast_arrays(*parts: Any) -> list[Any]:
     return [_broadcast(x, shape) if isinstance(x, Node) else np.broadcast_to(x, shape) for x in parts]
 
 
+def _moveaxis(x: Node, source: Any, destination: Any) -> Node:
+    shape = np.moveaxis(np.broadcast_to(0.0, x.shape), source, destination).shape
+
+    def pull(adjoint: Any) -> Any:
+        return np.moveaxis(np.broadcast_to(adjoint, shape), destination, source)
+
+    return Node((Edge(x, pull=pull),), shape)
+
+
+def _reshape(x: Node, shape: Shape) -> Node:
+    shape = np.broadcast_to(0.0, x.shape).reshape(shape).shape
+
+    def pull(adjoint: Any) -> Any:
+        return np.reshape(np.broadcast_to(adjoint, shape), x.shape)
+
+    return Node((Edge(x, pull=pull),), shape)
+
+
 MOVES: dict[Any, Callable[..., Any]] = {
     np.broadcast_to: _broadcast,
     np.broadcast_arrays: _broadcast_arrays,
     np.where: _where,
     np.stack: _stack,
+    np.moveaxis: _moveaxis,
+    np.reshape: _reshape,
     np.shape: lambda x: x.shape,
     np.ndim: lambda x: x.ndim,
 }

@@ -14,6 +14,7 @@ from msgspec import Struct
 from potto.core.terms import Lam, postorder
 from potto.kernels import support
 from potto.kernels.cells import Cell, Value, scalar_parts
+from potto.kernels.rows import listed
 
 
 class Kernel(Struct, frozen=True):
@@ -49,6 +50,6 @@ class Written(Struct, frozen=True):
             terms = postorder(lam.body)
             for name, at in self.objects.items():
                 scope[name] = tuple(terms[place] for place in at) if isinstance(at, tuple) else terms[at]
-        scope.update(Cell=Cell, parts=scalar_parts)
+        scope.update(Cell=Cell, parts=scalar_parts, listed=listed)
         exec(marshal.loads(self.code), scope)
         return Kernel(scope["kernel"], self.text, lam.params, self.plain)

@@ -7,11 +7,12 @@ from potto.primitives import PRIMITIVES
 CONSTANTS = ("pi", "inf")
 SPECIALS = ("deriv", "delta")
 PROJECTIONS = ("fst", "snd")
+VECTORS = ("len", "dot", "norm", "cross")
 
 
 def is_builtin(name: str) -> bool:
     """Whether a program may write a name without defining or importing it."""
-    if name in CONSTANTS or name in SPECIALS or name in PROJECTIONS:
+    if name in CONSTANTS or name in SPECIALS or name in PROJECTIONS or name in VECTORS:
         return True
     primitive = PRIMITIVES.get(name)
     return primitive is not None and primitive.surface

@@ -80,8 +80,16 @@ def dependencies(db: Database, file: str, name: str) -> tuple[DefinitionTarget, 
 
 
 def refer(db: Database, file: str, path: str | None, name: str) -> Target | None:
-    """What a reference in a file means, with or without a module in front."""
-    return resolve(db, file, name) if path is None else resolve_member(db, file, path, name)
+    """What a reference in a file means, with or without a module in front; of a field, what it is the field of."""
+    if path is None:
+        return resolve(db, file, name)
+    return resolve_member(db, file, path, name) or owner(db, file, path)
+
+
+def owner(db: Database, file: str, path: str) -> DefinitionTarget | None:
+    """The definition that `path` begins with, in `origin.x`, which is no member of a module."""
+    found = resolve(db, file, path.partition(".")[0])
+    return found if isinstance(found, DefinitionTarget) else None
 
 
 @query

@@ -22,7 +22,7 @@ from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.printing import format_digits
 from potto.source import Span
 from potto.types import format_type
-from potto.types.types import Diffeo, Dist, Function, ListOf, Real, TupleOf, Type, resolve, result_of
+from potto.types.types import ArrayOf, Diffeo, Dist, Function, Real, TupleOf, Type, resolve, result_of
 
 NO_KIND = declare("P0523", "a Python value that is no value of Potto")
 
@@ -209,11 +209,12 @@ def _complaint(name: str, argument: Any, type: Type, own: Type | None) -> str | 
                 return "the derivative of a function is needed, `potto.deriv(…)` of the one that is given"
             return None
         case _ if own is not None:
-            return "not a function" if isinstance(type, Real | Dist | TupleOf | ListOf) else None
+            return "not a function" if isinstance(type, Real | Dist | TupleOf | ArrayOf) else None
         case TupleOf(items, dual):
             return _tuple_misfit(name, argument, items, dual)
-        case ListOf():
-            return None if isinstance(argument, list) else f"a list is needed, not {_kind(argument)}"
+        case ArrayOf():
+            fits = isinstance(argument, list | np.ndarray | Estimate)
+            return None if fits else f"an array is needed, not {_kind(argument)}"
         case Real() | Dist():
             fits = not isinstance(argument, tuple | list)
             return None if fits else f"a number is needed, not {_kind(argument)}"

@@ -26,6 +26,7 @@ from potto.projects.settings import DEFAULTS, Settings
 from potto.runtime.answers.convergence import CANCELS, Shortfalls, converged_members, members_of, merged, missed
 from potto.runtime.answers.estimate import Estimate, OneSided
 from potto.runtime.answers.inherited_errors import rough, widened
+from potto.runtime.evaluation.arrays import array, element, fold, length
 from potto.runtime.evaluation.duals import call_derivative, call_paired
 from potto.runtime.evaluation.functions import Closure, Derivative
 from potto.runtime.evaluation.local import locally
@@ -48,7 +49,9 @@ def _added(machine: Machine, terms: tuple[Term, ...], env: dict[str, Value]) -> 
     return added(machine, terms, env)
 
 
-SEMANTICS = Semantics(call_derivative, call_paired, lazy, _added, total, _integral)
+SEMANTICS = Semantics(
+    call_derivative, call_paired, lazy, _added, total, array, element, length, fold, _integral
+)  # fmt: skip
 
 
 class Program:

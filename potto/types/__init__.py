@@ -19,10 +19,10 @@ from potto.types.queries import (
     typed_names,
 )
 from potto.types.types import (
+    ArrayOf,
     Diffeo,
     Dist,
     Function,
-    ListOf,
     Parameter,
     Real,
     Truth,
@@ -36,12 +36,12 @@ from potto.types.types import (
 )
 
 __all__ = [
+    "ArrayOf",
     "Diffeo",
     "Dist",
     "Function",
     "Inferred",
     "Interface",
-    "ListOf",
     "Parameter",
     "Real",
     "Truth",

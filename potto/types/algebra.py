@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from potto.types.types import Diffeo, Function, ListOf, TupleOf, Type, resolve
+from potto.types.types import ArrayOf, Diffeo, Function, TupleOf, Type, resolve
 from potto.types.types import Dist as DistType
 from potto.types.types import Real as RealType
 from potto.types.types import Truth as TruthType
@@ -78,7 +78,7 @@ def fitted(value: Value, type: Type) -> Value:
             return Closure(inputs, fitted(answer, result), tuple(simple))
         case TupleOf(items), TupleValue(parts) if len(items) == len(parts):
             return TupleValue(tuple(map(fitted, parts, items)))
-        case ListOf(item), ListValue(inner):
+        case ArrayOf(_, item), ListValue(inner):
             return ListValue(fitted(inner, item))
         case Diffeo(), TupleValue(parts):
             return TupleValue(tuple(map(_simple, parts)))
@@ -222,7 +222,7 @@ def symbolic(type: Type, source: Callable[[], Source], port: Callable[[], Port])
             return Scalar({source(): None})
         case TupleOf(items):
             return TupleValue(tuple(symbolic(item, source, port) for item in items))
-        case ListOf(item):
+        case ArrayOf(_, item):
             return ListValue(symbolic(item, source, port))
         case Diffeo(dims) if dims is not None:
             return TupleValue(tuple(Scalar({source(): None}) for _ in range(dims)))

@@ -14,7 +14,16 @@ from potto.modules.lookup import DefinitionTarget
 from potto.quick import quick, replace, value
 from potto.source import Span
 from potto.syntax import nodes
-from potto.types import calls, conditions, flow_binders, flow_calls, flow_rules, integrals  # noqa: F401  (imported for their rules)
+from potto.types import (  # noqa: F401  (imported for their rules)
+    arrays,
+    calls,
+    conditions,
+    flow_arrays,
+    flow_binders,
+    flow_calls,
+    flow_rules,
+    integrals,
+)
 from potto.types.algebra import fitted, flat, symbolic
 from potto.types.annotations import written_type
 from potto.types.closing import declared, reasons_of

@@ -9,11 +9,27 @@ from __future__ import annotations
 from typing import assert_never
 
 from potto.syntax import nodes
+from potto.syntax.kinds import BAD_TYPE
 from potto.types import kinds
 from potto.types.context import Inference
-from potto.types.types import REAL, UNKNOWN, Diffeo, Function, ListOf, Parameter, TupleOf, Type
+from potto.types.scope import Local
+from potto.types.types import (
+    ANY_SIZE,
+    REAL,
+    UNKNOWN,
+    ArrayOf,
+    Count,
+    Diffeo,
+    Function,
+    Meta,
+    Parameter,
+    TupleOf,
+    Type,
+    shifted,
+)
 
 MAX_DIMS = 64
+KNOWN = "`Real`, `Real*`, `Real[x]`, `Dist[x]`, `(T, U)`, `[n] T`, `T -> U` and `Diffeo[n]`"
 
 
 def written_type(inference: Inference, annotation: nodes.TypeExpr) -> Type:
@@ -23,8 +39,15 @@ def written_type(inference: Inference, annotation: nodes.TypeExpr) -> Type:
             return REAL
         case nodes.TupleType(items=items):
             return TupleOf(tuple(written_type(inference, item) for item in items))
-        case nodes.ListType(item=item):
-            return ListOf(written_type(inference, item))
+        case nodes.ArrayType(sizes=sizes, item=item):
+            found = written_type(inference, item)
+            for size in reversed(sizes):
+                found = ArrayOf(_size(inference, size), found)
+            return found
+        case nodes.NamedType():
+            help = f"types are {KNOWN}"
+            inference.report(BAD_TYPE(annotation.span, f"there is no type `{annotation.name}`", help=help))
+            return UNKNOWN
         case nodes.FunctionType(parameters=parameters, result=result):
             group = tuple(Parameter(None, _parameter(inference, parameter)) for parameter in parameters)
             return Function(group, written_type(inference, result))
@@ -36,6 +59,20 @@ def written_type(inference: Inference, annotation: nodes.TypeExpr) -> Type:
             return UNKNOWN
         case _:
             assert_never(annotation)
+
+
+def _size(inference: Inference, size: nodes.Size) -> Type:
+    """A size as it is written; a name of a size is a number in the body."""
+    if size.name is None:
+        return Count(size.offset)
+    if size.name in ("", "_"):
+        return ANY_SIZE
+    known = inference.sizes.get(size.name)
+    if known is None:
+        known = inference.sizes[size.name] = Meta(1, size=size.name)
+        if inference.scope.find(size.name) is None:
+            inference.scope.bind(Local(size.name, size.span, "size", REAL, used=True))
+    return shifted(known, size.offset)
 
 
 def _parameter(inference: Inference, parameter: nodes.Parameter) -> Type:

@@ -22,9 +22,9 @@ from potto.types.scope import Builtin
 from potto.types.types import (
     REAL,
     UNKNOWN,
+    ArrayOf,
     Diffeo,
     Function,
-    ListOf,
     Meta,
     Parameter,
     Real,
@@ -37,6 +37,7 @@ from potto.types.types import (
     resolve,
 )
 from potto.types.unify import settle, unify
+from potto.types.vectors import vector_form
 
 
 @rule(nodes.Apply)
@@ -44,6 +45,9 @@ def _apply(inference: Inference, node: nodes.Apply) -> Type:
     form = special(inference, node.function)
     if form is not None:
         inference.meanings[id(strip(node.function))] = Builtin(form)
+        of_vectors = vector_form(form)
+        if of_vectors is not None:
+            return of_vectors(inference, node)
         return _deriv(inference, node) if form == "deriv" else _delta(inference, node)
     callee = resolve(inference.infer(node.function))
     types = [inference.infer(argument.value) for argument in node.arguments]
@@ -119,8 +123,8 @@ def _not_a_function(inference: Inference, node: nodes.Apply, callee: Type) -> Di
         help = "to multiply, write `*` between the two"
     elif isinstance(callee, TupleOf | Diffeo):
         help = "a call binds to what stands before it: write the operator between the two, or a comma"
-    elif isinstance(callee, ListOf):
-        help = "a list has no indices: go through it in a script, `for v in list: …`"
+    elif isinstance(callee, ArrayOf):
+        help = "an element of an array is written with brackets: `xs[i]`"
     label = "a number" if is_number else describe(callee)
     message = f"this is {describe(callee)}, not a function, so it cannot be applied"
     return kinds.NOT_A_FUNCTION(node.function.span, message, label=label, help=help)

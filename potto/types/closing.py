@@ -17,6 +17,7 @@ from potto.types.values import (
     Abstract,
     Closure,
     Effect,
+    ListValue,
     Port,
     PortTree,
     PortTuple,
@@ -63,6 +64,10 @@ class _Declared:
             case nodes.TupleType(items=items), TupleValue(parts):
                 for item, part in zip(items, parts):
                     self.parameter(name, item, part)
+            case nodes.ArrayType(item=item), ListValue(part):
+                for _ in annotation.sizes[1:]:
+                    part = part.item if isinstance(part, ListValue) else part
+                self.parameter(name, item, part)
             case nodes.FunctionType(parameters=parameters), Abstract(ports):
                 for parameter, tree in zip(parameters, ports):
                     if parameter.annotation is not None:

@@ -22,6 +22,7 @@ from potto.types.types import (
     resolve,
 )
 from potto.types.unify import unify
+from potto.types.vectors import is_vector
 
 
 @rule(nodes.Unary)
@@ -29,7 +30,10 @@ def _unary(inference: Inference, node: nodes.Unary) -> Type:
     if node.op == "not":
         _operand(inference, node, node.operand, "`not`")
         return TRUTH
-    inference.number(node.operand, f"what stands behind `{node.op}`")
+    found = inference.infer(node.operand)
+    if is_vector(found):
+        return found
+    inference.need_number(found, node.operand, f"what stands behind `{node.op}`")
     return REAL
 
 

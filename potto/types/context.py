@@ -22,10 +22,11 @@ from potto.types.scope import Local, LocalKind, Meaning, Member, Outside, Scope
 from potto.types.types import (
     REAL,
     UNKNOWN,
+    ArrayOf,
+    Count,
     Diffeo,
     Dist,
     Function,
-    ListOf,
     Meta,
     Parameter,
     Real,
@@ -35,6 +36,7 @@ from potto.types.types import (
     Unknown,
     Var,
     dual_name,
+    dual_of_array,
     dual_of_tuple,
     resolve,
 )
@@ -111,6 +113,8 @@ class Inference:
         self.conditions: dict[int, Condition] = {}
         self.comparisons: list[nodes.Compare] = []
         self.brackets: set[int] = set()
+        self.owners: dict[int, Meaning] = {}  # of members of no module, `u.x`: what `u` is
+        self.sizes: dict[str, Type] = {}  # the names of sizes in annotations
         self.mixed: set[int] = set()  # the `and`, `or`, `not` of conditions, where brackets may stand
         self.integrals = 0  # how many integrals are around the place that is looked at
         self._late: list[Callable[[], None]] = []
@@ -141,6 +145,10 @@ class Inference:
 
     def fresh(self) -> Meta:
         return Meta(self.level)
+
+    def fresh_size(self, name: str) -> Meta:
+        """A size that is not known yet, and what it would like to be called."""
+        return Meta(self.level, size=name)
 
     def report(self, diagnostic: Diagnostic) -> None:
         self.diagnostics.append(diagnostic)
@@ -219,8 +227,9 @@ class Inference:
             case TupleOf(items, dual):
                 settle(type)  # its dual is not known before its parts are
                 return dual_of_tuple(tuple(self.dual(item, node) for item in items), dual)
-            case ListOf(item):
-                return ListOf(self.dual(item, node))
+            case ArrayOf(size, item):
+                settle(type)
+                return dual_of_array(size, self.dual(item, node))
             case Function(group, result):
                 names = (None if parameter.name is None else dual_name(parameter.name) for parameter in group)
                 duals = (Parameter(name, self.dual(p.type, node)) for name, p in zip(names, group))
@@ -294,8 +303,9 @@ def describe(type: Type) -> str:
             return f"a function `{format_type(found)}`"
         case TupleOf(items):
             return f"a tuple of {len(items)}"
-        case ListOf():
-            return "a list"
+        case ArrayOf(size):
+            known = resolve(size)
+            return f"an array of {known.number}" if isinstance(known, Count) else "an array"
         case Truth():
             return "a comparison"
         case Diffeo():
@@ -354,8 +364,8 @@ def _not_a_number(found: Type, expr: nodes.Expr, where: str) -> Diagnostic:
             return kinds.TUPLE_ARITHMETIC(
                 expr.span,
                 f"{where} must be a number, but this is a tuple of {len(items)}",
-                label="tuples have no arithmetic",
-                help="take it apart, `(a, b) = …`, and compute with its parts",
+                label="a tuple",
+                help="take one of its parts, `u.0`, or all of them, `(a, b) = …`",
             )
         case Diffeo():
             return kinds.TUPLE_ARITHMETIC(
@@ -364,12 +374,12 @@ def _not_a_number(found: Type, expr: nodes.Expr, where: str) -> Diagnostic:
                 label="a tuple of coordinates",
                 help="use it as a condition, `… ? a : b`, or take it apart, `(u, v) = …`",
             )
-        case ListOf():
+        case ArrayOf():
             return kinds.LIST_INSIDE(
                 expr.span,
-                f"{where} must be a number, but this is a list",
-                label="a list",
-                help="go through a list in a script: `for v in list: print(…)`",
+                f"{where} must be a number, but this is {describe(found)}",
+                label=describe(found),
+                help="take one of its elements, `xs[i]`, or add them up, `sum x in xs (x)`",
             )
         case Function():
             return kinds.ESCAPES(

@@ -56,6 +56,13 @@ def _transposed_ports(duals: tuple[PortTree, ...]) -> PortTree:
     return PortTuple((PortTuple(tuple(p[0] for p in pairs)), PortTuple(tuple(p[1] for p in pairs))))
 
 
+def _columns(dual: Value) -> Value:
+    """The dual of an array from that of its elements: the array of values, then the array of tangents."""
+    if isinstance(dual, TupleValue) and len(dual.items) == 2:
+        return TupleValue(tuple(ListValue(part) for part in dual.items))
+    return ListValue(dual)
+
+
 class _Dual:
     """One function being derived: the tangents of its inputs and the ports for tangents."""
 
@@ -79,7 +86,7 @@ class _Dual:
             case TupleValue(items):
                 return _transposed(tuple(map(self.input, items)))
             case ListValue(item):
-                return ListValue(self.input(item))
+                return _columns(self.input(item))
             case Abstract(ports, result, taint):
                 return Abstract(tuple(map(self.port, ports)), self.input(result), taint)
             case _:
@@ -103,7 +110,7 @@ class _Dual:
             case TupleValue(items):
                 return _transposed(tuple(map(self.result, items)))
             case ListValue(item):
-                return ListValue(self.result(item))
+                return _columns(self.result(item))
             case Closure():
                 return self.closure(value)
             case Abstract():
@@ -152,7 +159,7 @@ def _doubled(value: Value) -> Value:
         case TupleValue(items):
             return _transposed(tuple(map(_doubled, items)))
         case ListValue(item):
-            return ListValue(_doubled(item))
+            return _columns(_doubled(item))
         case Abstract():
             return _dual_of_input(value)
         case _:

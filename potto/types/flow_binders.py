@@ -1,4 +1,4 @@
-"""The walk over integrals and sums, and over the statements of scripts."""
+"""The walk over integrals, and over the statements of scripts."""
 
 from __future__ import annotations
 
@@ -44,17 +44,6 @@ def _variable(walk: Walk, binder: nodes.Binder, kind: Literal["variable", "other
     walk.locals[local] = value
     walk.places[id(binder)] = value
     return source
-
-
-@walks(nodes.Sum)
-def _sum(walk: Walk, node: nodes.Sum) -> Value:
-    lo, hi = walk.value(node.lo), walk.value(node.hi)
-    walk.sink("sum", node.lo.span, lo)
-    walk.sink("sum", node.hi.span, hi)
-    index = Source("other", node.variable.name, node.variable.span)
-    walk.locals[walk.inference.binders[id(node.variable)]] = Scalar({index: None})
-    body = without(walk.value(node.body), frozenset((index,)))
-    return taint(body, merge(flat(lo), flat(hi)))
 
 
 def walk_statement(walk: Walk, statement: nodes.Statement) -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
+from potto.modules.builtins import VECTORS
 from potto.primitives import PRIMITIVES
 from potto.syntax import nodes
 from potto.syntax.printer import print_expression
@@ -17,7 +18,20 @@ from potto.types.infer import strip
 from potto.types.rules import lone_delta, nonlinear
 from potto.types.scope import Builtin
 from potto.types.types import Parameter, groups_of
-from potto.types.values import HAZY, STILL, Closure, Effect, Scalar, Sink, Source, Spike, Step, TupleValue, Value
+from potto.types.values import (
+    HAZY,
+    STILL,
+    Closure,
+    Effect,
+    ListValue,
+    Scalar,
+    Sink,
+    Source,
+    Spike,
+    Step,
+    TupleValue,
+    Value,
+)
 
 
 @walks(nodes.Apply)
@@ -29,6 +43,8 @@ def _apply(walk: Walk, node: nodes.Apply) -> Value:
     arguments = [walk.value(argument.value) for argument in node.arguments]
     if name == "deriv":
         return dual(arguments[0]) if len(arguments) == 1 else HAZY
+    if name in VECTORS:
+        return _of_vectors(name, arguments)
     plan = walk.inference.plans.get(id(node))
     if plan is None:
         return HAZY
@@ -49,6 +65,26 @@ def _builtin(walk: Walk, node: nodes.Apply, name: str, arguments: Sequence[Value
         if PRIMITIVES[name].plain:
             walk.sink("jump", argument.value.span, value, node=name)
     return Scalar(sources, jumps)
+
+
+def _of_vectors(name: str, arguments: Sequence[Value]) -> Value:
+    """A builtin of vectors varies with all that their components vary with, and jumps where these do."""
+    if name == "len":
+        return STILL
+    found = Scalar(STILL.sources)
+    for part in _leaves(arguments):
+        found = Scalar(merge(found.sources, part.sources), found.jumps | part.jumps)
+    return TupleValue((found, found, found)) if name == "cross" else found
+
+
+def _leaves(values: Sequence[Value]) -> Iterator[Scalar]:
+    for value in values:
+        if isinstance(value, TupleValue):
+            yield from _leaves(value.items)
+        elif isinstance(value, ListValue):
+            yield from _leaves((value.item,))
+        else:
+            yield value if isinstance(value, Scalar) else Scalar(flat(value))
 
 
 def builtin_value(name: str) -> Value:

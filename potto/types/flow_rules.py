@@ -14,11 +14,12 @@ from potto.types.algebra import (
     taint,
 )
 from potto.types.flow import Surfaces, Walk, walks
+from potto.types.flow_arrays import part
 from potto.types.flow_calls import builtin_value
 from potto.types.infer import strip
 from potto.types.rules import nonlinear, product_of_deltas
-from potto.types.scope import Builtin, Global, Local, Member
-from potto.types.types import Unknown
+from potto.types.scope import Builtin, Global, Local, Meaning, Member
+from potto.types.types import UNKNOWN, Unknown
 from potto.types.values import (
     HAZY,
     STILL,
@@ -29,6 +30,7 @@ from potto.types.values import (
     TupleValue,
     Value,
 )
+from potto.types.vectors import is_vector
 
 
 @walks(nodes.Number)
@@ -48,7 +50,16 @@ def _paren(walk: Walk, node: nodes.Paren) -> Value:
 
 @walks(nodes.Name, nodes.Member)
 def _name(walk: Walk, node: nodes.Name | nodes.Member) -> Value:
-    meaning = walk.inference.meanings.get(id(node))
+    owner = walk.inference.owners.get(id(node))
+    if owner is not None and isinstance(node, nodes.Member):
+        found = _meant(walk, node, owner)
+        for name in (*node.path.split(".")[1:], node.name):
+            found = part(found, name)
+        return found
+    return _meant(walk, node, walk.inference.meanings.get(id(node)))
+
+
+def _meant(walk: Walk, node: nodes.Name | nodes.Member, meaning: Meaning | None) -> Value:
     if isinstance(meaning, Local):
         value = walk.locals.get(meaning, HAZY)
         walk.places[id(node)] = value
@@ -66,7 +77,8 @@ def _name(walk: Walk, node: nodes.Name | nodes.Member) -> Value:
 
 @walks(nodes.Unary)
 def _unary(walk: Walk, node: nodes.Unary) -> Value:
-    return _scalar(walk.value(node.operand))
+    value = walk.value(node.operand)
+    return value if is_vector(walk.inference.types.get(id(node), UNKNOWN)) else _scalar(value)
 
 
 def _scalar(value: Value) -> Scalar:
@@ -75,6 +87,8 @@ def _scalar(value: Value) -> Scalar:
 
 @walks(nodes.Chain)
 def _chain(walk: Walk, node: nodes.Chain) -> Value:
+    if is_vector(walk.inference.types.get(id(node), UNKNOWN)):
+        return _vectors(walk, node)
     first = _scalar(walk.value(node.first))
     sources, jumps, spikes = first.sources, first.jumps, first.spikes
     for operand in node.rest:
@@ -90,6 +104,32 @@ def _chain(walk: Walk, node: nodes.Chain) -> Value:
                 walk.report(product_of_deltas(operand.value))
             spikes = spikes | value.spikes
     return Scalar(sources, jumps, spikes)
+
+
+def _vectors(walk: Walk, node: nodes.Chain) -> Value:
+    """Component by component: each varies with what it is made of."""
+    found = walk.value(node.first)
+    for operand in node.rest:
+        found = _componentwise(found, walk.value(operand.value))
+    return found
+
+
+def _componentwise(a: Value, b: Value) -> Value:
+    match a, b:
+        case TupleValue(), TupleValue() if len(a.items) == len(b.items):
+            return TupleValue(tuple(map(_componentwise, a.items, b.items)))
+        case ListValue(), ListValue():
+            return ListValue(_componentwise(a.item, b.item))
+        case TupleValue(), _:
+            return TupleValue(tuple(_componentwise(item, b) for item in a.items))
+        case _, TupleValue():
+            return TupleValue(tuple(_componentwise(a, item) for item in b.items))
+        case ListValue(), _:
+            return ListValue(_componentwise(a.item, b))
+        case _, ListValue():
+            return ListValue(_componentwise(a, b.item))
+        case _:
+            return join(_scalar(a), _scalar(b))
 
 
 def _same_delta(a: frozenset[Spike], b: frozenset[Spike]) -> bool:

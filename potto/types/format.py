@@ -10,13 +10,17 @@ from collections.abc import Sequence
 from typing import assert_never
 
 from potto.types.types import (
+    AnySize,
+    ArrayOf,
+    Count,
     Diffeo,
     Dist,
     Function,
-    ListOf,
     Meta,
     Parameter,
     Real,
+    Shifted,
+    SizeVar,
     Truth,
     TupleOf,
     Type,
@@ -24,6 +28,7 @@ from potto.types.types import (
     Var,
     resolve,
 )
+from potto.types.unify import size_name
 
 
 def format_type(type: Type) -> str:
@@ -40,6 +45,7 @@ def format_types(types: Sequence[Type]) -> tuple[str, ...]:
 class _Printer:
     def __init__(self) -> None:
         self._names: dict[object, str] = {}
+        self._sizes: set[str] = set()
 
     def text(self, type: Type) -> str:
         type = resolve(type)
@@ -50,8 +56,16 @@ class _Printer:
                 return "Dist" + _over(variables)
             case TupleOf(items):
                 return f"({', '.join(map(self.text, items))})"
-            case ListOf(item):
-                return f"[{self.text(item)}]"
+            case ArrayOf():
+                return self._array(type)
+            case Count(number):
+                return str(number)
+            case SizeVar(name):
+                return name
+            case Shifted(base, offset):
+                return f"{self.text(base)} {'-' if offset < 0 else '+'} {abs(offset)}"
+            case AnySize():
+                return "_"
             case Function(parameters, result):
                 return f"{self._group(parameters)} -> {self.text(result)}"
             case Diffeo(dims):
@@ -60,12 +74,28 @@ class _Printer:
                 return "a comparison"
             case Var(name):
                 return self._variable(name)
+            case Meta(size=size) if size is not None:
+                return self._size(type, size)
             case Meta():
                 return self._variable(type)
             case Unknown():
                 return "?"
             case _:
                 assert_never(type)
+
+    def _array(self, type: ArrayOf) -> str:
+        """`[n, m] T`, the sizes of arrays of arrays in one bracket."""
+        sizes, item = [self.text(type.size)], resolve(type.item)
+        while isinstance(item, ArrayOf):
+            sizes.append(self.text(item.size))
+            item = resolve(item.item)
+        text = self.text(item)
+        return f"[{', '.join(sizes)}] {f'({text})' if isinstance(item, Function) else text}"
+
+    def _size(self, key: object, wanted: str) -> str:
+        if key not in self._names:
+            self._names[key] = size_name(wanted, self._sizes)
+        return self._names[key]
 
     def _group(self, parameters: tuple[Parameter, ...]) -> str:
         if len(parameters) == 1 and parameters[0].name is None:
@@ -80,7 +110,7 @@ class _Printer:
 
     def _variable(self, key: object) -> str:
         if key not in self._names:
-            number = len(self._names)
+            number = len(self._names) - len(self._sizes)
             self._names[key] = chr(ord("a") + number % 26) + (str(number // 26) if number >= 26 else "")
         return self._names[key]
 

@@ -19,8 +19,9 @@ from potto.types.scope import Builtin, Global, Local, Meaning, Member, Module, u
 from potto.types.types import (
     REAL,
     UNKNOWN,
+    ArrayOf,
+    Count,
     Function,
-    ListOf,
     Parameter,
     Real,
     Truth,
@@ -29,6 +30,7 @@ from potto.types.types import (
     resolve,
 )
 from potto.types.unify import MAX_LEAVES, free_metas, instantiate, leaves, open_type, unify
+from potto.types.vectors import combined, fields, vector_form
 
 
 @rule(nodes.Number)
@@ -68,9 +70,14 @@ def _name(inference: Inference, node: nodes.Name) -> Type:
 
 @rule(nodes.Member)
 def _member(inference: Inference, node: nodes.Member) -> Type:
-    hidden = inference.scope.find(node.path.partition(".")[0]) is not None
-    meaning = None if hidden else inference.outside.find(node.path, node.name)
+    head = node.path.partition(".")[0]
+    local = inference.scope.find(head)
+    meaning = inference.outside.find(node.path, node.name) if local is None else None
     if meaning is None:
+        whole = local or inference.outside.find(None, head)
+        if whole is not None and not isinstance(whole, Module):
+            inference.owners[id(node)] = whole
+            return fields(inference, _meant(inference, node, whole), node)
         inference.say(undefined_member(inference.outside, inference.scope, node))
         return UNKNOWN
     inference.meanings[id(node)] = meaning
@@ -112,6 +119,11 @@ def _builtin(inference: Inference, node: nodes.Name | nodes.Member, name: str) -
             )
         )
         return UNKNOWN
+    if vector_form(name) is not None:
+        message = f"`{name}` is not a function that can be passed on: it takes vectors of any size"
+        help = f"apply it here: `{name}(…)`, or pass on `\\u . {name}(u)`"
+        inference.report(kinds.SPECIAL(node.span, message, label="not applied", help=help))
+        return UNKNOWN
     return _of_numbers(PRIMITIVES[name].arity or 2)
 
 
@@ -126,14 +138,12 @@ def _of_numbers(count: int) -> Function:
 
 @rule(nodes.Chain)
 def _chain(inference: Inference, node: nodes.Chain) -> Type:
-    inference.number(node.first, _LEFT[node.rest[0].op])
+    found = inference.infer(node.first)
     for operand in node.rest:
-        inference.number(operand.value, _RIGHT[operand.op])
-    return REAL
-
-
-_LEFT = {op: f"the left of `{op}`" for op in "+-*/"}
-_RIGHT = {op: f"the right of `{op}`" for op in "+-*/"}
+        right = inference.infer(operand.value)
+        if found is not REAL or right is not REAL:  # as they mostly are
+            found = combined(inference, found, operand, right, node)
+    return found
 
 
 @rule(nodes.Power)
@@ -167,20 +177,10 @@ def _list(inference: Inference, node: nodes.ListLiteral) -> Type:
     item: Type = inference.fresh()
     for expr, type in zip(node.items, types):
         if isinstance(resolve(type), Truth):
-            inference.report(comparison(expr, "a list holds numbers, tuples or functions"))
+            inference.report(comparison(expr, "an array holds numbers, tuples or functions"))
         elif not unify(item, type):
-            inference.report(mismatch(type, item, expr, "all items of a list must be of one type: this one"))
-    if inference.integrals:
-        inference.report(
-            kinds.LIST_INSIDE(
-                node.span,
-                "a list cannot stand under an integral",
-                label="inside the integral",
-                help="use a tuple, `(a, b)`, or for a condition the comparison in brackets, `[x < t]`",
-            )
-        )
-        return UNKNOWN
-    return ListOf(item)
+            inference.report(mismatch(type, item, expr, "all elements of an array must be of one type: this one"))
+    return ArrayOf(Count(len(types)), item)
 
 
 def value_only(inference: Inference, type: Type, expr: nodes.Expr, what: str) -> None:
@@ -312,9 +312,11 @@ def is_known(inference: Inference, expr: nodes.Expr) -> bool:
 
 
 def special(inference: Inference, expr: nodes.Expr) -> str | None:
-    """`deriv` or `delta` if that is what a function's name means here."""
+    """`deriv`, `delta` or a builtin of vectors if that is what a function's name means here."""
     expr = strip(expr)
-    if not isinstance(expr, nodes.Name) or expr.id not in ("deriv", "delta") or inference.scope.find(expr.id):
+    if not isinstance(expr, nodes.Name) or inference.scope.find(expr.id):
+        return None
+    if expr.id not in ("deriv", "delta") and vector_form(expr.id) is None:
         return None
     return expr.id if isinstance(inference.outside.find(None, expr.id), Builtin) else None
 

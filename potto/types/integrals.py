@@ -1,4 +1,4 @@
-"""Binders of numbers: integrals, sums, and the statements of scripts.
+"""Integrals, and the statements of scripts.
 
 Owns the scoping of bounds: the first variable is the outermost, a bound sees the variables before its own, a measure
 names its variable itself.
@@ -18,7 +18,20 @@ from potto.types import kinds
 from potto.types.context import Inference, comparison, describe, rule
 from potto.types.infer import bindings, escape
 from potto.types.scope import Local
-from potto.types.types import REAL, Dist, Function, ListOf, Meta, Real, Truth, TupleOf, Type, Unknown, resolve
+from potto.types.types import (
+    ANY_SIZE,
+    REAL,
+    ArrayOf,
+    Dist,
+    Function,
+    Meta,
+    Real,
+    Truth,
+    TupleOf,
+    Type,
+    Unknown,
+    resolve,
+)
 from potto.types.unify import unify
 
 
@@ -32,7 +45,7 @@ def _integral(inference: Inference, node: nodes.Integral) -> Type:
         inference.integrals += 1
         body = inference.infer(node.body)
         inference.integrals -= 1
-    return _summed(inference, body, node.body, "the integrand")
+    return summed(inference, body, node.body, "the integrand")
 
 
 Bounds = nodes.Interval | nodes.MeasureBound
@@ -101,18 +114,8 @@ def _measure(inference: Inference, bounds: nodes.MeasureBound) -> None:
     inference.report(kinds.MEASURE(span, message, label=label, help=f"write `{bounds.variable} ~ {call}`"))
 
 
-@rule(nodes.Sum)
-def _sum(inference: Inference, node: nodes.Sum) -> Type:
-    inference.number(node.lo, "the first value of a sum")
-    inference.number(node.hi, "the last value of a sum")
-    with inference.scope.inside():
-        inference.local(node.variable, node.variable.name, node.variable.span, "index", REAL)
-        body = inference.infer(node.body)
-    return _summed(inference, body, node.body, "what is summed")
-
-
-def _summed(inference: Inference, type: Type, expr: nodes.Expr, what: str) -> Type:
-    """What is integrated or summed is a number or a tuple of such; the type of the whole."""
+def summed(inference: Inference, type: Type, expr: nodes.Expr, what: str) -> Type:
+    """What is integrated or summed is a number, a tuple or an array of such; the type of the whole."""
     found = resolve(type)
     if isinstance(found, Truth):
         inference.report(comparison(expr, f"{what} must be a number"))
@@ -133,15 +136,11 @@ def _summed_late(inference: Inference, type: Type, expr: nodes.Expr, what: str) 
     elif isinstance(found, TupleOf):
         for item in found.items:
             _summed_late(inference, item, expr, what)
+    elif isinstance(found, ArrayOf):
+        _summed_late(inference, found.item, expr, what)
     elif not isinstance(found, Real | Dist | Unknown):
-        inference.report(
-            kinds.LIST_INSIDE(
-                expr.span,
-                f"{what} must be a number, but this is {describe(found)}",
-                label=describe(found),
-                help="take it apart first" if not isinstance(found, ListOf) else "a list has no integral",
-            )
-        )
+        message = f"{what} must be a number, but this is {describe(found)}"
+        inference.report(kinds.LIST_INSIDE(expr.span, message, label=describe(found), help="take it apart first"))
 
 
 # Scripts
@@ -163,16 +162,16 @@ def statement(inference: Inference, node: nodes.Statement) -> None:
 
 def _shown(inference: Inference, type: Type, expr: nodes.Expr) -> None:
     if isinstance(resolve(type), Truth):
-        inference.report(comparison(expr, "what is shown is a number, a tuple, a list or a function"))
+        inference.report(comparison(expr, "what is shown is a number, a tuple, an array or a function"))
 
 
 def _for(inference: Inference, node: nodes.For) -> None:
     item: Type = inference.fresh()
     iterable = inference.infer(node.iterable)
-    if not unify(iterable, ListOf(item)):
+    if not unify(iterable, ArrayOf(ANY_SIZE, item)):
         found = resolve(iterable)
-        message = f"`for` goes through a list, but this is {describe(found)}"
-        help = "put the items in a list: `for v in [a, b]:`"
+        message = f"`for` goes through an array, but this is {describe(found)}"
+        help = "put the items in an array: `for v in [a, b]:`"
         inference.report(kinds.MISMATCH(node.iterable.span, message, label=describe(found), help=help))
         item = Unknown()
     with inference.scope.inside():

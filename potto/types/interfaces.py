@@ -20,9 +20,9 @@ from potto.types.algebra import flat, inputs_of, inputs_of_ports, join, ports_in
 from potto.types.types import (
     REAL,
     UNKNOWN,
+    ArrayOf,
     Dist,
     Function,
-    ListOf,
     Parameter,
     Real,
     TupleOf,
@@ -56,7 +56,7 @@ from potto.types.values import (
 
 STARRED = Real(star=True)
 _number = attrgetter("number")
-PLAIN_KINDS: tuple[SinkKind, ...] = ("condition", "jump", "sum", "equality", "declared")
+PLAIN_KINDS: tuple[SinkKind, ...] = ("condition", "jump", "sum", "index", "equality", "declared")
 
 
 @dataclass(frozen=True, slots=True)
@@ -321,8 +321,8 @@ class Decorating:
                 return Function(parameters, self.type(result, answer))
             case Function(), Abstract():
                 return self._input(type, value, self.settled)
-            case ListOf(item), ListValue(inner):
-                return ListOf(self.type(item, inner))
+            case ArrayOf(size, item), ListValue(inner):
+                return ArrayOf(size, self.type(item, inner))
             case TupleOf(items, dual), TupleValue(parts) if len(items) == len(parts):
                 return TupleOf(tuple(map(self.type, items, parts)), dual)
             case _:
@@ -365,6 +365,8 @@ class Decorating:
             case TupleOf(items, dual), TupleValue(parts) if len(items) == len(parts):
                 inner = tuple(self._input(item, part, still) for item, part in zip(items, parts))
                 return TupleOf(inner, dual)
+            case ArrayOf(size, item), ListValue(part):
+                return ArrayOf(size, self._input(item, part, still))
             case Function(group, result), Abstract(ports, answer) if len(group) == len(ports):
                 parameters = (Parameter(None, self._given(p.type, tree)) for p, tree in zip(group, ports))
                 return Function(tuple(parameters), self._input(result, answer, None))

@@ -32,6 +32,11 @@ SPECIAL = declare("P0323", "deriv, delta or print used as a value")
 TRUTH_ESCAPES = declare("P0324", "a comparison where a number is needed")
 TOO_LARGE = declare("P0325", "a tuple that is too large")
 
+SIZES = declare("P0326", "sizes that do not agree")
+NO_FIELD = declare("P0327", "something that has no such part")
+OUT_OF_RANGE = declare("P0328", "an index that is out of range")
+NOT_AN_ARRAY = declare("P0329", "something that is no array")
+
 UNUSED_LOCAL = declare("P0610", "a local name that is not used", "warning")
 UNUSED_VARIABLE = declare("P0611", "a variable of integration that is not used", "warning")
 SHADOWED = declare("P0612", "a name that hides another one", "warning")

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from potto.diagnostics import Diagnostic
 from potto.modules.free import free_references
 from potto.modules.graph import refer, references, strongly_connected
-from potto.modules.lookup import DefinitionTarget, ModuleTarget
+from potto.modules.lookup import DefinitionTarget, ModuleTarget, resolve_member
 from potto.modules.texts import chunk_text, definition, is_diffeo, parsed
 from potto.query import Database, query
 from potto.quick import quick, value
@@ -121,6 +121,8 @@ def _outside(
     known: dict[tuple[str | None, str], Meaning] = {}
     for path, name in used:
         target = refer(db, file, path, name)
+        if path is not None and target is not None and resolve_member(db, file, path, name) is None:
+            name, path = path.partition(".")[0], None  # a field of a definition
         if isinstance(target, ModuleTarget):
             known[path, name] = Module(name)
         elif target is not None:

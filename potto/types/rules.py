@@ -28,6 +28,7 @@ KINDS: dict[SinkKind, Kind] = {
     "condition": kinds.VARYING_CONDITION,
     "jump": kinds.VARYING_JUMP,
     "sum": kinds.VARYING_SUM,
+    "index": kinds.VARYING_CONDITION,
     "equality": kinds.EQUALITY,
     "declared": kinds.DECLARED_PLAIN,
 }
@@ -111,6 +112,8 @@ class _Wording:
                 return f"`{self.sink.node}` jumps, so that its argument may not depend on {self._names()}"
             case "sum":
                 return f"this bound of a sum depends on {self._names()}"
+            case "index":
+                return f"this index depends on {self._names()}"
             case "equality":
                 return f"`{self.sink.node}` over {self._names()} holds on a set of measure zero"
             case _:
@@ -123,6 +126,7 @@ class _Wording:
         does = {
             "jump": f"takes a builtin that jumps of {parameter}",
             "sum": f"takes the bound of a sum from {parameter}",
+            "index": f"takes an index from {parameter}",
             "equality": f"asks for an equality of {parameter}",
             "declared": f"declares {parameter} to be `Real`",
         }.get(self.sink.kind, f"decides a plain condition by {parameter}")
@@ -175,6 +179,8 @@ class _Wording:
                 return f"{where}write the jump as a bracket, `[x >= 1]`, so that its boundary term is counted"
             case "sum":
                 return f"{where}sum to a fixed bound and put a bracket into the terms, `[i <= x]`"
+            case "index":
+                return f"{where}sum over all elements, each with a bracket that says where it counts: `[i <= x] * …`"
             case "equality":
                 return f"{where}write `[x < t]` for a jump, or `delta(x - t)` for the surface itself"
             case "declared":
@@ -197,6 +203,7 @@ REASON_TEXT: dict[SinkKind, str] = {
     "condition": "this plain condition decides by it",
     "jump": "this is given to a builtin that jumps",
     "sum": "this is a bound of a sum",
+    "index": "this is an index",
     "equality": "this is an equality",
     "declared": "declared `Real` here",
 }

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from potto.diagnostics import Diagnostic
-from potto.modules.builtins import CONSTANTS, PROJECTIONS, SPECIALS, is_builtin
+from potto.modules.builtins import CONSTANTS, PROJECTIONS, SPECIALS, VECTORS, is_builtin
 from potto.modules.hints import did_you_mean, elsewhere, known_elsewhere, near_names
 from potto.modules.lookup import Defined, DefinitionTarget, find_module, meaning, preludes, resolve_module
 from potto.modules.texts import imports, names
@@ -26,7 +26,9 @@ from potto.types.kinds import NOT_DEFINED
 from potto.types.reasons import Reasons
 from potto.types.types import Meta, Type
 
-LocalKind = Literal["parameter", "local", "variable", "index", "loop"]
+LocalKind = Literal["parameter", "local", "variable", "index", "loop", "size"]
+
+
 @dataclass(eq=False, slots=True)
 class Local:
     """A name that is bound inside a definition. `known`: its value is a function whose parameters have names.
@@ -97,7 +99,7 @@ class Outside:
 
 def builtin_names() -> tuple[str, ...]:
     """All builtin names that programs may write."""
-    return (*CONSTANTS, *SPECIALS, *PROJECTIONS, *(p.name for p in PRIMITIVES.values() if p.surface))
+    return (*CONSTANTS, *SPECIALS, *PROJECTIONS, *VECTORS, *(p.name for p in PRIMITIVES.values() if p.surface))
 
 
 class Scope:

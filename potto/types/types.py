@@ -43,8 +43,38 @@ class TupleOf:
 
 
 @value
-class ListOf:
+class ArrayOf:
+    """An array of items of one type. `size` is a Count, a SizeVar, Shifted, AnySize or a Meta."""
+
+    size: Type
     item: Type
+
+
+@value
+class Count:
+    """A size that is known."""
+
+    number: int
+
+
+@value
+class SizeVar:
+    """A size of a finished type: any number, the same wherever the name stands."""
+
+    name: str
+
+
+@value
+class Shifted:
+    """A size that differs from another one, which is not known, by a number."""
+
+    base: Type
+    offset: int
+
+
+@value
+class AnySize:
+    """A size that is known at run time only. It fits every other."""
 
 
 @value
@@ -89,17 +119,23 @@ class Unknown:
 
 @dataclass(eq=False, slots=True)
 class Meta:
-    """A type that inference does not know yet. `level`: the depth of the binding that it belongs to."""
+    """A type that inference does not know yet. `level`: the depth of the binding that it belongs to.
+
+    size: of a size, the name that it would like to have.
+    """
 
     level: int
     found: Type | None = None
+    size: str | None = None
 
 
-Type = Real | Dist | TupleOf | ListOf | Function | Diffeo | Truth | Var | Unknown | Meta
+Size = Count | SizeVar | Shifted | AnySize
+Type = Real | Dist | TupleOf | ArrayOf | Size | Function | Diffeo | Truth | Var | Unknown | Meta
 
 REAL = Real()
 TRUTH = Truth()
 UNKNOWN = Unknown()
+ANY_SIZE = AnySize()
 
 
 def resolve(type: Type) -> Type:
@@ -112,6 +148,27 @@ def resolve(type: Type) -> Type:
     while isinstance(type, Meta) and type.found is not None:
         type.found, type = root, type.found
     return root
+
+
+def shifted(size: Type, offset: int) -> Type:
+    """A size so much larger."""
+    size = resolve(size)
+    match size:
+        case Count(number):
+            return Count(max(0, number + offset))
+        case Shifted(base, before):
+            return shifted(base, before + offset)
+        case AnySize() | Unknown():
+            return size
+        case _:
+            return Shifted(size, offset) if offset else size
+
+
+def dual_of_array(size: Type, dual: Type) -> Type:
+    """The dual of an array of items with this dual: the array of values, then the array of tangents."""
+    if isinstance(dual, TupleOf) and len(dual.items) == 2:
+        return TupleOf(tuple(ArrayOf(size, part) for part in dual.items), dual=True)
+    return ArrayOf(size, dual)
 
 
 def function(groups: Iterable[tuple[Parameter, ...]], result: Type) -> Type:
@@ -152,7 +209,7 @@ def derivative_type(type: Type) -> Type:
 def dual_of_tuple(duals: tuple[Type, ...], dual: bool = False) -> Type:
     """The dual of a tuple of numbers (and tuples of them): the tuple of values, then the tuple of tangents.
 
-    What is no tuple of numbers (a list in it, something wrong) keeps its duals side by side.
+    What is no tuple of numbers (a function in it, something wrong) keeps its duals side by side.
     """
     pairs = [d.items for d in duals if isinstance(d, TupleOf) and len(d.items) == 2]
     if len(pairs) != len(duals):
@@ -175,8 +232,8 @@ def _derivative(type: Type, parameters: frozenset[str]) -> Type:
             return TupleOf((Dist(renamed(variables)), Dist(renamed(variables))), dual=True)
         case TupleOf(items, dual):
             return dual_of_tuple(tuple(_derivative(item, parameters) for item in items), dual)
-        case ListOf(item):
-            return ListOf(_derivative(item, parameters))
+        case ArrayOf(size, item):
+            return dual_of_array(size, _derivative(item, parameters))
         case Function(group, result):
             inner = parameters | {p.name for p in group if p.name is not None}
             duals = tuple(
@@ -188,10 +245,10 @@ def _derivative(type: Type, parameters: frozenset[str]) -> Type:
             return UNKNOWN if dims is None else dual_of_tuple((TupleOf((REAL, REAL), dual=True),) * dims)
         case Var():  # a number, for want of better knowledge
             return TupleOf((Real(star=True), Real(star=True)), dual=True)
-        case Truth() | Unknown() | Meta():
+        case Truth() | Unknown() | Meta() | Count() | SizeVar() | Shifted() | AnySize():
             return UNKNOWN
         case _:
             assert_never(type)
 
 
-quick(Real, Dist, TupleOf, ListOf, Parameter, Function, Diffeo, Truth, Var, Unknown)
+quick(Real, Dist, TupleOf, ArrayOf, Count, SizeVar, Shifted, AnySize, Parameter, Function, Diffeo, Truth, Var, Unknown)

@@ -11,22 +11,28 @@ from collections.abc import Callable
 
 from potto.types.types import (
     REAL,
+    AnySize,
+    ArrayOf,
+    Count,
     Diffeo,
     Dist,
     Function,
-    ListOf,
     Meta,
     Parameter,
     Real,
+    Shifted,
+    SizeVar,
     Truth,
     TupleOf,
     Type,
     Unknown,
     Var,
     resolve,
+    shifted,
 )
 
 NUMBERS = (Real, Dist)
+SIZES = (Count, SizeVar, Shifted, AnySize)
 MAX_LEAVES = 4096  # numbers in one tuple: beyond it a program is wrong (or hostile)
 
 
@@ -45,11 +51,25 @@ def unify(a: Type, b: Type) -> bool:
         return isinstance(b, Function) and _unify_functions(a, b)
     if isinstance(a, TupleOf | Diffeo) and isinstance(b, TupleOf | Diffeo):
         return _unify_tuples(a, b)
-    if isinstance(a, ListOf) and isinstance(b, ListOf):
-        return unify(a.item, b.item)
+    if isinstance(a, ArrayOf) and isinstance(b, ArrayOf):
+        fits = unify(a.item, b.item)
+        return unify(a.size, b.size) and fits
+    if isinstance(a, SIZES) and isinstance(b, SIZES):
+        return _unify_sizes(a, b)
     if isinstance(a, Var) and isinstance(b, Var):
         return a.name == b.name
     return isinstance(a, Truth) and isinstance(b, Truth)
+
+
+def _unify_sizes(a: Type, b: Type) -> bool:
+    """Whether sizes may be the same; what one of them is shifted from is found out."""
+    if isinstance(a, AnySize) or isinstance(b, AnySize):
+        return True
+    if isinstance(a, Shifted) and not (isinstance(b, Count) and b.number < a.offset):
+        return unify(a.base, shifted(b, -a.offset))
+    if isinstance(b, Shifted) and not (isinstance(a, Count) and a.number < b.offset):
+        return unify(b.base, shifted(a, -b.offset))
+    return a == b
 
 
 def _unify_functions(a: Function, b: Function) -> bool:
@@ -122,7 +142,9 @@ def parts(type: Type) -> tuple[Type, ...]:
         return type.items
     if isinstance(type, Function):
         return (*(p.type for p in type.parameters), type.result)
-    return (type.item,) if isinstance(type, ListOf) else ()
+    if isinstance(type, ArrayOf):
+        return type.size, type.item
+    return (type.base,) if isinstance(type, Shifted) else ()
 
 
 def rebuild(type: Type, leaf: Callable[[Type], Type]) -> Type:
@@ -133,7 +155,9 @@ def rebuild(type: Type, leaf: Callable[[Type], Type]) -> Type:
         return Function(parameters, rebuild(type.result, leaf))
     if isinstance(type, TupleOf):
         return TupleOf(tuple([rebuild(item, leaf) for item in type.items]), type.dual)
-    return ListOf(rebuild(type.item, leaf)) if isinstance(type, ListOf) else leaf(type)
+    if isinstance(type, ArrayOf):
+        return ArrayOf(rebuild(type.size, leaf), rebuild(type.item, leaf))
+    return shifted(rebuild(type.base, leaf), type.offset) if isinstance(type, Shifted) else leaf(type)
 
 
 def leaves(type: Type, limit: int = MAX_LEAVES) -> int:
@@ -142,7 +166,7 @@ def leaves(type: Type, limit: int = MAX_LEAVES) -> int:
     while stack and count < limit:
         part = resolve(stack.pop())
         below = parts(part)
-        count += not below
+        count += not below and not isinstance(part, SIZES)
         stack.extend(below)
     return count
 
@@ -165,7 +189,7 @@ def instantiate(type: Type, generic: tuple[Meta, ...], level: int) -> Type:
     """A fresh copy of a local name's type."""
     if not generic:
         return type
-    fresh: dict[Meta, Type] = {meta: Meta(level) for meta in generic}
+    fresh: dict[Meta, Type] = {meta: Meta(level, size=meta.size) for meta in generic}
     return rebuild(type, lambda leaf: fresh.get(leaf, leaf) if isinstance(leaf, Meta) else leaf)
 
 
@@ -176,6 +200,8 @@ def open_type(type: Type, level: int) -> Type:
     def leaf(part: Type) -> Type:
         if isinstance(part, Var):
             return fresh.setdefault(part.name, Meta(level))
+        if isinstance(part, SizeVar):
+            return fresh.setdefault(f"[{part.name}]", Meta(level, size=part.name))
         return REAL if isinstance(part, NUMBERS) else part
 
     return rebuild(type, leaf)
@@ -184,13 +210,26 @@ def open_type(type: Type, level: int) -> Type:
 def close_type(type: Type) -> Type:
     """A type without `Meta`: what is unknown at the end holds for all types, and gets a name."""
     names: dict[Meta, Type] = {}
+    sizes: set[str] = set()
 
     def leaf(part: Type) -> Type:
-        if isinstance(part, Meta):
-            return names.setdefault(part, Var(_variable_name(len(names))))
-        return part
+        if not isinstance(part, Meta):
+            return part
+        if part.size is not None and part not in names:
+            names[part] = SizeVar(size_name(part.size, sizes))
+        return names.setdefault(part, Var(_variable_name(len(names))))
 
     return rebuild(type, leaf)
+
+
+def size_name(wanted: str, taken: set[str]) -> str:
+    """A name for a size that is not taken yet: the one that is wanted, or the next of n, m, k, …"""
+    name, number = wanted or "n", 0
+    while name in taken:
+        name = "nmklpqrst"[number % 9] + (str(number // 9) if number >= 9 else "")
+        number += 1
+    taken.add(name)
+    return name
 
 
 def _variable_name(number: int) -> str:
@@ -203,6 +242,6 @@ def settle(type: Type) -> None:
     while stack:
         part = resolve(stack.pop())
         if isinstance(part, Meta):
-            part.found = REAL
+            part.found = part.found if part.size is not None else REAL
         else:
             stack.extend(parts(part))

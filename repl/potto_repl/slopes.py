@@ -12,13 +12,13 @@ from msgspec import Struct
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.shown import as_dual
 from potto.syntax import nodes, print_expression
-from potto.types.types import Diffeo, Function, ListOf, Parameter, TupleOf, resolve
+from potto.types.types import ArrayOf, Diffeo, Function, Parameter, TupleOf, resolve
 from potto_repl.expressions import Called, checked
 from potto_repl.reply import Refusal
 from potto_repl.session import Conversation
 from potto_repl.values import Parts, parts_of
 
-_NO_NUMBERS = (Function, Diffeo, TupleOf, ListOf)
+_NO_NUMBERS = (Function, Diffeo, TupleOf, ArrayOf)
 
 
 class Slope(Struct, frozen=True):

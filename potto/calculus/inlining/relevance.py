@@ -10,7 +10,7 @@ from potto.modules.graph import refer
 from potto.modules.lookup import DefinitionTarget
 from potto.query import Database
 from potto.types import interface
-from potto.types.types import Dist, Function, ListOf, Real, Truth, TupleOf, Type
+from potto.types.types import ArrayOf, Dist, Function, Real, Truth, TupleOf, Type
 
 _INTEGRALS = ("integral", "∫")
 
@@ -39,6 +39,6 @@ def _takes_numbers(type: Type) -> bool:
 def _is_number(type: Type) -> bool:
     if isinstance(type, TupleOf):
         return all(map(_is_number, type.items))
-    if isinstance(type, ListOf):
+    if isinstance(type, ArrayOf):
         return _is_number(type.item)
     return isinstance(type, Real | Dist | Truth)

@@ -13,9 +13,12 @@ from msgspec import Struct
 
 from potto.core.terms import (
     App,
+    Array,
     Branch,
     Deriv,
+    Fold,
     If,
+    Index,
     Integral,
     Lam,
     Prim,
@@ -76,13 +79,17 @@ def spine(call: App) -> tuple[Term, tuple[tuple[Term, ...], ...]]:
     return term, tuple(reversed(groups))
 
 
+HEAVY = (Integral, Sum, Fold, Array, Index)
+
+
 @lru_cache(maxsize=65536)
 def is_heavy(term: Term, calls: bool) -> bool:
     """Whether a side of a conditional is worth evaluating only where it is taken.
 
-    Integrals and sums are; calls are too (`calls`) under a plain condition, which may be what ends a recursion.
+    Integrals, sums and what reads arrays are; calls are too (`calls`) under a plain condition, which may be what ends
+    a recursion.
     """
-    return any(isinstance(t, (Integral, Sum)) or (calls and isinstance(t, App)) for t in postorder(term))
+    return any(isinstance(t, HEAVY) or (calls and isinstance(t, App)) for t in postorder(term))
 
 
 def is_lazy(term: If | Branch) -> bool:
@@ -97,6 +104,10 @@ def immediate(term: Term) -> tuple[Term, ...]:
             return ()
         case Sum():
             return (term.lo, term.hi)
+        case Fold():
+            return (term.lo, term.hi, term.start)
+        case Array():
+            return (term.size,)
         case If():
             return (term.condition,) if is_lazy(term) else children(term)
         case Branch():

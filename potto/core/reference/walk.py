@@ -20,15 +20,20 @@ from potto.core.reference.functions import function
 from potto.core.reference.integrals import Trace
 from potto.core.terms import (
     App,
+    Array,
     Branch,
     Const,
+    Data,
     Delta,
     Deriv,
+    Fold,
     Global,
     Hole,
     If,
+    Index,
     Integral,
     Lam,
+    Length,
     ListOf,
     Prim,
     Proj,
@@ -137,6 +142,17 @@ class Oracle:
                 return self.delta(term, env)
             case Sum():
                 return self.sum(term, env)
+            case Fold():
+                return self.fold(term, env)
+            case Array():
+                count = int(self.run(term.size, env))
+                return [self.run(term.body, {**env, term.variable: mp.mpf(place)}) for place in range(count)]
+            case Index():
+                return self.element(self.run(term.array, env), self.decide(term.index, env))
+            case Length():
+                return mp.mpf(len(self.run(term.array, env)))
+            case Data():
+                raise KeyError(f"{term.path}: give the data as values")
             case Deriv(function=inner):
                 return differences.derivative(self.run(inner, env), self.digits)
             case Hole(reason=reason):
@@ -177,6 +193,19 @@ class Oracle:
         lo, hi = int(mp.ceil(self.run(term.lo, env))), int(mp.floor(self.run(term.hi, env)))
         parts = [self.run(term.body, {**env, term.variable: mp.mpf(i)}) for i in range(lo, hi + 1)]
         return integrals.plus(parts[0], parts[1:]) if parts else mp.mpf(0)
+
+
+    def fold(self, term: Fold, env: Environment) -> Value:
+        lo, hi = int(mp.ceil(self.run(term.lo, env))), int(mp.floor(self.run(term.hi, env)))
+        state = self.run(term.start, env)
+        for place in range(lo, hi + 1):
+            state = self.run(term.body, {**env, term.variable: mp.mpf(place), term.state: state})
+        return state
+
+    def element(self, whole: Value, place: Any) -> Value:
+        if not 0 <= int(place) < len(whole) or int(place) != place:
+            raise IndexError(f"the index {place} of an array of {len(whole)}")
+        return whole[int(place)]
 
 
 _PLACES = tuple(f"#{i}" for i in range(1000))

@@ -20,9 +20,10 @@ from potto.syntax.nodes import Node
 
 _EXPRESSIONS = (
     nodes.Number, nodes.Unary, nodes.Chain, nodes.Power, nodes.Bracket, nodes.Tuple, nodes.Paren, nodes.If,
-    nodes.Apply, nodes.Integral, nodes.Sum, nodes.Let, nodes.Name, nodes.Member, nodes.Lambda, nodes.InlineDiffeo,
+    nodes.Apply, nodes.Integral, nodes.Reduction, nodes.Fold, nodes.Comprehension, nodes.Index, nodes.Field,
+    nodes.Let, nodes.Name, nodes.Member, nodes.Lambda, nodes.InlineDiffeo,
 )  # fmt: skip
-_SCOPES = (nodes.Lambda, nodes.Integral, nodes.Sum, nodes.Let)
+_SCOPES = (nodes.Lambda, nodes.Integral, nodes.Reduction, nodes.Fold, nodes.Comprehension, nodes.Let)
 
 
 def extractions(place: At) -> Iterator[Offer]:

@@ -13,7 +13,7 @@ from potto.source import Span
 from potto.syntax import live_expressions, nodes, parse_expression, walk
 from potto.syntax.live import Live
 from potto.types import (
-    ListOf,
+    ArrayOf,
     Real,
     Type,
     Unknown,
@@ -111,7 +111,7 @@ def _statement_names(
         case nodes.For(variable=variable, iterable=iterable, body=body):
             yield from expression_names(db, file, iterable, loops)
             found = infer_expression(db, file, iterable, loops).type
-            type = found.item if isinstance(found, ListOf) else Unknown()
+            type = found.item if isinstance(found, ArrayOf) else Unknown()
             yield Typed(variable.span, variable.name, type)
             for inner in body:
                 yield from _statement_names(db, file, inner, (*loops, (variable.name, type)))
@@ -134,7 +134,7 @@ def bound_by(db: Database, chunk: ChunkAt, span: Span) -> tuple[nodes.Node, str]
         match node:
             case nodes.Integral(variables=variables) if any(v.span == span for v in variables):
                 return node, text
-            case nodes.Sum(variable=variable) | nodes.For(variable=variable) if variable.span == span:
+            case nodes.Clause(variable=variable) | nodes.For(variable=variable) if variable.span == span:
                 return node, text
             case nodes.Binding(targets=targets) if any(t.span == span for t in targets):
                 return node, text
@@ -205,8 +205,10 @@ def _value(db: Database, chunk: ChunkAt, span: Span, type: Type) -> list[str]:
     match node:
         case nodes.Binding():
             parts += _bound_to(node, source, span)
-        case nodes.Sum(lo=lo, hi=hi):
+        case nodes.Clause(over=nodes.Range(lo=lo, hi=hi)):
             parts.append(f"from {code(written(source, lo))} to {code(written(source, hi))}")
+        case nodes.Clause(over=over) if len(text := written(source, over)) <= LONG_VALUE:  # type: ignore[arg-type]
+            parts.append(f"in {code(text)}")
         case nodes.For(iterable=iterable) if len(text := written(source, iterable)) <= LONG_VALUE:
             parts.append(f"in {code(text)}")
         case _:

@@ -177,10 +177,12 @@ class _Walk:
                 return self._scoped(self._groups(node.groups, Span(node.span.start, node.span.end)), (node.body,))
             case nodes.Integral():
                 return self._integral(node)
-            case nodes.Sum():
-                scope = Span(node.body.span.start, node.span.end)
-                number = self.binder(node.variable.name, node.variable.span, "index", scope)
-                return (node.lo, node.hi, *self._scoped((number,), (node.body,)))
+            case nodes.Reduction() | nodes.Comprehension():
+                return self._through(node.clauses, node.body, (node.body,))
+            case nodes.Fold():
+                scope = node.body.span
+                state = [self.binder(t.name, t.span, "local", scope) for t in node.targets]
+                return (node.start, *self._through(node.clauses, node.body, self._scoped(state, (node.body,))))
             case nodes.Let():
                 return self._block(node.bindings, (node.body,), node.span.end, "local")
             case nodes.Binding():
@@ -211,6 +213,19 @@ class _Walk:
                 hidden = isinstance(function, nodes.Name) and self.meant(function.id) >= 0
                 self.add(argument.name_span, argument.name, "keyword", callee=None if hidden else node.function)
         return (node.function, *(argument.value for argument in node.arguments))
+
+    def _through(self, clauses: Sequence[nodes.Clause], body: nodes.Expr, inner: Iterable[Any]) -> tuple[Any, ...]:
+        """What goes through clauses: each sees the variables before it, the body all of them."""
+        steps: list[Any] = []
+        names: list[str] = []
+        for clause, after in zip(clauses, (*clauses[1:], None)):
+            start = body.span.start if after is None else min(after.span.start, body.span.start)
+            kind: BinderKind = "index" if isinstance(clause.over, nodes.Range) else "loop"
+            end = max(body.span.end, clauses[-1].span.end)
+            number = self.binder(clause.variable.name, clause.variable.span, kind, Span(start, end))
+            steps += (clause.over, _Bind((number,)))
+            names.append(clause.variable.name)
+        return (*steps, *inner, _Unbind(tuple(names)))
 
     def _scoped(self, numbers: Iterable[int], inner: Iterable[Any]) -> tuple[Any, ...]:
         given = tuple(numbers)

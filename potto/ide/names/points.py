@@ -75,9 +75,12 @@ def points_in(db: Database, file: str, text: str) -> tuple[tuple[tuple[str, str]
     return tuple(found for found in made if found is not None)
 
 
+_THROUGH = nodes.Reduction | nodes.Fold | nodes.Comprehension
+
+
 def _calls(node: nodes.Node) -> Iterator[nodes.Apply]:
     """The calls in a tree, the outer ones first; not those inside of what binds names."""
-    if isinstance(node, nodes.Lambda | nodes.Let | nodes.Integral | nodes.Sum):
+    if isinstance(node, nodes.Lambda | nodes.Let | nodes.Integral | _THROUGH):
         return
     if isinstance(node, nodes.Apply):
         yield node

@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 from potto.core.terms import Lam
 from potto.kernels.cells import Cell, Pattern, Value, pad
+from potto.kernels.rows import Rows
 
 
 class Closure:
@@ -73,4 +74,6 @@ def _moves(value: Value, direction: int) -> bool:
         return direction < len(value.t) and value.t[direction] is not None
     if isinstance(value, (tuple, list)):
         return any(_moves(v, direction) for v in value)
+    if isinstance(value, Rows):
+        return _moves(value.item, direction)
     return bool(value.pattern(direction + 1)[1 + direction])

@@ -17,7 +17,22 @@ import numpy as np
 from potto.calculus.differentiation.deltas import PRODUCT_OF_DELTAS
 from potto.calculus.inlining.currying import sizes_of
 from potto.calculus.surfaces.branch_cuts import opened
-from potto.core.terms import Branch, Deriv, Global, Hole, If, Integral, Lam, Sum, Term, function_of, postorder
+from potto.core.terms import (
+    Array,
+    Branch,
+    Data,
+    Deriv,
+    Fold,
+    Global,
+    Hole,
+    If,
+    Integral,
+    Lam,
+    Sum,
+    Term,
+    function_of,
+    postorder,
+)
 from potto.core.terms import Delta as DeltaTerm
 from potto.diagnostics import PottoError
 from potto.integrate.costs import Costs
@@ -28,6 +43,7 @@ from potto.kernels.cells import Cell, Ints, Number, Pattern, Trace, Value, pad, 
 from potto.kernels.chunks import at_points, many
 from potto.kernels.compile import kernel
 from potto.kernels.making import counts
+from potto.kernels.rows import Rows
 from potto.kernels.written import Kernel
 from potto.projects.settings import Settings
 from potto.runtime.evaluation.arguments import fit, uncurried
@@ -56,6 +72,10 @@ class Semantics:
     conditional: Callable[[Machine, Any, If | Branch, dict[str, Value], tuple[Any, Any]], Value]
     added: Callable[[Machine, tuple[Term, ...], dict[str, Value]], Value]
     sum: Callable[[Machine, Sum, Value, Value, dict[str, Value], Trace | None], Value]
+    array: Callable[[Machine, Array, Value, dict[str, Value]], Value]
+    element: Callable[[Value, Value], Value]
+    length: Callable[[Machine, Value], Value]
+    fold: Callable[[Machine, Fold, Value, Value, Value, dict[str, Value]], Value]
     integral: Callable[[Machine, Integral, dict[str, Value]], Value]
 
 
@@ -105,6 +125,12 @@ class Linker:
                 break
         self.exactness[term] = result
         return result
+
+    def functional(self, term: Term) -> bool:
+        """Whether a term is a function, as the elements of some arrays are."""
+        while isinstance(term, If | Branch):
+            term = term.then
+        return isinstance(term, Lam | Deriv) or (isinstance(term, Global) and self.function(term) is not None)
 
     def reached(self, *terms: Term) -> tuple[tuple[str, str, bytes], ...]:
         """The definitions that terms lead to, with the digests of what they are: what a plan depends on."""
@@ -361,6 +387,23 @@ class Machine:
     def sum(self, term: Sum, lo: Value, hi: Value, env: dict[str, Value], trace: Trace | None) -> Value:
         return self.linker.semantics.sum(self, term, lo, hi, env, trace)
 
+    # Arrays
+
+    def array(self, term: Array, size: Value, env: dict[str, Value]) -> Value:
+        return self.linker.semantics.array(self, term, size, env)
+
+    def index(self, whole: Value, place: Value) -> Value:
+        return self.linker.semantics.element(whole, place)
+
+    def length(self, whole: Value) -> Value:
+        return self.linker.semantics.length(self, whole)
+
+    def fold(self, term: Fold, lo: Value, hi: Value, start: Value, env: dict[str, Value]) -> Value:
+        return self.linker.semantics.fold(self, term, lo, hi, start, env)
+
+    def data(self, term: Data) -> Value:
+        raise errors.wrong_call(f"the file {term.path} is not loaded")
+
     # Integrals
 
     def integral(self, term: Integral, env: dict[str, Value]) -> Value:
@@ -373,6 +416,8 @@ def _any_inexact(values: dict[str, Value]) -> bool:
             return value.e is not None
         if isinstance(value, (tuple, list)):
             return any(map(inexact, value))
+        if isinstance(value, Rows):
+            return inexact(value.item)
         return isinstance(value, Closure) and value.inexact
 
     return any(map(inexact, values.values()))

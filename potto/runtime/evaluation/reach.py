@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from potto.calculus.inlining.arrays import ARRAYS
 from potto.calculus.inlining.expand import Resolve
-from potto.core.terms import Branch, Delta, Deriv, Global, Integral, Prim, Term, Var, outside, postorder
+from potto.core.terms import Branch, Delta, Deriv, Global, Index, Integral, Prim, Term, Var, outside, postorder
 from potto.primitives import PRIMITIVES
 
 
@@ -23,7 +24,8 @@ class Reach:
         self.known_spikes: dict[Term, bool] = {}
 
     def kinds(self, term: Term) -> frozenset[type]:
-        """Deriv, Branch and Integral, where there are such terms; Prim for a builtin with a kink."""
+        """Deriv, Branch and Integral, where there are such terms; Prim for a builtin with a kink, Index for what has to
+        do with arrays."""
         found = self.known.get(term)
         if found is None:
             found = self.known[term] = frozenset(self._found(term))
@@ -79,5 +81,7 @@ class Reach:
         for node in self._all(term):
             if isinstance(node, Deriv | Branch | Integral):
                 yield type(node)
+            elif isinstance(node, ARRAYS):
+                yield Index
             elif isinstance(node, Prim) and PRIMITIVES[node.op].kinks(*node.args):
                 yield Prim

@@ -14,6 +14,7 @@ from potto.core.terms import Sum, lam
 from potto.diagnostics import PottoError
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Number, Trace, Value, all_arrays, combined, map_arrays
+from potto.kernels.rows import Rows, listed
 from potto.kernels.whole import UNIT_ROUNDOFF
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.selection import Pick, apart
@@ -92,6 +93,8 @@ def _grouped(machine: Machine, term: Sum, first: Number, last: Number, env: dict
 def _reduce(value: Value, shape: tuple[int, ...], count: int) -> Value:
     if isinstance(value, tuple):
         return tuple(_reduce(v, shape, count) for v in value)
+    if isinstance(value, Rows):
+        return listed([_reduce(row, shape, count) for row in value.rows()])
     if not isinstance(value, Cell):
         raise errors.not_a_number(value)
 

@@ -19,10 +19,12 @@ from potto.diagnostics import PottoError
 from potto.integrate.events import BUDGET_SPENT
 from potto.integrate.pieces import Sums, gather, still
 from potto.kernels import errors
-from potto.kernels.cells import Cell, Ints, Value, all_arrays, map_arrays, pad
+from potto.kernels.cells import Array, Cell, Ints, Value, all_arrays, map_arrays, pad
 from potto.kernels.making import making
 from potto.runtime.answers.convergence import allowance, widest
 from potto.runtime.evaluation.machine import Machine
+from potto.runtime.evaluation.selection import apart
+from potto.runtime.integration.arrays import Differ, met, without_arrays
 from potto.runtime.integration.members import Whole
 from potto.runtime.integration.preparation import filled, held, placed, prepared
 from potto.runtime.integration.problem import Mixed, Problem, linked
@@ -34,6 +36,14 @@ def integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
     """The value of an integral in an environment whose numbers may be batches of any shape: made ready, and solved."""
     linker = machine.linker
     term, env = filled(term, env, linker.reach)
+    if met(term, env, linker.reach):
+        try:
+            ready, env = without_arrays(machine, term, env)
+        except Differ as differ:
+            return _by_length(machine, term, env, differ.ends)
+        if not isinstance(ready, Integral):
+            return machine.evaluate(function_of(ready), env, None)
+        term = ready
     derived = linker.reach.deltas(term.body)
     key = (term, machine.directions > 0)
     known = linker.placed.get(key)
@@ -51,6 +61,14 @@ def integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
             note_rims(machine, term, env)
         return machine.evaluate(function_of(ready), {n: env[n] for n in ready.free}, None)
     return integrate(machine, term, env)
+
+
+def _by_length(machine: Machine, term: Integral, env: dict[str, Value], ends: Array) -> Value:
+    """The members whose loops are of one length together."""
+    shape = np.broadcast_shapes(ends.shape, *(a.shape for value in env.values() for a in all_arrays(value)))
+    full = np.broadcast_to(ends, shape)
+    masks = [full == end for end in np.unique(ends)]
+    return apart(masks, env, lambda _, here, pick: integral(machine, term, here))
 
 
 def integrate(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:

@@ -26,6 +26,7 @@ from potto.core.terms import (
     Delta,
     Deriv,
     Global,
+    Index,
     Integral,
     Prim,
     Sum,
@@ -46,6 +47,7 @@ from potto.kernels import errors
 from potto.kernels.cells import Value
 from potto.runtime.evaluation.functions import Closure, Derivative
 from potto.runtime.evaluation.reach import Reach
+from potto.runtime.integration.arrays import holds
 
 NOT_COUNTED = declare("P0510", "deltas of a derivative that were not found")
 
@@ -168,11 +170,15 @@ def _underived(function: Closure) -> tuple[int, Closure]:
 
 
 def _matters(function: Closure, reach: Reach) -> bool:
-    """Whether a function is a derivative of something that may jump, or leads to one."""
+    """Whether a function is a derivative of something that may jump, leads to one, or has to do with arrays."""
     order, primal = _underived(function)
     if reach.deltas(primal.lam) or reach.spikes(primal.lam) or (order and reach.kinds(primal.lam) & {Branch, Prim}):
         return True
-    return any(_matters(value, reach) for value in primal.captured.values() if isinstance(value, Closure))
+    if Index in reach.kinds(primal.lam):
+        return True
+    return any(
+        _matters(value, reach) if isinstance(value, Closure) else holds(value) for value in primal.captured.values()
+    )
 
 
 def _counted(term: Integral, reach: Reach, again: bool) -> Integral:

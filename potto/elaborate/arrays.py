@@ -1,0 +1,241 @@
+"""Arrays, and what goes through them: indices, sums and the like, folds, comprehensions, fields, arithmetic of vectors.
+
+An array is gone through by the places of its elements. Several clauses are binders inside of each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from potto.core.terms import (
+    ONE,
+    ZERO,
+    Term,
+    add,
+    apply,
+    array,
+    const,
+    div,
+    fold,
+    hole,
+    index,
+    length,
+    mul,
+    neg,
+    proj,
+    sub,
+    substitute,
+    sum_,
+    tuple_,
+    var,
+)
+from potto.elaborate.context import Elaboration, rule
+from potto.elaborate.shapes import is_vector
+from potto.elaborate.values import Scope, Value
+from potto.syntax import nodes
+from potto.types.types import ArrayOf, TupleOf, Type, resolve
+from potto.types.vectors import place_of
+
+
+@rule(nodes.Index)
+def _index(elaboration: Elaboration, node: nodes.Index, scope: Scope) -> Value:
+    found = elaboration.term(node.array, scope)
+    for place in node.indices:
+        found = elaboration.note(index(found, elaboration.term(place, scope)), node.span)
+    return found
+
+
+@rule(nodes.Field)
+def _field(elaboration: Elaboration, node: nodes.Field, scope: Scope) -> Value:
+    return field(elaboration.term(node.value, scope), node.name)
+
+
+def field(whole: Term, name: str) -> Term:
+    """A part of a tuple."""
+    place = place_of(name)
+    return hole(f"there is no part `{name}`") if place is None else proj(whole, place)
+
+
+@rule(nodes.Text)
+def _text(elaboration: Elaboration, node: nodes.Text, scope: Scope) -> Value:
+    return hole("the name of a file has no value by itself")
+
+
+@rule(nodes.With)
+def _with(elaboration: Elaboration, node: nodes.With, scope: Scope) -> Value:
+    return hole("this is no record")
+
+
+# What goes through ranges and arrays
+
+Around = Callable[[Term], Term]
+Binder = Callable[[str, Term, Term, Term], Term]
+
+
+def _through(
+    elaboration: Elaboration, clauses: Sequence[nodes.Clause], scope: Scope, bind: Binder, body: Callable[[Scope], Term]
+) -> Term:
+    """The body inside of the binders of clauses: `bind` makes one of an index, its range, and what is inside."""
+    if not clauses:
+        return body(scope)
+    clause, rest = clauses[0], clauses[1:]
+    if isinstance(clause.over, nodes.Range):
+        lo, hi = elaboration.term(clause.over.lo, scope), elaboration.term(clause.over.hi, scope)
+        name, inner = elaboration.bind_number(clause.variable.name, scope)
+    else:
+        whole = elaboration.term(clause.over, scope)
+        name = elaboration.fresh("i")
+        elaboration.numbers.add(name)
+        lo, hi = ZERO, sub(length(whole), ONE)
+        inner = scope.bind({clause.variable.name: index(whole, var(name))})
+    return bind(name, lo, hi, _through(elaboration, rest, inner, bind, body))
+
+
+@rule(nodes.Reduction)
+def _reduction(elaboration: Elaboration, node: nodes.Reduction, scope: Scope) -> Value:
+    def body(inner: Scope) -> Term:
+        return elaboration.term(node.body, inner)
+
+    if node.op == "sum":
+        return _through(elaboration, node.clauses, scope, sum_, body)
+    return _through(elaboration, node.clauses, scope, _FOLDED[node.op](elaboration), body)
+
+
+def _multiplied(elaboration: Elaboration) -> Binder:
+    def bind(name: str, lo: Term, hi: Term, body: Term) -> Term:
+        state = elaboration.fresh("p")
+        return fold(name, lo, hi, state, ONE, mul(var(state), body))
+
+    return bind
+
+
+def _extreme(op: str) -> Callable[[Elaboration], Binder]:
+    def binder(elaboration: Elaboration) -> Binder:
+        def bind(name: str, lo: Term, hi: Term, body: Term) -> Term:
+            state = elaboration.fresh("m")
+            first = substitute(body, {name: lo})
+            return fold(name, add(lo, ONE), hi, state, first, apply(op, var(state), body))
+
+        return bind
+
+    return binder
+
+
+_FOLDED: dict[str, Callable[[Elaboration], Binder]] = {
+    "product": _multiplied,
+    "min": _extreme("min"),
+    "max": _extreme("max"),
+}
+
+
+@rule(nodes.Comprehension)
+def _comprehension(elaboration: Elaboration, node: nodes.Comprehension, scope: Scope) -> Value:
+    def bind(name: str, lo: Term, hi: Term, body: Term) -> Term:
+        if lo is not ZERO:
+            body = substitute(body, {name: add(var(name), lo)})
+        return array(name, add(sub(hi, lo), ONE), body)
+
+    return _through(elaboration, node.clauses, scope, bind, lambda inner: elaboration.term(node.body, inner))
+
+
+@rule(nodes.Fold)
+def _fold(elaboration: Elaboration, node: nodes.Fold, scope: Scope) -> Value:
+    start = elaboration.term(node.start, scope)
+    return _stepped(elaboration, node, node.clauses, scope, start)
+
+
+def _stepped(
+    elaboration: Elaboration, node: nodes.Fold, clauses: Sequence[nodes.Clause], scope: Scope, start: Term
+) -> Term:
+    """The state after all steps of the clauses; those of a later clause are steps of one of an earlier."""
+    if not clauses:
+        return elaboration.term(node.body, _with_state(node, start, scope))
+    state = elaboration.fresh(node.targets[0].name if len(node.targets) == 1 else "state")
+    elaboration.shapes.names[state] = elaboration.shapes.of(start)
+
+    def bind(name: str, lo: Term, hi: Term, body: Term) -> Term:
+        return fold(name, lo, hi, state, start, body)
+
+    return _through(
+        elaboration, clauses[:1], scope, bind,
+        lambda inner: _stepped(elaboration, node, clauses[1:], inner, var(state)),
+    )  # fmt: skip
+
+
+def _with_state(node: nodes.Fold, state: Term, scope: Scope) -> Scope:
+    if len(node.targets) == 1:
+        return scope.bind({node.targets[0].name: state})
+    return scope.bind({target.name: proj(state, place) for place, target in enumerate(node.targets)})
+
+
+# Vectors
+
+Operation = Callable[..., Term]
+
+
+def combined(elaboration: Elaboration, op: str, a: Term, b: Term) -> Term:
+    """`a op b`, component by component where one of them is a vector."""
+    return lifted(elaboration, _OPERATIONS[op], (a, elaboration.shapes.of(a)), (b, elaboration.shapes.of(b)))
+
+
+_OPERATIONS: dict[str, Operation] = {"+": add, "-": sub, "*": mul, "/": div}
+
+
+def negated(elaboration: Elaboration, term: Term) -> Term:
+    return lifted(elaboration, neg, (term, elaboration.shapes.of(term)))
+
+
+def lifted(elaboration: Elaboration, operation: Operation, *operands: tuple[Term, Type]) -> Term:
+    """An operation on numbers done to the components of vectors; a number goes with every component."""
+    operands = tuple((term, resolve(type)) for term, type in operands)
+    wide = next((type for _, type in operands if is_vector(type)), None)
+    if isinstance(wide, TupleOf):
+        return tuple_(
+            lifted(elaboration, operation, *(_item(operand, place) for operand in operands))
+            for place in range(len(wide.items))
+        )
+    if isinstance(wide, ArrayOf):
+        place = elaboration.fresh("k")
+        elaboration.numbers.add(place)
+        size = next(length(term) for term, type in operands if isinstance(type, ArrayOf))
+        return array(place, size, lifted(elaboration, operation, *(_element(o, var(place)) for o in operands)))
+    return operation(*(term for term, _ in operands))
+
+
+def _item(operand: tuple[Term, Type], place: int) -> tuple[Term, Type]:
+    term, type = operand
+    return (proj(term, place), resolve(type.items[place])) if isinstance(type, TupleOf) else operand
+
+
+def _element(operand: tuple[Term, Type], place: Term) -> tuple[Term, Type]:
+    term, type = operand
+    return (index(term, place), resolve(type.item)) if isinstance(type, ArrayOf) else operand
+
+
+def of_vectors(elaboration: Elaboration, name: str, args: Sequence[Term]) -> Term:
+    """A builtin of vectors applied."""
+    wanted = 1 if name in ("len", "norm") else 2
+    if len(args) != wanted:
+        return hole(f"`{name}` takes {wanted} argument{'s' if wanted > 1 else ''}")
+    if name == "len":
+        shape = elaboration.shapes.of(args[0])
+        return const(float(len(shape.items))) if isinstance(shape, TupleOf) else length(args[0])
+    if name == "norm":
+        return apply("sqrt", _dot(elaboration, args[0], args[0]))
+    return _dot(elaboration, *args) if name == "dot" else _cross(*args)
+
+
+def _dot(elaboration: Elaboration, u: Term, v: Term) -> Term:
+    shape = elaboration.shapes.of(u)
+    if isinstance(shape, TupleOf):
+        return add(*(mul(proj(u, place), proj(v, place)) for place in range(len(shape.items))))
+    place = elaboration.fresh("k")
+    elaboration.numbers.add(place)
+    return sum_(place, ZERO, sub(length(u), ONE), mul(index(u, var(place)), index(v, var(place))))
+
+
+def _cross(u: Term, v: Term) -> Term:
+    def minor(i: int, j: int) -> Term:
+        return sub(mul(proj(u, i), proj(v, j)), mul(proj(u, j), proj(v, i)))
+
+    return tuple_((minor(1, 2), minor(2, 0), minor(0, 1)))

@@ -1,0 +1,131 @@
+"""What terms stand for, as far as it decides how they are put together: numbers, tuples, arrays.
+
+Owns `Shapes`. Types of definitions come from their interfaces, those of local names from what they were bound to, so
+that a term is all that has to be looked at; what is not known is a number.
+"""
+
+from __future__ import annotations
+
+from potto.core.terms import (
+    App,
+    Array,
+    Branch,
+    Deriv,
+    Fold,
+    Global,
+    If,
+    Index,
+    Integral,
+    Lam,
+    ListOf,
+    Proj,
+    Sum,
+    Term,
+    Tuple,
+    Var,
+)
+from potto.query import Database
+from potto.types import interface
+from potto.types.types import (
+    ANY_SIZE,
+    REAL,
+    ArrayOf,
+    Count,
+    Diffeo,
+    Function,
+    Parameter,
+    TupleOf,
+    Type,
+    derivative_type,
+    resolve,
+)
+from potto.types.types import Var as TypeVar
+from potto.types.unify import as_tuple, open_type, parts, unify
+
+
+class Shapes:
+    """The types of the terms of one elaboration. names: of variables that stand for more than a number."""
+
+    def __init__(self, db: Database) -> None:
+        self.db = db
+        self.names: dict[str, Type] = {}
+        self.known: dict[Term, Type] = {}
+
+    def of(self, term: Term) -> Type:
+        """The type of a term; of what is no composite, a number."""
+        found = self.known.get(term)
+        if found is None:
+            found = self.known[term] = resolve(self._found(term))
+        return found
+
+    def _found(self, term: Term) -> Type:
+        match term:
+            case Var(name=name):
+                return self.names.get(name, REAL)
+            case Tuple(items=items):
+                return TupleOf(tuple(map(self.of, items)))
+            case ListOf(items=items):
+                return ArrayOf(Count(len(items)), self.of(items[0]) if items else REAL)
+            case Array(body=body):
+                return ArrayOf(ANY_SIZE, self.of(body))
+            case Index(array=array):
+                whole = self.of(array)
+                return whole.item if isinstance(whole, ArrayOf) else REAL
+            case Proj(term=inner, index=index):
+                return _part(self.of(inner), index)
+            case If(then=inner) | Branch(then=inner) | Integral(body=inner) | Sum(body=inner) | Fold(start=inner):
+                return self.of(inner)
+            case App() | Global() | Deriv():
+                return self._called(term)
+            case _:
+                return REAL
+
+    def _called(self, term: Term) -> Type:
+        """The type of a call: that of the definition, for arguments like these."""
+        match term:
+            case Global(module=file, name=name):
+                type = interface(self.db, file, name).type
+                return open_type(type, 1) if any(isinstance(p, TypeVar) for p in _leaves(type)) else type
+            case Deriv(function=function):
+                return derivative_type(self._called(function))
+            case App(function=function, args=args) if not isinstance(function, Lam):
+                found = resolve(self._called(function))
+                if not isinstance(found, Function):
+                    return REAL
+                given = tuple(Parameter(None, self.of(arg)) for arg in args if not isinstance(arg, Lam | Deriv))
+                if len(given) == len(args):
+                    unify(as_tuple(found.parameters), as_tuple(given))
+                return resolve(found.result)
+            case App(function=Lam(body=body)):
+                return self.of(body)
+            case _:
+                return self.of(term)
+
+
+def _part(whole: Type, index: int) -> Type:
+    if isinstance(whole, TupleOf) and index < len(whole.items):
+        return resolve(whole.items[index])
+    return REAL
+
+
+def _leaves(type: Type) -> list[Type]:
+    found, waiting = list[Type](), [type]
+    while waiting:
+        here = resolve(waiting.pop())
+        below = parts(here)
+        waiting += below
+        if not below:
+            found.append(here)
+    return found
+
+
+def is_vector(type: Type) -> bool:
+    """Whether arithmetic on it goes component by component."""
+    return isinstance(type, TupleOf | ArrayOf)
+
+
+def dims_of(type: Type) -> int | None:
+    """The size of a tuple."""
+    if isinstance(type, Diffeo):
+        return type.dims
+    return len(type.items) if isinstance(type, TupleOf) else None

@@ -1,0 +1,180 @@
+"""Arrays while a program runs: all elements at once, along an axis in front of the batch; elements at places; folds.
+
+Owns `array`, `element`, `length` and `fold`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from potto.core.terms import Array as ArrayTerm
+from potto.core.terms import Fold, lam
+from potto.diagnostics import PottoError, declare
+from potto.kernels import errors
+from potto.kernels.cells import Cell, Number, Value, all_arrays
+from potto.kernels.rows import Rows, gathered, listed
+from potto.runtime.evaluation.machine import Machine
+from potto.runtime.evaluation.selection import Pick, apart
+
+OUT_OF_RANGE = declare("P0511", "an index that is out of range")
+NO_PLACE = declare("P0512", "an index or a size that is no whole number")
+RAGGED = declare("P0513", "sizes that do not agree")
+NOTHING = declare("P0514", "the least or greatest of nothing")
+
+MOST_ELEMENTS = 100_000_000
+
+Env = dict[str, Value]
+
+
+def array(machine: Machine, term: ArrayTerm, size: Value, env: Env) -> Value:
+    """The array of a body for all places."""
+    count = _size(size)
+    params = tuple(sorted(term.body.free | {term.variable}))
+    body = lam(params, term.body)
+    shape = np.broadcast_shapes(*(a.shape for v in env.values() for a in all_arrays(v)))
+    if count == 0 or machine.linker.functional(term.body):
+        return _one_by_one(machine, body, count, env, term.variable)
+    places = np.arange(count, dtype=float).reshape(count, *(1,) * len(shape))
+    here = {**env, term.variable: Cell(places, None, (None,) * machine.directions)}
+    value = machine.run(body, [here[name] for name in params], None)
+    return Rows(_in_front(value, count, shape, 0), count)
+
+
+def _one_by_one(machine: Machine, body: Any, count: int, env: Env, variable: str) -> Value:
+    """An array of functions: each has captured a place of its own."""
+    found = []
+    for place in range(count):
+        here = {**env, variable: Cell(float(place), None, (None,) * machine.directions)}
+        found.append(machine.run(body, [here[name] for name in body.params], None))
+    if found:
+        return listed(found)
+    return Rows(Cell(np.zeros(0), None, (None,) * machine.directions), 0)
+
+
+def _size(size: Value) -> int:
+    """How many elements there are to be, which is the same for all members of a batch."""
+    if not isinstance(size, Cell):
+        raise errors.not_a_number(size)
+    flat = np.unique(np.asarray(size.v))
+    if flat.size != 1:
+        message = f"the arrays of a batch are of different sizes, from {flat[0]:.0f} to {flat[-1]:.0f}"
+        raise PottoError([RAGGED(errors.NOWHERE, message, help="evaluate them one by one")])
+    count = float(flat[0])
+    if count != np.rint(count) or not np.isfinite(count):
+        raise PottoError([NO_PLACE(errors.NOWHERE, f"an array cannot have {count!r} elements: no whole number")])
+    if count > MOST_ELEMENTS:
+        raise PottoError([NO_PLACE(errors.NOWHERE, f"an array of {count:.0f} elements is too large")])
+    return max(0, int(count))
+
+
+def _in_front(value: Value, count: int, shape: tuple[int, ...], inner: int) -> Value:
+    """A value over (places, *batch) with an axis for the places in front of all of its parts."""
+    if isinstance(value, tuple):
+        return tuple([_in_front(item, count, shape, inner) for item in value])
+    if isinstance(value, Rows):
+        return Rows(_in_front(value.item, count, shape, inner + 1), value.size)
+    if isinstance(value, list):
+        message = "the rows of this array are of different lengths, or functions"
+        raise PottoError([RAGGED(errors.NOWHERE, message, help="let the inner size not depend on the outer index")])
+    if not isinstance(value, Cell):
+        raise errors.not_a_number(value)
+
+    def part(x: Any) -> Any:
+        if not np.ndim(x):
+            return x
+        own, batch = x.shape[:inner], x.shape[inner:]
+        if len(batch) == len(shape) + 1 and batch[0] == count:
+            x = np.moveaxis(x, inner, 0)
+            if all(n == 1 for n in batch[1:]):
+                return np.reshape(x, (count, *own))
+            return np.broadcast_to(x, (count, *own, *shape)) if batch[1:] != shape else x
+        if len(batch) == len(shape) + 1:  # the same at all places
+            x = np.reshape(x, (*own, *batch[1:]))
+        return np.broadcast_to(x, (count, *x.shape))
+
+    t, et = ([None if x is None else part(x) for x in side] for side in (value.t, value.et))
+    return Cell(part(value.v), None if value.e is None else part(value.e), tuple(t), tuple(et))
+
+
+# Elements
+
+
+def element(whole: Value, place: Value) -> Value:
+    """The element of an array at a place, or for a batch of places those."""
+    if not isinstance(place, Cell):
+        raise errors.not_a_number(place)
+    if isinstance(whole, Rows):
+        places = _places(place.v, whole.size)
+        return whole.at(int(places)) if not places.ndim else gathered(whole, places)
+    if isinstance(whole, list):
+        places = np.unique(_places(place.v, len(whole)))
+        if places.size == 1:
+            return whole[int(places[0])]
+        raise errors.wrong_call("an array of functions has one index for all members of a batch")
+    raise errors.wrong_call("only an array has elements", "to call a function, write parentheses")
+
+
+def _places(place: Number, size: int) -> Any:
+    at = np.asarray(place)
+    with np.errstate(invalid="ignore"):
+        bad = ~(np.isfinite(at) & (at == np.rint(at)))
+        if np.any(bad):
+            message = f"the index {float(at[bad].ravel()[0])!r} is no whole number"
+            raise PottoError([NO_PLACE(errors.NOWHERE, message, help="use `floor` or `ceil` to make it one")])
+        out = (at < 0) | (at >= size)
+    if np.any(out):
+        first = int(at[out].ravel()[0])
+        last = f"indices go from 0 to {size - 1}" if size else "it has no elements"
+        message = f"the index {first} is out of range: the array has {size} elements"
+        raise PottoError([OUT_OF_RANGE(errors.NOWHERE, message, notes=(last,))])
+    return at.astype(np.int64)
+
+
+def length(machine: Machine, whole: Value) -> Value:
+    """How many elements an array has."""
+    if isinstance(whole, Rows):
+        count = whole.size
+    elif isinstance(whole, tuple | list):
+        count = len(whole)
+    else:
+        raise errors.wrong_call("only an array has a length")
+    return Cell(float(count), None, (None,) * machine.directions)
+
+
+# Folds
+
+
+def fold(machine: Machine, term: Fold, lo: Value, hi: Value, start: Value, env: Env) -> Value:
+    """The state after all steps: a loop, however long, in which each step is one call of a kernel."""
+    from potto.runtime.evaluation.sums import bounds
+
+    first, last = bounds(lo, "lower"), bounds(hi, "upper")
+    if isinstance(first, np.ndarray) or isinstance(last, np.ndarray):
+        return _grouped(machine, term, first, last, start, env)
+    body = lam(tuple(sorted(term.body.free | {term.variable, term.state})), term.body)
+    here, still = {**env, term.state: start}, (None,) * machine.directions
+    params, run = body.params, machine.run
+    for place in range(int(first), int(last) + 1):
+        here[term.variable] = Cell(float(place), None, still)
+        here[term.state] = run(body, [here[name] for name in params], None)
+    return here[term.state]
+
+
+def _grouped(machine: Machine, term: Fold, first: Number, last: Number, start: Value, env: Env) -> Value:
+    """Bounds that differ over the batch: the members with equal bounds together."""
+    whole = {**env, "": start}
+    shape = np.broadcast_shapes(
+        np.shape(first), np.shape(last), *(a.shape for value in whole.values() for a in all_arrays(value))
+    )
+    lo, hi = np.broadcast_to(first, shape), np.broadcast_to(last, shape)
+    pairs = np.unique(np.stack([lo.ravel(), hi.ravel()]), axis=1).T
+
+    def evaluated(number: int, here: Env, _: Pick) -> Value:
+        a, b = (Cell(float(end)) for end in pairs[number])
+        return fold(machine, term, a, b, here.pop(""), here)
+
+    return apart([(lo == a) & (hi == b) for a, b in pairs], whole, evaluated)
+
+

@@ -1,0 +1,104 @@
+"""Arrays end where an integral begins: what it reads of them is found beside it, and it integrates numbers.
+
+Owns `without_arrays`.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from potto.calculus.inlining.arrays import MOST_STEPS, Access, TooMany, hoisted, inlined, loops, summands, unrolled
+from potto.core.terms import Index, Integral, Term, function_of, substitute, tuple_, var
+from potto.diagnostics import PottoError, declare
+from potto.kernels import errors
+from potto.kernels.cells import Cell, Number, Value
+from potto.kernels.making import making
+from potto.runtime.evaluation.functions import Closure
+from potto.runtime.evaluation.machine import Machine
+from potto.runtime.evaluation.reach import Reach
+
+TOO_LONG = declare("P0515", "a loop under an integral is too long to be written out")
+
+Env = dict[str, Value]
+
+
+def met(term: Integral, env: Env, reach: Reach) -> bool:
+    """Whether an integral has to do with arrays, itself or by what it is given."""
+    return Index in reach.kinds(term) or any(holds(env[name]) for name in term.free)
+
+
+def holds(value: Value) -> bool:
+    """Whether a value is an array, or a tuple with one in it."""
+    if isinstance(value, tuple):
+        return any(map(holds, value))
+    return not isinstance(value, Cell | Closure)
+
+
+def without_arrays(machine: Machine, term: Integral, env: Env) -> tuple[Term, Env]:
+    """An equal term, and what it is of: an integral of numbers; or a term in which sums are around integrals."""
+    reach = machine.linker.reach
+    names = frozenset(name for name in term.free if holds(env[name]))
+    with making:
+        found = _outside(term, names, reach)
+    if not isinstance(found, Integral):
+        return found, {name: env[name] for name in found.free}
+    term = found
+    while ends := loops(term):
+        known = tuple((end, _whole(machine, end, env)) for end in ends)
+        try:
+            term = unrolled(term, known)
+        except TooMany:
+            raise PottoError([TOO_LONG(
+                errors.NOWHERE, f"a loop under this integral has more than {MOST_STEPS:,} steps",
+                notes=("what varies with a variable of integration is written out step by step",),
+                help="move what does not vary with it out of the loop, or the loop out of the integral",
+            )]) from None  # fmt: skip
+    with making:
+        term, accesses = hoisted(term)
+    return _read(machine, term, accesses, env)
+
+
+@lru_cache(maxsize=4096)
+def _outside(term: Integral, arrays: frozenset[str], reach: Reach) -> Term:
+    return summands(inlined(term, lambda name: Index in reach.kinds(name), reach.resolve, arrays))
+
+
+def _whole(machine: Machine, end: Term, env: Env) -> float:
+    """The bound of a loop, which is the same for all members."""
+    value = machine.with_directions(0).term(end, {name: env[name] for name in end.free})
+    if not isinstance(value, Cell):
+        raise errors.not_a_number(value)
+    flat = np.unique(np.asarray(value.v))
+    if flat.size > 1:
+        raise Differ(value.v)
+    return float(flat[0])
+
+
+class Differ(Exception):
+    """The members of a batch have loops of different lengths, which begin or end at these numbers."""
+
+    def __init__(self, ends: Number) -> None:
+        self.ends = np.asarray(ends)
+
+
+def _read(machine: Machine, term: Integral, accesses: tuple[Access, ...], env: Env) -> tuple[Term, Env]:
+    """The integral, with the values of what it reads; tuples in their parts."""
+    here = {name: env[name] for name in term.free if name in env}
+    parts: dict[str, Term] = {}
+    for access in accesses:
+        value = machine.evaluate(function_of(access.term), {name: env[name] for name in access.term.free}, None)
+        if isinstance(value, tuple):
+            parts[access.name] = _named(access.name, value, here)
+        else:
+            here[access.name] = value
+    found = substitute(term, parts) if parts else term
+    return found, {name: here[name] for name in found.free}
+
+
+def _named(name: str, value: Value, env: Env) -> Term:
+    if not isinstance(value, tuple):
+        env[name] = value
+        return var(name)
+    return tuple_(_named(f"{name}.{place}", item, env) for place, item in enumerate(value))

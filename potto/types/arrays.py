@@ -1,0 +1,178 @@
+"""The types of arrays and of what goes through them: indices, sums and the like, folds, comprehensions, fields."""
+
+from __future__ import annotations
+
+from potto.syntax import nodes
+from potto.types import kinds
+from potto.types.context import Inference, describe, mismatch, rule
+from potto.types.infer import strip, value_only
+from potto.types.integrals import summed
+from potto.types.scope import Local
+from potto.types.types import (
+    ANY_SIZE,
+    REAL,
+    UNKNOWN,
+    ArrayOf,
+    Count,
+    Function,
+    TupleOf,
+    Type,
+    Unknown,
+    resolve,
+    shifted,
+)
+from potto.types.unify import unify
+from potto.types.vectors import expect_array, field
+
+
+@rule(nodes.Index)
+def _index(inference: Inference, node: nodes.Index) -> Type:
+    type = inference.infer(node.array)
+    for place, index in enumerate(node.indices):
+        array = resolve(type)
+        inference.number(index, "an index")
+        what = "only an array has elements" if not place else f"this array has no {_ordinal(place)} index"
+        type = expect_array(inference, array, node.array, what)
+        if isinstance(array, ArrayOf):
+            _in_range(inference, resolve(array.size), index)
+    return type
+
+
+def _ordinal(place: int) -> str:
+    return ("first", "second", "third")[place] if place < 3 else f"{place + 1}th"
+
+
+def _in_range(inference: Inference, size: Type, index: nodes.Expr) -> None:
+    known = _constant(index)
+    if known is None or not isinstance(size, Count) or 0 <= known < size.number:
+        return
+    last = f"the last one is {size.number - 1}" if size.number else "it has no elements"
+    from_end = f"; the last element is `[{size.number - 1}]`" if known < 0 and size.number else ""
+    inference.report(kinds.OUT_OF_RANGE(
+        index.span, f"the index {known} is out of range: the array has {size.number} elements",
+        label=f"not in 0..{size.number - 1}", help=f"indices count from 0, so that {last}{from_end}",
+    ))  # fmt: skip
+
+
+def _constant(expr: nodes.Expr) -> int | None:
+    """The whole number that is written."""
+    expr = strip(expr)
+    if isinstance(expr, nodes.Unary) and expr.op == "-":
+        found = _constant(expr.operand)
+        return None if found is None else -found
+    return int(expr.value) if isinstance(expr, nodes.Number) and expr.value.is_integer() else None
+
+
+@rule(nodes.Field)
+def _field(inference: Inference, node: nodes.Field) -> Type:
+    return field(inference, inference.infer(node.value), node.name, node)
+
+
+@rule(nodes.Text, nodes.With)
+def _unexpected(inference: Inference, node: nodes.Text | nodes.With) -> Type:
+    if isinstance(node, nodes.With):
+        inference.infer(node.record)
+    message = "the name of a file stands in `load(…)` alone" if isinstance(node, nodes.Text) else "this is no record"
+    inference.report(kinds.MISMATCH(node.span, message))
+    return UNKNOWN
+
+
+# What goes through arrays and ranges
+
+
+def _clauses(inference: Inference, clauses: tuple[nodes.Clause, ...], what: str) -> list[Type]:
+    """The variables of clauses in scope, each seeing those before; how often each goes round."""
+    sizes: list[Type] = []
+    for clause in clauses:
+        over, variable = clause.over, clause.variable
+        if isinstance(over, nodes.Range):
+            inference.number(over.lo, f"the first value of {what}")
+            inference.number(over.hi, f"the last value of {what}")
+            sizes.append(_count(inference, over))
+            inference.local(variable, variable.name, variable.span, "index", REAL)
+            continue
+        found = inference.infer(over)
+        item = expect_array(inference, found, over, f"{what} goes through an array or a range `lo..hi`")
+        array = resolve(found)
+        sizes.append(array.size if isinstance(array, ArrayOf) else UNKNOWN)
+        inference.local(variable, variable.name, variable.span, "loop", item)
+    return sizes
+
+
+def _count(inference: Inference, over: nodes.Range) -> Type:
+    """How many numbers a range has, as far as that is written."""
+    lo, hi = _size(inference, over.lo), _size(inference, over.hi)
+    return shifted(hi, 1 - lo.number) if isinstance(lo, Count) and not isinstance(hi, Unknown) else ANY_SIZE
+
+
+def _size(inference: Inference, expr: nodes.Expr) -> Type:
+    """A bound as a size and a number: `n - 1`, `len(xs) - 1`, `3`. Negative ones are counted too."""
+    expr = strip(expr)
+    constant = _constant(expr)
+    if constant is not None:
+        return Count(constant)
+    match expr:
+        case nodes.Name(id=name) if name in inference.sizes:
+            meaning = inference.meanings.get(id(expr))
+            return inference.sizes[name] if isinstance(meaning, Local) and meaning.kind == "size" else UNKNOWN
+        case nodes.Apply(function=nodes.Name(id="len"), arguments=(nodes.Argument(value=array),)):
+            found = resolve(inference.types.get(id(array), UNKNOWN))
+            return found.size if isinstance(found, ArrayOf) else UNKNOWN
+        case nodes.Chain(first=first, rest=(nodes.Operand(op="+" | "-" as op, value=value),)):
+            size, offset = _size(inference, first), _constant(value)
+            if offset is None or isinstance(resolve(size), Unknown):
+                return UNKNOWN
+            offset = offset if op == "+" else -offset
+            return Count(size.number + offset) if isinstance(size, Count) else shifted(size, offset)
+        case _:
+            return UNKNOWN
+
+
+@rule(nodes.Reduction)
+def _reduction(inference: Inference, node: nodes.Reduction) -> Type:
+    what = {"sum": "a sum", "product": "a product"}.get(node.op, f"`{node.op}`")
+    with inference.scope.inside():
+        _clauses(inference, node.clauses, what)
+        if node.op != "sum":
+            inference.number(node.body, f"what `{node.op}` is taken of")
+            return REAL
+        body = inference.infer(node.body)
+    return summed(inference, body, node.body, "what is summed")
+
+
+@rule(nodes.Fold)
+def _fold(inference: Inference, node: nodes.Fold) -> Type:
+    state = inference.infer(node.start)
+    value_only(inference, state, node.start, "the state of a fold is made of numbers")
+    with inference.scope.inside():
+        _clauses(inference, node.clauses, "a fold")
+        _bind_state(inference, node, state)
+        body = inference.infer(node.body)
+    if not unify(body, state):
+        inference.report(mismatch(body, state, node.body, "each step of a fold gives a state like the first one: this"))
+    return state
+
+
+def _bind_state(inference: Inference, node: nodes.Fold, state: Type) -> None:
+    targets = node.targets
+    if len(targets) == 1:
+        inference.local(targets[0], targets[0].name, targets[0].span, "loop", state)
+        return
+    parts = tuple(inference.fresh() for _ in targets)
+    if not unify(state, TupleOf(parts)):
+        message = f"{len(parts)} names are bound here, but the state is {describe(state)}"
+        inference.report(kinds.MISMATCH(node.start.span, message, label=describe(state)))
+    for target, part in zip(targets, parts):
+        inference.local(target, target.name, target.span, "loop", part)
+
+
+@rule(nodes.Comprehension)
+def _comprehension(inference: Inference, node: nodes.Comprehension) -> Type:
+    with inference.scope.inside():
+        sizes = _clauses(inference, node.clauses, "an array")
+        found = inference.infer(node.body)
+    if not isinstance(resolve(found), Function):
+        value_only(inference, found, node.body, "an array holds numbers, tuples or functions")
+    for size in reversed(sizes):
+        found = ArrayOf(size, found)
+    return found

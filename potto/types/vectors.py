@@ -1,0 +1,260 @@
+"""Arithmetic on tuples and arrays: component by component, and the builtins of vectors.
+
+Owns `combined`, `fields` and the forms of `len dot norm cross`. What is not known yet where it meets a vector is a
+number in a product, and a vector of the same shape in a sum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from potto.diagnostics import Diagnostic
+from potto.modules.hints import did_you_mean
+from potto.syntax import nodes
+from potto.types import kinds
+from potto.types.context import Inference, describe
+from potto.types.format import format_type, format_types
+from potto.types.types import REAL, UNKNOWN, ArrayOf, Count, Diffeo, Meta, TupleOf, Type, Unknown, resolve
+from potto.types.unify import SIZES, unify
+
+AXES = "xyzw"
+_LEFT = {op: f"the left of `{op}`" for op in "+-*/"}
+_RIGHT = {op: f"the right of `{op}`" for op in "+-*/"}
+
+
+def is_vector(type: Type) -> bool:
+    """Whether there is arithmetic on a value component by component; a dual is taken apart instead."""
+    found = resolve(type)
+    return isinstance(found, ArrayOf) or (isinstance(found, TupleOf) and not found.dual)
+
+
+def combined(inference: Inference, left: Type, operand: nodes.Operand, right: Type, chain: nodes.Chain) -> Type:
+    """What an operator makes of two values; what stands left of it is the chain so far."""
+    op, first = operand.op, chain.first
+    if not is_vector(left) and not is_vector(right):
+        inference.need_number(left, first, _LEFT[op])
+        inference.need_number(right, operand.value, _RIGHT[op])
+        return REAL
+    if op in "+-":
+        if isinstance(resolve(left), Unknown) or isinstance(resolve(right), Unknown):
+            return UNKNOWN
+        if not is_vector(left) and isinstance(resolve(left), Meta):
+            unify(left, right)
+        elif not is_vector(right) and isinstance(resolve(right), Meta):
+            unify(right, left)
+    elif not is_vector(right):
+        inference.need_number(right, operand.value, _RIGHT[op])
+        return left
+    elif not is_vector(left) and op == "*":
+        inference.need_number(left, first, _LEFT[op])
+        return right
+    problem = _differ(left, right)
+    if problem is not None:
+        inference.report(_disagree(left, right, operand, problem))
+        return UNKNOWN
+    return left if is_vector(left) else right
+
+
+def _differ(a: Type, b: Type) -> tuple[Type, Type] | None:
+    """The parts in which two vectors differ: their sizes, where these are all."""
+    a, b = resolve(a), resolve(b)
+    if isinstance(a, Unknown) or isinstance(b, Unknown):
+        return None
+    if isinstance(a, TupleOf) and isinstance(b, TupleOf):
+        if len(a.items) != len(b.items):
+            return Count(len(a.items)), Count(len(b.items))
+        return next((found for x, y in zip(a.items, b.items) if (found := _differ(x, y)) is not None), None)
+    if isinstance(a, ArrayOf) and isinstance(b, ArrayOf):
+        return _differ(a.item, b.item) if unify(a.size, b.size) else (resolve(a.size), resolve(b.size))
+    if is_vector(a) or is_vector(b):
+        return a, b
+    return None if unify(a, REAL) and unify(b, REAL) else (a, b)
+
+
+def _disagree(left: Type, right: Type, operand: nodes.Operand, problem: tuple[Type, Type]) -> Diagnostic:
+    shown, other = format_types((left, right))
+    if isinstance(problem[0], SIZES) and isinstance(problem[1], SIZES):
+        a, b = format_types(problem)
+        return kinds.SIZES(
+            operand.op_span,
+            f"`{operand.op}` goes component by component, but the left has {a} and the right {b}",
+            label=f"`{shown}` and `{other}`",
+            help="take as many of both",
+        )
+    help = "write it for each component: `[x + 1 for x in xs]`" if operand.op in "+-" else ""
+    return kinds.TUPLE_ARITHMETIC(
+        operand.op_span,
+        f"`{operand.op}` has no meaning between {describe(left)} and {describe(right)}",
+        label=f"`{shown}` and `{other}`",
+        help=help,
+    )
+
+
+# Fields
+
+
+def fields(inference: Inference, type: Type, node: nodes.Member) -> Type:
+    """The type of `u.a.b`, where `u` is no module."""
+    names = [*node.path.split(".")[1:], node.name]
+    for name in names:
+        type = field(inference, type, name, node)
+    return type
+
+
+def field(inference: Inference, type: Type, name: str, node: nodes.Member | nodes.Field) -> Type:
+    """The type of a part of a value."""
+    found = resolve(type)
+    if isinstance(found, Unknown):
+        return UNKNOWN
+    if isinstance(found, Diffeo) and found.dims is not None:
+        found = TupleOf((REAL,) * found.dims)
+    place = place_of(name)
+    if isinstance(found, TupleOf) and place is not None and place < len(found.items):
+        return found.items[place]
+    inference.report(_no_field(found, name, node, place))
+    return UNKNOWN
+
+
+def place_of(name: str) -> int | None:
+    """Which item of a tuple a field is: `0`, `1`, … or `x`, `y`, `z`, `w`."""
+    if name.isdigit():
+        return int(name[:9])
+    return AXES.index(name) if len(name) == 1 and name in AXES else None
+
+
+def _no_field(found: Type, name: str, node: nodes.Member | nodes.Field, place: int | None) -> Diagnostic:
+    help = ""
+    if isinstance(found, Meta):
+        help = "say in the head what it is: `(u: (Real, Real))`"
+        message = f"it is not known what `.{name}` is a part of"
+    elif isinstance(found, TupleOf):
+        count = len(found.items)
+        message = f"a tuple of {count} has no part `.{name}`"
+        numbers = ", ".join(f"`.{number}`" for number in range(min(count, 4)))
+        help = did_you_mean(()) or f"its parts are {numbers}{' and so on' if count > 4 else ''}"
+    else:
+        message = f"this is {describe(found)}, which has no part `.{name}`"
+        if isinstance(found, ArrayOf):
+            help = f"an element is `xs[{place or 0}]`"
+    return kinds.NO_FIELD(node.name_span, message, label=f"of `{format_type(found)}`", help=help)
+
+
+# Builtins
+
+
+def vector_form(name: str) -> Callable[[Inference, nodes.Apply], Type] | None:
+    """What types a call of a builtin of vectors."""
+    return _FORMS.get(name)
+
+
+def _types(inference: Inference, node: nodes.Apply, name: str, count: int) -> list[Type] | None:
+    """The types of the arguments, where there are as many as it takes."""
+    found = [inference.infer(argument.value) for argument in node.arguments]
+    if len(found) == count:
+        return found
+    kind = kinds.TOO_MANY if len(found) > count else kinds.MISSING
+    wanted = "one vector" if count == 1 else f"{count} vectors"
+    inference.report(kind(node.span, f"`{name}` takes {wanted}", label=f"{len(found)} given"))
+    return None
+
+
+def _len(inference: Inference, node: nodes.Apply) -> Type:
+    found = _types(inference, node, "len", 1)
+    if found is not None:
+        whole = resolve(found[0])
+        if not isinstance(whole, TupleOf | Unknown):
+            expect_array(inference, whole, node.arguments[0].value, "`len` counts the elements of an array")
+    return REAL
+
+
+def _norm(inference: Inference, node: nodes.Apply) -> Type:
+    found = _types(inference, node, "norm", 1)
+    if found is not None:
+        _numbers(inference, found[0], node.arguments[0].value, "norm")
+    return REAL
+
+
+def _dot(inference: Inference, node: nodes.Apply) -> Type:
+    found = _types(inference, node, "dot", 2)
+    if found is not None:
+        _alike(inference, found, node, "dot")
+    return REAL
+
+
+def _cross(inference: Inference, node: nodes.Apply) -> Type:
+    found = _types(inference, node, "cross", 2)
+    result = TupleOf((REAL, REAL, REAL))
+    for argument, type in zip(node.arguments, found or ()):
+        if not unify(type, result):
+            inference.report(kinds.SIZES(
+                argument.value.span, f"`cross` takes vectors of three numbers, but this is {describe(type)}",
+                label=f"this is `{format_type(type)}`",
+            ))  # fmt: skip
+    return result
+
+
+def _alike(inference: Inference, found: list[Type], node: nodes.Apply, name: str) -> None:
+    left, right = found
+    for type, other in ((left, right), (right, left)):
+        if isinstance(resolve(type), Meta) and is_vector(other):
+            unify(type, other)
+    for argument, type in zip(node.arguments, found):
+        if not _numbers(inference, type, argument.value, name):
+            return
+    problem = _differ(left, right)
+    if problem is not None:
+        a, b = format_types((left, right))
+        message = f"`{name}` takes two vectors of one size, but these are `{a}` and `{b}`"
+        inference.report(kinds.SIZES(node.span, message, label=f"`{a}` and `{b}`", help="take as many of both"))
+
+
+def _numbers(inference: Inference, type: Type, expr: nodes.Expr, name: str) -> bool:
+    """Whether this is a vector of numbers; what is not known yet is an array of them."""
+    found = resolve(type)
+    if isinstance(found, Meta):
+        return unify(found, ArrayOf(inference.fresh_size("n"), REAL))
+    if isinstance(found, Unknown):
+        return True
+    items = (found.item,) if isinstance(found, ArrayOf) else found.items if isinstance(found, TupleOf) else ()
+    if items and all(unify(item, REAL) for item in items):
+        return True
+    inference.report(kinds.MISMATCH(
+        expr.span, f"`{name}` takes a vector of numbers, but this is {describe(found)}",
+        label=f"this is `{format_type(found)}`", help="a vector is a tuple or an array: `(1, 2)`, `[1, 2]`",
+    ))  # fmt: skip
+    return False
+
+
+def expect_array(inference: Inference, type: Type, expr: nodes.Expr, what: str) -> Type:
+    """The type of the elements of what must be an array; UNKNOWN if it is none, as is reported."""
+    found = resolve(type)
+    if isinstance(found, ArrayOf):
+        return found.item
+    if isinstance(found, Meta):
+        item = inference.fresh()
+        unify(found, ArrayOf(inference.fresh_size("n"), item))
+        return item
+    if not isinstance(found, Unknown):
+        inference.report(kinds.NOT_AN_ARRAY(
+            expr.span, f"{what}, but this is {describe(found)}", label=f"this is `{format_type(found)}`",
+            help=_instead(found, expr),
+        ))  # fmt: skip
+    return UNKNOWN
+
+
+def _instead(found: Type, expr: nodes.Expr) -> str:
+    from potto.types.types import Function
+
+    if isinstance(found, Function):
+        return "a function is called with parentheses: `f(i)`"
+    if isinstance(found, TupleOf):
+        return "the parts of a tuple are `u.0`, `u.1`, …; an array is written `[a, b]`"
+    return "to count up to it, write `0..n-1`" if resolve(found) is REAL else ""
+
+
+_FORMS: dict[str, Callable[[Inference, nodes.Apply], Type]] = {
+    "len": _len,
+    "norm": _norm,
+    "dot": _dot,
+    "cross": _cross,
+}
