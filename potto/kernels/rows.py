@@ -1,8 +1,8 @@
 """Arrays as values: the numbers of all elements together, the places of the elements along the first axis.
 
 Owns `Rows`, `listed` and `gathered`. A part of a cell in an array of n is a number (the same for all elements), or of
-shape (n,) where it is the same for all members of a batch, else (n, *batch); in an array of arrays (n, m, *batch). Arrays of
-functions, or of arrays of different lengths, are Python lists.
+shape (n,) where it is the same for all members of a batch, else (n, *batch); in an array of arrays (n, m, *batch).
+Arrays of functions, or of arrays of different lengths, are Python lists.
 """
 
 from __future__ import annotations

@@ -24,9 +24,11 @@ from potto.diagnostics import Diagnostic, PottoError
 from potto.evaluating.world import World
 from potto.kernels.cells import Value
 from potto.kernels.errors import wrong_call
+from potto.kernels.rows import Rows
 from potto.modules import DefinitionTarget, ModuleTarget, find_module, names, resolve
 from potto.modules.kinds import NO_MODULE
 from potto.python.arguments import Batch, batch_of, misfit, moving, value_of
+from potto.python.arrays import has_arrays, with_arrays
 from potto.python.calls import Call, Form
 from potto.python.tiles import in_tiles
 from potto.python.travel import Travelling
@@ -222,6 +224,7 @@ class Function(Travelling):
         return self._run(given)
 
     def _run(self, given: Given) -> Estimate:
+        given = self._with_arrays(given)
         arguments, batch = self._arguments(given)
         if self._is_derivative():
             self._must_move(given)
@@ -229,15 +232,27 @@ class Function(Travelling):
 
     def in_tiles(self, args: tuple[Any, ...], kwargs: dict[str, Any], wrt: tuple[str, ...]) -> Estimate:
         """The estimate of a call with its derivatives by the parameters named; a large batch in tiles."""
-        given = (*self._given, (args, kwargs))
+        given = self._with_arrays((*self._given, (args, kwargs)))
         return in_tiles(self, given, wrt, *self._arguments(given))
 
     def prepared(
         self, args: tuple[Any, ...], kwargs: dict[str, Any], extra: Mapping[str, Any]
     ) -> tuple[Call, builtins.list[tuple[str, Value]], Batch]:
         """A call that is to be run: its arguments as values, and the batch that they make with `extra`."""
-        given = (*self._given, (args, kwargs))
+        given = self._with_arrays((*self._given, (args, kwargs)))
         return self._call(given), *self._arguments(given, extra)
+
+    def _with_arrays(self, given: Given) -> Given:
+        """What is given, with arrays of Python as arrays of Potto where parameters are such. Raises PottoError."""
+        groups = groups_of(self._whole)
+        if not any(has_arrays(parameter.type) for group in groups for parameter in group):
+            return given
+        sizes: dict[str, tuple[str, int]] = {}
+        found = iter(
+            argument if type is None else with_arrays(label, argument, type, sizes)
+            for label, argument, type in _labelled(given, groups)
+        )
+        return tuple((tuple(next(found) for _ in args), {name: next(found) for name in words}) for args, words in given)
 
     def _is_derivative(self) -> bool:
         """Whether this is the derivative of a function, whose arguments are all that moves."""
@@ -369,8 +384,8 @@ def _labelled(
 def _carries(argument: Any, type: Type | None) -> bool:
     """Whether an argument of a derivative has a tangent, or may have."""
     if isinstance(argument, tuple):  # of a group, if it is not known what for
-        return type is not None or any(isinstance(item, tuple | list | Function) for item in argument)
-    return type is None or isinstance(argument, list | Function)
+        return type is not None or any(isinstance(item, tuple | list | Rows | Function) for item in argument)
+    return type is None or isinstance(argument, list | Rows | Function)
 
 
 def bound(function: Function, args: tuple[Any, ...], kwargs: dict[str, Any]) -> builtins.list[tuple[str, Any]]:

@@ -18,6 +18,7 @@ from msgspec.structs import replace
 from potto.diagnostics import PottoError, declare
 from potto.kernels.cells import Cell, Value
 from potto.kernels.errors import wrong_call
+from potto.kernels.rows import Rows, listed
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.printing import format_digits
 from potto.source import Span
@@ -65,6 +66,17 @@ class Batch(Struct, frozen=True):
         converged = ~np.logical_or.reduce([np.zeros(self.shape, dtype=bool), *missed.values()])
         return replace(shaped, member_converged=converged, shortfalls=missed)
 
+    def _array(self, items: list[Any]) -> Any:
+        """An array of Potto: one of numpy whose last axes are those of the array; of tuples, a tuple's numbers are the
+        last axis. What is ragged, or holds functions, stays a list."""
+        found = [self._restored(item) for item in items]
+        try:
+            parts: list[Any] = [np.stack(item, axis=-1) if isinstance(item, tuple) else item for item in found]
+            batch = 0 if self.shape is None else len(self.shape)
+            return np.stack(parts, axis=batch).astype(float) if parts else np.zeros((*(self.shape or ()), 0))
+        except (TypeError, ValueError):
+            return found
+
     def _mask(self, mask: Any) -> Any:
         """A mask of the batch's members in its shape."""
         assert self.shape is not None
@@ -74,8 +86,10 @@ class Batch(Struct, frozen=True):
     def _restored(self, part: Any) -> Any:
         if part is None:
             return None
-        if isinstance(part, tuple | list):
-            return type(part)(self._restored(item) for item in part)
+        if isinstance(part, list):
+            return self._array(part)
+        if isinstance(part, tuple):
+            return tuple(self._restored(item) for item in part)
         if self.shape is None:
             return float(part)
         if 0 in self.shape:
@@ -147,7 +161,9 @@ def value_of(name: str, argument: Any, batch: Batch, to_function: ToFunction) ->
     if isinstance(argument, tuple):
         return tuple(value_of(name, item, batch, to_function) for item in argument)
     if isinstance(argument, list):
-        return [value_of(name, item, batch, to_function) for item in argument]
+        return listed([value_of(name, item, batch, to_function) for item in argument])
+    if isinstance(argument, Rows):
+        return argument
     raise no_kind(name, argument, "numbers, numpy arrays, tuples, lists and functions of Potto are accepted")
 
 
@@ -213,7 +229,7 @@ def _complaint(name: str, argument: Any, type: Type, own: Type | None) -> str | 
         case TupleOf(items, dual):
             return _tuple_misfit(name, argument, items, dual)
         case ArrayOf():
-            fits = isinstance(argument, list | np.ndarray | Estimate)
+            fits = isinstance(argument, list | np.ndarray | Estimate | Rows)
             return None if fits else f"an array is needed, not {_kind(argument)}"
         case Real() | Dist():
             fits = not isinstance(argument, tuple | list)

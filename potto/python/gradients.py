@@ -18,6 +18,7 @@ from msgspec.structs import asdict, replace
 from potto.kernels.cells import Cell, Number, Value, all_cells, map_cells, pad
 from potto.kernels.chunks import POINTS
 from potto.kernels.errors import wrong_call
+from potto.kernels.rows import Rows, listed
 from potto.kernels.tape import Node, Swept, Untaped, swept
 from potto.projects.settings import current
 from potto.python.api import Function, must_be_function
@@ -189,6 +190,7 @@ class _Run:
         self.extra = {name: value_of(name, item, batch, lambda _: None) for name, item in extra.items()}
         self.machine = self._machine()
         self.clock = Clock()
+        self.whole = False  # whether derivatives by all elements of an array are one array, as a tape gives them
 
     def _machine(self) -> Machine:
         world = self.call.world
@@ -230,15 +232,16 @@ class _Run:
         if directions >= MANY and np.prod(shape) <= POINTS:  # a tape keeps arrays for all operations
             seeds: list[Any] = []
 
-            def seeded(cell: Cell) -> Cell:
-                seeds.append(Node((), shape))
+            def seeded(cell: Cell, places: tuple[int, ...]) -> Cell:
+                seeds.append(Node((), (*places, *shape)))
                 return Cell(cell.v, cell.e, (seeds[-1],))
 
-            moving = {name: map_cells(self.given[name], seeded) for name in wrt}
+            moving = {name: _with_places(self.given[name], (), seeded) for name in wrt}
+            self.whole = True
             try:
                 return self.evaluated(moving, self.machine.taped(), lambda value: swept_back(value, seeds))
             except Untaped:
-                self.machine = self._machine()
+                self.machine, self.whole = self._machine(), False
         numbers = iter(range(directions))
         moving = {name: _seeded(self.given[name], numbers, directions) for name in wrt}
         return self.evaluated(moving, self.machine.with_directions(directions), forward)
@@ -248,7 +251,7 @@ class _Run:
         k = machine.directions
         values = [moving[name] if name in moving else pad(value, k) for name, value in self.arguments]
         with self.clock:
-            value = self.call.value(values, machine)
+            value = in_lists(self.call.value(values, machine))
             if not _numbers(value):
                 raise wrong_call("only a number or a tuple of numbers has a gradient")
             with np.errstate(all="ignore"):
@@ -266,10 +269,11 @@ class _Run:
 
     def gradient(self, value: Value, moving: Value, wrt: tuple[str, ...]) -> Gradient:
         """The estimate of a value, with the derivatives of `moving` in the form of the parameters."""
-        directions = range(sum(_size(name, self.given[name]) for name in wrt))
+        directions = range(len(all_cells(tuple(self.given[name] for name in wrt))) if self.whole
+                           else sum(_size(name, self.given[name]) for name in wrt))  # fmt: skip
         tangents = [told(moving, lambda cell, d=d: cell.t[d]) for d in directions]  # type: ignore[misc]
         bounds = [told(moving, lambda cell, d=d: cell.et[d]) for d in directions]  # type: ignore[misc]
-        forms = (_by_name(part, wrt, self.given) for part in (tangents, bounds))
+        forms = (_by_name(part, wrt, self.given, self.whole) for part in (tangents, bounds))
         found = self.answer(value, *(form[0] if len(wrt) == 1 else form for form in forms))
         return Gradient(**asdict(found), wrt=wrt)
 
@@ -286,7 +290,14 @@ def _plain(found: Estimate) -> Estimate:
 
 
 def _numbers(value: Value) -> bool:
-    return isinstance(value, Cell) or (isinstance(value, tuple) and all(map(_numbers, value)))
+    return isinstance(value, Cell) or (isinstance(value, tuple | list) and all(map(_numbers, value)))
+
+
+def in_lists(value: Value) -> Value:
+    """A value with its arrays as lists of their elements."""
+    if isinstance(value, tuple | list):
+        return type(value)([in_lists(item) for item in value])
+    return [in_lists(row) for row in value.rows()] if isinstance(value, Rows) else value
 
 
 # Parameters that move
@@ -298,6 +309,8 @@ def _size(name: str, value: Value) -> int:
         return 1
     if isinstance(value, tuple):
         return sum(_size(name, item) for item in value)
+    if isinstance(value, Rows):
+        return value.size * _size(name, value.item)
     kind = "list" if isinstance(value, list) else "function"
     raise wrong_call(
         f"`{name}` is a {kind} and not a number, so there is no derivative by it", "name other parameters in `wrt`"
@@ -308,9 +321,21 @@ def _seeded(value: Value, numbers: Iterator[int], directions: int) -> Value:
     """The parameter, each of its numbers moving in a direction of its own."""
     if isinstance(value, tuple):
         return tuple(_seeded(item, numbers, directions) for item in value)
+    if isinstance(value, Rows):
+        return listed([_seeded(row, numbers, directions) for row in value.rows()])
     assert isinstance(value, Cell)
     own = next(numbers)
     return Cell(value.v, value.e, (None,) * own + (1.0,) + (None,) * (directions - own - 1))
+
+
+def _with_places(value: Value, places: tuple[int, ...], change: Callable[[Cell, tuple[int, ...]], Cell]) -> Value:
+    """The value with `change` done to its cells, which is told how many elements the arrays around each have."""
+    if isinstance(value, tuple):
+        return tuple(_with_places(item, places, change) for item in value)
+    if isinstance(value, Rows):
+        return Rows(_with_places(value.item, (*places, value.size), change), value.size)
+    assert isinstance(value, Cell)
+    return change(value, places)
 
 
 def _moved(name: str, value: Value, tangent: Value) -> Value:
@@ -338,14 +363,27 @@ def _bounds(cell: Cell) -> tuple[Number | None, ...]:
     return cell.et
 
 
-def _by_name(numbers: list[Any], wrt: tuple[str, ...], given: dict[str, Value]) -> tuple[Any, ...]:
-    """The derivatives in the form of the parameters that they belong to."""
+def _by_name(numbers: list[Any], wrt: tuple[str, ...], given: dict[str, Value], whole: bool) -> tuple[Any, ...]:
+    """The derivatives in the form of the parameters; `whole`: those by all elements of an array are one array."""
     rest = iter(numbers)
 
     def form(value: Value) -> Any:
-        return tuple(form(item) for item in value) if isinstance(value, tuple) else next(rest)
+        if isinstance(value, tuple):
+            return tuple(form(item) for item in value)
+        if not isinstance(value, Rows):
+            return next(rest)
+        return _rows(form(value.item), value) if whole else [form(row) for row in value.rows()]
 
     return tuple(form(given[name]) for name in wrt)
+
+
+def _rows(found: Any, value: Rows) -> list[Any]:
+    """Derivatives by all elements as a list of those by each."""
+    if isinstance(found, tuple):
+        return list(zip(*(_rows(part, value) for part in found), strict=True))
+    if isinstance(found, list):  # of an array of arrays: by the inner places first
+        return [list(row) for row in zip(*found, strict=True)]
+    return list(found) if np.ndim(found) else [found] * value.size
 
 
 def _as_matrix(rows: Any, one_answer: bool, one_parameter: bool) -> Any:

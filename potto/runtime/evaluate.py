@@ -22,6 +22,7 @@ from potto.integrate.events import INFINITE, ROUGH, Shortfall
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Number, Value, all_cells
 from potto.kernels.making import counts
+from potto.kernels.rows import Rows
 from potto.projects.settings import DEFAULTS, Settings
 from potto.runtime.answers.convergence import CANCELS, Shortfalls, converged_members, members_of, merged, missed
 from potto.runtime.answers.estimate import Estimate, OneSided
@@ -29,7 +30,6 @@ from potto.runtime.answers.inherited_errors import rough, widened
 from potto.runtime.evaluation.arrays import array, element, fold, length
 from potto.runtime.evaluation.duals import call_derivative, call_paired
 from potto.runtime.evaluation.functions import Closure, Derivative
-from potto.runtime.evaluation.local import locally
 from potto.runtime.evaluation.machine import Linker, Machine, Record, Semantics
 from potto.runtime.evaluation.selection import lazy
 from potto.runtime.evaluation.sums import total
@@ -40,7 +40,7 @@ Lookup = Callable[[str, str], Term]
 def _integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
     from potto.runtime.integration.driver import integral  # loaded with the first integral: a prompt is there before
 
-    return locally(machine, env, lambda own, here: integral(own, term, here))
+    return integral(machine, term, env)
 
 
 def _added(machine: Machine, terms: tuple[Term, ...], env: dict[str, Value]) -> Value:
@@ -162,7 +162,7 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
         tangents = told(value, lambda cell: cell.t[0] if cell.t else None)
         tangent_bounds = told(value, lambda cell: cell.et[0] if cell.t else None)
     shown = _flat(numbers, bounds)
-    slopes = [(number(t), number(et)) for c in all_cells(value) for t, et in zip(c.t, c.et, strict=True)]
+    slopes = _slopes(value)
     missing = _missing([*shown, *slopes], machine)
     shape = np.broadcast_shapes(*(number.shape for number, _ in shown if isinstance(number, np.ndarray)))
     return answer(
@@ -170,6 +170,15 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
         shortfalls={why: members_of(where, shape) if shape else True for why, where in missing.items()},
         member_converged=converged_members(missing, shape) if shape else None,
     )  # fmt: skip
+
+
+def _slopes(value: Value) -> list[tuple[Any, Any]]:
+    """All tangents with their errors."""
+    if isinstance(value, Rows):
+        return [pair for row in value.rows() for pair in _slopes(row)] if any(c.t for c in all_cells(value)) else []
+    if isinstance(value, tuple | list):
+        return [pair for item in value for pair in _slopes(item)]
+    return [(number(t), number(et)) for c in all_cells(value) for t, et in zip(c.t, c.et, strict=True)]
 
 
 def _missing(flat: list[tuple[Any, Any]], machine: Machine) -> Shortfalls:
@@ -211,7 +220,22 @@ def told(value: Value, part: Callable[[Cell], Number | None]) -> Any:
         return number(part(value))
     if isinstance(value, tuple | list):
         return type(value)([told(item, part) for item in value])
+    if isinstance(value, Rows):
+        return told_rows(value, part)
     raise errors.not_a_number(value)
+
+
+def told_rows(rows: Rows, part: Callable[[Cell], Number | None]) -> list[Any]:
+    """One part of all numbers of an array, as lists."""
+    if isinstance(rows.item, Cell):
+        found = number(part(rows.item))
+        if not isinstance(found, np.ndarray):
+            return [found] * rows.size
+        return found.tolist() if found.ndim == 1 else list(found)
+    if isinstance(rows.item, tuple):
+        columns = [told_rows(Rows(item, rows.size), part) for item in rows.item]
+        return list(zip(*columns, strict=True))
+    return [told(row, part) for row in rows.rows()]
 
 
 def number(part: Number | None) -> Number:

@@ -19,6 +19,7 @@ from potto.elaborate import elaborate_expression
 from potto.integrate.events import DIVERGENT, ROUGH, UNDEFINED
 from potto.kernels.cells import Value
 from potto.kernels.errors import wrong_call
+from potto.kernels.rows import Rows
 from potto.modules import statements
 from potto.projects.settings import Settings
 from potto.query import Database
@@ -102,9 +103,11 @@ class Script:
 
     def items(self, iterable: nodes.Expr, env: Environment) -> list[Value]:
         value, _ = self.value(iterable, env)
+        if isinstance(value, Rows):
+            return value.rows()
         if isinstance(value, list):
             return value
-        raise self.failed(wrong_call("a loop goes over a list"), iterable.span)
+        raise self.failed(wrong_call("a loop goes over an array"), iterable.span)
 
     def bind(self, binding: nodes.Binding, env: Environment) -> None:
         value, _ = self.value(binding.value, env)

@@ -204,8 +204,9 @@ def concisely(value: Any, error: Any) -> str:
 
 def _joined(value: Any, error: Any, form: Callable[[float, float], str]) -> str:
     if isinstance(value, tuple | list):
-        parts = [_joined(v, e, form) for v, e in zip(value, error, strict=True)]
-        return format_tuple(parts) if isinstance(value, tuple) else f"[{', '.join(parts)}]"
+        shown = value[:MOST_ITEMS] if isinstance(value, list) else value
+        parts = [_joined(v, e, form) for v, e in zip(shown, error, strict=False)]
+        return format_tuple(parts) if isinstance(value, tuple) else format_list(parts, len(value))
     if value is None:
         return "<function>"
     if getattr(value, "ndim", 0):
@@ -238,6 +239,8 @@ def format_bars(value: Any, error: Any) -> tuple[str, str]:
 
 def _bars(value: Any, error: Any) -> str:
     if isinstance(value, tuple | list):
+        if isinstance(value, list) and len(value) > MOST_ITEMS:
+            return f"at most {format_error(largest(error))}"
         return format_tuple([_bars(v, e) for v, e in zip(value, error, strict=True)])
     if getattr(value, "ndim", 0):
         bars = [_bar(v, e)[1] for v, e in _first(value, error)]
@@ -268,6 +271,12 @@ def largest(error: Any) -> float:
     if isinstance(error, tuple | list):
         return max((largest(item) for item in error), default=0.0)
     return float(error) if error is not None and error == error else math.inf
+
+
+def format_list(parts: Sequence[str], size: int) -> str:
+    """`[a, b]`, and how many more there are."""
+    more = size - len(parts)
+    return f"[{', '.join([*parts, *([f'… {more} more'] if more else [])])}]"
 
 
 def format_tuple(parts: Sequence[str]) -> str:

@@ -15,8 +15,16 @@ from msgspec.structs import replace
 
 from potto.core.terms import App, Deriv, Global, If, Lam, Term, Var
 from potto.kernels.cells import Cell, Value
+from potto.kernels.rows import Rows
 from potto.runtime.answers.estimate import Estimate
-from potto.runtime.answers.printing import format_bounds, format_numbers, format_tuple, with_error
+from potto.runtime.answers.printing import (
+    MOST_ITEMS,
+    format_bounds,
+    format_list,
+    format_numbers,
+    format_tuple,
+    with_error,
+)
 from potto.runtime.evaluation.functions import Derivative
 from potto.runtime.evaluation.machine import Linker
 
@@ -30,8 +38,10 @@ def format_value(value: Value) -> str:
         return format_numbers(value.v, 0.0 if value.e is None else value.e)
     if isinstance(value, tuple):
         return format_tuple([format_value(item) for item in value])
-    if isinstance(value, list):
-        return f"[{', '.join(format_value(item) for item in value)}]"
+    if isinstance(value, list | Rows):
+        size = len(value) if isinstance(value, list) else value.size
+        first = [value[i] if isinstance(value, list) else value.at(i) for i in range(min(size, MOST_ITEMS))]
+        return format_list([format_value(item) for item in first], size)
     return "<derivative>" if isinstance(value, Derivative) else "<function>"
 
 

@@ -11,7 +11,8 @@ from __future__ import annotations
 from potto.calculus.inlining.currying import sizes_of
 from potto.integrate.pieces import still
 from potto.kernels import errors
-from potto.kernels.cells import Cell, Trace, Value
+from potto.kernels.cells import Cell, Trace, Value, map_cells
+from potto.kernels.rows import Rows
 from potto.kernels.tape import Untaped
 from potto.runtime.evaluation.arguments import fit, uncurried
 from potto.runtime.evaluation.compared import compared
@@ -49,18 +50,30 @@ def merge(arg: Value) -> Value:
         return Paired(arg.padded(1))
     if isinstance(arg, list):
         return [merge(item) for item in arg]
+    if isinstance(arg, Rows):
+        return Rows(merge_still(arg.item), arg.size)
     if not isinstance(arg, tuple):
         raise errors.wrong_call("a derivative takes duals, pairs `(value, tangent)`")
     if len(arg) == 2 and all(isinstance(part, Cell) for part in arg):
         v, t = arg
         assert isinstance(v, Cell) and isinstance(t, Cell)
         return Cell(v.v, v.e, (_unit(t),), (t.e,))
+    if len(arg) == 2 and all(isinstance(part, Rows) for part in arg):
+        values, tangents = arg
+        assert isinstance(values, Rows) and isinstance(tangents, Rows)
+        if values.size == tangents.size:
+            return Rows(merge((values.item, tangents.item)), values.size)
     if len(arg) == 2 and all(isinstance(part, tuple) for part in arg):
         values, tangents = arg
         assert isinstance(values, tuple) and isinstance(tangents, tuple)
         if len(values) == len(tangents):
             return tuple(merge((v, t)) for v, t in zip(values, tangents, strict=True))
     raise errors.wrong_call("a derivative takes duals, pairs `(value, tangent)`")
+
+
+def merge_still(value: Value) -> Value:
+    """Numbers that have tangent 0."""
+    return map_cells(value, lambda cell: Cell(cell.v, cell.e, (None,)))
 
 
 def _unit(t: Cell) -> float | None:
@@ -79,9 +92,12 @@ def split(value: Value) -> Value:
     if isinstance(value, tuple):
         pairs = [split(item) for item in value]
         return (tuple(p[0] for p in pairs), tuple(p[1] for p in pairs))  # type: ignore[index]
-    if isinstance(value, Closure):
-        return Derivative(value)
-    raise errors.wrong_call("a derivative cannot give a list")
+    if isinstance(value, Rows):
+        values, tangents = split(value.item)  # type: ignore[misc]
+        return Rows(values, value.size), Rows(tangents, value.size)
+    if isinstance(value, list):
+        return [split(item) for item in value]
+    return Derivative(value)  # type: ignore[arg-type]
 
 
 def call_paired(
@@ -114,6 +130,9 @@ def _pair(arg: Value, d: int) -> Value:
         return (Cell(arg.v, arg.e), Cell(0.0 if t is None else t, arg.et[d] if arg.et else None))
     if isinstance(arg, tuple):
         return tuple(_pair(item, d) for item in arg)
-    if isinstance(arg, Closure):
-        return Derivative(arg)
-    raise errors.wrong_call("a list has no derivative")
+    if isinstance(arg, Rows):
+        values, tangents = _pair(arg.item, d)  # type: ignore[misc]
+        return Rows(values, arg.size), Rows(tangents, arg.size)
+    if isinstance(arg, list):
+        return [_pair(item, d) for item in arg]
+    return Derivative(arg)  # type: ignore[arg-type]

@@ -22,6 +22,7 @@ from potto.kernels import errors
 from potto.kernels.cells import Array, Cell, Ints, Value, all_arrays, map_arrays, pad
 from potto.kernels.making import making
 from potto.runtime.answers.convergence import allowance, widest
+from potto.runtime.evaluation.local import locally
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.selection import apart
 from potto.runtime.integration.arrays import Differ, met, without_arrays
@@ -33,7 +34,8 @@ from potto.runtime.integration.solving import solve
 
 
 def integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
-    """The value of an integral in an environment whose numbers may be batches of any shape: made ready, and solved."""
+    """The value of an integral in an environment whose numbers may be batches of any shape: what it reads of arrays is
+    found beside it, and it is solved in as few directions as there have to be."""
     linker = machine.linker
     term, env = filled(term, env, linker.reach)
     if met(term, env, linker.reach):
@@ -44,6 +46,12 @@ def integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
         if not isinstance(ready, Integral):
             return machine.evaluate(function_of(ready), env, None)
         term = ready
+    return locally(machine, env, lambda own, here: _of_numbers(own, term, here))
+
+
+def _of_numbers(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
+    """The value of an integral that reads no arrays: made ready, and solved."""
+    linker = machine.linker
     derived = linker.reach.deltas(term.body)
     key = (term, machine.directions > 0)
     known = linker.placed.get(key)

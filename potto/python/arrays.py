@@ -1,0 +1,107 @@
+"""Arrays of Python as arrays of Potto: what a parameter's type says which axes of numpy's are.
+
+Owns `with_arrays`. A parameter `[n] Real` takes a numpy array, a column of a table or a list as one array; a parameter
+`Real` takes a numpy array as a batch.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from typing import Any
+
+import numpy as np
+
+from potto.kernels.cells import Cell, Value
+from potto.kernels.errors import wrong_call
+from potto.kernels.rows import Rows, listed
+from potto.runtime.answers.estimate import Estimate
+from potto.types import format_type
+from potto.types.types import ArrayOf, Count, Dist, Real, Shifted, SizeVar, TupleOf, Type, resolve
+
+Sizes = dict[str, tuple[str, int]]  # of names of sizes: the parameter that says how many, and the number
+
+
+def with_arrays(name: str, argument: Any, type: Type, sizes: Sizes) -> Any:
+    """An argument in which what its type calls an array is one. Raises PottoError where sizes do not agree."""
+    found = resolve(type)
+    if isinstance(found, ArrayOf):
+        return _array(name, argument, found, sizes)
+    if isinstance(found, TupleOf) and isinstance(argument, tuple) and len(argument) == len(found.items):
+        return tuple(with_arrays(name, part, item, sizes) for part, item in zip(argument, found.items, strict=True))
+    return argument
+
+
+def has_arrays(type: Type) -> bool:
+    """Whether a parameter takes an array."""
+    found = resolve(type)
+    return isinstance(found, ArrayOf) or (isinstance(found, TupleOf) and any(map(has_arrays, found.items)))
+
+
+def _array(name: str, argument: Any, type: ArrayOf, sizes: Sizes) -> Any:
+    if isinstance(argument, Estimate) and argument.tangent is None:
+        argument = argument.value
+    if hasattr(argument, "to_numpy"):
+        argument = argument.to_numpy()
+    if isinstance(argument, list) and _of_numbers(type):
+        with contextlib.suppress(TypeError, ValueError):  # of answers, or not of one shape
+            argument = np.array(argument, dtype=float)
+    if isinstance(argument, np.ndarray):
+        return _numpy(name, argument, type, sizes)
+    if isinstance(argument, list):
+        _agree(name, len(argument), type.size, sizes)
+        items = [with_arrays(name, item, type.item, sizes) for item in argument]
+        return listed(items) if items and all(isinstance(item, Rows) for item in items) else items
+    return argument
+
+
+def _of_numbers(type: Type) -> bool:
+    found = resolve(type)
+    if isinstance(found, ArrayOf):
+        return _of_numbers(found.item)
+    if isinstance(found, TupleOf):
+        return all(map(_of_numbers, found.items))
+    return isinstance(found, Real | Dist)
+
+
+def _numpy(name: str, argument: np.ndarray[Any, Any], type: ArrayOf, sizes: Sizes) -> Value:
+    if argument.dtype.kind not in "fiu":
+        raise wrong_call(f"`{name}` is {format_type(type)}: an array must hold real numbers, not {argument.dtype}")
+    axes = _axes(type)
+    if argument.ndim != axes:
+        wanted = f"a numpy array of {axes} axes is needed, not one of shape {argument.shape}"
+        raise wrong_call(f"`{name}` is {format_type(type)}: {wanted}")
+    return _made(name, argument.astype(np.float64), type, sizes)
+
+
+def _axes(type: Type) -> int:
+    found = resolve(type)
+    if isinstance(found, ArrayOf):
+        return 1 + _axes(found.item)
+    return 1 if isinstance(found, TupleOf) else 0
+
+
+def _made(name: str, numbers: np.ndarray[Any, Any], type: ArrayOf, sizes: Sizes, axis: int = 0) -> Rows:
+    """An array whose places are an axis of some numbers; those of arrays around it are the axes before."""
+    count = numbers.shape[axis]
+    _agree(name, count, type.size, sizes)
+    item = resolve(type.item)
+    if isinstance(item, ArrayOf):
+        return Rows(_made(name, numbers, item, sizes, axis + 1), count)
+    if not isinstance(item, TupleOf):
+        return Rows(Cell(np.ascontiguousarray(numbers)), count)
+    if numbers.shape[-1] != len(item.items):
+        raise wrong_call(f"`{name}` holds tuples of {len(item.items)}, and is given rows of {numbers.shape[-1]}")
+    return Rows(tuple(Cell(np.ascontiguousarray(numbers[..., place])) for place in range(len(item.items))), count)
+
+
+def _agree(name: str, count: int, size: Type, sizes: Sizes) -> None:
+    """Raise PottoError if a size that is known, or that another argument has fixed, is another."""
+    found, offset = resolve(size), 0
+    if isinstance(found, Shifted):
+        offset, found = found.offset, resolve(found.base)
+    if isinstance(found, Count) and found.number != count:
+        raise wrong_call(f"`{name}` has {found.number} elements, and is given {count}")
+    if isinstance(found, SizeVar):
+        other, known = sizes.setdefault(found.name, (name, count - offset))
+        if known != count - offset:
+            raise wrong_call(f"`{name}` has {known + offset} elements, as `{other}` says, and is given {count}")
