@@ -7,6 +7,7 @@ Iverson bracket, its surface turned so that it reads as a comparison (`[x < t]` 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 
 from msgspec import Struct
@@ -49,6 +50,7 @@ from potto.core.terms import (
 _OPEN, _OR, _AND, _NOT, _COMPARE, _ADD, _SIGN, _MUL, _POW, _ATOM = range(10)
 _COMPARISONS = {"lt": "<", "le": "<=", "eq": "==", "ne": "!="}
 _LOGIC = {"and": _AND, "or": _OR}
+_LIKE_A_HEAD = re.compile(r"[^\W\d][\w']*\.\d")  # `c.2`, which begins a function of c where a function's head ends
 
 
 class _Text(Struct, frozen=True):
@@ -168,7 +170,9 @@ def _binder(node: Lam | App | Integral | Sum | Array | Fold, texts: _Texts) -> _
     match node:
         case Lam(params=params):
             group = params[0] if len(params) == 1 else f"({', '.join(params)})"
-            return _Text(f"\\{group} . {texts[node.body].text}", _OPEN)
+            body = texts[node.body].text
+            body = f"({body})" if _LIKE_A_HEAD.match(body) else body
+            return _Text(f"\\{group} . {body}", _OPEN)
         case App(function=function, args=args):
             return _Text(f"{texts[function].at(_ATOM)}({_list(args, texts)})", _ATOM)
         case Integral():
@@ -179,12 +183,23 @@ def _binder(node: Lam | App | Integral | Sum | Array | Fold, texts: _Texts) -> _
             limits = f"{texts[node.lo].at(_ADD)}..{texts[node.hi].at(_ADD)}"
             return _Text(f"sum {node.variable} in {limits} ({texts[node.body].text})", _SIGN)
         case Array():
-            last = f"{texts[node.size].at(_ADD)} - 1"
-            return _Text(f"[{texts[node.body].text} for {node.variable} in 0..{last}]", _ATOM)
+            return _Text(f"[{texts[node.body].text} for {node.variable} in 0..{_last(node.size, texts)}]", _ATOM)
         case Fold():
             limits = f"{texts[node.lo].at(_ADD)}..{texts[node.hi].at(_ADD)}"
             head = f"fold {node.state} = {texts[node.start].text} for {node.variable} in {limits}"
             return _Text(f"{head} ({texts[node.body].text})", _SIGN)
+
+
+def _last(size: Term, texts: _Texts) -> str:
+    """The last place of an array: `n - 1`, and of `n + 1` elements `n`."""
+    match size:
+        case Const(name=None, value=value):
+            return _number(value - 1).text
+        case Prim(op="add", args=(*rest, Const(name=None, value=value))) if rest:
+            last = [texts[part] for part in rest]
+            return _sum([*last, *([_number(value - 1)] if value != 1 else [])])
+        case _:
+            return f"{texts[size].at(_ADD)} - 1"
 
 
 def _list(items: tuple[Term, ...], texts: _Texts) -> str:
@@ -200,7 +215,7 @@ def _projection(node: Proj, texts: _Texts) -> _Text:
     inner = texts[node.term]
     if node.index < 2:
         return _Text(f"{('fst', 'snd')[node.index]}({inner.text})", _ATOM)
-    return _Text(f"{inner.at(_ATOM)}[{node.index}]", _ATOM)
+    return _Text(f"{inner.at(_ATOM)}.{node.index}", _ATOM)
 
 
 def _builtin(node: Prim, texts: _Texts) -> _Text:

@@ -12,15 +12,19 @@ from collections.abc import Callable, Sequence
 from potto.core.collecting import product_of, sum_of
 from potto.core.terms import (
     ZERO,
+    Array,
     Branch,
     Const,
+    Fold,
     If,
+    Index,
     Integral,
     Prim,
     Proj,
     Sum,
     Term,
     Tuple,
+    Var,
     bound_names,
     branch,
     children,
@@ -31,6 +35,7 @@ from potto.core.terms import (
     prim,
     proj,
     rebuild,
+    substitute,
     transform,
     unknown,
 )
@@ -68,8 +73,19 @@ class Rewriter:
                 return node if isinstance(node.body, Tuple) else ZERO
             case Sum() if node.body is ZERO:
                 return ZERO
+            case Fold():
+                return _fold(node)
+            case Index():
+                return self.element(node)
             case _:
                 return node
+
+    def element(self, node: Index) -> Term:
+        """The element at a known place of an array that is made on the spot. What is out of range stays, to be said."""
+        whole, place = node.array, _value(node.index)
+        if not isinstance(whole, Array) or not (place >= 0 and place.is_integer() and place < _value(whole.size)):
+            return node
+        return self.run(substitute(whole.body, {whole.variable: node.index}))
 
     # Conditions that are decided further out
 
@@ -195,6 +211,12 @@ def _spine(node: Term) -> tuple[Term, ...]:
             return (node.body,)
         case _:
             return ()
+
+
+def _fold(node: Fold) -> Term:
+    """A fold with no steps, or none that changes the state. Steps are never written out."""
+    idle = isinstance(node.body, Var) and node.body.name == node.state
+    return node.start if idle or _value(node.lo) > _value(node.hi) else node
 
 
 # Builtins

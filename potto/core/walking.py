@@ -190,9 +190,7 @@ def replaced(root: Term, parts: Mapping[Term, Term]) -> Term:
     return transform(root, lambda node, new: parts.get(node, new), lambda n: () if n in parts else children(n))
 
 
-def unknown(
-    root: Term, known: Container[Term], below: Callable[[Term], Sequence[Term]] = children
-) -> list[Term]:
+def unknown(root: Term, known: Container[Term], below: Callable[[Term], Sequence[Term]] = children) -> list[Term]:
     """The parts of a term that nothing is known of yet, children first: what is known is not gone into."""
     order = postorder(root, below=lambda node: () if node in known else below(node))
     return [node for node in order if node not in known]

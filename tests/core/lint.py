@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from potto.core.terms import (
+    Array,
     Branch,
+    Fold,
     Hole,
     If,
     Integral,
@@ -112,7 +114,7 @@ def _binders(term: Term) -> Iterator[str]:
 def _scope(node: Term, inside: Mapping[Term, frozenset[str]]) -> frozenset[str]:
     """The names bound within the scope of a binder: the names it binds must not be among them."""
     match node:
-        case Lam(body=body) | Sum(body=body) | Integral(body=body):
+        case Lam(body=body) | Sum(body=body) | Integral(body=body) | Array(body=body) | Fold(body=body):
             return inside[body]
         case _:
             return frozenset()

@@ -35,10 +35,14 @@ from potto.core.polynomials import (
 )
 from potto.core.terms import (
     App,
+    Array,
     Const,
     Deriv,
+    Fold,
+    Index,
     Integral,
     Lam,
+    Length,
     ListOf,
     Prim,
     Sum,
@@ -136,7 +140,8 @@ def _without_it(term: Term, name: str) -> Term:
     return term
 
 
-_OPAQUE = (App, Deriv, Integral, Lam, ListOf, Sum, Tuple)  # equal ones are told by their normal forms
+# Equal ones are told by their normal forms.
+_OPAQUE = (App, Array, Deriv, Fold, Index, Integral, Lam, Length, ListOf, Sum, Tuple)
 
 
 @lru_cache(maxsize=8192)

@@ -44,9 +44,14 @@ def derivative(function: Value, digits: int) -> Value:
 
 
 def family_of(value: Value) -> Family:
-    """A dual (value, tangent), a tuple of duals, the derivative of a function, or a number that does not move."""
+    """A dual (value, tangent), a tuple of duals, the derivative of a function, or a number that does not move.
+
+    The dual of an array is (its values, their tangents).
+    """
     if isinstance(value, Dual):
         return value.family
+    if isinstance(value, tuple) and len(value) == 2 and all(isinstance(part, list) for part in value):
+        return lambda h: _shifted(*value, h)
     if isinstance(value, tuple):
         if len(value) == 2 and not any(isinstance(v, tuple) or callable(v) for v in value):
             return lambda h: value[0] + h * value[1]
@@ -55,6 +60,13 @@ def family_of(value: Value) -> Family:
     if callable(value):
         return lambda h: _Moved(value, h)
     return lambda h: value
+
+
+def _shifted(value: Value, tangent: Value, h: Any) -> Value:
+    """An array (or what is in one) moved along a tangent of its own shape."""
+    if isinstance(value, list | tuple):
+        return type(value)(_shifted(v, t, h) for v, t in zip(value, tangent, strict=True))
+    return value + h * tangent
 
 
 class _Moved(Struct, frozen=True):
@@ -91,10 +103,17 @@ def _dual(family: Family, digits: int) -> Value:
 def _pair(value: Value, points: dict[int, Value], h: Any) -> Value:
     if isinstance(value, tuple):
         return tuple(_pair(v, {k: p[i] for k, p in points.items()}, h) for i, v in enumerate(value))
+    if isinstance(value, list) and not any(map(callable, value)):
+        return value, _slopes(value, points, h)
     if isinstance(value, list):
         return [_pair(v, {k: p[i] for k, p in points.items()}, h) for i, v in enumerate(value)]
-    slope = sum((points[k] - points[-k]) * mp.mpf(a) / b for k, (a, b) in enumerate(_WEIGHTS, 1))
-    return value, slope / h
+    return value, _slopes(value, points, h)
+
+
+def _slopes(value: Value, points: dict[int, Value], h: Any) -> Value:
+    if isinstance(value, list | tuple):
+        return type(value)(_slopes(v, {k: p[i] for k, p in points.items()}, h) for i, v in enumerate(value))
+    return sum((points[k] - points[-k]) * mp.mpf(a) / b for k, (a, b) in enumerate(_WEIGHTS, 1)) / h
 
 
 def call(function: Value, args: tuple[Value, ...]) -> Value:

@@ -289,11 +289,11 @@ def _inside(a: Any, b: Any) -> Any:
 
 def _pieces(oracle: Oracle, inner: Callable[[Any], Value], ends: list[Any]) -> Value:
     shape = _Look(oracle, inner).value(_inside(ends[0], ends[-1]))
-    if isinstance(shape, tuple):
+    if isinstance(shape, tuple | list):
         parts = []
         for i in range(len(shape)):
             parts.append(_pieces(oracle, lambda x, i=i: inner(x)[i], ends))  # type: ignore[misc]
-        return tuple(parts)
+        return type(shape)(parts)
     return sum((_piece(oracle, inner, a, b, 0) for a, b in pairwise(ends)), mp.mpf(0))
 
 
@@ -312,21 +312,21 @@ def _piece(oracle: Oracle, f: Callable[[Any], Any], a: Any, b: Any, splits: int)
 
 
 def _scaled(value: Value, factor: Any) -> Value:
-    return tuple(_scaled(v, factor) for v in value) if isinstance(value, tuple) else value * factor
+    return type(value)(_scaled(v, factor) for v in value) if isinstance(value, tuple | list) else value * factor
 
 
 def _zero_like(value: Value) -> Value:
-    return tuple(map(_zero_like, value)) if isinstance(value, tuple) else mp.mpf(0)
+    return type(value)(map(_zero_like, value)) if isinstance(value, tuple | list) else mp.mpf(0)
 
 
 def plus(value: Value, others: list[Value]) -> Value:
-    """The sum of numbers, or of tuples component by component."""
+    """The sum of numbers, or of tuples and arrays component by component."""
     for other in others:
-        if isinstance(value, tuple):
-            other = other if isinstance(other, tuple) else (other,) * len(value)
-            value = tuple(plus(v, [o]) for v, o in zip(value, other, strict=True))
-        elif isinstance(other, tuple):
-            value = plus((value,) * len(other), [other])
+        if isinstance(value, tuple | list):
+            other = other if isinstance(other, tuple | list) else (other,) * len(value)
+            value = type(value)(plus(v, [o]) for v, o in zip(value, other, strict=True))
+        elif isinstance(other, tuple | list):
+            value = plus(type(other)((value,) * len(other)), [other])
         else:
             value = value + other
     return value

@@ -60,15 +60,18 @@ def evaluate(
     lookup: Lookup | None = None,
     digits: int = 30,
     samples: int = 64,
+    data: Mapping[tuple[str, str], Any] | None = None,
 ) -> Value:
     """The value of a term, to about `digits` digits: an mpmath number, a tuple, a list or a function.
 
     `env` gives its free variables, `lookup` other definitions by module and name. `samples` is how many points of an
-    interval are looked at in search of places where the integrand jumps or bends.
+    interval are looked at in search of places where the integrand jumps or bends. `data`: what files hold, by path and
+    column.
     """
     with mp.workdps(digits + GUARD), _deep_recursion():
         values = {name: as_value(value) for name, value in (env or {}).items()}
-        return Oracle(lookup, digits, samples).run(term, values)
+        held = {place: as_value(value) for place, value in (data or {}).items()}
+        return Oracle(lookup, digits, samples, held).run(term, values)
 
 
 @contextlib.contextmanager
@@ -94,8 +97,9 @@ def as_value(value: Any) -> Value:
 class Oracle:
     """One evaluation: how definitions are found, how exact it is, and the trace that is being written."""
 
-    def __init__(self, lookup: Lookup | None, digits: int, samples: int) -> None:
+    def __init__(self, lookup: Lookup | None, digits: int, samples: int, data: Mapping[tuple[str, str], Value]) -> None:
         self.lookup = lookup
+        self.data = data
         self.digits = digits
         self.samples = samples
         self.trace: Trace | None = None
@@ -151,8 +155,8 @@ class Oracle:
                 return self.element(self.run(term.array, env), self.decide(term.index, env))
             case Length():
                 return mp.mpf(len(self.run(term.array, env)))
-            case Data():
-                raise KeyError(f"{term.path}: give the data as values")
+            case Data(path=path, column=column):
+                return self.data[path, column]
             case Deriv(function=inner):
                 return differences.derivative(self.run(inner, env), self.digits)
             case Hole(reason=reason):
@@ -194,7 +198,6 @@ class Oracle:
         parts = [self.run(term.body, {**env, term.variable: mp.mpf(i)}) for i in range(lo, hi + 1)]
         return integrals.plus(parts[0], parts[1:]) if parts else mp.mpf(0)
 
-
     def fold(self, term: Fold, env: Environment) -> Value:
         lo, hi = int(mp.ceil(self.run(term.lo, env))), int(mp.floor(self.run(term.hi, env)))
         state = self.run(term.start, env)
@@ -203,7 +206,7 @@ class Oracle:
         return state
 
     def element(self, whole: Value, place: Any) -> Value:
-        if not 0 <= int(place) < len(whole) or int(place) != place:
+        if int(place) != place or not 0 <= place < len(whole):
             raise IndexError(f"the index {place} of an array of {len(whole)}")
         return whole[int(place)]
 
