@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, Protocol, Union
 import numpy as np
 
 from potto.kernels.errors import not_a_number, wrong_call
-from potto.kernels.rows import Rows, listed
 from potto.kernels.tape import Node
 
 if TYPE_CHECKING:
@@ -34,6 +33,7 @@ Mask = bool | Bools
 # A trace: for a branching site of a kernel a mask (forced) or the trace of a callee; sites not named go as they fall.
 Trace = dict[int, Any]
 Pattern = Any
+Part = Any  # of a cell: a number, an array, or a node of a tape
 
 
 class Cell:
@@ -77,6 +77,62 @@ def _mapped(side: Sequence[Number | None], change: Callable[[Array], Number]) ->
     return tuple([change(x) if type(x) in WIDE else x for x in side])  # type: ignore[arg-type]
 
 
+class Rows:
+    """An array of `size` elements; `item` has their numbers, the places of the elements along the first axis."""
+
+    __slots__ = ("item", "size")
+
+    def __init__(self, item: Value, size: int) -> None:
+        self.item, self.size = item, size
+
+    def __repr__(self) -> str:
+        return f"Rows({self.item!r}, {self.size})"
+
+    def at(self, place: int) -> Value:
+        """One element."""
+        return parts_of(self.item, lambda part: part[place] if np.ndim(part) else part)
+
+    def rows(self) -> list[Value]:
+        return [self.at(place) for place in range(self.size)]
+
+    @property
+    def batched(self) -> bool:
+        """Whether elements differ over a batch."""
+        return any(np.ndim(part) > depth for part, depth in _with_depth(self.item, 1))
+
+    def batches(self) -> list[Part]:
+        """For each part that differs over a batch, its first element."""
+        found = []
+        for part, depth in _with_depth(self.item, 1):
+            if np.ndim(part) > depth:
+                for _ in range(depth):
+                    part = part[0] if part.shape[0] else np.zeros(part.shape[1:])
+                found.append(part)
+        return found
+
+
+def parts_of(value: Value, change: Callable[[Part], Part]) -> Value:
+    """The value with `change` done to every part of its cells."""
+    if isinstance(value, Cell):
+        t = tuple([None if x is None else change(x) for x in value.t])
+        et = tuple([None if x is None else change(x) for x in value.et])
+        return Cell(change(value.v), None if value.e is None else change(value.e), t, et)
+    if isinstance(value, tuple):
+        return tuple([parts_of(item, change) for item in value])
+    assert isinstance(value, Rows)
+    return Rows(parts_of(value.item, change), value.size)
+
+
+def _with_depth(value: Value, depth: int) -> list[tuple[Part, int]]:
+    """Every part of a value's cells, with how many of its axes are places."""
+    if isinstance(value, tuple):
+        return [found for item in value for found in _with_depth(item, depth)]
+    if isinstance(value, Rows):
+        return _with_depth(value.item, depth + 1)
+    cell: Any = value
+    return [(part, depth) for part in (cell.v, cell.e, *cell.t, *cell.et) if part is not None]
+
+
 class FunctionLike(Protocol):
     """A function as a value: the term it came from and the values of the term's free variables."""
 
@@ -88,6 +144,46 @@ class FunctionLike(Protocol):
 
 
 Value = Union[Cell, "tuple[Value, ...]", "list[Value]", Rows, FunctionLike]
+
+
+def listed(items: Sequence[Value]) -> Value:
+    """An array of elements that were found one by one; a list where they are not of one kind."""
+    kinds = {_kind(item) for item in items}
+    if len(kinds) != 1 or None in kinds:
+        return list(items)
+    return Rows(_stacked(items), len(items))
+
+
+def _kind(value: Value) -> object:
+    """What elements must have in common to be one array; None for what is no number."""
+    if isinstance(value, Cell):
+        return 0
+    if isinstance(value, tuple):
+        inner = tuple(map(_kind, value))
+        return None if None in inner else inner
+    if isinstance(value, Rows):
+        return value.size, _kind(value.item)
+    return None
+
+
+def _stacked(items: Sequence[Value]) -> Value:
+    first = items[0]
+    if isinstance(first, tuple):
+        return tuple([_stacked([item[place] for item in items]) for place in range(len(first))])  # type: ignore[index]
+    if isinstance(first, Rows):
+        return Rows(_stacked([item.item for item in items]), first.size)  # type: ignore[union-attr]
+    cells: list[Cell] = list(items)  # type: ignore[arg-type]
+    k = max(len(cell.t) for cell in cells)
+    columns = [(c.v, c.e, *(c.t or (None,) * k), *(c.et or (None,) * k)) for c in cells]
+    v, e, *rest = [_column(parts) for parts in zip(*columns, strict=True)]
+    assert v is not None
+    return Cell(v, e, tuple(rest[:k]), tuple(rest[k:]))
+
+
+def _column(parts: Sequence[Part | None]) -> Part | None:
+    if all(part is None for part in parts):
+        return None
+    return np.stack(np.broadcast_arrays(*[0.0 if part is None else part for part in parts]), axis=0)
 
 
 def pattern(value: Value, directions: int) -> Pattern:

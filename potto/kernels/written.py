@@ -13,8 +13,7 @@ from msgspec import Struct
 
 from potto.core.terms import Lam, postorder
 from potto.kernels import support
-from potto.kernels.cells import Cell, Value, scalar_parts
-from potto.kernels.rows import listed
+from potto.kernels.cells import Cell, Value, listed, scalar_parts
 
 
 class Kernel(Struct, frozen=True):

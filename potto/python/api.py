@@ -22,9 +22,8 @@ from msgspec.structs import replace
 from potto import store
 from potto.diagnostics import Diagnostic, PottoError
 from potto.evaluating.world import World
-from potto.kernels.cells import Value
+from potto.kernels.cells import Rows, Value
 from potto.kernels.errors import wrong_call
-from potto.kernels.rows import Rows
 from potto.modules import DefinitionTarget, ModuleTarget, find_module, names, resolve
 from potto.modules.kinds import NO_MODULE
 from potto.python.arguments import Batch, batch_of, misfit, moving, value_of

@@ -16,9 +16,8 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from potto.diagnostics import PottoError, declare
-from potto.kernels.cells import Cell, Value
+from potto.kernels.cells import Cell, Rows, Value, listed
 from potto.kernels.errors import wrong_call
-from potto.kernels.rows import Rows, listed
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.printing import format_digits
 from potto.source import Span

@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from potto.kernels.cells import Cell, Value
+from potto.kernels.cells import Cell, Rows, Value, listed
 from potto.kernels.errors import wrong_call
-from potto.kernels.rows import Rows, listed
 from potto.runtime.answers.estimate import Estimate
 from potto.types import format_type
 from potto.types.types import ArrayOf, Count, Dist, Real, Shifted, SizeVar, TupleOf, Type, resolve

@@ -15,10 +15,9 @@ from typing import Any
 import numpy as np
 from msgspec.structs import asdict, replace
 
-from potto.kernels.cells import Cell, Number, Value, all_cells, map_cells, pad
+from potto.kernels.cells import Cell, Number, Rows, Value, all_cells, listed, map_cells, pad
 from potto.kernels.chunks import POINTS
 from potto.kernels.errors import wrong_call
-from potto.kernels.rows import Rows, listed
 from potto.kernels.tape import Node, Swept, Untaped, swept
 from potto.projects.settings import current
 from potto.python.api import Function, must_be_function

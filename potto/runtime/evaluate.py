@@ -20,9 +20,8 @@ from potto.core.terms import Integral, Term
 from potto.diagnostics import PottoError
 from potto.integrate.events import INFINITE, ROUGH, Shortfall
 from potto.kernels import errors
-from potto.kernels.cells import Cell, Number, Value, all_cells
+from potto.kernels.cells import Cell, Number, Rows, Value, all_cells
 from potto.kernels.making import counts
-from potto.kernels.rows import Rows
 from potto.projects.settings import DEFAULTS, Settings
 from potto.runtime.answers.convergence import CANCELS, Shortfalls, converged_members, members_of, merged, missed
 from potto.runtime.answers.estimate import Estimate, OneSided

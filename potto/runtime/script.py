@@ -17,9 +17,8 @@ from potto.checking.spoiled import statement_errors
 from potto.diagnostics import Diagnostic, PottoError, declare
 from potto.elaborate import elaborate_expression
 from potto.integrate.events import DIVERGENT, ROUGH, UNDEFINED
-from potto.kernels.cells import Value
+from potto.kernels.cells import Rows, Value
 from potto.kernels.errors import wrong_call
-from potto.kernels.rows import Rows
 from potto.modules import statements
 from potto.projects.settings import Settings
 from potto.query import Database

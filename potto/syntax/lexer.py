@@ -160,7 +160,7 @@ class _Lexer:
         if found is None or found[1].match(self.text, end) is None:
             return None
         tokens = self.tokens
-        if word == "record" and tokens:
+        if (word == "record" and tokens) or (tokens and tokens[-1].kind in ("DEF", "DIFFEODEF")):
             return None
         return found[0] if word != "with" or (tokens and tokens[-1].kind in _BEHIND) else None
 

@@ -22,11 +22,13 @@ from potto.types.types import (
     ArrayOf,
     Count,
     Function,
+    Meta,
     Parameter,
     Real,
     Truth,
     TupleOf,
     Type,
+    Unknown,
     resolve,
 )
 from potto.types.unify import MAX_LEAVES, free_metas, instantiate, leaves, open_type, unify
@@ -75,9 +77,10 @@ def _member(inference: Inference, node: nodes.Member) -> Type:
     meaning = inference.outside.find(node.path, node.name) if local is None else None
     if meaning is None:
         whole = local or inference.outside.find(None, head)
-        if whole is not None and not isinstance(whole, Module):
+        type = UNKNOWN if whole is None or isinstance(whole, Module) else resolve(_meant(inference, node, whole))
+        if whole is not None and not isinstance(type, Unknown | Meta | Real):
             inference.owners[id(node)] = whole
-            return fields(inference, _meant(inference, node, whole), node)
+            return fields(inference, type, node)
         inference.say(undefined_member(inference.outside, inference.scope, node))
         return UNKNOWN
     inference.meanings[id(node)] = meaning

@@ -176,7 +176,7 @@ def test_modules(tmp_path: Path) -> None:
     (tmp_path / "user.po").write_text("from pkg.m import f\nimport pkg.m as inner\ndef g(x) 2*f(x)\n")
     ws = potto.Workspace(tmp_path)
     m = ws.module("pkg.m")
-    assert dir(m) == ["f", "k", "l"] and float(m.k) == 0.5 and m.l.value == [1.0, 2.0]
+    assert dir(m) == ["f", "k", "l"] and float(m.k) == 0.5 and m.l.value.tolist() == [1.0, 2.0]
     user = ws.module("user")
     assert user.g(1).value == 3.0 and user.f(1).value == 1.5 and user.inner.f(1).value == 1.5
     assert "user.po" in repr(user) and user.eval("g(2)").value == 5.0

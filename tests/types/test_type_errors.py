@@ -172,7 +172,7 @@ def test_tuples_have_no_arithmetic() -> None:
     check("""
         diffeo half(x, y; c) = (x + y + c, x - y)
         def f(p) (p, 1) + 2
-        #        ^^^^^^ error[P0315]: but this is a tuple of 2
+        #               ^ error[P0315]: `+` has no meaning between a tuple of 2 and a number
         def g(x) 2*half(x, x, 1)
         #          ^^^^^^^^^^^^^ error[P0315]: but this is a diffeomorphism's result
         def h(x) fst(half(x, x, 1)) + (let (u, v) = half(x, x, 2) in u*v)
@@ -181,17 +181,17 @@ def test_tuples_have_no_arithmetic() -> None:
     """)
 
 
-def test_lists() -> None:
+def test_arrays() -> None:
     check("""
         items = [1, 2, 3]
         def f(t) integral [0, 1] [x*t, x] d(x)
-        #                        ^^^^^^^^ error[P0314]: a list cannot stand under an integral
         def g(x) [x, 1] + 1
-        #        ^^^^^^ error[P0314]: but this is a list
+        #               ^ error[P0315]: `+` has no meaning between an array of 2 and a number
         mixed = [1, (2, 3)]
-        #           ^^^^^^ error[P0306]: all items of a list must be of one type
+        #           ^^^^^^ error[P0306]: all elements of an array must be of one type
         def h(t) integral [0, 1] items d(_x)
-        #                        ^^^^^ error[P0314]: the integrand must be a number, but this is a list
+        def k(t) 2^items
+        #          ^^^^^ error[P0314]: the right of `^` must be a number, but this is an array of 3
     """)
 
 
@@ -203,7 +203,7 @@ def test_branches_and_results() -> None:
             x + 1
         #   ^^^^^ error[P0306]: the result of `g` must be `(Real, Real)`
         def h(x: (Real*, Real*)) x + 1
-        #                        ^ error[P0315]: but this is a tuple of 2
+        #                          ^ error[P0315]: `+` has no meaning between a tuple of 2 and a number
         def i(x) sin((x, 1))
         #            ^^^^^^ error[P0306]: the argument of `sin` must be `Real`
         def j(k) k(k)
@@ -311,7 +311,7 @@ def test_scripts() -> None:
         def f(t) integral [0, 1] [x < t] d(x)
         for c in [0.1, 0.2]: print(f(c), c)
         for c in 3: print(c)
-        #        ^ error[P0306]: `for` goes through a list
+        #        ^ error[P0306]: `for` goes through an array
         for c in [1, 2]: print(f(c, 1))
         #                           ^ error[P0308]: `f` takes 1 argument
         print(f(1) > 0)

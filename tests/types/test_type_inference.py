@@ -10,10 +10,10 @@ from marks import FOLDER, database, local_types, type_of
 import potto
 from potto.syntax import parse_expression
 from potto.types import (
+    ArrayOf,
     Diffeo,
     Dist,
     Function,
-    ListOf,
     Parameter,
     Real,
     TupleOf,
@@ -23,6 +23,7 @@ from potto.types import (
     format_type,
     infer_expression,
 )
+from potto.types.types import Count
 
 STAR = Real(star=True)
 
@@ -171,7 +172,7 @@ PRINTED: list[tuple[Type, str]] = [
     (Real(variables=("x", "y")), "Real[x, y]"),
     (Dist(("x",)), "Dist[x]"),
     (TupleOf((Real(), STAR)), "(Real, Real*)"),
-    (ListOf(Real()), "[Real]"),
+    (ArrayOf(Count(3), Real()), "[3] Real"),
     (Diffeo(2), "Diffeo[2]"),
     (Diffeo(None), "Diffeo[n]"),
     (Function((Parameter(None, Real()),), Real()), "Real -> Real"),

@@ -14,8 +14,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from potto.core.terms import App, Deriv, Global, If, Lam, Term, Var
-from potto.kernels.cells import Cell, Value
-from potto.kernels.rows import Rows
+from potto.kernels.cells import Cell, Rows, Value
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.printing import (
     MOST_ITEMS,

@@ -13,15 +13,14 @@ from potto.core.terms import Array as ArrayTerm
 from potto.core.terms import Fold, lam
 from potto.diagnostics import PottoError, declare
 from potto.kernels import errors
-from potto.kernels.cells import Cell, Number, Value, all_arrays
-from potto.kernels.rows import Rows, gathered, listed
+from potto.kernels.cells import Cell, Number, Rows, Value, all_arrays, listed
+from potto.kernels.rows import gathered
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.selection import Pick, apart
 
 OUT_OF_RANGE = declare("P0511", "an index that is out of range")
 NO_PLACE = declare("P0512", "an index or a size that is no whole number")
 RAGGED = declare("P0513", "sizes that do not agree")
-NOTHING = declare("P0514", "the least or greatest of nothing")
 
 MOST_ELEMENTS = 100_000_000
 

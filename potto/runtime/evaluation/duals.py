@@ -11,8 +11,7 @@ from __future__ import annotations
 from potto.calculus.inlining.currying import sizes_of
 from potto.integrate.pieces import still
 from potto.kernels import errors
-from potto.kernels.cells import Cell, Trace, Value, map_cells
-from potto.kernels.rows import Rows
+from potto.kernels.cells import Cell, Rows, Trace, Value, map_cells
 from potto.kernels.tape import Untaped
 from potto.runtime.evaluation.arguments import fit, uncurried
 from potto.runtime.evaluation.compared import compared

@@ -10,8 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from potto.core.terms import Lam
-from potto.kernels.cells import Cell, Pattern, Value, pad
-from potto.kernels.rows import Rows
+from potto.kernels.cells import Cell, Pattern, Rows, Value, pad
 
 
 class Closure:

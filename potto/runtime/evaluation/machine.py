@@ -39,11 +39,10 @@ from potto.integrate.costs import Costs
 from potto.integrate.events import MEETINGS, Event, Events, Members
 from potto.integrate.pieces import STRAY
 from potto.kernels import errors
-from potto.kernels.cells import Cell, Ints, Number, Pattern, Trace, Value, pad, pattern
+from potto.kernels.cells import Cell, Ints, Number, Pattern, Rows, Trace, Value, pad, pattern
 from potto.kernels.chunks import at_points, many
 from potto.kernels.compile import kernel
 from potto.kernels.making import counts
-from potto.kernels.rows import Rows
 from potto.kernels.written import Kernel
 from potto.projects.settings import Settings
 from potto.runtime.evaluation.arguments import fit, uncurried

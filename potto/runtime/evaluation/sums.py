@@ -13,8 +13,7 @@ import numpy as np
 from potto.core.terms import Sum, lam
 from potto.diagnostics import PottoError
 from potto.kernels import errors
-from potto.kernels.cells import Cell, Number, Trace, Value, all_arrays, combined, map_arrays
-from potto.kernels.rows import Rows, listed
+from potto.kernels.cells import Cell, Number, Rows, Trace, Value, all_arrays, combined, listed, map_arrays
 from potto.kernels.whole import UNIT_ROUNDOFF
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.selection import Pick, apart
