@@ -66,13 +66,19 @@ class Batch(Struct, frozen=True):
         return replace(shaped, member_converged=converged, shortfalls=missed)
 
     def _array(self, items: list[Any]) -> Any:
-        """An array of Potto: one of numpy whose last axes are those of the array; of tuples, a tuple's numbers are the
-        last axis. What is ragged, or holds functions, stays a list."""
+        """An array of Potto as one of numpy: behind the axes of the batch those of the array, then those of tuples in it.
+        What is ragged, or holds functions, stays a list."""
+        axis = 0 if self.shape is None else len(self.shape)
+
+        def whole(item: Any) -> Any:
+            parts = list(map(whole, item)) if isinstance(item, tuple | list) else None
+            return np.asarray(item, dtype=float) if parts is None else np.stack(parts, axis=axis)
+
         found = [self._restored(item) for item in items]
+        if not found:
+            return np.zeros((*(self.shape or ()), 0))
         try:
-            parts: list[Any] = [np.stack(item, axis=-1) if isinstance(item, tuple) else item for item in found]
-            batch = 0 if self.shape is None else len(self.shape)
-            return np.stack(parts, axis=batch).astype(float) if parts else np.zeros((*(self.shape or ()), 0))
+            return whole(found)
         except (TypeError, ValueError):
             return found
 

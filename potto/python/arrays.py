@@ -66,31 +66,40 @@ def _numpy(name: str, argument: np.ndarray[Any, Any], type: ArrayOf, sizes: Size
     if argument.dtype.kind not in "fiu":
         raise wrong_call(f"`{name}` is {format_type(type)}: an array must hold real numbers, not {argument.dtype}")
     axes = _axes(type)
+    if axes is None:
+        raise wrong_call(f"`{name}` is {format_type(type)}: give it as a list")
     if argument.ndim != axes:
         wanted = f"a numpy array of {axes} axes is needed, not one of shape {argument.shape}"
         raise wrong_call(f"`{name}` is {format_type(type)}: {wanted}")
     return _made(name, argument.astype(np.float64), type, sizes)
 
 
-def _axes(type: Type) -> int:
+def _axes(type: Type) -> int | None:
+    """How many axes of numpy a type has; None for a tuple whose items differ in that."""
     found = resolve(type)
     if isinstance(found, ArrayOf):
-        return 1 + _axes(found.item)
-    return 1 if isinstance(found, TupleOf) else 0
+        inner = _axes(found.item)
+        return None if inner is None else 1 + inner
+    if not isinstance(found, TupleOf):
+        return 0
+    each = {_axes(item) for item in found.items}
+    only = each.pop() if len(each) == 1 else None
+    return None if only is None else 1 + only
 
 
-def _made(name: str, numbers: np.ndarray[Any, Any], type: ArrayOf, sizes: Sizes, axis: int = 0) -> Rows:
-    """An array whose places are an axis of some numbers; those of arrays around it are the axes before."""
-    count = numbers.shape[axis]
-    _agree(name, count, type.size, sizes)
-    item = resolve(type.item)
-    if isinstance(item, ArrayOf):
-        return Rows(_made(name, numbers, item, sizes, axis + 1), count)
-    if not isinstance(item, TupleOf):
-        return Rows(Cell(np.ascontiguousarray(numbers)), count)
-    if numbers.shape[-1] != len(item.items):
-        raise wrong_call(f"`{name}` holds tuples of {len(item.items)}, and is given rows of {numbers.shape[-1]}")
-    return Rows(tuple(Cell(np.ascontiguousarray(numbers[..., place])) for place in range(len(item.items))), count)
+def _made(name: str, numbers: np.ndarray[Any, Any], type: Type, sizes: Sizes, axis: int = 0) -> Value:
+    """The value of a type: the places of its arrays are the first axes of all numbers, tuples are taken apart."""
+    found = resolve(type)
+    if isinstance(found, ArrayOf):
+        count = numbers.shape[axis]
+        _agree(name, count, found.size, sizes)
+        return Rows(_made(name, numbers, found.item, sizes, axis + 1), count)
+    if not isinstance(found, TupleOf):
+        return Cell(np.ascontiguousarray(numbers))
+    if numbers.shape[axis] != len(found.items):
+        raise wrong_call(f"`{name}` holds tuples of {len(found.items)}, and is given rows of {numbers.shape[axis]}")
+    parts = (np.take(numbers, place, axis=axis) for place in range(len(found.items)))
+    return tuple(_made(name, part, item, sizes, axis) for part, item in zip(parts, found.items, strict=True))
 
 
 def _agree(name: str, count: int, size: Type, sizes: Sizes) -> None:
