@@ -32,6 +32,7 @@ from potto.elaborate import builtins
 from potto.elaborate.arrays import of_vectors
 from potto.elaborate.context import Elaboration, rule
 from potto.elaborate.filling import Filling, Given, Packed, Spread, fill
+from potto.elaborate.lookups import image, interp
 from potto.elaborate.signatures import groups_of_term
 from potto.elaborate.values import Builtin, Closure, Groups, Scope, Value, counted
 from potto.modules.builtins import VECTORS
@@ -57,7 +58,11 @@ def call(elaboration: Elaboration, function: Value, given: Arguments, span: Span
             if any(argument.name is not None for argument in given):
                 return hole(f"the parameters of `{name}` have no names")
             if name in VECTORS:
-                return of_vectors(elaboration, name, [elaboration.as_term(a.value) for a in given])
+                args = [elaboration.as_term(argument.value) for argument in given]
+                look_up = {"interp": interp, "image": image}.get(name)
+                if look_up is None:
+                    return of_vectors(elaboration, name, args)
+                return look_up(elaboration, *args) if len(args) == 3 else hole(f"`{name}` takes three arguments")
             found = builtins.applied(elaboration.db, name, [elaboration.as_term(a.value) for a in given])
             return elaboration.note(found, span) if isinstance(found, Delta) else found
         case Hole():

@@ -14,6 +14,7 @@ from potto.syntax import nodes
 from potto.types import kinds
 from potto.types.context import Inference, describe
 from potto.types.format import format_type, format_types
+from potto.types.lookups import image, interp
 from potto.types.types import REAL, UNKNOWN, ArrayOf, Count, Diffeo, Meta, TupleOf, Type, Unknown, resolve
 from potto.types.unify import SIZES, unify
 
@@ -166,9 +167,19 @@ def _types(inference: Inference, node: nodes.Apply, name: str, count: int) -> li
     if len(found) == count:
         return found
     kind = kinds.TOO_MANY if len(found) > count else kinds.MISSING
-    wanted = "one vector" if count == 1 else f"{count} vectors"
+    wanted = ("one vector", "two vectors", "three arguments")[count - 1]
     inference.report(kind(node.span, f"`{name}` takes {wanted}", label=f"{len(found)} given"))
     return None
+
+
+def _between(name: str, form: Callable[[Inference, nodes.Apply, list[Type]], Type]) -> Callable[..., Type]:
+    """A form of three arguments that looks something up."""
+
+    def typed(inference: Inference, node: nodes.Apply) -> Type:
+        found = _types(inference, node, name, 3)
+        return UNKNOWN if found is None else form(inference, node, found)
+
+    return typed
 
 
 def _len(inference: Inference, node: nodes.Apply) -> Type:
@@ -270,4 +281,6 @@ _FORMS: dict[str, Callable[[Inference, nodes.Apply], Type]] = {
     "norm": _norm,
     "dot": _dot,
     "cross": _cross,
+    "interp": _between("interp", interp),
+    "image": _between("image", image),
 }

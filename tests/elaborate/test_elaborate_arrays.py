@@ -5,10 +5,9 @@ from __future__ import annotations
 import pytest
 from lint import lint
 from mpmath import mp
-from snippets import program, shown, term
+from snippets import close, program, shown, term, value
 
 from potto.core.printer import format_term
-from potto.core.reference import evaluate
 from potto.core.terms import Global, Term
 from potto.elaborate import core, elaborate_expression
 from potto.query import Database
@@ -48,25 +47,6 @@ ARRAYS = [
 def test_arrays_and_vectors(body, expected):
     head, text = shown(f"def f(xs: [n] Real, i, t) {body}").split(" . ", 1)
     assert (head, text) == ("\\(xs, i, t)", expected)
-
-
-def value(text: str, expression: str, **names: object) -> object:
-    """The value of an expression in a program, by mpmath."""
-    db = program(text)
-    expr = parse_expression(expression)
-    assert expr.expr is not None and expr.diagnostics == ()
-    found = elaborate_expression(db, "<text>", expr.expr, tuple(names)).term
-    assert lint(found) == []
-    return evaluate(found, names, lambda file, name: core(db, file, name).term)
-
-
-def close(found: object, wanted: object) -> None:
-    if isinstance(wanted, tuple | list):
-        assert type(found) is type(wanted) and len(found) == len(wanted)  # type: ignore[arg-type]
-        for part, other in zip(found, wanted, strict=True):  # type: ignore[call-overload]
-            close(part, other)
-    else:
-        assert abs(found - wanted) <= mp.mpf("1e-14") * max(1, abs(wanted))  # type: ignore[operator]
 
 
 def test_sizes_are_lengths_of_what_carries_them():
