@@ -9,17 +9,18 @@ from __future__ import annotations
 import ast
 import io
 import re
-import zipfile
-import zlib
 from collections.abc import Callable, Iterator
 from math import prod
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from msgspec import Struct
 
 from potto.data.mistakes import Refused, bad_row, counted, malformed, quoted
 from potto.data.texts import identifiers
 from potto.data.values import DEEPEST, Array, Columns, Number, Sizes, Table
+
+if TYPE_CHECKING:
+    from zipfile import ZipFile, ZipInfo
 
 _MAGIC = b"\x93NUMPY"
 _PICKLE = b"\x80"
@@ -28,7 +29,6 @@ _REAL = re.compile(r"[<>|=]?(?:b1|[iu][1248]|f(?:2|4|8|12|16))")
 _ODD = {"c": "complex numbers", "U": "texts", "S": "texts", "M": "dates", "m": "durations", "V": "records"}
 _SAVE = "save it as an array of real numbers: `numpy.save(path, array.astype(float))`"
 _SAVE_MANY = "save arrays of real numbers by their names: `numpy.savez(path, x=x, y=y)`"
-_BROKEN = (zipfile.BadZipFile, ValueError, OSError, NotImplementedError)
 _T = TypeVar("_T")
 
 
@@ -59,7 +59,7 @@ def array_file(content: bytes) -> float | Array:
 def table_head(content: bytes) -> Columns:
     """The shape of an NPZ file."""
 
-    def head(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> Number | Sizes:
+    def head(archive: ZipFile, entry: ZipInfo) -> Number | Sizes:
         with archive.open(entry) as file:
             return _shape(_checked(file.read(_LONGEST + 12), entry.file_size))
 
@@ -71,11 +71,15 @@ def table_file(content: bytes) -> Table:
     return Table(tuple(_entries(content, lambda archive, entry: _array(archive.read(entry)))))
 
 
-def _entries(content: bytes, read: Callable[[zipfile.ZipFile, zipfile.ZipInfo], _T]) -> Iterator[tuple[str, _T]]:
+def _entries(content: bytes, read: Callable[[ZipFile, ZipInfo], _T]) -> Iterator[tuple[str, _T]]:
+    import zipfile  # 3 ms, and most files are none
+    import zlib
+
+    broken = (zipfile.BadZipFile, ValueError, OSError, NotImplementedError)
     try:
         archive = zipfile.ZipFile(io.BytesIO(content))
         entries = archive.infolist()
-    except _BROKEN as error:
+    except broken as error:
         raise malformed(f"the file is no NPZ file: {_said(error)}", hint=_SAVE_MANY) from None
     if not entries:
         raise malformed("the file holds no arrays", hint=_SAVE_MANY)
@@ -88,7 +92,7 @@ def _entries(content: bytes, read: Callable[[zipfile.ZipFile, zipfile.ZipInfo], 
             yield name, read(archive, entry)
         except Refused as refused:
             raise _within(written, refused) from None
-        except (*_BROKEN, zlib.error, EOFError, RuntimeError) as error:
+        except (*broken, zlib.error, EOFError, RuntimeError) as error:
             raise malformed(f"the array {quoted(written)} can't be read: {_said(error)}", hint=_SAVE_MANY) from None
 
 
@@ -175,7 +179,8 @@ def _array(content: bytes) -> float | Array:
         raise malformed(f"numbers of the type {head.dtype} are not known on this machine", hint=_SAVE) from None
     read = np.frombuffer(content, dtype, prod(head.dimensions), head.start)
     with np.errstate(over="ignore", invalid="ignore"):
-        found = np.ascontiguousarray(read.reshape(head.dimensions, order="F" if head.fortran else "C"), np.float64)
+        shaped = read.reshape(head.dimensions, order="F" if head.fortran else "C")
+        found = np.require(shaped, np.float64, ["C", "A"])  # heads of files need not leave the numbers aligned
     if not np.isfinite(found).all():
         at = np.argwhere(~np.isfinite(found.reshape(head.dimensions)))[0].tolist() if head.dimensions else []
         raise _infinite(tuple(at), str(found.reshape(head.dimensions)[tuple(at)]))

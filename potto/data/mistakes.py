@@ -24,8 +24,8 @@ _SHOWN = 40
 class DataMistake(Struct, frozen=True):
     """What is wrong, where, and what to do.
 
-    row: the line of a text, counted from 1, or the first index of an array, counted from 1.
-    column: the column of a table, counted from 1.
+    row: the line of a text, or the first index of an array in numpy's files, both counted from 1.
+    column: the column of a table, or of an array, counted from 1.
     found, expected: what stands there, and what ought to.
     """
 

@@ -23,7 +23,7 @@ WHITE = " "  # any blanks and tabs
 DELIMITERS = ("\t", ";", "|", ",", WHITE)  # between equals the earlier one
 MISSING = frozenset({"", "-", "--", "?", ".", "na", "n/a", "#n/a", "nan", "nil", "none", "null", "missing"})
 _SAMPLE = 20  # lines by which the delimiter is told
-_BATCH = 20_000  # rows that are texts at the same time
+_BATCH = 500  # rows that are texts at the same time; of more, the garbage collector takes notice: twice the time
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _INFINITE = re.compile(r"[+-]?inf(?:inity)?", re.IGNORECASE)
 _THOUSANDS = re.compile(r"[+-]?[0-9]{1,3}(?:[,.' ][0-9]{3})+(?:[.,][0-9]+)?")
@@ -51,7 +51,7 @@ def separated(text: str, tabs: bool) -> Array | Table:
     if not first:
         raise malformed("the file holds no values", hint="a table has numbers in rows, one row a line")
     names = tuple(first) if _is_header(first, delimiter != ",") else ()
-    kept = [line for line in lines[row - (not names) :] if not _is_idle(line, delimiter)]
+    kept = _kept(lines[row - (not names) :], delimiter, comments="#" in text)
     body = "\n".join(kept)
     comma = delimiter != "," and "," in body and "." not in body
     layout = _Layout(delimiter, comma, names, len(first), row)
@@ -78,9 +78,22 @@ def _value(layout: _Layout, columns: Sequence[array[float]]) -> Array | Table:
 
 
 def _is_idle(line: str, delimiter: str) -> bool:
-    """Whether a line is blank or a comment. With tabs between values, one of tabs alone is a row without any."""
-    rest = line.strip(" " if delimiter == "\t" else " \t")
+    """Whether a line is blank or a comment."""
+    rest = line.strip(_blank(delimiter))
     return not rest or rest.startswith("#")
+
+
+def _blank(delimiter: str) -> str:
+    """What a blank line is made of. With tabs between values, one of tabs alone is a row without any."""
+    return " " if delimiter == "\t" else " \t"
+
+
+def _kept(lines: Sequence[str], delimiter: str, comments: bool) -> list[str]:
+    """Lines that are neither blank nor comments, of which there may be some or not."""
+    if comments:
+        return [line for line in lines if not _is_idle(line, delimiter)]
+    blank = _blank(delimiter)
+    return [line for line in lines if line.strip(blank)]
 
 
 def _records(lines: Sequence[str], delimiter: str) -> Iterator[tuple[int, list[str]]]:

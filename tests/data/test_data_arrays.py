@@ -52,6 +52,13 @@ def test_versions(version: tuple[int, int]) -> None:
     assert plain("a.npy", file.getvalue()) == [[0, 1, 2], [3, 4, 5]]
 
 
+def test_numbers_are_aligned_wherever_they_start() -> None:
+    head = b"{'descr': '<f8', 'fortran_order': False, 'shape': (2,)}"
+    content = b"\x93NUMPY\x01\x00" + bytes([len(head), 0]) + head + np.array([1.0, 2.0]).tobytes()
+    value = values_of(Path("a.npy"), content)
+    assert isinstance(value, Array) and value.values.flags.aligned and value.values.tolist() == [1, 2]
+
+
 @given(st.dictionaries(st.sampled_from(["a", "b", "rate", "x y", "2"]), arrays, min_size=1, max_size=3), st.booleans())
 def test_archives_are_columns(named: dict[str, npt.NDArray[Any]], compressed: bool) -> None:
     content = many(compressed, **named)
