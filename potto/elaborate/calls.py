@@ -86,8 +86,9 @@ def _call_known(elaboration: Elaboration, function: Term, groups: Groups, given:
     if isinstance(filled, str):
         return hole(filled)
     for group, filling in zip(groups, filled):
-        values = _values(elaboration, len(group), filling)
-        function = elaboration.note(app(function, tuple(map(elaboration.as_term, values))), span)
+        args = tuple(map(elaboration.as_term, _values(elaboration, len(group), filling)))
+        elaboration.shapes.meets_records |= elaboration.shapes.makes_record(function)
+        function = elaboration.note(app(function, args), span)
     return function
 
 

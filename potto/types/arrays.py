@@ -68,12 +68,9 @@ def _field(inference: Inference, node: nodes.Field) -> Type:
     return field(inference, inference.infer(node.value), node.name, node)
 
 
-@rule(nodes.Text, nodes.With)
-def _unexpected(inference: Inference, node: nodes.Text | nodes.With) -> Type:
-    if isinstance(node, nodes.With):
-        inference.infer(node.record)
-    message = "the name of a file stands in `load(…)` alone" if isinstance(node, nodes.Text) else "this is no record"
-    inference.report(kinds.MISMATCH(node.span, message))
+@rule(nodes.Text)
+def _text(inference: Inference, node: nodes.Text) -> Type:
+    inference.report(kinds.MISMATCH(node.span, "the name of a file stands in `load(…)` alone"))
     return UNKNOWN
 
 
