@@ -66,7 +66,7 @@ class Batch(Struct, frozen=True):
         return replace(shaped, member_converged=converged, shortfalls=missed)
 
     def _array(self, items: list[Any]) -> Any:
-        """An array of Potto as one of numpy: behind the axes of the batch those of the array, then those of tuples in it.
+        """An array of Potto as one of numpy: behind the axes of the batch those of the array, then of tuples in it.
         What is ragged, or holds functions, stays a list."""
         axis = 0 if self.shape is None else len(self.shape)
 
@@ -249,6 +249,8 @@ def _is_dual(type: Type) -> bool:
 
 
 def _tuple_misfit(name: str, argument: Any, items: tuple[Type, ...], dual: bool) -> str | None:
+    if dual and isinstance(items[0], ArrayOf) and isinstance(argument, list | np.ndarray | Rows):
+        return None  # an array without tangents
     if dual and not isinstance(argument, tuple | list):
         return None  # a number given for a dual has tangent 0
     if isinstance(argument, Estimate):

@@ -25,6 +25,8 @@ def with_arrays(name: str, argument: Any, type: Type, sizes: Sizes) -> Any:
     found = resolve(type)
     if isinstance(found, ArrayOf):
         return _array(name, argument, found, sizes)
+    if isinstance(found, TupleOf) and found.dual and not isinstance(argument, tuple):
+        return with_arrays(name, argument, found.items[0], sizes)  # without tangents
     if isinstance(found, TupleOf) and isinstance(argument, tuple) and len(argument) == len(found.items):
         return tuple(with_arrays(name, part, item, sizes) for part, item in zip(argument, found.items, strict=True))
     return argument

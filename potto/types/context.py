@@ -202,7 +202,10 @@ class Inference:
         actual, expected = resolve(actual), resolve(expected)
         if not isinstance(expected, TupleOf):
             return unify(actual, expected)
-        if expected.dual and isinstance(actual, Real | Dist):
+        if expected.dual and isinstance(first := resolve(expected.items[0]), ArrayOf):
+            if not isinstance(actual, TupleOf):
+                return unify(actual, first)  # an array without tangents
+        elif expected.dual and isinstance(actual, Real | Dist):
             return True
         if expected.dual and isinstance(actual, Meta):
             self.later(lambda: self._fit_late(actual, expected))

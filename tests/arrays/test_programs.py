@@ -187,3 +187,10 @@ def test_a_large_array_is_a_handful_of_passes() -> None:
     assert found.value == pytest.approx(math.fsum(xs**2), rel=1e-13)
     assert np.array_equal(found.tangent, 2 * xs)
     assert found.error < 1e-8
+
+
+def test_an_array_without_tangents_stands_still() -> None:
+    module = potto.compile("def f(a, xs: [n] Real) a*(sum x in xs (x^2))\nk = deriv(f)((2, 1), [1, 2, 3])")
+    assert (module.k.value, module.k.tangent) == (28, 14)
+    found = potto.deriv(module.f)((2.0, 1.0), np.array([1.0, 2.0]))
+    assert (found.value, found.tangent) == (10, 5)
