@@ -16,6 +16,7 @@ from potto.core.simplify import simplify
 from potto.core.terms import Term, var
 from potto.elaborate import elaborate_expression
 from potto.measures import COMPOSITIONS, MEASURES, Measure
+from potto.modules.builtins import VECTORS
 from potto.primitives import PRIMITIVES, Primitive
 from potto.query import Database
 from potto.syntax import parse_expression
@@ -63,7 +64,7 @@ def sections() -> dict[str, tuple[str, ...]]:
 
 def grammars() -> dict[Path, str]:
     """The grammars of editors with the builtins that there are."""
-    names = sorted(entry.name for entry in PRIMITIVES.values() if entry.surface)
+    names = sorted([*(entry.name for entry in PRIMITIVES.values() if entry.surface), *VECTORS, "load"])
     rules = {
         "vim/syntax/potto.vim": (
             r"(?m)(^syntax keyword pottoBuiltin .*\n)+",

@@ -41,9 +41,10 @@
   '("and" "as" "def" "diffeo" "else" "for" "from" "if" "import" "in" "integral" "let" "not" "or" "sum" "then"))
 
 (defconst potto--builtins
-  '("abs" "acos" "asin" "atan" "atan2" "besselj0" "besselj1" "ceil" "clamp" "cos" "cosh" "digamma" "erf" "erfc"
-    "erfinv" "exp" "expm1" "floor" "gamma" "hypot" "lgamma" "log" "log1p" "max" "min" "pow" "sech" "sign" "sin" "sinc"
-    "sinh" "sqrt" "tan" "tanh" "trigamma" "fst" "snd" "print" "deriv" "delta"))
+  '("abs" "acos" "asin" "atan" "atan2" "besselj0" "besselj1" "ceil" "clamp" "cos" "cosh" "cross" "digamma" "dot" "erf"
+    "erfc" "erfinv" "exp" "expm1" "floor" "gamma" "hypot" "image" "interp" "len" "lgamma" "load" "log" "log1p" "max"
+    "min" "norm" "pow" "sech" "sign" "sin" "sinc" "sinh" "sqrt" "tan" "tanh" "trigamma" "fst" "snd" "print" "deriv"
+    "delta"))
 
 (defconst potto-font-lock-keywords
   `(("^\\s-*#>" 0 font-lock-doc-face t)
@@ -51,6 +52,10 @@
     ("^\\(\\w+\\)\\s-*=\\s-*\\(?:\\\\\\|λ\\|deriv\\_>\\)" 1 font-lock-function-name-face)
     ("^\\s-+\\(inverse\\|where\\)\\_>" 1 font-lock-keyword-face)
     (,(regexp-opt potto--keywords 'symbols) . font-lock-keyword-face)
+    ("\\_<\\(product\\|min\\|max\\)\\s-+\\w+\\s-+in\\_>" 1 font-lock-keyword-face)
+    ("\\_<\\(fold\\)\\(?:\\s-+\\w+\\|\\s-*([^()]*)\\)\\s-*=[^=]" 1 font-lock-keyword-face)
+    ("\\_<\\(with\\)\\s-+(?\\w+\\s-*=[^=]" 1 font-lock-keyword-face)
+    ("^\\(record\\)\\s-+\\(\\w+\\)\\s-*(" (1 font-lock-keyword-face) (2 font-lock-type-face))
     ("∫\\|\\\\\\|λ" . font-lock-keyword-face)
     ("\\_<\\(d\\)(" 1 font-lock-keyword-face)
     (,(regexp-opt '("pi" "inf") 'symbols) . font-lock-constant-face)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 Handler = Callable[["Server", Any], None]
-PATTERNS = ("**/*.{po,diffeo}", "**/potto.toml")
+PATTERNS = ("**/*.{po,diffeo}", "**/potto.toml", "**/*.{csv,tsv,npy,npz,json,png,jpg,jpeg}")
 
 
 def _session(server: Server) -> Any:

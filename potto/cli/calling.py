@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +17,38 @@ def assignment(text: str) -> tuple[str, str]:
     name, equals, expression = text.partition("=")
     if not equals or not name.strip().isidentifier() or not expression.strip() or expression.startswith("="):
         raise argparse.ArgumentTypeError(f"{text!r} does not say which parameter is what; write `name=value`")
-    return name.strip(), expression.strip()
+    return name.strip(), from_file(expression.strip())
+
+
+def from_file(text: str) -> str:
+    """`@heights.csv` or `@people.csv:height` as the program text that loads it; any other text as it is."""
+    if not text.startswith("@"):
+        return text
+    path, colon, column = text[1:].partition(":")
+    if os.name == "nt" and len(path) == 1:  # of a drive
+        rest, colon, column = column.partition(":")
+        path = f"{path}:{rest}"
+    whole = f'load("{os.path.abspath(path)}")'
+    return f"({whole}).{column}" if colon else _only(whole, path)
+
+
+def _only(whole: str, path: str) -> str:
+    """The one column of a table that has no other."""
+    from pathlib import Path
+
+    from potto.data.files import read, shape_of
+    from potto.data.values import Columns
+
+    content = read(Path(path))
+    shape = shape_of(Path(path), content) if isinstance(content, bytes) else None
+    return f"({whole}).{shape.fields[0][0]}" if isinstance(shape, Columns) and len(shape.fields) == 1 else whole
+
+
+def with_names(expression: str, given: Sequence[tuple[str, str]]) -> str:
+    """An expression with names for parts of it."""
+    if not given:
+        return expression
+    return f"let {'; '.join(f'{name} = {text}' for name, text in given)} in {expression}"
 
 
 def function_in(world: World, file: str, text: str) -> Function:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from potto.cli.calling import assignment, with_names
 from potto.cli.console import Console
 from potto.cli.numbers import accounts, add_options, settings_of, show_stats, totals
 
@@ -15,6 +16,10 @@ EXAMPLE = "  potto eval examples/paper/renderer.po 'deriv(renderer)((-0.7, 1), d
 def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", help="the program; `-` reads it from standard input")
     parser.add_argument("expression", metavar="EXPR", help="the expression")
+    parser.add_argument(
+        "--set", dest="given", metavar="NAME=EXPR", action="append", default=[], type=assignment,
+        help="a name for the expression; `xs=@heights.csv` is what a file holds, `xs=@people.csv:height` a column",
+    )  # fmt: skip
     add_options(parser)
 
 
@@ -34,24 +39,25 @@ def run(options: argparse.Namespace, console: Console) -> int:
     from potto.runtime.answers.shown import estimate_json, format_answer, interval
 
     world = World(["."])
+    text = with_names(options.expression.strip(), options.given)
     try:
         file = opened(world, options.file)
         with accounts(options):
-            answer = world.evaluate(file, options.expression.strip(), settings)
+            answer = world.evaluate(file, text, settings)
     except ProgramError as error:
         return fail(error, options, console)
     estimate = answer.estimate
     if options.json:
         more: dict[str, Any] = {"stats": totals([estimate])} if options.stats else {}
         if answer.remarks:
-            sources = world.sources(options.expression.strip())
+            sources = world.sources(text)
             more["remarks"] = [to_json(located, sources) for located in answer.remarks]
         console.answer_json({**estimate_json(estimate, answer.type), **more, **others_json(world, file)})
     else:
         console.answer(format_answer(estimate))
         if estimate.text is None and options.stats:
             console.complain(f"with its error: {interval(estimate)}")
-        console.diagnostics(answer.remarks, world.sources(options.expression.strip()))
+        console.diagnostics(answer.remarks, world.sources(text))
     if options.stats:
         show_stats([estimate], console)
     return report_others(world, file, options, console)

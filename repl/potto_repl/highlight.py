@@ -34,7 +34,7 @@ THEMES: dict[str, dict[str, str]] = {
 _KINDS = {"NUMBER": "number", "COMMENT": "comment", "INTEGRAL": "keyword", "SUM": "keyword", "DIFFEO": "keyword",
           "D": "keyword", "DEF": "keyword", "FOR": "keyword", "IN": "keyword", "IF": "keyword", "THEN": "keyword",
           "ELSE": "keyword", "LET": "keyword", "NOT": "keyword", "FROM": "keyword", "IMPORT": "keyword",
-          "AS": "keyword"}  # fmt: skip
+          "AS": "keyword", "FOLD": "keyword", "WITH": "keyword", "RECORDDEF": "keyword"}  # fmt: skip
 
 
 @lru_cache(maxsize=8)

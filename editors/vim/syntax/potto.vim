@@ -11,6 +11,10 @@ syntax match pottoNumber "\<\d\+\(\.\(\.\)\@!\d*\)\?\([eE][-+]\?\d\+\)\?"
 
 syntax keyword pottoConditional if then else
 syntax keyword pottoRepeat for sum
+syntax match pottoRepeat "\<\(product\|min\|max\)\ze\s\+\K\k*\s\+in\>"
+syntax match pottoRepeat "\<fold\ze\(\s\+\K\k*\|\s*([^()]*)\)\s*=[^=]"
+syntax match pottoKeyword "\<with\ze\s\+(\?\K\k*\s*=[^=]"
+syntax match pottoDefine "^record\ze\s\+\K\k*\s*("
 syntax keyword pottoKeyword let in
 syntax keyword pottoLogic and or not
 syntax keyword pottoIntegral integral
@@ -25,9 +29,9 @@ syntax match pottoFunction "\K\k*" contained
 syntax match pottoFunction "^\K\k*\ze\s*=\s*\(\\\|λ\|deriv\>\)"
 syntax keyword pottoConstant pi inf
 syntax keyword pottoCalculus deriv delta
-syntax keyword pottoBuiltin abs acos asin atan atan2 besselj0 besselj1 ceil clamp cos cosh digamma erf erfc erfinv exp
-syntax keyword pottoBuiltin expm1 floor gamma hypot lgamma log log1p max min pow sech sign sin sinc sinh sqrt tan tanh
-syntax keyword pottoBuiltin trigamma fst snd print
+syntax keyword pottoBuiltin abs acos asin atan atan2 besselj0 besselj1 ceil clamp cos cosh cross digamma dot erf erfc
+syntax keyword pottoBuiltin erfinv exp expm1 floor gamma hypot image interp len lgamma load log log1p max min norm pow
+syntax keyword pottoBuiltin sech sign sin sinc sinh sqrt tan tanh trigamma fst snd print
 syntax match pottoMeasure "\(\~\s*\)\@<=\K\k*"
 syntax keyword pottoType Real Dist Diffeo
 

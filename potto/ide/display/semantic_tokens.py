@@ -32,7 +32,7 @@ from potto.types import Function, interface, typed_names
 _OPERATORS = frozenset({"BINOP", "SIGN", "STAR", "ARROW", "TILDE", "QMARK", "EQ", "LAMBDA", "DOTDOT"})
 _WORDS = frozenset(
     {"DEF", "FOR", "IN", "IF", "THEN", "ELSE", "LET", "NOT", "INTEGRAL", "SUM", "DIFFEO", "DIFFEODEF", "FROM", "IMPORT",
-     "AS", "INVERSE", "WHERE", "D", "PRINT"}
+     "AS", "INVERSE", "WHERE", "D", "PRINT", "FOLD", "WITH", "RECORDDEF"}
 )  # fmt: skip
 
 

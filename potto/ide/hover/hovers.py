@@ -15,6 +15,7 @@ from potto.core.printer import format_term
 from potto.core.simplify import simplify
 from potto.core.terms import Branch, Term, var
 from potto.ide.hover.conditions import RULE, at_condition, condition_after
+from potto.ide.hover.data import data_markdown
 from potto.ide.hover.derivatives import (
     code,
     condition_infos,
@@ -99,6 +100,8 @@ def definition_markdown(db: Database, file: str, name: str) -> str:
     if isinstance(item, nodes.DiffeoDefinition):
         known = diffeo_markdown(db, file, name)
         parts.append(known if known is not None else _no_diffeo(db, file, name))
+    elif item is not None and (held := data_markdown(db, file, item)):
+        parts.append(held)
     elif item is not None:
         derivative = derivative_text(db, file, name)
         parts += [] if derivative is None else derivative_parts(derivative, condition_infos(db, file, name))

@@ -34,7 +34,8 @@ _ALL = (
             "from m import f, g as h", "from ${1:module} import ${0:name}", "top"),
     Keyword("import", "Imports a module; its definitions are then written `m.f`.", "import m as k",
             "import ${0:module}", "top"),
-    Keyword("for", "Runs statements for each item of a list, at the top of a script.",
+    Keyword("for", "Runs statements for each element of an array, at the top of a script. In an array or a fold: "
+            "what it goes through.",
             "for v in [1, 2]:\n    print(f(v))", "for ${1:v} in ${2:list}:\n    ${0:print(v)}", "top"),
     Keyword("print", "Prints values, at the top of a script.", "print(f(1))", "print(${0})", "top"),
     Keyword("integral", "An integral over bounds, one interval for each variable; the first variable is the "
@@ -42,6 +43,13 @@ _ALL = (
             "integral ([0, 1], [0, 1]) body d(x, y)", "integral [${1:0}, ${2:1}] ${0:body} d(${3:x})", "expression"),
     Keyword("sum", "A sum over whole numbers, with fixed bounds.", "sum i in 1..n (1/i)",
             "sum ${1:i} in ${2:1}..${3:n} (${0:i})", "expression"),
+    Keyword("product", "A product over whole numbers or the elements of an array; `min` and `max` are written alike.",
+            "product i in 1..n (i)", "product ${1:i} in ${2:1}..${3:n} (${0:i})", "expression"),
+    Keyword("fold", "A state that is stepped through whole numbers or the elements of an array: each is made of the "
+            "one before. It is differentiated as it runs.", "fold s = 0 for i in 1..n (s/2 + i)",
+            "fold ${1:s} = ${2:0} for ${3:i} in ${4:1}..${5:n} (${0:s})", "expression"),
+    Keyword("record", "Defines a record: a tuple whose parts have names. Its name makes one, by name or by place.",
+            "record Camera(eye: (Real, Real), focal: Real)", "record ${1:Name}(${2:x}: ${0:Real})", "top"),
     Keyword("if", "A conditional. A plain condition must not vary with a variable of integration; a diffeomorphism, "
             "or a comparison in brackets, may: its boundary term is counted.", "if [x < t] then a else b",
             "if ${1:condition} then ${2:a} else ${0:b}", "expression"),
@@ -101,6 +109,9 @@ _SPECIALS = (
             "Bilinear between the centres of pixels: `u` from 0 to 1 along the rows, `v` from 0 to 1 down "
             "the columns; beyond the outer centres the value there.", "",
             "image([[1, 2], [3, 5]], 0.5, 0.5)"),
+    Special("load", "the name of a file -> a", "What a file of data holds: the columns of a table (`.csv`) as the "
+            "fields of a record, arrays (`.npy`, `.npz`), nested lists (`.json`), pictures (`.png`, `.jpg`).", "",
+            'load("heights.csv")'),
     Special("pi", "Real", "The ratio of a circle's circumference to its diameter, 3.14159…", "d pi = 0", "sin(pi/2)"),
     Special("inf", "Real", "Infinity, for bounds of integrals.", "", "integral [0, inf] exp(-x) d(x)"),
 )  # fmt: skip
