@@ -26,8 +26,9 @@ from potto.projects.settings import DEFAULTS, Settings
 from potto.runtime.answers.convergence import CANCELS, Shortfalls, converged_members, members_of, merged, missed
 from potto.runtime.answers.estimate import Estimate, OneSided
 from potto.runtime.answers.inherited_errors import rough, widened
-from potto.runtime.evaluation.arrays import array, element, fold, length
+from potto.runtime.evaluation.arrays import array, element, length
 from potto.runtime.evaluation.duals import call_derivative, call_paired
+from potto.runtime.evaluation.folds import fold
 from potto.runtime.evaluation.functions import Closure, Derivative
 from potto.runtime.evaluation.machine import Linker, Machine, Record, Semantics
 from potto.runtime.evaluation.selection import lazy
