@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from msgspec.structs import asdict, replace
@@ -24,7 +24,7 @@ from potto.python.api import Function, must_be_function
 from potto.python.arguments import Batch, value_of
 from potto.python.calls import Call
 from potto.runtime.answers.estimate import Estimate
-from potto.runtime.evaluate import Clock, number, report, told
+from potto.runtime.evaluate import Clock, number, report, told, told_rows
 from potto.runtime.evaluation.machine import Machine
 
 # Parameters, from which on a tape is swept back instead of carrying a tangent for each: it costs 2.5 to 3.4 values
@@ -83,11 +83,13 @@ def jacobian(function: Function, wrt: Names = None) -> Callable[..., Estimate]:
         run = _Run(*function.prepared(args, kwargs, {}), {})
         value = run.along_each(names)
         tangents, bounds = (
-            tuple(tuple(map(number, side(cell))) for cell in all_cells(value)) for side in (_tangents, _bounds)
+            tuple(run.one_by_one(list(map(number, side(cell))), names) for cell in all_cells(value))
+            for side in (_tangents, _bounds)
         )
         found = run.answer(value, tangents, bounds)
         single = isinstance(value, Cell), len(names) == 1 and isinstance(run.given[names[0]], Cell)
-        slopes, errors = (_as_matrix(part, *single) for part in (found.tangent, found.tangent_error))
+        count = sum(_size(name, run.given[name]) for name in names)
+        slopes, errors = (_as_matrix(part, count, run.batch, *single) for part in (found.tangent, found.tangent_error))
         return replace(found, value=slopes, error=errors, tangent=None, tangent_error=None)
 
     return matrix
@@ -103,9 +105,9 @@ def vjp(function: Function, cotangent: Any, wrt: Names = None) -> Callable[..., 
     names = parameters_to_vary(function, wrt)
 
     def product(*args: Any, **kwargs: Any) -> Gradient:
-        extra = {"cotangent": cotangent}
+        extra = {"cotangent": function.in_form("cotangent", cotangent, None)}
         run = _Run(*function.prepared(args, kwargs, extra), extra)
-        value, weighted = run.along_each_together(names, run.extra["cotangent"])
+        value, weighted = run.along_each_together(names, in_lists(run.extra["cotangent"]))
         return run.gradient(value, weighted, names)
 
     return product
@@ -121,7 +123,11 @@ def jvp(function: Function, along: Mapping[str, Any]) -> Callable[..., Estimate]
     names = parameters_to_vary(function, tuple(along))
 
     def product(*args: Any, **kwargs: Any) -> Estimate:
-        labels = {f"the tangent of {name}": tangent for name, tangent in along.items()}
+        labels = {
+            label: function.in_form(label, tangent, name)
+            for name, tangent in along.items()
+            if (label := f"the tangent of {name}")
+        }
         run = _Run(*function.prepared(args, kwargs, labels), labels)
         tangents = dict(zip(names, run.extra.values(), strict=True))
         moving = {name: _moved(name, run.own(name), tangents[name]) for name in names}
@@ -266,6 +272,14 @@ class _Run:
         found = report(value, self.machine, self.clock)
         return self.batch.shaped(replace(found, tangent=tangents, tangent_error=bounds))
 
+    def one_by_one(self, slopes: list[Any], names: tuple[str, ...]) -> tuple[Any, ...]:
+        """The derivatives by each number of the parameters, those of an array element by element."""
+
+        def flat(form: Any) -> list[Any]:
+            return [x for item in form for x in flat(item)] if isinstance(form, tuple | list) else [form]
+
+        return tuple(flat(_by_name(slopes, names, self.given, self.whole)))
+
     def gradient(self, value: Value, moving: Value, wrt: tuple[str, ...]) -> Gradient:
         """The estimate of a value, with the derivatives of `moving` in the form of the parameters."""
         directions = range(len(all_cells(tuple(self.given[name] for name in wrt))) if self.whole
@@ -344,10 +358,14 @@ def _moved(name: str, value: Value, tangent: Value) -> Value:
         return Cell(value.v, value.e, (tangent.v,), (tangent.e,))
     if isinstance(value, tuple) and isinstance(tangent, tuple) and len(value) == len(tangent):
         return tuple(_moved(name, *pair) for pair in zip(value, tangent, strict=True))
+    if isinstance(value, Rows) and isinstance(tangent, Rows) and value.size == tangent.size:
+        return Rows(_moved(name, value.item, tangent.item), value.size)
     raise wrong_call(f"the tangent of `{name}` must have its form, {_form(value)}")
 
 
 def _form(value: Value) -> str:
+    if isinstance(value, Rows | list):
+        return f"an array of {value.size if isinstance(value, Rows) else len(value)}"
     return f"a tuple of {len(value)}" if isinstance(value, tuple) else "a number"
 
 
@@ -371,23 +389,16 @@ def _by_name(numbers: list[Any], wrt: tuple[str, ...], given: dict[str, Value], 
             return tuple(form(item) for item in value)
         if not isinstance(value, Rows):
             return next(rest)
-        return _rows(form(value.item), value) if whole else [form(row) for row in value.rows()]
+        if not whole:
+            return [form(row) for row in value.rows()]
+        return told_rows(cast(Rows, map_cells(value, lambda _: Cell(next(rest)))), lambda cell: cell.v)
 
     return tuple(form(given[name]) for name in wrt)
 
 
-def _rows(found: Any, value: Rows) -> list[Any]:
-    """Derivatives by all elements as a list of those by each."""
-    if isinstance(found, tuple):
-        return list(zip(*(_rows(part, value) for part in found), strict=True))
-    if isinstance(found, list):  # of an array of arrays: by the inner places first
-        return [list(row) for row in zip(*found, strict=True)]
-    return list(found) if np.ndim(found) else [found] * value.size
-
-
-def _as_matrix(rows: Any, one_answer: bool, one_parameter: bool) -> Any:
-    """Rows of numbers, or of arrays over a batch, as an array whose last axes are those of the rows."""
-    whole = np.asarray(rows, dtype=float)
+def _as_matrix(rows: Any, count: int, batch: Batch, one_answer: bool, one_parameter: bool) -> Any:
+    """Rows of `count` numbers, or of arrays over a batch, as an array whose last axes are those of the rows."""
+    whole = np.asarray(rows, dtype=float).reshape((len(rows), count, *(batch.shape or ())))
     whole = np.moveaxis(whole, (0, 1), (-2, -1))
     if one_parameter:
         whole = whole[..., 0]
@@ -400,6 +411,12 @@ def _must_match(value: Value, cotangent: Value) -> None:
     """Raise PottoError if a cotangent has not the form of the answer."""
     if isinstance(value, tuple):
         if not isinstance(cotangent, tuple) or len(cotangent) != len(value):
+            wanted, found = _form(value), _form(cotangent)
+            raise wrong_call(f"the cotangent must have the form of the answer, {wanted}, and is {found}")
+        for pair in zip(value, cotangent, strict=True):
+            _must_match(*pair)
+    elif isinstance(value, list):
+        if not isinstance(cotangent, list) or len(cotangent) != len(value):
             wanted, found = _form(value), _form(cotangent)
             raise wrong_call(f"the cotangent must have the form of the answer, {wanted}, and is {found}")
         for pair in zip(value, cotangent, strict=True):

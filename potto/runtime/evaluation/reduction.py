@@ -72,7 +72,8 @@ def _of_others(numbers: Array) -> Array:
 
 def _taken(numbers: Array, at: Any) -> Array:
     """1 for the number that is taken, 0 for the others."""
-    return (np.arange(len(numbers)).reshape(-1, *(1,) * (numbers.ndim - 1)) == at).astype(float)
+    places = np.arange(len(numbers), dtype=float).reshape(-1, *(1,) * (numbers.ndim - 1))
+    return np.where(places == at, 1.0, 0.0)
 
 
 _REDUCTIONS: dict[str, Callable[[Array], Array]] = {
