@@ -22,7 +22,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     ("potto.types",),
     ("potto.modules", "potto.diffeos", "potto.measures"),
     ("potto.syntax", "potto.core", "potto.primitives"),
-    ("potto.reports", "potto.projects"),
+    ("potto.reports", "potto.projects", "potto.data"),
     ("potto.source", "potto.quick", "potto.diagnostics", "potto.query", "potto.store"),
 )
 # What a package must not import although its floor would let it.
@@ -31,12 +31,15 @@ FORBIDDEN: dict[str, tuple[str, ...]] = {
     "potto.core": ("potto.syntax",),
     "potto.primitives": ("potto.syntax",),
     "potto.ide": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.python", "potto.evaluating"),
+    "potto.data": ("potto.reports", "potto.projects"),
 }
 # Who may import a package that is not ours; nobody else may, at the top of a module or inside of a function.
 OUTSIDERS: dict[str, tuple[str, ...]] = {
     "lark": ("potto.syntax",),
     "numpy": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.python.arguments", "potto.python.arrays",
-              "potto.python.gradients", "potto.applications", "potto.bench", "potto_lsp.preview", "potto_lsp.sampling"),
+              "potto.python.gradients", "potto.applications", "potto.bench", "potto.data", "potto_lsp.preview",
+              "potto_lsp.sampling"),
+    "PIL": ("potto.data",),
     "scipy": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.applications.fitting", "potto.bench"),
     "jax": ("potto.bench.peers",),
     "vegas": ("potto.bench.peers",),

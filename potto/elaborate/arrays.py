@@ -10,13 +10,17 @@ from collections.abc import Callable, Sequence
 from potto.core.terms import (
     ONE,
     ZERO,
+    App,
+    Array,
     Term,
     add,
+    app,
     apply,
     array,
     const,
     div,
     fold,
+    global_,
     hole,
     index,
     length,
@@ -34,7 +38,7 @@ from potto.elaborate.shapes import is_vector
 from potto.elaborate.values import Scope, Value
 from potto.syntax import nodes
 from potto.types.types import ArrayOf, TupleOf, Type, resolve
-from potto.types.vectors import place_of
+from potto.types.vectors import place_in
 
 
 @rule(nodes.Index)
@@ -47,13 +51,26 @@ def _index(elaboration: Elaboration, node: nodes.Index, scope: Scope) -> Value:
 
 @rule(nodes.Field)
 def _field(elaboration: Elaboration, node: nodes.Field, scope: Scope) -> Value:
-    return field(elaboration.term(node.value, scope), node.name)
+    return field(elaboration, elaboration.term(node.value, scope), node.name)
 
 
-def field(whole: Term, name: str) -> Term:
-    """A part of a tuple."""
-    place = place_of(name)
-    return hole(f"there is no part `{name}`") if place is None else proj(whole, place)
+def field(elaboration: Elaboration, whole: Term, name: str) -> Term:
+    """A part of a tuple or a record."""
+    place = place_in(elaboration.shapes.of(whole), name)
+    if place is None:
+        return hole(f"there is no part `{name}`")
+    if isinstance(whole, App) and elaboration.shapes.makes_record(whole.function):
+        return whole.args[place]
+    return proj(whole, place)
+
+
+def shaped(elaboration: Elaboration, shape: TupleOf, parts: Sequence[Term]) -> Term:
+    """A tuple, or a record, of these parts."""
+    record = shape.record
+    if record is None:
+        return tuple_(parts)
+    elaboration.shapes.meets_records = True
+    return app(global_(record.file, record.name), tuple(parts))
 
 
 @rule(nodes.Text)
@@ -63,7 +80,13 @@ def _text(elaboration: Elaboration, node: nodes.Text, scope: Scope) -> Value:
 
 @rule(nodes.With)
 def _with(elaboration: Elaboration, node: nodes.With, scope: Scope) -> Value:
-    return hole("this is no record")
+    whole = elaboration.term(node.record, scope)
+    given = {argument.name: elaboration.term(argument.value, scope) for argument in node.arguments}
+    shape = elaboration.shapes.of(whole)
+    if not isinstance(shape, TupleOf) or shape.record is None or not given.keys() <= set(shape.record.fields):
+        return hole("this is no record with such fields")
+    parts = [given.get(name) or field(elaboration, whole, name) for name in shape.record.fields]
+    return shaped(elaboration, shape, parts)
 
 
 # What goes through ranges and arrays
@@ -198,7 +221,8 @@ def lifted(elaboration: Elaboration, operation: Operation, *operands: tuple[Term
         place = elaboration.fresh("k")
         elaboration.numbers.add(place)
         size = next(length(term) for term, type in operands if isinstance(type, ArrayOf))
-        return array(place, size, lifted(elaboration, operation, *(_element(o, var(place)) for o in operands)))
+        parts = [_element(operand, var(place), size) for operand in operands]
+        return array(place, size, lifted(elaboration, operation, *parts))
     return operation(*(term for term, _ in operands))
 
 
@@ -207,9 +231,16 @@ def _item(operand: tuple[Term, Type], place: int) -> tuple[Term, Type]:
     return (proj(term, place), resolve(type.items[place])) if isinstance(type, TupleOf) else operand
 
 
-def _element(operand: tuple[Term, Type], place: Term) -> tuple[Term, Type]:
+def _element(operand: tuple[Term, Type], place: Term, size: Term) -> tuple[Term, Type]:
     term, type = operand
-    return (index(term, place), resolve(type.item)) if isinstance(type, ArrayOf) else operand
+    return (element(term, place, size), resolve(type.item)) if isinstance(type, ArrayOf) else operand
+
+
+def element(whole: Term, place: Term, size: Term) -> Term:
+    """The element at a place below `size`; of an array of just that size, which is made on the spot, what it makes."""
+    if isinstance(whole, Array) and whole.size is size:
+        return substitute(whole.body, {whole.variable: place})
+    return index(whole, place)
 
 
 def of_vectors(elaboration: Elaboration, name: str, args: Sequence[Term]) -> Term:
@@ -229,9 +260,9 @@ def _dot(elaboration: Elaboration, u: Term, v: Term) -> Term:
     shape = elaboration.shapes.of(u)
     if isinstance(shape, TupleOf):
         return add(*(mul(proj(u, place), proj(v, place)) for place in range(len(shape.items))))
-    place = elaboration.fresh("k")
+    place, size = elaboration.fresh("k"), length(u)
     elaboration.numbers.add(place)
-    return sum_(place, ZERO, sub(length(u), ONE), mul(index(u, var(place)), index(v, var(place))))
+    return sum_(place, ZERO, sub(size, ONE), mul(element(u, var(place), size), element(v, var(place), size)))
 
 
 def _cross(u: Term, v: Term) -> Term:

@@ -30,12 +30,13 @@ from potto.core.terms import (
     var,
 )
 from potto.core.terms import integral as integral_term
-from potto.elaborate.arrays import combined
+from potto.elaborate.arrays import combined, field, shaped
 from potto.elaborate.context import Elaboration, rule
 from potto.elaborate.shapes import dims_of as size_of_tuple
 from potto.elaborate.values import Scope, Value
 from potto.measures.composed import Part, parts_of, problem
 from potto.syntax import nodes
+from potto.types.types import TupleOf
 
 
 @rule(nodes.Integral)
@@ -137,7 +138,15 @@ def scaled(elaboration: Elaboration, factor: Term, term: Term) -> Term:
                 elaboration.note(made, elaboration.origins[term])
             return made
         case _:
-            return combined(elaboration, "*", factor, term)
+            return _components(elaboration, factor, term)
+
+
+def _components(elaboration: Elaboration, factor: Term, term: Term) -> Term:
+    shape = elaboration.shapes.of(term)
+    if not isinstance(shape, TupleOf) or shape.record is None:
+        return combined(elaboration, "*", factor, term)
+    fields = [field(elaboration, term, name) for name in shape.record.fields]
+    return shaped(elaboration, shape, [scaled(elaboration, factor, part) for part in fields])
 
 
 def dims_of(elaboration: Elaboration, term: Term) -> int | None:

@@ -32,6 +32,7 @@ from potto.elaborate import builtins
 from potto.elaborate.arrays import of_vectors
 from potto.elaborate.context import Elaboration, rule
 from potto.elaborate.filling import Filling, Given, Packed, Spread, fill
+from potto.elaborate.lookups import image, interp
 from potto.elaborate.signatures import groups_of_term
 from potto.elaborate.values import Builtin, Closure, Groups, Scope, Value, counted
 from potto.modules.builtins import VECTORS
@@ -57,7 +58,11 @@ def call(elaboration: Elaboration, function: Value, given: Arguments, span: Span
             if any(argument.name is not None for argument in given):
                 return hole(f"the parameters of `{name}` have no names")
             if name in VECTORS:
-                return of_vectors(elaboration, name, [elaboration.as_term(a.value) for a in given])
+                args = [elaboration.as_term(argument.value) for argument in given]
+                look_up = {"interp": interp, "image": image}.get(name)
+                if look_up is None:
+                    return of_vectors(elaboration, name, args)
+                return look_up(elaboration, *args) if len(args) == 3 else hole(f"`{name}` takes three arguments")
             found = builtins.applied(elaboration.db, name, [elaboration.as_term(a.value) for a in given])
             return elaboration.note(found, span) if isinstance(found, Delta) else found
         case Hole():
@@ -86,8 +91,9 @@ def _call_known(elaboration: Elaboration, function: Term, groups: Groups, given:
     if isinstance(filled, str):
         return hole(filled)
     for group, filling in zip(groups, filled):
-        values = _values(elaboration, len(group), filling)
-        function = elaboration.note(app(function, tuple(map(elaboration.as_term, values))), span)
+        args = tuple(map(elaboration.as_term, _values(elaboration, len(group), filling)))
+        elaboration.shapes.meets_records |= elaboration.shapes.makes_record(function)
+        function = elaboration.note(app(function, args), span)
     return function
 
 

@@ -108,7 +108,7 @@ class Elaboration:
 
         found = self.as_term(self.name(head, scope))
         for part in (*inner, name):
-            found = field(found, part)
+            found = field(self, found, part)
         return found
 
     # Binders

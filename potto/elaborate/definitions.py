@@ -116,7 +116,12 @@ def _opened(db: Database, file: str, locals: Locals) -> tuple[Elaboration, Scope
 
 
 def _finished(elaboration: Elaboration, term: Term) -> Elaborated:
-    return Elaborated(term, tuple(elaboration.origins.items()))
+    if not elaboration.shapes.meets_records:
+        return Elaborated(term, tuple(elaboration.origins.items()))
+    made: dict[Term, Term] = {}
+    found = elaboration.shapes.erased(term, made)
+    origins = {made.get(part, part): place for part, place in elaboration.origins.items()}
+    return Elaborated(found, tuple(origins.items()))
 
 
 def _diffeo(elaboration: Elaboration, item: nodes.DiffeoDefinition) -> DiffeoCore:

@@ -23,7 +23,10 @@ from potto.core.terms import (
     Term,
     Tuple,
     Var,
+    transform,
+    tuple_,
 )
+from potto.elaborate.signatures import signature
 from potto.query import Database
 from potto.types import interface
 from potto.types.types import (
@@ -50,6 +53,7 @@ class Shapes:
         self.db = db
         self.names: dict[str, Type] = {}
         self.known: dict[Term, Type] = {}
+        self.meets_records = False  # whether some are made
 
     def of(self, term: Term) -> Type:
         """The type of a term; of what is no composite, a number."""
@@ -79,6 +83,19 @@ class Shapes:
                 return self._called(term)
             case _:
                 return REAL
+
+    def makes_record(self, function: Term) -> bool:
+        """Whether a function is the definition of a record."""
+        found = signature(self.db, function.module, function.name) if isinstance(function, Global) else None
+        return found is not None and found.record
+
+    def erased(self, term: Term, made: dict[Term, Term]) -> Term:
+        """A term in which records are the tuples that they are. made: what parts have become."""
+
+        def change(_: Term, new: Term) -> Term:
+            return tuple_(new.args) if isinstance(new, App) and self.makes_record(new.function) else new
+
+        return transform(term, change, made=made)
 
     def _called(self, term: Term) -> Type:
         """The type of a call: that of the definition, for arguments like these."""
@@ -121,7 +138,7 @@ def _leaves(type: Type) -> list[Type]:
 
 def is_vector(type: Type) -> bool:
     """Whether arithmetic on it goes component by component."""
-    return isinstance(type, TupleOf | ArrayOf)
+    return isinstance(type, ArrayOf) or (isinstance(type, TupleOf) and type.record is None)
 
 
 def dims_of(type: Type) -> int | None:

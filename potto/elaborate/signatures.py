@@ -19,10 +19,12 @@ from potto.types.types import Diffeo, TupleOf, Type, dual_name, groups_of, resol
 
 
 class Signature(Struct, frozen=True):
-    """The parameters of a definition, group by group; `dims` is the size of its result if that is a tuple."""
+    """The parameters of a definition, group by group; `dims` is the size of its result if that is a tuple. `record`: it
+    is that of a record, which puts its arguments together."""
 
     groups: Groups
     dims: int | None = None
+    record: bool = False
 
 
 @query(travels=True)
@@ -36,7 +38,10 @@ def signature(db: Database, file: str, name: str) -> Signature | None:
         return None
     type = interface(db, file, name).type
     groups = tuple(tuple(Slot(p.name, _dims(p.type)) for p in group) for group in groups_of(type))
-    return Signature(groups or _written(item), _dims(result_of(type)))
+    made = result_of(type)
+    record = made.record if isinstance(made, TupleOf) else None
+    named = record is not None and (record.file, record.name) == (file, name)
+    return Signature(groups or _written(item), _dims(made), named)
 
 
 def _dims(type: Type) -> int | None:

@@ -7,7 +7,8 @@ from potto.primitives import PRIMITIVES
 CONSTANTS = ("pi", "inf")
 SPECIALS = ("deriv", "delta")
 PROJECTIONS = ("fst", "snd")
-VECTORS = ("len", "dot", "norm", "cross")
+LOOK_UPS = ("interp", "image")
+VECTORS = ("len", "dot", "norm", "cross", *LOOK_UPS)
 
 
 def is_builtin(name: str) -> bool:

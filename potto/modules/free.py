@@ -1,7 +1,7 @@
 """Names that a piece of syntax uses and does not bind itself.
 
 Owns the scoping rules of the surface language as one walk, `free_references`, in the order of the text and without
-recursion. Knows no files. Types have no names that could be free: `Real[x]` talks about a bound variable.
+recursion. Knows no files. Of types those of records are free: `Real[x]` talks about a bound variable.
 """
 
 from __future__ import annotations
@@ -142,6 +142,18 @@ def _parameters(groups: Sequence[Sequence[nodes.Parameter]]) -> tuple[str, ...]:
     return tuple(parameter.name for group in groups for parameter in group)
 
 
+def _annotations(groups: Sequence[Sequence[nodes.Parameter]], result: nodes.TypeExpr | None = None) -> Sequence[_Step]:
+    """The types of parameters and of a result, in which records have names."""
+    written = [p.annotation for group in groups for p in group if p.annotation is not None]
+    return written if result is None else [*written, result]
+
+
+def _named_type_steps(node: nodes.NamedType) -> Sequence[_Step]:
+    """The record that a type is the name of: `Camera`, `scene.Camera`."""
+    path, _, name = node.name.rpartition(".")
+    return (nodes.Member(node.span, path, node.span, name, node.span) if path else nodes.Name(node.span, name),)
+
+
 def _values(operands: Sequence[nodes.Operand | nodes.Argument]) -> Sequence[_Step]:
     return [operand.value for operand in operands]
 
@@ -165,7 +177,7 @@ _STEPS: dict[type, Callable[[Any], Sequence[_Step]]] = {
     nodes.Argument: lambda node: (node.value,),
     nodes.Interval: lambda node: (node.lo, node.hi),
     nodes.MeasureBound: lambda node: node.arguments,
-    nodes.Lambda: lambda node: _scoped(_parameters(node.groups), (node.body,)),
+    nodes.Lambda: lambda node: (*_annotations(node.groups), *_scoped(_parameters(node.groups), (node.body,))),
     nodes.Range: lambda node: (node.lo, node.hi),
     nodes.Clause: lambda node: (node.over,),
     nodes.Reduction: lambda node: _ranges(node.clauses, (node.body,)),
@@ -177,7 +189,15 @@ _STEPS: dict[type, Callable[[Any], Sequence[_Step]]] = {
     nodes.Let: lambda node: _block(node.bindings, (node.body,)),
     nodes.Integral: _integral_steps,
     nodes.Binding: lambda node: (node.value,),
-    nodes.Definition: lambda node: _scoped(_parameters(node.groups), _block(node.bindings, (node.body,))),
+    nodes.Definition: lambda node: (
+        *_annotations(node.groups, node.result),
+        *_scoped(_parameters(node.groups), _block(node.bindings, (node.body,))),
+    ),
+    nodes.RecordDefinition: lambda node: _annotations((node.fields,)),
+    nodes.NamedType: _named_type_steps,
+    nodes.TupleType: lambda node: node.items,
+    nodes.ArrayType: lambda node: (node.item,),
+    nodes.FunctionType: lambda node: _annotations((node.parameters,), node.result),
     nodes.DiffeoDefinition: _diffeo_steps,
     nodes.Inverse: lambda node: _scoped(_parameters((node.parameters,)), node.components),
     nodes.Print: lambda node: node.arguments,

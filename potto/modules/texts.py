@@ -117,7 +117,7 @@ def head(db: Database, text: str, diffeo: bool) -> Head:
     match item:
         case None:
             return Head("blank")
-        case nodes.Definition() | nodes.DiffeoDefinition():
+        case nodes.Definition() | nodes.DiffeoDefinition() | nodes.RecordDefinition():
             return Head("definition", item.name, item.name_span)
         case nodes.FromImport() | nodes.Import():
             return Head("import", importing=item)
@@ -222,7 +222,32 @@ def definition(db: Database, file: str, name: str) -> nodes.Definition | nodes.D
     """
     text = chunk_text(db, file, name)
     item = None if text is None else parsed(db, text, is_diffeo(file)).item
+    if isinstance(item, nodes.RecordDefinition):
+        return _maker(item)
     return item if isinstance(item, (nodes.Definition, nodes.DiffeoDefinition)) else None
+
+
+def _maker(item: nodes.RecordDefinition) -> nodes.Definition:
+    """A record as the function of its fields that its name stands for; what it gives is called as it is."""
+    fields = tuple(nodes.Parameter(f.span, f.name, f.annotation and _starred(f.annotation)) for f in item.fields)
+    values = tuple(nodes.Name(field.span, field.name) for field in fields)
+    made = nodes.NamedType(item.name_span, item.name)
+    return nodes.Definition(
+        item.span, item.name, item.name_span, (fields,), made, (), nodes.Tuple(item.span, values), True
+    )
+
+
+def _starred(annotation: nodes.TypeExpr) -> nodes.TypeExpr:
+    """The type of a field as that of a parameter: a record also holds what varies."""
+    match annotation:
+        case nodes.RealType():
+            return replace(annotation, star=True)
+        case nodes.TupleType(items=items):
+            return replace(annotation, items=tuple(map(_starred, items)))
+        case nodes.ArrayType(item=item):
+            return replace(annotation, item=_starred(item))
+        case _:
+            return annotation
 
 
 @query

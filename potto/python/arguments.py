@@ -77,13 +77,19 @@ class Batch(Struct, frozen=True):
         return replace(shaped, member_converged=converged, shortfalls=missed)
 
     def _array(self, items: list[Any]) -> Any:
-        """An array of Potto: one of numpy whose last axes are those of the array; of tuples, a tuple's numbers are the
-        last axis. What is ragged, or holds functions, stays a list."""
+        """An array of Potto as one of numpy: behind the axes of the batch those of the array, then of tuples in it.
+        What is ragged, or holds functions, stays a list."""
+        axis = 0 if self.shape is None else len(self.shape)
+
+        def whole(item: Any) -> Any:
+            parts = list(map(whole, item)) if isinstance(item, tuple | list) else None
+            return np.asarray(item, dtype=float) if parts is None else np.stack(parts, axis=axis)
+
         found = [self._restored(item) for item in items]
+        if not found:
+            return np.zeros((*(self.shape or ()), 0))
         try:
-            batch = 0 if self.shape is None else len(self.shape)
-            parts = [_stacked(item, batch) for item in found]
-            return np.stack(parts, axis=batch).astype(float) if parts else np.zeros((*(self.shape or ()), 0))
+            return whole(found)
         except (TypeError, ValueError):
             return found
 
@@ -106,11 +112,6 @@ class Batch(Struct, frozen=True):
             return np.empty(self.shape)
         count = int(np.prod(self.shape))
         return np.broadcast_to(np.asarray(part, dtype=float).reshape(-1), (count,)).reshape(self.shape).copy()
-
-
-def _stacked(item: Any, batch: int) -> Any:
-    """The numbers of tuples inside of each other along axes behind those of the batch, outer ones first."""
-    return np.stack([_stacked(part, batch) for part in item], axis=batch) if isinstance(item, tuple) else item
 
 
 def batch_of(arguments: Iterable[tuple[str, Any]]) -> Batch:
@@ -263,6 +264,8 @@ def _is_dual(type: Type) -> bool:
 
 
 def _tuple_misfit(name: str, argument: Any, items: tuple[Type, ...], dual: bool) -> str | None:
+    if dual and isinstance(items[0], ArrayOf) and isinstance(argument, list | np.ndarray | Rows):
+        return None  # an array without tangents
     if dual and not isinstance(argument, tuple | list):
         return None  # a number given for a dual has tangent 0
     if isinstance(argument, Estimate):

@@ -27,6 +27,8 @@ def with_arrays(name: str, argument: Any, type: Type, sizes: Sizes) -> Any:
     found = resolve(type)
     if isinstance(found, ArrayOf):
         return _array(name, argument, found, sizes)
+    if isinstance(found, TupleOf) and found.dual and not isinstance(argument, tuple):
+        return with_arrays(name, argument, found.items[0], sizes)  # without tangents
     if isinstance(found, TupleOf) and isinstance(argument, tuple) and len(argument) == len(found.items):
         return tuple(with_arrays(name, part, item, sizes) for part, item in zip(argument, found.items, strict=True))
     return argument
@@ -45,8 +47,9 @@ def _array(name: str, argument: Any, type: ArrayOf, sizes: Sizes) -> Any:
         argument = argument.to_numpy()
     if isinstance(argument, list) and _of_numbers(type):
         with contextlib.suppress(TypeError, ValueError):  # of answers, or not of one shape
-            numbers = np.array(argument, dtype=float)
-            argument = numbers if numbers.ndim <= _axes(type) else argument  # else of elements that are batches
+            axes = _axes(type) or 0
+            numbers = np.array(argument, dtype=float) if argument else np.zeros((0,) * axes)
+            argument = numbers if numbers.ndim <= axes else argument  # else of elements that are batches
     if isinstance(argument, np.ndarray):
         return _numpy(name, argument, type, sizes)
     if isinstance(argument, list):
@@ -80,6 +83,8 @@ def _numpy(name: str, argument: np.ndarray[Any, Any], type: ArrayOf, sizes: Size
     if argument.dtype.kind not in "fiu":
         raise wrong_call(f"`{name}` is {format_type(type)}: an array must hold real numbers, not {argument.dtype}")
     axes = _axes(type)
+    if axes is None:
+        raise wrong_call(f"`{name}` is {format_type(type)}: give it as a list")
     if argument.ndim < axes:
         plural = "axis" if axes == 1 else "axes"
         wanted = f"a numpy array of {axes} {plural} or more is needed, not one of shape {argument.shape}"
@@ -89,26 +94,32 @@ def _numpy(name: str, argument: np.ndarray[Any, Any], type: ArrayOf, sizes: Size
     return _made(name, numbers, type, sizes)
 
 
-def _axes(type: Type) -> int:
+def _axes(type: Type) -> int | None:
+    """How many axes of numpy a type has; None for a tuple whose items differ in that."""
     found = resolve(type)
     if isinstance(found, ArrayOf):
-        return 1 + _axes(found.item)
-    return 1 if isinstance(found, TupleOf) else 0
+        inner = _axes(found.item)
+        return None if inner is None else 1 + inner
+    if not isinstance(found, TupleOf):
+        return 0
+    each = {_axes(item) for item in found.items}
+    only = each.pop() if len(each) == 1 else None
+    return None if only is None else 1 + only
 
 
-def _made(name: str, numbers: np.ndarray[Any, Any], type: ArrayOf, sizes: Sizes, axis: int = 0) -> Rows:
-    """An array whose places are an axis of some numbers; those of arrays around it are the axes before."""
-    count = numbers.shape[axis]
-    _agree(name, count, type.size, sizes)
-    item = resolve(type.item)
-    if isinstance(item, ArrayOf):
-        return Rows(_made(name, numbers, item, sizes, axis + 1), count)
-    if not isinstance(item, TupleOf):
-        return Rows(Cell(np.ascontiguousarray(numbers)), count)
-    width = numbers.shape[axis + 1]
-    if width != len(item.items):
-        raise wrong_call(f"`{name}` holds tuples of {len(item.items)}, and is given rows of {width}")
-    return Rows(tuple(Cell(np.ascontiguousarray(np.take(numbers, place, axis + 1))) for place in range(width)), count)
+def _made(name: str, numbers: np.ndarray[Any, Any], type: Type, sizes: Sizes, axis: int = 0) -> Value:
+    """The value of a type: the places of its arrays are the first axes of all numbers, tuples are taken apart."""
+    found = resolve(type)
+    if isinstance(found, ArrayOf):
+        count = numbers.shape[axis]
+        _agree(name, count, found.size, sizes)
+        return Rows(_made(name, numbers, found.item, sizes, axis + 1), count)
+    if not isinstance(found, TupleOf):
+        return Cell(np.ascontiguousarray(numbers))
+    if numbers.shape[axis] != len(found.items):
+        raise wrong_call(f"`{name}` holds tuples of {len(found.items)}, and is given rows of {numbers.shape[axis]}")
+    parts = (np.take(numbers, place, axis=axis) for place in range(len(found.items)))
+    return tuple(_made(name, part, item, sizes, axis) for part, item in zip(parts, found.items, strict=True))
 
 
 # Batches

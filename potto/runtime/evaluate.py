@@ -16,7 +16,7 @@ import numpy as np
 from potto.calculus.surfaces.branch_cuts import opened
 from potto.calculus.surfaces.discontinuities import TooDeep
 from potto.core.printer import format_term
-from potto.core.terms import Integral, Term
+from potto.core.terms import Integral, Sum, Term
 from potto.diagnostics import PottoError
 from potto.integrate.events import INFINITE, ROUGH, Shortfall
 from potto.kernels import errors
@@ -43,6 +43,12 @@ def _integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
     return integral(machine, term, env)
 
 
+def _culled(machine: Machine, term: Sum, first: int, last: int, env: dict[str, Value]) -> Value | None:
+    from potto.runtime.integration.culling import culled
+
+    return culled(machine, term, first, last, env)
+
+
 def _added(machine: Machine, terms: tuple[Term, ...], env: dict[str, Value]) -> Value:
     from potto.runtime.integration.summands import added
 
@@ -50,7 +56,7 @@ def _added(machine: Machine, terms: tuple[Term, ...], env: dict[str, Value]) -> 
 
 
 SEMANTICS = Semantics(
-    call_derivative, call_paired, lazy, _added, total, array, element, length, fold, _integral
+    call_derivative, call_paired, lazy, _added, total, _culled, array, element, length, fold, _integral
 )  # fmt: skip
 
 
@@ -134,6 +140,8 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
         "integrals": record.integrals,
         "evaluations": record.evaluations,
     }
+    if record.culled:
+        stats["integrals culled"] = record.culled
     if clock.native or clock.kept or clock.native_points:
         stats |= {
             "machine code compiled": clock.native,

@@ -34,6 +34,7 @@ from potto.types.interfaces import Closing, Decorating, Interface, chain_of
 from potto.types.lints import lints
 from potto.types.motionless import is_derivative
 from potto.types.reasons import NO_REASONS, Reasons
+from potto.types.records import labelled
 from potto.types.recursion import endless
 from potto.types.scope import Outside
 from potto.types.types import UNKNOWN, Diffeo, Dist, Function, Meta, Parameter, Real, Type, Unknown, groups_of, resolve
@@ -149,7 +150,10 @@ def _infer(inference: Inference, item: Written, skeleton: Type) -> None:
 def _infer_body(inference: Inference, item: nodes.Definition, result: Type) -> None:
     body = inference.infer(item.body)
     returned(inference, body, item.body)
-    if item.result is not None:
+    made = labelled(item, inference.outside.file, body)
+    if made is not body:
+        body = made
+    elif item.result is not None:
         written = written_type(inference, item.result)
         if not unify(body, written):
             inference.report(mismatch(body, written, item.body, f"the result of `{item.name}`"))

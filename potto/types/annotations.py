@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import assert_never
 
 from potto.syntax import nodes
-from potto.syntax.kinds import BAD_TYPE
 from potto.types import kinds
 from potto.types.context import Inference
+from potto.types.records import named_type
 from potto.types.scope import Local
 from potto.types.types import (
     ANY_SIZE,
@@ -45,9 +45,7 @@ def written_type(inference: Inference, annotation: nodes.TypeExpr) -> Type:
                 found = ArrayOf(_size(inference, size), found)
             return found
         case nodes.NamedType():
-            help = f"types are {KNOWN}"
-            inference.report(BAD_TYPE(annotation.span, f"there is no type `{annotation.name}`", help=help))
-            return UNKNOWN
+            return named_type(inference, annotation, KNOWN)
         case nodes.FunctionType(parameters=parameters, result=result):
             group = tuple(Parameter(None, _parameter(inference, parameter)) for parameter in parameters)
             return Function(group, written_type(inference, result))

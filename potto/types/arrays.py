@@ -68,12 +68,9 @@ def _field(inference: Inference, node: nodes.Field) -> Type:
     return field(inference, inference.infer(node.value), node.name, node)
 
 
-@rule(nodes.Text, nodes.With)
-def _unexpected(inference: Inference, node: nodes.Text | nodes.With) -> Type:
-    if isinstance(node, nodes.With):
-        inference.infer(node.record)
-    message = "the name of a file stands in `load(…)` alone" if isinstance(node, nodes.Text) else "this is no record"
-    inference.report(kinds.MISMATCH(node.span, message))
+@rule(nodes.Text)
+def _text(inference: Inference, node: nodes.Text) -> Type:
+    inference.report(kinds.MISMATCH(node.span, "the name of a file stands in `load(…)` alone"))
     return UNKNOWN
 
 
@@ -146,24 +143,30 @@ def _fold(inference: Inference, node: nodes.Fold) -> Type:
     value_only(inference, state, node.start, "the state of a fold is made of numbers")
     with inference.scope.inside():
         _clauses(inference, node.clauses, "a fold")
-        _bind_state(inference, node, state)
+        fits = _bind_state(inference, node, state)
         body = inference.infer(node.body)
+    if not fits:
+        return UNKNOWN
     if not unify(body, state):
         inference.report(mismatch(body, state, node.body, "each step of a fold gives a state like the first one: this"))
     return state
 
 
-def _bind_state(inference: Inference, node: nodes.Fold, state: Type) -> None:
+def _bind_state(inference: Inference, node: nodes.Fold, state: Type) -> bool:
+    """The names of the state in scope; False if there are not as many parts."""
     targets = node.targets
     if len(targets) == 1:
         inference.local(targets[0], targets[0].name, targets[0].span, "loop", state)
-        return
-    parts = tuple(inference.fresh() for _ in targets)
-    if not unify(state, TupleOf(parts)):
+        return True
+    parts: tuple[Type, ...] = tuple(inference.fresh() for _ in targets)
+    fits = unify(state, TupleOf(parts))
+    if not fits:
         message = f"{len(parts)} names are bound here, but the state is {describe(state)}"
         inference.report(kinds.MISMATCH(node.start.span, message, label=describe(state)))
+        parts = (UNKNOWN,) * len(targets)
     for target, part in zip(targets, parts):
         inference.local(target, target.name, target.span, "loop", part)
+    return fits
 
 
 @rule(nodes.Comprehension)

@@ -207,12 +207,13 @@ class _Filling:
             return False
         if first == 1 and len(self.groups) == 1 and len(given) > 1:
             only = resolve(self.parameters[0].type)
-            if isinstance(only, TupleOf) and len(only.items) == len(given):
+            if isinstance(only, TupleOf) and only.record is None and len(only.items) == len(given):
                 self.slots[0] = tuple(given)
                 return True
         if first > 1 and len(given) == 1:
             type = resolve(self.types[0])
-            dims = len(type.items) if isinstance(type, TupleOf) else type.dims if isinstance(type, Diffeo) else None
+            tuple_ = isinstance(type, TupleOf) and type.record is None
+            dims = len(type.items) if tuple_ else type.dims if isinstance(type, Diffeo) else None  # type: ignore[union-attr]
             if dims == first or isinstance(type, Meta) or (isinstance(type, Diffeo) and dims is None):
                 self.slots[:first] = [(given[0],)] * first
                 self.spread = True

@@ -114,6 +114,7 @@ class Inference:
         self.comparisons: list[nodes.Compare] = []
         self.brackets: set[int] = set()
         self.owners: dict[int, Meaning] = {}  # of members of no module, `u.x`: what `u` is
+        self.fields: dict[int, list[int]] = {}  # of `u.x`, and of `c with x = 1`: where in the tuple it is
         self.sizes: dict[str, Type] = {}  # the names of sizes in annotations
         self.mixed: set[int] = set()  # the `and`, `or`, `not` of conditions, where brackets may stand
         self.integrals = 0  # how many integrals are around the place that is looked at
@@ -201,12 +202,16 @@ class Inference:
         actual, expected = resolve(actual), resolve(expected)
         if not isinstance(expected, TupleOf):
             return unify(actual, expected)
-        if expected.dual and isinstance(actual, Real | Dist):
+        if expected.dual and isinstance(first := resolve(expected.items[0]), ArrayOf):
+            if not isinstance(actual, TupleOf):
+                return unify(actual, first)  # an array without tangents
+        elif expected.dual and isinstance(actual, Real | Dist):
             return True
         if expected.dual and isinstance(actual, Meta):
             self.later(lambda: self._fit_late(actual, expected))
             return True
-        if isinstance(actual, TupleOf) and len(actual.items) == len(expected.items):
+        same = isinstance(actual, TupleOf) and actual.record == expected.record
+        if same and isinstance(actual, TupleOf) and len(actual.items) == len(expected.items):
             fits = [self.fits(item, other) for item, other in zip(actual.items, expected.items)]
             return all(fits)
         return unify(actual, expected)
@@ -226,7 +231,7 @@ class Inference:
                 return TupleOf((REAL, REAL), dual=True)
             case TupleOf(items, dual):
                 settle(type)  # its dual is not known before its parts are
-                return dual_of_tuple(tuple(self.dual(item, node) for item in items), dual)
+                return dual_of_tuple(tuple(self.dual(item, node) for item in items), dual, type.record)
             case ArrayOf(size, item):
                 settle(type)
                 return dual_of_array(size, self.dual(item, node))
@@ -301,6 +306,8 @@ def describe(type: Type) -> str:
             return "a number"
         case Function():
             return f"a function `{format_type(found)}`"
+        case TupleOf(record=record) if record is not None:
+            return f"a record `{record.name}`"
         case TupleOf(items):
             return f"a tuple of {len(items)}"
         case ArrayOf(size):
@@ -360,12 +367,13 @@ def comparison(expr: nodes.Expr, what: str) -> Diagnostic:
 
 def _not_a_number(found: Type, expr: nodes.Expr, where: str) -> Diagnostic:
     match found:
-        case TupleOf(items):
+        case TupleOf(record=record):
+            parts = "`u.0`, or all of them, `(a, b) = …`" if record is None else f"`c.{record.fields[0]}`"
             return kinds.TUPLE_ARITHMETIC(
                 expr.span,
-                f"{where} must be a number, but this is a tuple of {len(items)}",
-                label="a tuple",
-                help="take one of its parts, `u.0`, or all of them, `(a, b) = …`",
+                f"{where} must be a number, but this is {describe(found)}",
+                label="a tuple" if record is None else "a record",
+                help=f"take one of its parts, {parts}",
             )
         case Diffeo():
             return kinds.TUPLE_ARITHMETIC(

@@ -11,7 +11,6 @@ from potto.syntax import nodes
 from potto.types.algebra import flat, join, merge, taint, without
 from potto.types.flow import Walk, walks
 from potto.types.values import HAZY, NONE, ListValue, Scalar, Source, Sources, TupleValue, Value
-from potto.types.vectors import place_of
 
 MOST_ROUNDS = 20
 
@@ -33,12 +32,17 @@ def element(array: Value) -> Value:
 
 @walks(nodes.Field)
 def _field(walk: Walk, node: nodes.Field) -> Value:
-    return part(walk.value(node.value), node.name)
+    return parts_of(walk, walk.value(node.value), node)
 
 
-def part(whole: Value, name: str) -> Value:
-    """The value of a part of a tuple."""
-    place = place_of(name)
+def parts_of(walk: Walk, whole: Value, node: nodes.Field | nodes.Member) -> Value:
+    """The value of a part of a tuple or a record, or of a part of that."""
+    for place in walk.inference.fields.get(id(node), (None,)):
+        whole = _part(whole, place)
+    return whole
+
+
+def _part(whole: Value, place: int | None) -> Value:
     if isinstance(whole, TupleValue) and place is not None and place < len(whole.items):
         return whole.items[place]
     return Scalar(flat(whole))
@@ -51,7 +55,14 @@ def _text(walk: Walk, node: nodes.Text) -> Value:
 
 @walks(nodes.With)
 def _with(walk: Walk, node: nodes.With) -> Value:
-    return HAZY
+    whole = walk.value(node.record)
+    given = [walk.value(argument.value) for argument in node.arguments]
+    if not isinstance(whole, TupleValue):
+        return Scalar(flat(TupleValue((whole, *given))))
+    items = list(whole.items)
+    for place, value in zip(walk.inference.fields.get(id(node), ()), given):
+        items[place] = value
+    return TupleValue(tuple(items))
 
 
 def _clauses(walk: Walk, clauses: tuple[nodes.Clause, ...]) -> tuple[Sources, frozenset[Source]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from potto.modules.builtins import VECTORS
+from potto.modules.builtins import LOOK_UPS, VECTORS
 from potto.primitives import PRIMITIVES
 from potto.syntax import nodes
 from potto.syntax.printer import print_expression
@@ -14,6 +14,7 @@ from potto.types.calls import callee_name
 from potto.types.context import Plan
 from potto.types.dualize import dual
 from potto.types.flow import Walk, walks
+from potto.types.flow_arrays import element
 from potto.types.infer import strip
 from potto.types.rules import lone_delta, nonlinear
 from potto.types.scope import Builtin
@@ -71,10 +72,25 @@ def _of_vectors(name: str, arguments: Sequence[Value]) -> Value:
     """A builtin of vectors varies with all that their components vary with, and jumps where these do."""
     if name == "len":
         return STILL
-    found = Scalar(STILL.sources)
-    for part in _leaves(arguments):
-        found = Scalar(merge(found.sources, part.sources), found.jumps | part.jumps)
+    if name in LOOK_UPS and len(arguments) == 3:
+        whole = element(arguments[1]) if name == "interp" else element(element(arguments[0]))
+        return _with_sources(whole, _all_of(arguments))
+    found = _all_of(arguments)
     return TupleValue((found, found, found)) if name == "cross" else found
+
+
+def _all_of(values: Sequence[Value]) -> Scalar:
+    found = Scalar(STILL.sources)
+    for part in _leaves(values):
+        found = Scalar(merge(found.sources, part.sources), found.jumps | part.jumps)
+    return found
+
+
+def _with_sources(value: Value, more: Scalar) -> Value:
+    """A number, or each of a tuple, that varies with more."""
+    if isinstance(value, TupleValue):
+        return TupleValue(tuple(_with_sources(item, more) for item in value.items))
+    return ListValue(_with_sources(value.item, more)) if isinstance(value, ListValue) else more
 
 
 def _leaves(values: Sequence[Value]) -> Iterator[Scalar]:

@@ -14,7 +14,7 @@ from potto.types.algebra import (
     taint,
 )
 from potto.types.flow import Surfaces, Walk, walks
-from potto.types.flow_arrays import part
+from potto.types.flow_arrays import parts_of
 from potto.types.flow_calls import builtin_value
 from potto.types.infer import strip
 from potto.types.rules import nonlinear, product_of_deltas
@@ -52,10 +52,7 @@ def _paren(walk: Walk, node: nodes.Paren) -> Value:
 def _name(walk: Walk, node: nodes.Name | nodes.Member) -> Value:
     owner = walk.inference.owners.get(id(node))
     if owner is not None and isinstance(node, nodes.Member):
-        found = _meant(walk, node, owner)
-        for name in (*node.path.split(".")[1:], node.name):
-            found = part(found, name)
-        return found
+        return parts_of(walk, _meant(walk, node, owner), node)
     return _meant(walk, node, walk.inference.meanings.get(id(node)))
 
 

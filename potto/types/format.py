@@ -54,6 +54,8 @@ class _Printer:
                 return "Real" + ("*" if star else "") + _over(variables)
             case Dist(variables):
                 return "Dist" + _over(variables)
+            case TupleOf(record=record) if record is not None:
+                return record.name
             case TupleOf(items):
                 return f"({', '.join(map(self.text, items))})"
             case ArrayOf():
@@ -101,7 +103,8 @@ class _Printer:
         if len(parameters) == 1 and parameters[0].name is None:
             only = resolve(parameters[0].type)
             text = self.text(only)
-            return f"({text})" if isinstance(only, Function | TupleOf) else text
+            tuple_ = isinstance(only, TupleOf) and only.record is None
+            return f"({text})" if tuple_ or isinstance(only, Function) else text
         return f"({', '.join(map(self._parameter, parameters))})"
 
     def _parameter(self, parameter: Parameter) -> str:

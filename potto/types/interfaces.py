@@ -29,6 +29,7 @@ from potto.types.types import (
     Type,
     groups_of,
     result_of,
+    with_items,
 )
 from potto.types.values import (
     HAZE,
@@ -323,8 +324,8 @@ class Decorating:
                 return self._input(type, value, self.settled)
             case ArrayOf(size, item), ListValue(inner):
                 return ArrayOf(size, self.type(item, inner))
-            case TupleOf(items, dual), TupleValue(parts) if len(items) == len(parts):
-                return TupleOf(tuple(map(self.type, items, parts)), dual)
+            case TupleOf(items), TupleValue(parts) if len(items) == len(parts):
+                return with_items(type, tuple(map(self.type, items, parts)))
             case _:
                 return type
 
@@ -362,9 +363,8 @@ class Decorating:
         if isinstance(type, Real) and isinstance(value, Scalar):
             return REAL if still is None or not still.isdisjoint(value.sources) else STARRED
         match type, value:
-            case TupleOf(items, dual), TupleValue(parts) if len(items) == len(parts):
-                inner = tuple(self._input(item, part, still) for item, part in zip(items, parts))
-                return TupleOf(inner, dual)
+            case TupleOf(items), TupleValue(parts) if len(items) == len(parts):
+                return with_items(type, tuple(self._input(item, part, still) for item, part in zip(items, parts)))
             case ArrayOf(size, item), ListValue(part):
                 return ArrayOf(size, self._input(item, part, still))
             case Function(group, result), Abstract(ports, answer) if len(group) == len(ports):
@@ -379,8 +379,8 @@ class Decorating:
         match type, tree:
             case Real(), Port():
                 return Real(star=any(self._varies(source) for source in self.given.get(tree, ())))
-            case TupleOf(items, dual), PortTuple(parts) if len(items) == len(parts):
-                return TupleOf(tuple(self._given(item, part) for item, part in zip(items, parts)), dual)
+            case TupleOf(items), PortTuple(parts) if len(items) == len(parts):
+                return with_items(type, tuple(self._given(item, part) for item, part in zip(items, parts)))
             case Function(group, result), PortFunction(inputs) if len(group) == len(inputs):
                 parameters = (Parameter(None, self._input(p.type, s, self.plain)) for p, s in zip(group, inputs))
                 return Function(tuple(parameters), result)

@@ -35,11 +35,22 @@ class Dist:
 
 
 @value
+class RecordName:
+    """Which record a tuple is: its definition, and the names of the fields."""
+
+    file: str
+    name: str
+    fields: tuple[str, ...]
+
+
+@value
 class TupleOf:
-    """A tuple. `dual`: a value and its tangent, for which a plain number may be given."""
+    """A tuple. `dual`: a value and its tangent, for which a plain number may be given. `record`: its fields have names,
+    and it is told from other tuples by its own."""
 
     items: tuple[Type, ...]
     dual: bool = False
+    record: RecordName | None = None
 
 
 @value
@@ -206,7 +217,12 @@ def derivative_type(type: Type) -> Type:
     return _derivative(resolve(type), frozenset())
 
 
-def dual_of_tuple(duals: tuple[Type, ...], dual: bool = False) -> Type:
+def with_items(type: TupleOf, items: tuple[Type, ...]) -> TupleOf:
+    """The same tuple, or record, of other items."""
+    return TupleOf(items, type.dual, type.record)
+
+
+def dual_of_tuple(duals: tuple[Type, ...], dual: bool = False, record: RecordName | None = None) -> Type:
     """The dual of a tuple of numbers (and tuples of them): the tuple of values, then the tuple of tangents.
 
     What is no tuple of numbers (a function in it, something wrong) keeps its duals side by side.
@@ -214,7 +230,8 @@ def dual_of_tuple(duals: tuple[Type, ...], dual: bool = False) -> Type:
     pairs = [d.items for d in duals if isinstance(d, TupleOf) and len(d.items) == 2]
     if len(pairs) != len(duals):
         return TupleOf(duals, dual)
-    return TupleOf((TupleOf(tuple(p[0] for p in pairs)), TupleOf(tuple(p[1] for p in pairs))), dual)
+    values, tangents = (TupleOf(tuple(p[place] for p in pairs), record=record) for place in (0, 1))
+    return TupleOf((values, tangents), dual or record is not None)
 
 
 def _derivative(type: Type, parameters: frozenset[str]) -> Type:
@@ -231,7 +248,7 @@ def _derivative(type: Type, parameters: frozenset[str]) -> Type:
         case Dist(variables):
             return TupleOf((Dist(renamed(variables)), Dist(renamed(variables))), dual=True)
         case TupleOf(items, dual):
-            return dual_of_tuple(tuple(_derivative(item, parameters) for item in items), dual)
+            return dual_of_tuple(tuple(_derivative(item, parameters) for item in items), dual, type.record)
         case ArrayOf(size, item):
             return dual_of_array(size, _derivative(item, parameters))
         case Function(group, result):
@@ -251,4 +268,7 @@ def _derivative(type: Type, parameters: frozenset[str]) -> Type:
             assert_never(type)
 
 
-quick(Real, Dist, TupleOf, ArrayOf, Count, SizeVar, Shifted, AnySize, Parameter, Function, Diffeo, Truth, Var, Unknown)
+quick(
+    Real, Dist, RecordName, TupleOf, ArrayOf, Count, SizeVar, Shifted, AnySize, Parameter, Function, Diffeo, Truth, Var,
+    Unknown,
+)

@@ -29,6 +29,7 @@ from potto.types.types import (
     Var,
     resolve,
     shifted,
+    with_items,
 )
 
 NUMBERS = (Real, Dist)
@@ -89,7 +90,7 @@ def as_tuple(parameters: tuple[Parameter, ...]) -> Type:
 
 def _unify_tuples(a: TupleOf | Diffeo, b: TupleOf | Diffeo) -> bool:
     if isinstance(a, TupleOf) and isinstance(b, TupleOf):
-        if len(a.items) != len(b.items):
+        if len(a.items) != len(b.items) or a.record != b.record:
             return False
         fits = [unify(item, other) for item, other in zip(a.items, b.items)]
         return all(fits)
@@ -97,6 +98,8 @@ def _unify_tuples(a: TupleOf | Diffeo, b: TupleOf | Diffeo) -> bool:
         return a.dims is None or b.dims is None or a.dims == b.dims
     diffeo, plain = (a, b) if isinstance(a, Diffeo) else (b, a)
     assert isinstance(diffeo, Diffeo) and isinstance(plain, TupleOf)
+    if plain.record is not None:
+        return False
     if diffeo.dims is not None and diffeo.dims != len(plain.items):
         return False
     fits = [unify(item, REAL) for item in plain.items]
@@ -154,7 +157,7 @@ def rebuild(type: Type, leaf: Callable[[Type], Type]) -> Type:
         parameters = tuple([Parameter(p.name, rebuild(p.type, leaf)) for p in type.parameters])
         return Function(parameters, rebuild(type.result, leaf))
     if isinstance(type, TupleOf):
-        return TupleOf(tuple([rebuild(item, leaf) for item in type.items]), type.dual)
+        return with_items(type, tuple([rebuild(item, leaf) for item in type.items]))
     if isinstance(type, ArrayOf):
         return ArrayOf(rebuild(type.size, leaf), rebuild(type.item, leaf))
     return shifted(rebuild(type.base, leaf), type.offset) if isinstance(type, Shifted) else leaf(type)

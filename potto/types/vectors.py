@@ -9,11 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from potto.diagnostics import Diagnostic
-from potto.modules.hints import did_you_mean
+from potto.modules.hints import did_you_mean, near_names
 from potto.syntax import nodes
 from potto.types import kinds
 from potto.types.context import Inference, describe
 from potto.types.format import format_type, format_types
+from potto.types.lookups import image, interp
 from potto.types.types import REAL, UNKNOWN, ArrayOf, Count, Diffeo, Meta, TupleOf, Type, Unknown, resolve
 from potto.types.unify import SIZES, unify
 
@@ -25,7 +26,7 @@ _RIGHT = {op: f"the right of `{op}`" for op in "+-*/"}
 def is_vector(type: Type) -> bool:
     """Whether there is arithmetic on a value component by component; a dual is taken apart instead."""
     found = resolve(type)
-    return isinstance(found, ArrayOf) or (isinstance(found, TupleOf) and not found.dual)
+    return isinstance(found, ArrayOf) or (isinstance(found, TupleOf) and not found.dual and found.record is None)
 
 
 def combined(inference: Inference, left: Type, operand: nodes.Operand, right: Type, chain: nodes.Chain) -> Type:
@@ -108,11 +109,20 @@ def field(inference: Inference, type: Type, name: str, node: nodes.Member | node
         return UNKNOWN
     if isinstance(found, Diffeo) and found.dims is not None:
         found = TupleOf((REAL,) * found.dims)
-    place = place_of(name)
+    place = place_in(found, name)
     if isinstance(found, TupleOf) and place is not None and place < len(found.items):
+        inference.fields.setdefault(id(node), []).append(place)
         return found.items[place]
     inference.report(_no_field(found, name, node, place))
     return UNKNOWN
+
+
+def place_in(type: Type, name: str) -> int | None:
+    """Which item of a tuple or a record a field is."""
+    record = type.record if isinstance(type, TupleOf) else None
+    if record is not None:
+        return record.fields.index(name) if name in record.fields else None
+    return place_of(name)
 
 
 def place_of(name: str) -> int | None:
@@ -127,6 +137,10 @@ def _no_field(found: Type, name: str, node: nodes.Member | nodes.Field, place: i
     if isinstance(found, Meta):
         help = "say in the head what it is: `(u: (Real, Real))`"
         message = f"it is not known what `.{name}` is a part of"
+    elif isinstance(found, TupleOf) and found.record is not None:
+        names = found.record.fields
+        message = f"a record `{found.record.name}` has no field `{name}`"
+        help = did_you_mean(near_names(name, names)) or "it has " + ", ".join(f"`{other}`" for other in names)
     elif isinstance(found, TupleOf):
         count = len(found.items)
         message = f"a tuple of {count} has no part `.{name}`"
@@ -153,9 +167,19 @@ def _types(inference: Inference, node: nodes.Apply, name: str, count: int) -> li
     if len(found) == count:
         return found
     kind = kinds.TOO_MANY if len(found) > count else kinds.MISSING
-    wanted = "one vector" if count == 1 else f"{count} vectors"
+    wanted = ("one vector", "two vectors", "three arguments")[count - 1]
     inference.report(kind(node.span, f"`{name}` takes {wanted}", label=f"{len(found)} given"))
     return None
+
+
+def _between(name: str, form: Callable[[Inference, nodes.Apply, list[Type]], Type]) -> Callable[..., Type]:
+    """A form of three arguments that looks something up."""
+
+    def typed(inference: Inference, node: nodes.Apply) -> Type:
+        found = _types(inference, node, name, 3)
+        return UNKNOWN if found is None else form(inference, node, found)
+
+    return typed
 
 
 def _len(inference: Inference, node: nodes.Apply) -> Type:
@@ -257,4 +281,6 @@ _FORMS: dict[str, Callable[[Inference, nodes.Apply], Type]] = {
     "norm": _norm,
     "dot": _dot,
     "cross": _cross,
+    "interp": _between("interp", interp),
+    "image": _between("image", image),
 }

@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from msgspec import Struct
 
 from potto.calculus.algebra.point_values import sample_value
+from potto.calculus.differentiation.loops import parts_below
 from potto.calculus.inlining.currying import arguments_of, groups_of, sizes_of, uncurry
 from potto.calculus.inlining.expand import DEEPEST, Expansion, Resolve, expanded
 from potto.calculus.surfaces.trace import spine
@@ -24,10 +25,12 @@ from potto.core.terms import (
     ONE,
     ZERO,
     App,
+    Array,
     Branch,
     Const,
     Delta,
     Deriv,
+    Fold,
     Global,
     Holding,
     Integral,
@@ -40,14 +43,13 @@ from potto.core.terms import (
     Var,
     bound_apart,
     branch,
-    children,
     fresh,
     integral,
     lam,
     postorder,
     proj,
+    rebuild,
     substitute,
-    sum_,
     transform,
     tuple_,
     var,
@@ -119,10 +121,10 @@ def _kept(term: Term, leads_on: Callable[[Global], bool]) -> Term:
                 inner = _kept(node.body, leads_on)
                 if inner.free:
                     items[integral(node.variables, node.bounds, inner)] = None
-            case Sum():
+            case Sum() | Array() | Fold():
                 inner = _kept(node.body, leads_on)
                 if inner.free:
-                    items[sum_(node.variable, node.lo, node.hi, inner)] = None
+                    items[rebuild(node, (*parts_below(node), inner))] = None
             case _:
                 pass
     return tuple_(items)
@@ -147,10 +149,10 @@ def has_conditions(exported: Term | None) -> bool:
 
 
 def _outside_bodies(node: Term) -> Sequence[Term]:
-    """The children of a node but for what is integrated or summed."""
+    """The children of a node but for what is integrated, summed or done at each step of a loop."""
     if isinstance(node, Integral):
         return [bound for pair in node.bounds for bound in pair]
-    return (node.lo, node.hi) if isinstance(node, Sum) else children(node)
+    return parts_below(node)
 
 
 def conditions_of(term: Term, skeletons: Resolve, whole: Resolve) -> tuple[Condition, ...]:
@@ -194,7 +196,7 @@ class _Walk:
         nodes = postorder(term)
         self.taken |= term.free
         for node in nodes:
-            if isinstance(node, Lam | Sum):
+            if isinstance(node, Lam | Sum | Array | Fold):
                 self.taken |= node.body.free
             elif isinstance(node, Integral):
                 self.taken.update(node.variables)

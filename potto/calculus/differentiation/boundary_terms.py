@@ -9,7 +9,7 @@ brackets, so that they can be differentiated again.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 from msgspec import Struct
 
@@ -25,12 +25,13 @@ from potto.calculus.surfaces.branch_assignment import (
     Box,
     Flip,
     Flips,
+    Loop,
     box_of,
     branches_of,
     flipping,
     forced,
+    loops_over,
     side_of,
-    summed_over,
     unguarded,
 )
 from potto.core.simplify import normalized_surface
@@ -42,7 +43,6 @@ from potto.core.terms import (
     If,
     Integral,
     Prim,
-    Sum,
     Term,
     Tuple,
     add,
@@ -82,7 +82,7 @@ def at_surfaces(node: Integral, moving: frozenset[str], rate: Rate, folding: boo
     met: list[Root] = []
     zero = zero_like(node.body)
     for surface, members in surfaces.items():
-        sums = summed_over(node.body, members[0])
+        sums = loops_over(node.body, members[0])
         alternatives: list[tuple[Term | None, Term]] = []
         try:
             for pivot in pivots(node, surface, folding):
@@ -119,7 +119,7 @@ def _same(root: Root, other: Root) -> bool:
     return is_zero(sub(unguarded(root.at), unguarded(other.at)))
 
 
-def _at_root(node: Integral, flips: Flips, root: Root, rate: Rate, sums: list[Sum]) -> Iterator[Term]:
+def _at_root(node: Integral, flips: Flips, root: Root, rate: Rate, sums: list[Loop]) -> Iterator[Term]:
     speed = rate(root.at)
     if speed is ZERO:
         return
@@ -134,8 +134,13 @@ def _at_root(node: Integral, flips: Flips, root: Root, rate: Rate, sums: list[Su
         gain = sum_(root.index, *root.counts, gain)
     gain = substitute(gain, instances)
     for old in sums:
-        gain = sum_(_name(instances[old.variable]), old.lo, old.hi, gain)
+        gain = sum_(_name(instances[old.variable]), *_ends(old, instances), gain)
     yield remaining(node, root.variable, root.at, gain)
+
+
+def _ends(loop: Loop, instances: Mapping[str, Term]) -> tuple[Term, Term]:
+    """From where to where a loop goes for the instances of those around it."""
+    return substitute(loop.lo, instances), substitute(loop.hi, instances)
 
 
 def _name(term: Term) -> str:
@@ -144,7 +149,7 @@ def _name(term: Term) -> str:
 
 
 def _instances(
-    body: Term, flips: Flips, sums: list[Sum], box: Box, used: Iterable[str] = ()
+    body: Term, flips: Flips, sums: list[Loop], box: Box, used: Iterable[str] = ()
 ) -> tuple[Callable[[bool], Term], dict[str, Term]]:
     """The forced integrand; under sums only the instance of a branch that flips is forced, the others fall."""
     if not sums:
@@ -312,11 +317,11 @@ def _jump_at(body: Term, surface: Term, members: Sequence[tuple[Branch, Term]], 
     speed = rate(surface)
     if speed is ZERO:
         return None
-    sums = summed_over(body, members[0][0])
+    sums = loops_over(body, members[0][0])
     sided, instances = _instances(body, [Flip(b, neg(side), side) for b, side in members], sums, NOWHERE)
     positive, negative = sided(True), sided(False)
     if positive is negative:
         return None
-    over = tuple((_name(instances[s.variable]), s.lo, s.hi) for s in sums)
+    over = tuple((_name(instances[s.variable]), *_ends(s, instances)) for s in sums)
     jump = difference(positive, negative)
     return JumpTerm(substitute(surface, instances), jump, substitute(speed, instances), over)

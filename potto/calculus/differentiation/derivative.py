@@ -9,16 +9,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
+from potto.calculus.differentiation.loops import dual_fold, element_of, outside_binders
+from potto.calculus.differentiation.loops import vanishes as vanishes
+from potto.calculus.differentiation.loops import zero_like as zero_like
 from potto.core.terms import (
     ONE,
     ZERO,
     App,
+    Array,
     Branch,
     Const,
     Delta,
+    Fold,
     If,
+    Index,
     Integral,
     Lam,
+    Length,
     ListOf,
     Prim,
     Proj,
@@ -27,6 +34,7 @@ from potto.core.terms import (
     Tuple,
     Var,
     add,
+    array,
     branch,
     children,
     const,
@@ -38,7 +46,6 @@ from potto.core.terms import (
     mul,
     neg,
     postorder,
-    postorder_by,
     pow_,
     prim,
     proj,
@@ -64,38 +71,10 @@ def partial(term: Term, name: str) -> Term:
     if name not in term.free:
         return zero_like(term)
     slopes: dict[Term, Term] = {}
-    for node in _outside_binders(term):
+    for node in outside_binders(term):
         if name in node.free:
             slopes[node] = _slope(node, name, slopes)
     return slopes[term]
-
-
-def zero_like(term: Term) -> Term:
-    """Zero, or a tuple of zeros where the term is seen to be a tuple."""
-    path: list[int] = []
-    while True:
-        match term:
-            case Branch(then=inner) | If(then=inner) | Integral(body=inner) | Sum(body=inner):
-                term = inner
-            case Proj(term=inner, index=index):
-                path.append(index)
-                term = inner
-            case Tuple(items=items) if path:
-                index = path.pop()
-                if index >= len(items):
-                    return ZERO
-                term = items[index]
-            case Tuple(items=items):
-                return tuple_(map(zero_like, items))
-            case ListOf(items=items) if not path:
-                return list_of(map(zero_like, items))
-            case _:
-                return ZERO
-
-
-def _outside_binders(root: Term) -> list[Term]:
-    """Every subterm that stands under no binder, children first."""
-    return postorder_by(root, lambda node: () if isinstance(node, Integral | Sum | Lam) else children(node))
 
 
 def _slope(node: Term, name: str, slopes: Mapping[Term, Term]) -> Term:
@@ -118,8 +97,14 @@ def _slope(node: Term, name: str, slopes: Mapping[Term, Term]) -> Term:
         case Proj():
             inner = of(node.term)
             return ZERO if inner is ZERO else proj(inner, node.index)
-        case Sum():
-            return _sum(node, name)
+        case Index():
+            return element_of(of(node.array), node.index)  # places don't move
+        case Length():
+            return ZERO
+        case Sum() | Array():
+            return _loop(node, name)
+        case Fold():
+            return _fold(node, name, of(node.start))
         case Integral():
             return _integral(node, name)
         case App(function=Lam() as function) if len(function.params) == len(node.args):
@@ -247,13 +232,50 @@ def _apart(node: Term, bound: tuple[str, ...], name: str) -> Term:
     return rename_bound(node, {name: fresh(name, {*node.free, *bound})}) if name in bound else node
 
 
-def _sum(node: Sum, name: str) -> Term:
+def _loop(node: Sum | Array, name: str) -> Term:
     """Term by term: the limits are whole numbers, which don't move."""
     apart = _apart(node, (node.variable,), name)
+    if name not in children(apart)[-1].free:
+        return zero_like(apart)
+    if isinstance(apart, Array):
+        return array(apart.variable, apart.size, partial(apart.body, name))
     assert isinstance(apart, Sum)
-    if name not in apart.body.free:
-        return zero_like(apart.body)
     return sum_(apart.variable, apart.lo, apart.hi, partial(apart.body, name))
+
+
+def _fold(node: Fold, name: str, start: Term) -> Term:
+    """The state's own slope is stepped beside it, by the chain rule for each number that the state is made of."""
+    apart = _apart(node, (node.variable, node.state), name)
+    assert isinstance(apart, Fold)
+    taken = {name, *apart.free, *apart.body.free, apart.variable, apart.state}
+    numbers, tangents = list[str](), list[Term]()
+    tangent = fresh(f"d{apart.state}", taken)
+    made = _numbers(zero_like(apart), var(tangent), taken | {tangent}, numbers, tangents)
+    opened = substitute(apart.body, {apart.state: made})
+    back = dict(zip(numbers, _numbers_of(made, var(apart.state)), strict=True))
+    slopes = [partial(opened, name)] if name in opened.free else []
+    slopes += [_scaled(partial(opened, z), t, zero_like(opened)) for z, t in zip(numbers, tangents) if z in opened.free]
+    slope = substitute(total(slopes, zero_like(opened)), back)
+    return ZERO if vanishes(slope) and vanishes(start) else dual_fold(apart, tangent, start, slope)
+
+
+def _numbers(shape: Term, tangent: Term, taken: set[str], numbers: list[str], tangents: list[Term]) -> Term:
+    """A state of variables, one for each number that it is made of, and their tangents."""
+    if isinstance(shape, Tuple):
+        below = [proj(tangent, place) for place in range(len(shape.items))]
+        return tuple_(_numbers(s, t, taken, numbers, tangents) for s, t in zip(shape.items, below, strict=True))
+    if shape is not ZERO:
+        raise NotSmooth("the state of a fold has arrays in it")
+    numbers.append(fresh("z", taken))
+    taken.add(numbers[-1])
+    tangents.append(tangent)
+    return var(numbers[-1])
+
+
+def _numbers_of(made: Term, state: Term) -> list[Term]:
+    if isinstance(made, Tuple):
+        return [part for place, item in enumerate(made.items) for part in _numbers_of(item, proj(state, place))]
+    return [state]
 
 
 def _integral(node: Integral, name: str) -> Term:
@@ -302,17 +324,6 @@ def _check_still(node: Integral, name: str) -> None:
 
 
 # Tuples: an integral or a sum may have a tuple for its body
-
-
-def vanishes(term: Term) -> bool:
-    """Whether a number, or each of a tuple, is 0 on all sides of what it depends on."""
-    match term:
-        case Tuple(items=parts):
-            return all(map(vanishes, parts))
-        case Branch(then=then, orelse=orelse) | If(then=then, orelse=orelse):
-            return vanishes(then) and vanishes(orelse)
-        case _:
-            return term is ZERO
 
 
 def total(parts: Sequence[Term], zero: Term) -> Term:

@@ -10,24 +10,29 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from potto.calculus.differentiation import loops
 from potto.calculus.differentiation.boundary_terms import at_bounds, at_surfaces, jumps, scaled
 from potto.calculus.differentiation.deltas import without_deltas, without_leftovers
-from potto.calculus.differentiation.derivative import NotSmooth, partial, total, vanishes, zero_like
+from potto.calculus.differentiation.derivative import NotSmooth, partial, total, zero_like
 from potto.calculus.differentiation.level_sets import level_set, steep, transported
-from potto.calculus.inlining.expand import Resolve, expanded, known_function
+from potto.calculus.inlining.expand import Resolve, expanded, heads_of, known_function
 from potto.calculus.surfaces.case_split import resolved
 from potto.calculus.surfaces.trace import spine
 from potto.core.terms import (
     ONE,
     ZERO,
     App,
+    Array,
     Branch,
     Const,
+    Data,
     Delta,
     Deriv,
+    Fold,
     Global,
     Hole,
     If,
+    Index,
     Integral,
     Lam,
     ListOf,
@@ -43,17 +48,17 @@ from potto.core.terms import (
     children,
     delta,
     deriv,
+    fold,
     fresh,
     if_,
+    index,
     lam,
     list_of,
     mul,
     postorder,
-    postorder_by,
     proj,
     rebuild,
     substitute,
-    sum_,
     tuple_,
     var,
     with_integrand,
@@ -61,6 +66,7 @@ from potto.core.terms import (
 from potto.primitives import PRIMITIVES
 
 Dual = tuple[Term, Term]
+NO_TANGENTS: Mapping[str, Term] = {}
 
 
 def nothing_known(name: Global) -> Term | None:
@@ -159,30 +165,6 @@ class Differentiator:
         return expanded(term, self.resolve, inside.function)
 
 
-def heads_of(term: Term) -> frozenset[str]:
-    """The variables that are functions: those that are applied."""
-    found: set[str] = set()
-    for node in postorder(term):
-        if isinstance(node, App):
-            head = node.function
-            while isinstance(head, Deriv):
-                head = head.function
-            if isinstance(head, Var):
-                found.add(head.name)
-    return frozenset(found)
-
-
-def _outside(root: Term) -> list[Term]:
-    """Every subterm under no binder, children first; of a sum the limits."""
-    return postorder_by(root, _unbound)
-
-
-def _unbound(node: Term) -> tuple[Term, ...]:
-    if isinstance(node, Sum):
-        return node.lo, node.hi
-    return () if isinstance(node, Integral | Lam) else children(node)
-
-
 class _Pass:
     """The duals of all subterms under one set of tangents."""
 
@@ -194,7 +176,7 @@ class _Pass:
 
     def run(self, term: Term) -> Dual:
         self.heads = heads_of(term) | {n for n, t in self.tangents.items() if isinstance(t, Lam | Global | Deriv)}
-        for node in _outside(term):
+        for node in loops.outside_binders(term):
             if node not in self.found:
                 self.found[node] = self.node(node)
         return self.found[term]
@@ -223,8 +205,11 @@ class _Pass:
                 return proj(value, node.index), ZERO if tangent is ZERO else proj(tangent, node.index)
             case App():
                 return self.call(node)
-            case Sum():
-                return self.sum(node)
+            case Sum() | Array() | Fold():
+                return self.loop(node)
+            case Index():
+                (whole, tangent), (place, _) = (self.found[p] for p in parts)
+                return index(whole, place), loops.element_of(tangent, place)
             case Integral():
                 return self.integral(node)
             case Delta() if self.owner.singular and any(self.found[p][1] is not ZERO for p in parts):
@@ -232,7 +217,7 @@ class _Pass:
                     raise NotSmooth("a delta moves")
                 surface, speed = self.found[parts[0]]
                 return delta((surface,)), mul(speed, steep(surface))
-            case Const() | Global() | Lam() | Deriv() | Hole():
+            case Const() | Global() | Lam() | Deriv() | Hole() | Data():
                 return node, ZERO
             case _:
                 return rebuild(node, tuple(self.found[p][0] for p in parts)), ZERO
@@ -350,7 +335,7 @@ class _Pass:
         if isinstance(body, Lam):
             return self.closed(body)
         if self.owner.singular:
-            body = resolved(body)
+            body = resolved(loops.stepped(body))
         value, tangent = self.run(body)
         if self.owner.singular:
             tangent = self.owner.with_deltas(body, tangent, self.tangents)
@@ -358,16 +343,34 @@ class _Pass:
 
     # Binders
 
-    def sum(self, node: Sum) -> Dual:
+    def loop(self, node: Sum | Array | Fold) -> Dual:
+        """Index by index: how often it goes round stands still."""
+        if isinstance(node, Fold):
+            return self.fold(node)
+        ends = tuple(self.found[p][0] for p in loops.parts_below(node))
         body, tangent = self.under(node.body, (node.variable,))
-        lo, hi = self.found[node.lo][0], self.found[node.hi][0]
-        return sum_(node.variable, lo, hi, body), ZERO if tangent is ZERO else sum_(node.variable, lo, hi, tangent)
+        return rebuild(node, (*ends, body)), ZERO if tangent is ZERO else rebuild(node, (*ends, tangent))
 
-    def under(self, body: Term, bound: tuple[str, ...]) -> Dual:
-        return _Pass(self.owner, {n: t for n, t in self.tangents.items() if n not in bound}).run(body)
+    def fold(self, node: Fold) -> Dual:
+        (lo, _), (hi, _), (start, moves) = (self.found[p] for p in loops.parts_below(node))
+        bound = node.variable, node.state
+        taken = {*node.free, *node.body.free, *self.tangents, *(n for t in self.tangents.values() for n in t.free)}
+        name = fresh(f"d{node.state}", taken.union(bound))
+        body, slope = self.under(node.body, bound)
+        still = loops.vanishes(moves) and loops.vanishes(slope)
+        if not still:
+            body, slope = self.under(node.body, bound, {node.state: var(name)})
+        value = fold(node.variable, lo, hi, node.state, start, body)
+        return value, zero_like(value) if still else loops.dual_fold(value, name, moves, slope)
+
+    def under(self, body: Term, bound: tuple[str, ...], more: Mapping[str, Term] = NO_TANGENTS) -> Dual:
+        still = {n: t for n, t in self.tangents.items() if n not in bound}
+        return _Pass(self.owner, {**still, **more}).run(body)
 
     def integral(self, node: Integral) -> Dual:
-        whole = resolved(self.owner.carried_out(node))
+        whole = resolved(loops.stepped(self.owner.carried_out(node)))
+        if isinstance(whole, Integral) and isinstance(whole.body, Array | ListOf):
+            whole = loops.of_integrals(whole)
         if not isinstance(whole, Integral):
             return _Pass(self.owner, self.tangents).run(whole)
         plain = without_leftovers(without_deltas(whole, self.owner.folding))
@@ -389,7 +392,7 @@ class _Pass:
             found = over.standing(plain, rate) if self.owner.frozen else transported(plain, over, rate, slope)
             return plain, total(found, zero_like(plain.body))
         inside = rate(plain.body)
-        parts: list[Term] = [] if vanishes(inside) else [with_integrand(plain, inside)]
+        parts: list[Term] = [] if loops.vanishes(inside) else [with_integrand(plain, inside)]
         if not self.owner.frozen:
             parts += [*at_bounds(plain, rate), *at_surfaces(plain, frozenset(moving), rate, self.owner.folding)]
         return plain, total([p for p in parts if p is not ZERO], zero_like(plain.body))

@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from potto.calculus.differentiation.derivative import NotSmooth
-from potto.calculus.differentiation.dual import Differentiator, heads_of
+from potto.calculus.differentiation.dual import Differentiator
 from potto.calculus.differentiation.level_sets import coefficient
-from potto.calculus.inlining.expand import Resolve, named
+from potto.calculus.inlining.expand import Resolve, heads_of, named
 from potto.calculus.solving.pivots import NoClosedForm
 from potto.core.terms import (
     ZERO,

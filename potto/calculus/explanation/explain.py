@@ -16,11 +16,11 @@ from potto.calculus.checking.guards import unguarded
 from potto.calculus.differentiation.boundary_terms import at_bounds, at_surfaces, jumps
 from potto.calculus.differentiation.deltas import without_deltas
 from potto.calculus.differentiation.derivative import NotSmooth
-from potto.calculus.differentiation.dual import Differentiator, heads_of
+from potto.calculus.differentiation.dual import Differentiator
 from potto.calculus.differentiation.higher_order import moving_deltas
 from potto.calculus.differentiation.level_sets import level_set
 from potto.calculus.explanation.layout import DerivativeText, IntegralText, SurfaceText
-from potto.calculus.inlining.expand import Resolve
+from potto.calculus.inlining.expand import Resolve, heads_of
 from potto.calculus.solving.pivots import NoClosedForm, pivots
 from potto.calculus.solving.solve import factors
 from potto.calculus.surfaces.branch_assignment import branches_of
@@ -160,7 +160,10 @@ def _with_deltas(
     functions: Mapping[str, str],
 ) -> DerivativeText:
     """A function that jumps over its parameters: its derivative is a distribution over what they are filled with."""
-    over = jumps(opened(plain), tangents, lambda t: work.dual(t, tangents)[1])
+    try:
+        over = jumps(opened(plain), tangents, lambda t: work.dual(t, tangents)[1])
+    except NotSmooth as problem:
+        return replace(found, problems=(*found.problems, f"where it jumps has no closed form: {problem}"))
     if not over:
         return found
     smooth = _text(work.dual(plain, tangents)[1], functions)  # calls carried out here too: else they count twice

@@ -14,8 +14,10 @@ from msgspec import Struct
 from potto.calculus.inlining.deciding import deciding
 from potto.calculus.surfaces.discontinuities import Resolve
 from potto.core.terms import (
+    Array,
     Branch,
     Const,
+    Fold,
     Integral,
     Lam,
     Prim,
@@ -115,7 +117,7 @@ def _head(node: Term) -> object:
             return Branch, node.strict, below
         case Integral():
             return Integral, node.variables, tuple(map(len, node.hints))
-        case Lam() | Sum():
+        case Lam() | Sum() | Fold() | Array():
             return type(node), bound_names(node)
         case Proj():
             return Proj, node.index

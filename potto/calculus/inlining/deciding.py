@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from potto.calculus.inlining.currying import fitted, sizes_of, uncurry
 from potto.calculus.surfaces.discontinuities import Resolve, underlying
 from potto.calculus.surfaces.trace import spine
-from potto.core.terms import App, Global, If, Lam, Prim, Sum, Term, postorder
+from potto.core.terms import App, Array, Fold, Global, If, Lam, Length, Prim, Sum, Term, Var, children, postorder
 
 
 def deciding(terms: Iterable[Term], resolve: Resolve, exponents: bool = False) -> frozenset[str]:
@@ -58,8 +58,10 @@ def _names(
         match node:
             case If() if recursive:
                 names |= node.condition.free
-            case Sum():
-                names |= node.lo.free | node.hi.free
+            case Sum() | Fold():
+                names |= _values(node.lo) | _values(node.hi)
+            case Array():
+                names |= _values(node.size)
             case Prim(op="pow") if exponents:
                 names |= node.args[1].free
             case App():
@@ -67,6 +69,14 @@ def _names(
             case _:
                 pass
     return frozenset(names)
+
+
+def _values(term: Term) -> frozenset[str]:
+    """The names whose values a term depends on: of an array of which only the length is asked, not its own."""
+    if not any(isinstance(node, Length) for node in postorder(term)):
+        return term.free
+    parts = postorder(term, below=lambda node: () if isinstance(node, Length) else children(node))
+    return term.free.intersection(node.name for node in parts if isinstance(node, Var))
 
 
 def _given(call: App, known: dict[Lam, frozenset[str]], resolve: Resolve) -> set[str]:

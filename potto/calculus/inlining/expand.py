@@ -1,6 +1,6 @@
 """Calls carried out: a term in which known functions are replaced by what they do.
 
-Owns `expanded`, `Expansion`, `Calls`, `known_function` and `named`.
+Owns `expanded`, `Expansion`, `Calls`, `known_function`, `named` and `heads_of`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Callable
 from potto.calculus.inlining.currying import arguments_of, sizes_of, uncurry
 from potto.calculus.surfaces.trace import spine
 from potto.core.binders import Bound, apart
-from potto.core.terms import App, Deriv, Global, Lam, Proj, Term, children, postorder, proj, rebuild, substitute
+from potto.core.terms import App, Deriv, Global, Lam, Proj, Term, Var, children, postorder, proj, rebuild, substitute
 
 # The term of another definition: its skeleton, or all of it.
 Resolve = Callable[[Global], "Term | None"]
@@ -111,3 +111,16 @@ def named(name: Global, resolve: Resolve) -> Term | None:
             return found
         found = resolve(found)
     return None
+
+
+def heads_of(term: Term) -> frozenset[str]:
+    """The variables that are functions: those that are applied."""
+    found: set[str] = set()
+    for node in postorder(term):
+        if isinstance(node, App):
+            head = node.function
+            while isinstance(head, Deriv):
+                head = head.function
+            if isinstance(head, Var):
+                found.add(head.name)
+    return frozenset(found)

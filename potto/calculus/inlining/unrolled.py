@@ -16,6 +16,7 @@ from potto.core.terms import (
     App,
     Branch,
     Deriv,
+    Fold,
     If,
     Lam,
     Proj,
@@ -93,13 +94,16 @@ class _Unrolling:
         return children(node)
 
     def carried_out(self, node: Term, depth: int, decides: bool) -> Term:
-        """A call as what it does, a sum as its summands where they jump, or decide where something else does."""
+        """A call as what it does, a sum as its summands where they jump, or decide where something else does; a fold
+        whose steps jump as these."""
         if isinstance(node, App):
             return self.applied(node, depth)
         if isinstance(node, Sum) and (
             decides or any(isinstance(part, App | Branch) for part in postorder(node.body))
         ):
             return self.summed(node, depth)
+        if isinstance(node, Fold) and any(isinstance(part, App | Branch) for part in postorder(node.body)):
+            return self.stepped(node, depth)
         return node
 
     def applied(self, call: App, depth: int) -> Term:
@@ -116,8 +120,22 @@ class _Unrolling:
         return self.calls.carried_out(call, function, groups, run)
 
     def summed(self, node: Sum, depth: int) -> Term:
+        numbers = self.numbers(node)
+        if numbers is None:
+            return node
+        return add(*(self.run(substitute(node.body, {node.variable: const(k)}), depth + 1) for k in numbers))
+
+    def stepped(self, node: Fold, depth: int) -> Term:
+        numbers, state = self.numbers(node), node.start
+        if numbers is None:
+            return node
+        for k in numbers:
+            state = self.run(substitute(node.body, {node.variable: const(k), node.state: state}), depth + 1)
+        return state
+
+    def numbers(self, node: Sum | Fold) -> range | None:
+        """What a loop goes through, if that is known and not too much to write out."""
         lo, hi = self.decide(node.lo), self.decide(node.hi)
         if lo is None or hi is None or not hi - lo < MOST_SUMMANDS:
-            return node
-        numbers = range(int(lo), int(hi) + 1)
-        return add(*(self.run(substitute(node.body, {node.variable: const(k)}), depth + 1) for k in numbers))
+            return None
+        return range(int(lo), int(hi) + 1)

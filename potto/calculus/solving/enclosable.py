@@ -12,17 +12,37 @@ from potto.calculus.algebra.degree import value_parts
 from potto.calculus.algebra.ranges import ARITHMETIC, RANGES
 from potto.calculus.differentiation.derivative import NotSmooth, partial
 from potto.core.simplify import simplify
-from potto.core.terms import Branch, Const, If, Prim, Proj, Sum, Term, Var, postorder_by
+from potto.core.terms import (
+    Array,
+    Branch,
+    Const,
+    Data,
+    Fold,
+    If,
+    Index,
+    Length,
+    ListOf,
+    Prim,
+    Proj,
+    Sum,
+    Term,
+    Tuple,
+    Var,
+    postorder_by,
+)
+
+_WRITTEN_OUT = Sum | Fold | Array | Index | Length | ListOf | Tuple | Data
 
 
 def enclosable(term: Term, jumps: bool = False) -> bool:
     """Whether a term can be enclosed: arithmetic and builtins, sums of such, and brackets if it may jump.
 
-    Sums are written out before any number is asked for (`unrolled`), and what plain conditionals decide is decided.
+    Sums, folds and arrays are written out before any number is asked for (`unrolled`), and what plain conditionals
+    decide is decided.
     """
     return all(
-        isinstance(node, Const | Var | Sum | If)
-        or (isinstance(node, Proj) and isinstance(node.term, Proj | Var))
+        isinstance(node, Const | Var | If | _WRITTEN_OUT)
+        or (isinstance(node, Proj) and isinstance(node.term, Proj | Var | Index | Fold))
         or (isinstance(node, Prim) and (node.op in ARITHMETIC or RANGES.knows(node.op)))
         or (jumps and isinstance(node, Branch))
         for node in postorder_by(term, value_parts)

@@ -13,10 +13,13 @@ from msgspec import Struct
 from potto.calculus.algebra.radicals import NAN
 from potto.calculus.algebra.ranges import range_of
 from potto.calculus.algebra.rational_form import as_term, is_zero, normal
-from potto.calculus.differentiation.derivative import partial
+from potto.calculus.differentiation.derivative import NotSmooth, partial
 from potto.core.terms import (
     ONE,
+    ZERO,
+    Array,
     Branch,
+    Fold,
     Integral,
     Lam,
     Sum,
@@ -25,6 +28,7 @@ from potto.core.terms import (
     mul,
     neg,
     postorder,
+    sub,
     substitute,
     transform,
 )
@@ -34,24 +38,47 @@ NOWHERE: Box = {}
 
 
 def branches_of(body: Term, variables: Iterable[str]) -> list[Branch]:
-    """The branches of an integrand that vary with the variables and with nothing bound further in."""
+    """The branches of an integrand that vary with the variables and with nothing bound further in.
+
+    Raises NotSmooth where the state of a fold decides one: it is another surface at each step.
+    """
     names = frozenset(variables)
-    inside: set[str] = set()
+    inside, states = set[str](), set[str]()
     for node in postorder(body):
         if isinstance(node, Integral):
             inside.update(node.variables)
         elif isinstance(node, Lam):
             inside.update(node.params)
-    return [
+        elif isinstance(node, Fold) and not names.isdisjoint(node.free):
+            states.add(node.state)
+    found = [
         node
         for node in postorder(body)
-        if isinstance(node, Branch) and node.surface.free & names and not node.surface.free & inside
+        if isinstance(node, Branch) and node.surface.free & (names | states) and not node.surface.free & inside
     ]
+    if any(not states.isdisjoint(item.surface.free) for item in found):
+        raise NotSmooth("the state of a fold decides a condition in it")
+    return found
 
 
-def summed_over(body: Term, branch_: Branch) -> list[Sum]:
-    """The sums whose index a branch's surface uses: it is one surface for each value."""
-    return [node for node in postorder(body) if isinstance(node, Sum) and node.variable in branch_.surface.free]
+class Loop(Struct, frozen=True):
+    """The index of a sum, a fold or an array, from where to where."""
+
+    variable: str
+    lo: Term
+    hi: Term
+
+
+def loops_over(body: Term, branch_: Branch) -> list[Loop]:
+    """The loops whose index a branch's surface uses, or the bounds of one of them, innermost first: it is one surface
+    for each value."""
+    found, names = list[Loop](), branch_.surface.free
+    for node in postorder(body):
+        if isinstance(node, Sum | Fold | Array) and node.variable in names:
+            ends = (ZERO, sub(node.size, ONE)) if isinstance(node, Array) else (node.lo, node.hi)
+            found.append(Loop(node.variable, *ends))
+            names = names.union(*(end.free for end in ends))
+    return found
 
 
 class Flip(Struct, frozen=True):

@@ -9,8 +9,10 @@ from __future__ import annotations
 from itertools import islice
 
 from potto.core.terms import (
+    Array,
     Branch,
     Delta,
+    Fold,
     If,
     Integral,
     Lam,
@@ -21,7 +23,7 @@ from potto.core.terms import (
     replaced,
 )
 
-BINDERS = (Integral, Sum, Lam)
+BINDERS = (Integral, Sum, Lam, Fold, Array)
 _MOST_PIECES = 16
 
 

@@ -71,6 +71,7 @@ class Semantics:
     conditional: Callable[[Machine, Any, If | Branch, dict[str, Value], tuple[Any, Any]], Value]
     added: Callable[[Machine, tuple[Term, ...], dict[str, Value]], Value]
     sum: Callable[[Machine, Sum, Value, Value, dict[str, Value], Trace | None], Value]
+    culled: Callable[[Machine, Sum, int, int, dict[str, Value]], Value | None]
     array: Callable[[Machine, Array, Value, dict[str, Value]], Value]
     element: Callable[[Value, Value], Value]
     length: Callable[[Machine, Value], Value]

@@ -97,6 +97,7 @@ class Record(Struct):
     shortfalls, edges: why answers are not what was asked for, and where they are one-sided, as masks and numbers over
     the whole of what was asked for, or True and numbers for one.
     within: the error up to which what cancels is 0 as accurately as asked for, of all or of each of the batch.
+    culled: integrals that are 0 for certain, and were not evaluated.
     start, members: how many evaluations had been done before those that count, and for how many members these are.
     """
 
@@ -110,6 +111,7 @@ class Record(Struct):
     start: int = 0
     members: int = 1
     integrals: int = 0
+    culled: int = 0
     used: dict[tuple[str, str], Value] = {}
     costs: Costs | None = field(default_factory=costs.books)
     gauge: Gauge | None = field(default_factory=_begun)

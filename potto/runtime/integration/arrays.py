@@ -90,15 +90,16 @@ def _read(machine: Machine, term: Integral, accesses: tuple[Access, ...], env: E
     for access in accesses:
         value = machine.evaluate(function_of(access.term), {name: env[name] for name in access.term.free}, None)
         if isinstance(value, tuple):
-            parts[access.name] = _named(access.name, value, here)
+            parts[access.name] = in_names(access.name, value, here)
         else:
             here[access.name] = value
     found = substitute(term, parts) if parts else term
     return found, {name: here[name] for name in found.free}
 
 
-def _named(name: str, value: Value, env: Env) -> Term:
+def in_names(name: str, value: Value, env: Env) -> Term:
+    """The term of a value under a name: the parts of a tuple have names of their own, and join the environment."""
     if not isinstance(value, tuple):
         env[name] = value
         return var(name)
-    return tuple_(_named(f"{name}.{place}", item, env) for place, item in enumerate(value))
+    return tuple_(in_names(f"{name}.{place}", item, env) for place, item in enumerate(value))

@@ -1,0 +1,195 @@
+"""Numpy's files: one array (NPY), or a zip file of several (NPZ).
+
+Owns `array_head`, `table_head` for shapes, read from the heads without numpy, and `array_file`, `table_file` for
+values. Nothing is unpickled.
+"""
+
+from __future__ import annotations
+
+import ast
+import io
+import re
+from collections.abc import Callable, Iterator
+from math import prod
+from typing import TYPE_CHECKING, TypeVar
+
+from msgspec import Struct
+
+from potto.data.mistakes import Refused, bad_row, counted, malformed, quoted
+from potto.data.texts import identifiers
+from potto.data.values import DEEPEST, Array, Columns, Number, Sizes, Table
+
+if TYPE_CHECKING:
+    from zipfile import ZipFile, ZipInfo
+
+_MAGIC = b"\x93NUMPY"
+_PICKLE = b"\x80"
+_LONGEST = 10_000  # what numpy, too, takes for the longest head
+_REAL = re.compile(r"[<>|=]?(?:b1|[iu][1248]|f(?:2|4|8|12|16))")
+_ODD = {"c": "complex numbers", "U": "texts", "S": "texts", "M": "dates", "m": "durations", "V": "records"}
+_SAVE = "save it as an array of real numbers: `numpy.save(path, array.astype(float))`"
+_SAVE_MANY = "save arrays of real numbers by their names: `numpy.savez(path, x=x, y=y)`"
+_T = TypeVar("_T")
+
+
+class _Head(Struct, frozen=True):
+    """What the head of an array says, and where its numbers start."""
+
+    dtype: str
+    fortran: bool
+    dimensions: tuple[int, ...]
+    start: int
+
+    @property
+    def end(self) -> int:
+        """How many bytes the array has, its head included."""
+        return self.start + prod(self.dimensions) * int(self.dtype.lstrip("<>|=")[1:])
+
+
+def array_head(content: bytes) -> Number | Sizes:
+    """The shape of an NPY file."""
+    return _shape(_checked(content, len(content)))
+
+
+def array_file(content: bytes) -> float | Array:
+    """The value of an NPY file."""
+    return _array(content)
+
+
+def table_head(content: bytes) -> Columns:
+    """The shape of an NPZ file."""
+
+    def head(archive: ZipFile, entry: ZipInfo) -> Number | Sizes:
+        with archive.open(entry) as file:
+            return _shape(_checked(file.read(_LONGEST + 12), entry.file_size))
+
+    return Columns(tuple(_entries(content, head)))
+
+
+def table_file(content: bytes) -> Table:
+    """The value of an NPZ file."""
+    return Table(tuple(_entries(content, lambda archive, entry: _array(archive.read(entry)))))
+
+
+def _entries(content: bytes, read: Callable[[ZipFile, ZipInfo], _T]) -> Iterator[tuple[str, _T]]:
+    import zipfile  # 3 ms, and most files are none
+    import zlib
+
+    broken = (zipfile.BadZipFile, ValueError, OSError, NotImplementedError)
+    try:
+        archive = zipfile.ZipFile(io.BytesIO(content))
+        entries = archive.infolist()
+    except broken as error:
+        raise malformed(f"the file is no NPZ file: {_said(error)}", hint=_SAVE_MANY) from None
+    if not entries:
+        raise malformed("the file holds no arrays", hint=_SAVE_MANY)
+    for entry in entries:
+        if not entry.filename.endswith(".npy"):
+            raise malformed(f"{quoted(entry.filename)} within the file is no array", hint=_SAVE_MANY)
+    names = [entry.filename.removesuffix(".npy") for entry in entries]
+    for written, name, entry in zip(names, identifiers(names), entries):
+        try:
+            yield name, read(archive, entry)
+        except Refused as refused:
+            raise _within(written, refused) from None
+        except (*broken, zlib.error, EOFError, RuntimeError) as error:
+            raise malformed(f"the array {quoted(written)} can't be read: {_said(error)}", hint=_SAVE_MANY) from None
+
+
+def _within(name: str, refused: Refused) -> Refused:
+    mistake = refused.mistake
+    message = f"{quoted(name)}: {mistake.message}"
+    if mistake.row is not None:
+        return bad_row(message, mistake.row, mistake.column, mistake.found, mistake.expected, mistake.hint)
+    return malformed(message, found=mistake.found, hint=mistake.hint)
+
+
+def _said(error: Exception) -> str:
+    """What a library says about bytes, as the end of a sentence."""
+    said = str(error) or type(error).__name__
+    return said[:1].lower() + said[1:]
+
+
+def _checked(content: bytes, length: int) -> _Head:
+    """The head of an array of real numbers that is `length` bytes long, or has that many at least."""
+    head = _head(content)
+    if head.end > length:
+        message = f"the file ends too early: it has {length} bytes where its head promises {head.end}"
+        raise malformed(message, hint="write the file again")
+    if len(head.dimensions) > DEEPEST:
+        raise malformed(f"the array has {len(head.dimensions)} dimensions; there may be {DEEPEST}")
+    if 0 in head.dimensions:
+        raise malformed(f"the array holds no values: its shape is {head.dimensions}")
+    return head
+
+
+def _head(content: bytes) -> _Head:
+    if not content:
+        raise malformed("the file is empty", hint=_SAVE)
+    if content.startswith(_PICKLE):
+        raise _pickled()
+    if not content.startswith(_MAGIC) or len(content) < 12:
+        raise malformed("the file is no NPY file: it does not start as one", hint=_SAVE)
+    if content[6] not in (1, 2, 3):
+        raise malformed(f"the file is of version {content[6]} of NPY, which is not known", hint=_SAVE)
+    wide = 2 if content[6] == 1 else 4
+    start = 8 + wide + int.from_bytes(content[8 : 8 + wide], "little")
+    broken = malformed("the head of the NPY file is broken", hint="write the file again")
+    if start > _LONGEST + 12:
+        raise malformed(f"the head of the NPY file is too long: {counted(start, 'byte')}", hint=_SAVE)
+    try:
+        head = ast.literal_eval(content[8 + wide : start].decode("latin-1" if content[6] < 3 else "utf-8").strip())
+        dtype, fortran, dimensions = head["descr"], head["fortran_order"], head["shape"]
+    except (ValueError, SyntaxError, TypeError, KeyError, MemoryError, RecursionError):
+        raise broken from None
+    if not isinstance(dimensions, tuple) or not all(type(n) is int and n >= 0 for n in dimensions):
+        raise broken
+    if len(content) < start or type(fortran) is not bool:
+        raise broken
+    return _Head(_real(dtype), fortran, dimensions, start)
+
+
+def _real(dtype: object) -> str:
+    """The type of the entries, if they are real numbers."""
+    if isinstance(dtype, str) and _REAL.fullmatch(dtype):
+        return dtype
+    kind = dtype.lstrip("<>|=")[:1] if isinstance(dtype, str) else "V"
+    if kind == "O":
+        raise _pickled()
+    found = _ODD.get(kind, "values of a kind that is not known")
+    raise malformed(f"the array holds {found}, not real numbers", found=str(dtype), hint=_SAVE)
+
+
+def _pickled() -> Refused:
+    message = "the file holds Python objects (a pickle); it is not read, since reading it could run any program"
+    return malformed(message, found="pickle", hint=_SAVE)
+
+
+def _shape(head: _Head) -> Number | Sizes:
+    return Sizes(head.dimensions) if head.dimensions else Number()
+
+
+def _array(content: bytes) -> float | Array:
+    import numpy as np
+
+    head = _checked(content, len(content))
+    try:
+        dtype = np.dtype(head.dtype)
+    except TypeError:
+        raise malformed(f"numbers of the type {head.dtype} are not known on this machine", hint=_SAVE) from None
+    read = np.frombuffer(content, dtype, prod(head.dimensions), head.start)
+    with np.errstate(over="ignore", invalid="ignore"):
+        shaped = read.reshape(head.dimensions, order="F" if head.fortran else "C")
+        found = np.require(shaped, np.float64, ["C", "A"])  # heads of files need not leave the numbers aligned
+    if not np.isfinite(found).all():
+        at = np.argwhere(~np.isfinite(found.reshape(head.dimensions)))[0].tolist() if head.dimensions else []
+        raise _infinite(tuple(at), str(found.reshape(head.dimensions)[tuple(at)]))
+    return Array(head.dimensions, Number(), found) if head.dimensions else float(found.reshape(()))
+
+
+def _infinite(at: tuple[int, ...], found: str) -> Refused:
+    row, column = (*(index + 1 for index in at[:2]), None, None)[:2]
+    ways = ("the number", f"row {row}", f"row {row}, column {column}")
+    where = ways[len(at)] if len(at) < len(ways) else f"entry {list(at)}, counted from 0"
+    hint = "leave out what has no finite value before the array is saved"
+    return bad_row(f"{where}: {found} is not finite", row, column, found, "a number", hint)

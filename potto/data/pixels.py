@@ -1,0 +1,131 @@
+"""Pictures: PNG and JPEG as arrays of light, from 0 to 1.
+
+Owns `picture_head`, which finds sizes in the bytes, and `picture`, which needs Pillow for all but colours of 16 bits:
+of those Pillow keeps 8, which is what interlaced ones are left with. A grey picture is an array of numbers, a coloured
+one of rows of three. Transparency is dropped, palettes are looked up; pixels stay as they are stored, whatever a note
+in the file says about how to turn them.
+"""
+
+from __future__ import annotations
+
+import io
+import struct
+from typing import TYPE_CHECKING, Any
+
+from msgspec import Struct
+
+from potto.data.mistakes import NO_PACKAGE, DataMistake, Refused, malformed
+from potto.data.scanlines import CHANNELS, deep
+from potto.data.values import Array, Item, Number, Row, Sizes
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+_PNG, _JPEG = b"\x89PNG\r\n\x1a\n", b"\xff\xd8"
+_GREY, _GREY_ALPHA = 0, 4  # colour types of PNG
+# The segments of JPEG that tell sizes: start of frame, but not those of tables, which lie between.
+_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+_BARE = frozenset({0x01, *range(0xD0, 0xD9)})  # segments without a length
+_AGAIN = "write the picture again as PNG or JPEG"
+
+
+class _Head(Struct, frozen=True):
+    """Sizes, whether there are colours, and the colour type of a PNG whose values Pillow would cut to 8 bits."""
+
+    height: int
+    width: int
+    coloured: bool
+    deep: int | None = None
+
+    @property
+    def item(self) -> Item:
+        return Row(3) if self.coloured else Number()
+
+
+def picture_head(content: bytes) -> Sizes:
+    """The shape of a picture."""
+    head = _head(content)
+    return Sizes((head.height, head.width), head.item)
+
+
+def picture(content: bytes) -> Array:
+    """The pixels of a picture, row by row from the top."""
+    head = _head(content)
+    numbers = _pixels(content, head) if head.deep is None else _deep(content, head, head.deep)
+    return Array((head.height, head.width), head.item, numbers)
+
+
+def _head(content: bytes) -> _Head:
+    if not content:
+        raise malformed("the file is empty", hint=_AGAIN)
+    if content.startswith(_PNG):
+        head = _png(content)
+    elif content.startswith(_JPEG):
+        head = _jpeg(content)
+    else:
+        raise malformed("the file is neither PNG nor JPEG: it does not start as one", hint=_AGAIN)
+    if not head.height or not head.width:
+        raise malformed(f"the picture has no pixels: it is {head.width} x {head.height}", hint=_AGAIN)
+    return head
+
+
+def _png(content: bytes) -> _Head:
+    if content[12:16] != b"IHDR" or len(content) < 33:
+        raise malformed("the head of the PNG file is broken", hint=_AGAIN)
+    width, height, depth, colour, interlaced = struct.unpack(">IIBBxxB", content[16:29])
+    deep = colour if depth == 16 and colour in CHANNELS and not interlaced else None
+    return _Head(height, width, colour not in (_GREY, _GREY_ALPHA), deep)
+
+
+def _jpeg(content: bytes) -> _Head:
+    at = 2
+    while at + 4 <= len(content) and content[at] == 0xFF:
+        mark = content[at + 1]
+        if mark == 0xFF or mark in _BARE:  # filling, or nothing but a mark
+            at += 1 if mark == 0xFF else 2
+            continue
+        if mark in _FRAMES and at + 10 <= len(content):
+            height, width, channels = struct.unpack(">HHB", content[at + 5 : at + 10])
+            return _Head(height, width, channels > 1)
+        at += 2 + struct.unpack(">H", content[at + 2 : at + 4])[0]
+    raise malformed("the JPEG file does not say how large the picture is", hint=_AGAIN)
+
+
+def _pixels(content: bytes, head: _Head) -> npt.NDArray[np.float64]:
+    import numpy as np
+
+    try:
+        from PIL import Image
+    except ImportError:
+        raise Refused(_without_pillow()) from None
+    try:
+        with Image.open(io.BytesIO(content), formats=("PNG", "JPEG")) as image:
+            plain = _converted(image, head)
+            largest = 65535.0 if plain.mode.startswith("I") else 255.0
+            found = np.ascontiguousarray(plain, np.float64)
+    except (OSError, SyntaxError, ValueError, EOFError, struct.error, Image.DecompressionBombError) as error:
+        raise malformed(f"the picture can't be read: {error}", hint=_AGAIN) from None
+    if found.size != head.height * head.width * (3 if head.coloured else 1):
+        raise malformed("the picture is not as large as its head says", hint=_AGAIN)
+    found /= largest
+    return found
+
+
+def _deep(content: bytes, head: _Head, colour: int) -> npt.NDArray[np.float64]:
+    import numpy as np
+
+    channels = deep(content, head.height, head.width, colour)
+    return np.ascontiguousarray(channels[:, :, : 3 if head.coloured else 1] / 65535.0)
+
+
+def _converted(image: Any, head: _Head) -> Any:
+    """The picture in one of three modes: colours, grey, grey of 16 bits."""
+    if head.coloured:
+        return image.convert("RGB")
+    return image if image.mode.startswith("I") else image.convert("L")
+
+
+def _without_pillow() -> DataMistake:
+    message = "to read pictures takes Pillow, which is not installed"
+    return DataMistake(NO_PACKAGE, message, expected="Pillow", hint="pip install 'potto[images]'")

@@ -1,0 +1,205 @@
+"""A sum of integrals in which most summands are nothing for most members: those that may be something are evaluated.
+
+Owns `culled`. What is left is one batch of pairs, a member and a summand each; its answers are added up by members.
+"""
+
+from __future__ import annotations
+
+import operator
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from msgspec import Struct
+
+from potto.calculus.inlining.arrays import Access, hoisted, inlined, loops, summands
+from potto.calculus.inlining.expand import expanded
+from potto.core.terms import Index, Integral, Prim, Sum, Term, Var, function_of, lam, outside, substitute
+from potto.diagnostics import PottoError
+from potto.integrate.decomposition.culling import Pairs, culls, remaining
+from potto.integrate.pieces import still
+from potto.kernels.cells import Array, Cell, Ints, Rows, Value, all_arrays, combined, map_arrays, map_cells
+from potto.kernels.making import making
+from potto.kernels.tape import Edge, Node
+from potto.kernels.whole import UNIT_ROUNDOFF
+from potto.runtime.answers.convergence import merged, widest
+from potto.runtime.evaluation.functions import Closure
+from potto.runtime.evaluation.machine import Machine
+from potto.runtime.evaluation.reach import Reach
+from potto.runtime.integration.arrays import holds, in_names
+from potto.runtime.integration.preparation import filled
+
+FEW = 512  # pairs, up to which all are evaluated
+PAIRS = 1 << 17  # evaluated together
+SUM = 8 * UNIT_ROUNDOFF
+
+Env = dict[str, Value]
+
+
+def culled(machine: Machine, term: Sum, first: int, last: int, env: Env) -> Value | None:
+    """The sum over the pairs that may be something; None where that cannot be told, or is most of them."""
+    shape = np.broadcast_shapes(*(a.shape for value in env.values() for a in all_arrays(value)))
+    members, count = int(np.prod(shape)), last - first + 1
+    if not machine.root or members * count < FEW or machine.costs is not None:
+        return None
+    integral = _integral(term.body, machine.linker.reach)
+    if integral is None:
+        return None
+    try:
+        pairs = _pairs(machine, term, integral, np.arange(first, last + 1, dtype=float), env, shape)
+    except PottoError:  # as it is evaluated, it says what is wrong, and where
+        return None
+    if pairs is None or pairs.members.size > members * count // 2:
+        return None
+    machine.record.culled += members * count - pairs.members.size
+    return _added(machine, term, pairs, first, env, shape)
+
+
+@lru_cache(maxsize=1024)
+def _integral(body: Term, reach: Reach) -> Integral | None:
+    """The integral that a summand is in proportion to."""
+    if not isinstance(body, Integral) and Integral in reach.kinds(body):
+        body = expanded(body, reach.resolve)
+    while isinstance(body, Prim) and body.op in ("mul", "neg", "div"):
+        inner = [arg for arg in body.args if any(isinstance(n, Integral) for n in outside(arg, (Integral,)))]
+        if len(inner) != 1 or (body.op == "div" and inner[0] is not body.args[0]):
+            return None
+        (body,) = inner
+    return body if isinstance(body, Integral) else None
+
+
+class _Open(Struct, frozen=True):
+    """An integral of numbers, and what these are beside it."""
+
+    term: Integral
+    accesses: tuple[Access, ...]
+
+
+@lru_cache(maxsize=1024)
+def _opened(term: Integral, arrays: frozenset[str], reach: Reach) -> _Open | None:
+    found = summands(inlined(term, lambda name: Index in reach.kinds(name), reach.resolve, arrays))
+    if not isinstance(found, Integral) or loops(found):
+        return None
+    found, accesses = hoisted(found)
+    whole = expanded(found, reach.resolve)
+    assert isinstance(whole, Integral)
+    return _Open(whole, accesses) if culls(whole) else None
+
+
+def _pairs(
+    machine: Machine, term: Sum, integral: Integral, places: Array, env: Env, shape: tuple[int, ...]
+) -> Pairs | None:
+    variable = term.variable
+    here = {name: still(env[name]) for name in integral.free if name != variable}
+    integral, here = filled(integral, {**here, variable: Cell(0.0)}, machine.linker.reach)
+    arrays = frozenset(name for name, value in here.items() if holds(value))
+    with making:
+        opened = _opened(integral, arrays, machine.linker.reach)
+    if opened is None:
+        return None
+    here[variable] = Cell(places)
+    members: dict[str, Any] = {}
+    others: dict[str, Any] = {}
+    shared: dict[str, Any] = {}
+    parts: dict[str, Term] = {}
+    quiet = machine.with_directions(0).apart()
+    for name in sorted(opened.term.free):
+        access = next((a.term for a in opened.accesses if a.name == name), None)
+        needs = frozenset((name,)) if access is None else access.free
+        given = {n: here[n] for n in needs}
+        wide = any(all_arrays(given[n]) for n in needs if n != variable)
+        if wide and variable in needs:
+            return None
+        value = here[name] if access is None else quiet.evaluate(function_of(access), given, None)
+        if isinstance(value, Closure | Rows | list):
+            return None
+        found: Env = {}
+        parts[name] = in_names(name, value, found)
+        into = others if variable in needs else members if wide else shared
+        for own, cell in found.items():
+            if not isinstance(cell, Cell):
+                return None
+            size = (places.size,) if into is others else shape
+            wanted = np.asarray(cell.v, dtype=float)
+            into[own] = float(wanted) if into is shared else np.broadcast_to(wanted, size).reshape(-1)
+    found_term = substitute(opened.term, {name: part for name, part in parts.items() if not isinstance(part, Var)})
+    assert isinstance(found_term, Integral)
+    return remaining(found_term, members, others, shared, (int(np.prod(shape)), places.size))
+
+
+def _added(machine: Machine, term: Sum, pairs: Pairs, first: int, env: Env, shape: tuple[int, ...]) -> Value | None:
+    """The answers for pairs, added up by members."""
+    params = tuple(sorted(term.body.free | {term.variable}))
+    body, size = lam(params, term.body), int(np.prod(shape))
+    order = np.argsort(pairs.members, kind="stable")
+    whole: Value | None = None
+    for start in range(0, max(1, order.size), PAIRS):
+        chosen = order[start : start + PAIRS]
+        at, those = pairs.members[chosen], pairs.summands[chosen]
+        if not chosen.size:
+            at, those = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
+
+        def picked(a: Any, at: Ints = at) -> Any:
+            return np.broadcast_to(a, shape).reshape(-1)[at] if not isinstance(a, Node) else _rows(a, shape, at)
+
+        here = {name: map_arrays(env[name], picked) for name in params if name != term.variable}
+        here[term.variable] = Cell(first + those.astype(float), None, (None,) * machine.directions)
+        value = _evaluated(machine, body, here, at, size, shape)
+        part = map_cells(value, lambda cell, at=at: _summed(cell, at, size, shape))  # type: ignore[misc]
+        whole = part if whole is None else _plus(whole, part)
+    return whole
+
+
+def _rows(node: Node, shape: tuple[int, ...], at: Ints) -> Any:
+    flat = np.reshape(np.broadcast_to(node, shape), (-1,))
+    return flat[at]
+
+
+def _evaluated(machine: Machine, body: Any, here: Env, at: Ints, size: int, shape: tuple[int, ...]) -> Value:
+    """The answers for pairs; what there is to be said of one is said of its member."""
+    record = machine.record
+    kept = record.shortfalls, record.within
+    record.shortfalls, record.within = {}, 0.0
+    try:
+        value = machine.run(body, [here[name] for name in body.params], None)
+        told, within = record.shortfalls, record.within
+    finally:
+        record.shortfalls, record.within = kept
+    for why, where in told.items():
+        mask = np.zeros(size, dtype=bool)
+        mask[at[np.broadcast_to(where, at.shape)]] = True
+        merged(record.shortfalls, {why: mask.reshape(shape) if shape else bool(mask.any())})
+    if np.ndim(within):
+        most = np.zeros(size)
+        np.maximum.at(most, at, np.broadcast_to(within, at.shape))
+        within = most.reshape(shape) if shape else float(most[0])
+    record.within = widest(record.within, within)
+    return value
+
+
+def _summed(cell: Cell, at: Ints, size: int, shape: tuple[int, ...]) -> Cell:
+    def total(part: Any) -> Any:
+        if part is None:
+            return None
+        if isinstance(part, Node):
+            return _total(part, at, size, shape)
+        found = np.bincount(at, np.broadcast_to(part, at.shape), size)
+        return found.reshape(shape) if shape else float(found[0])
+
+    off = SUM * np.abs(cell.v) + (0.0 if cell.e is None else cell.e)
+    return Cell(total(cell.v), total(off), tuple(map(total, cell.t)), tuple(map(total, cell.et)))
+
+
+def _total(node: Node, at: Ints, size: int, shape: tuple[int, ...]) -> Node:
+    """Members of a node added up at places; going back, each gets what its place has."""
+    node = np.broadcast_to(node, at.shape)  # type: ignore[assignment]
+
+    def pull(adjoint: Any) -> Any:
+        return np.broadcast_to(adjoint, shape).reshape(-1)[at] if shape else np.broadcast_to(adjoint, at.shape)
+
+    return Node((Edge(node, pull=pull),), shape)
+
+
+def _plus(a: Value, b: Value) -> Value:
+    return combined(operator.add, a, b)
+

@@ -1,0 +1,80 @@
+"""JSON: what the standard library writes is read, and places are told by path and line."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+from data_files import mistake, plain
+from hypothesis import given
+from hypothesis import strategies as st
+
+reals = st.floats(allow_nan=False, allow_infinity=False)
+numbers = st.one_of(reals, st.integers(-(2**53), 2**53))
+
+
+def box(dimensions: tuple[int, ...]) -> st.SearchStrategy[Any]:
+    found: st.SearchStrategy[Any] = numbers
+    for length in reversed(dimensions):
+        found = st.lists(found, min_size=length, max_size=length)
+    return found
+
+
+boxes = st.lists(st.integers(1, 3), max_size=4).map(tuple).flatmap(box)
+
+
+@given(boxes, st.sampled_from([None, 1]))
+def test_what_is_written_is_read(data: Any, indent: int | None) -> None:
+    assert plain("d.json", json.dumps(data, indent=indent)) == data
+
+
+@given(st.dictionaries(st.sampled_from("abcdef"), boxes, min_size=1))
+def test_objects_are_columns(data: dict[str, Any]) -> None:
+    found = plain("d.json", json.dumps(data))
+    assert found == data and list(found) == list(data)
+
+
+@given(st.recursive(st.one_of(numbers, st.none(), st.booleans(), st.text(max_size=2)),
+                    lambda inner: st.one_of(st.lists(inner, max_size=3), st.dictionaries(st.text(max_size=2), inner))))
+def test_any_json_is_answered(data: Any) -> None:  # fmt: skip
+    from pathlib import Path
+
+    from potto.data import shape_of
+
+    shape_of(Path("d.json"), json.dumps(data, indent=1).encode())
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "row", "column", "message"),
+    [
+        ("[1,\n2,\nNaN]", "P0803", 3, 3, "line 3, `[2]`: nan is not finite"),
+        ("-Infinity", "P0803", 1, None, "line 1: -inf is not finite"),
+        ('{"a": [[1, 2],\n[3, 1e999]]}', "P0803", 2, 2, "line 2, `a[1][1]`: inf is not finite"),
+        ("[[1, 2],\n [3]]", "P0803", 2, 2, "line 2, `[1]`: the list has 1, but those before it have 2 values"),
+        ("[[1], 2]", "P0803", 1, 2, "line 1, `[1]`: a number stands among lists"),
+        ("[1,\n [2]]", "P0803", 2, 2, "line 2, `[1]`: a list stands among numbers"),
+        ('[1, "x, ]"]', "P0803", 1, 2, "line 1, `[1]`: `x, ]` is a text, not a number"),
+        ("[true]", "P0803", 1, 1, "line 1, `[0]`: this is true or false, not a number"),
+        ('{"x": 1,\n"y": null}', "P0803", 2, None, "line 2, `y`: this is null, not a number"),
+        ('[{"x": 1}]', "P0803", 1, 1, "line 1, `[0]`: this is an object, not a number"),
+        ('{"x": {"y": 1}}', "P0803", 1, None, "line 1, `x`: this is an object, not a number"),
+        ('{"x": [1], "y": [[]]}', "P0803", 1, 1, "line 1, `y[0]`: the list is empty"),
+        ("[]", "P0803", 1, None, "line 1: the list is empty"),
+        ("{}", "P0805", None, None, "the file holds no values: its object is empty"),
+        ('{"x": 1, "x": 2}', "P0805", None, None, "an object has the name `x` twice"),
+        ("[1,\n2,]", "P0805", 2, None, "line 2 is no JSON: "),
+        (" \n", "P0805", None, None, "the file holds no values"),
+        ("[" * 40 + "1" + "]" * 40, "P0805", None, None, "lists are nested more than 32 deep"),
+        ("[" * 100_000, "P0805", None, None, "lists are nested more than 32 deep"),
+    ],
+)
+def test_mistakes(text: str, code: str, row: int | None, column: int | None, message: str) -> None:
+    found = mistake("d.json", text)
+    assert (found.code, found.row, found.column) == (code, row, column)
+    assert found.message.startswith(message)
+
+
+def test_large_whole_numbers() -> None:
+    assert plain("d.json", "[1" + "0" * 300 + ", 2]") == [1e300, 2.0]
+    assert mistake("d.json", "1" + "0" * 5000).message == "line 1: inf is not finite"

@@ -1,0 +1,115 @@
+"""Types of arrays: sizes as they are inferred and printed, and what is said of them."""
+
+from __future__ import annotations
+
+import pytest
+from marks import check, only, type_of
+
+TYPES = [
+    ("def f(xs: [n] Real) sum i in 0..n-1 (xs[i])", "(xs: [n] Real) -> Real"),
+    ("def f(xs) sum x in xs (x^2)", "(xs: [n] Real*) -> Real"),
+    ("def f(xs, i) xs[i] + 1", "(xs: [n] Real*, i: Real) -> Real"),
+    ("def f(xs, i, j) xs[i, j] + 1", "(xs: [n, m] Real*, i: Real, j: Real) -> Real"),
+    ("k = [1, 2, 3]", "[3] Real"),
+    ("k = [[1, 2], [3, 4], [5, 6]]", "[3, 2] Real"),
+    ("k = [(1, 2), (3, 4)]", "[2] (Real, Real)"),
+    ("k = [i*j for i in 0..3, j in 1..2]", "[4, 2] Real"),
+    ("def f(n) [i^2 for i in 0..n-1]", "(n: Real) -> [_] Real"),
+    ("def f(xs: [n] Real) [xs[i + 1] - xs[i] for i in 0..n-2]", "(xs: [n] Real) -> [n - 1] Real"),
+    ("def f(xs: [n] Real) [x for x in xs]", "(xs: [n] Real) -> [n] Real"),
+    ("def f(xs) [2*xs[i] for i in 0..len(xs)-1]", "(xs: [n] Real*) -> [n] Real"),
+    ("def f(u: [n] Real, v: [m] Real) [u[i]*v[j] for i in 0..n-1, j in 0..m-1]",
+     "(u: [n] Real, v: [m] Real) -> [n, m] Real"),
+    ("def f(u: (Real*, Real*), v) 2*u + v", "(u: (Real*, Real*), v: (Real*, Real*)) -> (Real, Real)"),
+    ("def f(u: [3] Real*) -u/2", "(u: [3] Real*) -> [3] Real"),
+    ("def f(u, v) dot(u, v)", "(u: [n] Real*, v: [n] Real*) -> Real"),
+    ("def f(v) cross((1, 2, 3), v)", "(v: (Real*, Real*, Real*)) -> (Real, Real, Real)"),
+    ("def f(x, n) fold s = x for i in 1..n (s/2 + i)", "(x: Real*, n: Real) -> Real"),
+    ("def f(n) fold (x, v) = (1, 0) for i in 1..n ((x + v, v - x))", "(n: Real) -> (Real, Real)"),
+    ("def f(t) integral [0, 1] [x, x*t] d(x)", "(t: Real) -> [2] Real"),
+    ("def f(ts) integral [0, 1] sum t in ts ([x < t]) d(x)", "(ts: [n] Real) -> Real"),
+    ("def g(xs) sum x in xs (x)\nf = deriv(g)", "(dxs: ([n] Real*, [n] Real*)) -> (Real, Real)"),
+    ("def g(xs) [x^2 for x in xs]\nf = deriv(g)", "(dxs: ([n] Real*, [n] Real*)) -> ([n] Real, [n] Real)"),
+    ("p = (1, 2)\ndef f(q: (Real*, Real*)) p.x*q.y + q.0", "(q: (Real*, Real*)) -> Real"),
+    ("def f(ps: [n] (Real*, Real*)) sum p in ps (p.x*p.y)", "(ps: [n] (Real*, Real*)) -> Real"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "expected"), TYPES, ids=[text for text, _ in TYPES])
+def test_types(text: str, expected: str) -> None:
+    assert type_of(text, "k" if text.startswith("k") else "f") == expected
+
+
+def test_sizes_that_do_not_agree() -> None:
+    check("""
+        def f(u: (Real, Real)) u + (1, 2, 3)
+        #                        ^ error[P0326]: but the left has 2 and the right 3
+        k = [1, 2] - [1, 2, 3, 4]
+        #          ^ error[P0326]: but the left has 2 and the right 4
+        def g(u: [3] Real) dot(u, [1, 2])
+        #                  ^^^^^^^^^^^^^^ error[P0326]: these are `[3] Real` and `[2] Real`
+        def h(x) cross((1, 2), (x, 2, 3))
+        #              ^^^^^^ error[P0326]: `cross` takes vectors of three numbers
+        def two(xs: [2] Real) xs[0] + xs[1]
+        l = two([1, 2, 3])
+        #       ^^^^^^^^^ error[P0306]: must be `[2] Real`, but this is `[3] Real`
+        m = [[1, 2], [3]]
+        #            ^^^ error[P0306]: must be `[2] Real`, but this is `[1] Real`
+    """)
+
+
+def test_indices() -> None:
+    check("""
+        k = [1, 2, 3]
+        l = k[3]
+        #     ^ error[P0328]: the index 3 is out of range: the array has 3 elements
+        m = k[-1]
+        #     ^^ error[P0328]: the index -1 is out of range
+        def f(g) g(1) + g[0]
+        #               ^ error[P0329]: only an array has elements, but this is a function
+        def h(x) (x, 2)[0]
+        #        ^^^^^^ error[P0329]: only an array has elements, but this is a tuple of 2
+        n = 4
+        i = sum i in n (i)
+        #            ^ error[P0329]: a sum goes through an array or a range
+        def j(t) integral [0, 1] k[x] d(x)
+        #                          ^ error[P0301]: this index depends on the variable of integration `x`
+        def o(t) integral [0, 3] sum i in 0..x (k[i]) d(x)
+        #                                    ^ error[P0303]: this bound of a sum depends on
+    """)
+
+
+def test_an_index_inside_of_another_definition_must_not_vary() -> None:
+    check("""
+        def at(xs, i) xs[i]
+        def f(t) integral [0, 3] at([1, 2, t], x) d(x)
+        #                                      ^ error[P0301]: `at` takes an index from its parameter `i`
+    """)
+
+
+def test_parts() -> None:
+    check("""
+        def f(u: (Real, Real)) u.z
+        #                        ^ error[P0327]: a tuple of 2 has no part `.z`
+        def g(xs: [3] Real) (xs).focal
+        #                        ^^^^^ error[P0327]: this is an array of 3, which has no part `.focal`
+        def h(u: (Real, Real)) (u + u).2
+        #                              ^ error[P0327]: a tuple of 2 has no part `.2`
+    """)
+
+
+def test_a_fold_keeps_the_form_of_its_state() -> None:
+    check("""
+        def f(n) fold s = 0 for i in 1..n ((s, i))
+        #                                  ^^^^^^ error[P0306]: must be `Real`, but this is `(Real, Real)`
+        def g(n) fold (a, b) = 1 for i in 1..n ((a, b))
+        #                      ^ error[P0306]: 2 names are bound here, but the state is a number
+    """)
+
+
+def test_an_array_has_no_power() -> None:
+    assert "take one of its elements" in only("def f(xs: [n] Real) xs^2").help
+
+
+def test_a_call_of_an_array_is_an_index_meant() -> None:
+    assert only("xs = [1, 2]\nk = xs(0)").help == "an element of an array is written with brackets: `xs[i]`"

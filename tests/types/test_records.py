@@ -1,0 +1,79 @@
+"""Records: their types, what is said of wrong ones, and what varies in them, field by field."""
+
+from __future__ import annotations
+
+import pytest
+from marks import FOLDER, check, database
+
+from potto.types import derivative_type, format_type, interface
+
+MAIN = FOLDER + "main.po"
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("def f(c: Camera) c.focal", "(c: Camera) -> Real"),
+        ("def f(c: Camera) c.eye", "(c: Camera) -> Vec"),
+        ("def f(t) Camera(Vec(t, 1), 2)", "(t: Real*) -> Camera"),
+        ("def f(t) Camera(focal=2, eye=Vec(t, 1))", "(t: Real*) -> Camera"),
+        ("def f(c: Camera, t) c with focal = t", "(c: Camera, t: Real*) -> Camera"),
+        ("def f(cs: [n] Camera) cs[0].eye.x", "(cs: [n] Camera) -> Real"),
+        ("def f(c: Camera, d: Camera) [c, d]", "(c: Camera, d: Camera) -> [2] Camera"),
+        ("f = Camera", "(eye: Vec, focal: Real*) -> Camera"),
+        ("def f(c: (Camera, Real)) fst(c).focal", "(c: (Camera, Real)) -> Real"),
+        ("f = deriv(\\(c: Camera) . c.focal)", "(dc: (Camera, Camera)) -> (Real, Real)"),
+    ],
+)
+def test_types(text, expected):
+    db = database(f"record Vec(x: Real, y: Real)\nrecord Camera(eye: Vec, focal: Real)\n{text}")
+    assert format_type(interface(db, MAIN, "f").type) == expected
+
+
+def test_a_size_in_a_record():
+    db = database("record Mesh(xs: [n] Real, h: Real)\ndef f(m: Mesh, k: Mesh) m.xs[0] + k.xs[1]")
+    assert format_type(interface(db, MAIN, "f").type) == "(m: Mesh, k: Mesh) -> Real"
+
+
+def test_mistakes():
+    check("""
+        record Vec(x: Real, y: Real)
+        record Camera(eye: Vec, focal: Real)
+        def unknown(c: Camera) c.foca
+        #                        ^^^^ error[P0327]: has no field
+        def changed(c: Camera) c with fokal = 2
+        #                             ^^^^^ error[P0327]: has no field
+        def added(c: Camera) c + 1
+        #                    ^ error[P0315]: a record
+        def given(c: Camera) c.focal
+        def tuple(t) given((1, 2))
+        #                  ^^^^^^ error[P0306]: must be `Camera`
+        def another(v: Vec) given(v)
+        #                         ^ error[P0306]: must be `Camera`
+        def missing(t) Camera(eye=Vec(1, 2))
+        #                     ^^^^^^^^^^^^^ error[P0309]: focal
+        def extra(t) Vec(x=1, y=2, z=3)
+        #                          ^ error[P0310]: no parameter
+        def none(c: Camra) 1
+        #           ^^^^^ error[P0116]: no type
+        def function(c: given) 1
+        #               ^^^^^ error[P0116]: no record
+        def number(t) t with x = 2
+        #             ^ error[P0327]: which record
+    """)
+
+
+def test_fields_vary_one_by_one():
+    check("""
+        record Camera(eye: Real, focal: Real)
+        def plain(c: Camera) if c.focal > 0 then c.eye else 1
+        def fine(t) integral [0, 1] plain(Camera(x, t)) d(x)
+        def still(t) integral [0, 1] plain(Camera(x, x) with focal = t) d(x)
+        def moved(t) integral [0, 1] plain(Camera(t, t) with focal = x) d(x)
+        #                                  ^^^^^^^^^^^^^^^^^^^^^^^^^^^ error[P0301]: depends on the variable
+    """)
+
+
+def test_the_derivative_of_a_record_has_its_name():
+    found = interface(database("record P(x: Real, y: Real)\ndef f(p: P) p"), MAIN, "f").type
+    assert format_type(derivative_type(found)) == "(dp: (P, P)) -> (P, P)"
