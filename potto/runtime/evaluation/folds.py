@@ -1,9 +1,9 @@
 """Folds while a program runs: a state stepped from place to place.
 
 Owns `fold`. The steps are a loop of one bare kernel. What that says of no step (derivatives, and how far off all is) is
-found for all steps at once afterwards: a step is nearly linear around the states that were met, `runtime/evaluation/
-linear` has its derivatives, and `steps` puts them together. States of many numbers, and steps that integrate, are
-stepped with all that they carry.
+found for all steps at once afterwards: a step is nearly linear around the states that were met, `linear` has its
+derivatives, and `steps` puts them together. States of many numbers are stepped with samples of their errors (`signed`),
+and steps that integrate with all that they carry.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from potto.runtime.evaluation.linear import along, fits
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.reduction import reduced
 from potto.runtime.evaluation.selection import Pick, apart
+from potto.runtime.evaluation.signed import can_be_sampled, stepped
 from potto.runtime.evaluation.sums import bounds
 
 Env = dict[str, Value]
@@ -40,6 +41,8 @@ def fold(machine: Machine, term: Fold, lo: Value, hi: Value, start: Value, env: 
         found = along(machine, term, body, places, states, start, env)
         if found is not None:
             return found
+    if can_be_sampled(machine, term, start):
+        return stepped(machine, term, body, places, start, env)
     return _carrying(machine, term, body, places, start, env)
 
 
@@ -84,17 +87,13 @@ def _grouped(machine: Machine, term: Fold, first: Number, last: Number, start: V
     )
     lo, hi = np.broadcast_to(first, shape), np.broadcast_to(last, shape)
     pairs = np.unique(np.stack([lo.ravel(), hi.ravel()]), axis=1).T
-    whole[""] = _as_wide(whole[""], shape, machine.directions)
+    whole[""] = pad(start, machine.directions)
 
     def evaluated(number: int, here: Env, _: Pick) -> Value:
         a, b = (Cell(float(end)) for end in pairs[number])
         return fold(machine, term, a, b, here.pop(""), here)
 
     return apart([(lo == a) & (hi == b) for a, b in pairs], whole, evaluated)
-
-
-def _as_wide(start: Value, shape: tuple[int, ...], directions: int) -> Value:
-    return pad(start, directions)
 
 
 __all__ = ["fold"]
