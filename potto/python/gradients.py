@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from msgspec.structs import asdict, replace
 
-from potto.kernels.cells import Cell, Number, Rows, Value, all_cells, listed, map_cells, pad
+from potto.kernels.cells import Cell, Rows, Value, all_cells, listed, map_cells, pad
 from potto.kernels.chunks import POINTS
 from potto.kernels.errors import wrong_call
 from potto.kernels.tape import Node, Swept, Untaped, swept
@@ -23,8 +23,9 @@ from potto.projects.settings import current
 from potto.python.api import Function, must_be_function
 from potto.python.arguments import Batch, value_of
 from potto.python.calls import Call
+from potto.python.forms import as_matrix, bounds_of, by_name, form_of, in_lists, must_match, tangents_of, weighted
 from potto.runtime.answers.estimate import Estimate
-from potto.runtime.evaluate import Clock, number, report, told, told_rows
+from potto.runtime.evaluate import Clock, number, report, told
 from potto.runtime.evaluation.machine import Machine
 
 # Parameters, from which on a tape is swept back instead of carrying a tangent for each: it costs 2.5 to 3.4 values
@@ -84,12 +85,12 @@ def jacobian(function: Function, wrt: Names = None) -> Callable[..., Estimate]:
         value = run.along_each(names)
         tangents, bounds = (
             tuple(run.one_by_one(list(map(number, side(cell))), names) for cell in all_cells(value))
-            for side in (_tangents, _bounds)
+            for side in (tangents_of, bounds_of)
         )
         found = run.answer(value, tangents, bounds)
         single = isinstance(value, Cell), len(names) == 1 and isinstance(run.given[names[0]], Cell)
         count = sum(_size(name, run.given[name]) for name in names)
-        slopes, errors = (_as_matrix(part, count, run.batch, *single) for part in (found.tangent, found.tangent_error))
+        slopes, errors = (as_matrix(part, count, run.batch, *single) for part in (found.tangent, found.tangent_error))
         return replace(found, value=slopes, error=errors, tangent=None, tangent_error=None)
 
     return matrix
@@ -107,8 +108,8 @@ def vjp(function: Function, cotangent: Any, wrt: Names = None) -> Callable[..., 
     def product(*args: Any, **kwargs: Any) -> Gradient:
         extra = {"cotangent": function.in_form("cotangent", cotangent, None)}
         run = _Run(*function.prepared(args, kwargs, extra), extra)
-        value, weighted = run.along_each_together(names, in_lists(run.extra["cotangent"]))
-        return run.gradient(value, weighted, names)
+        value, total = run.along_each_together(names, in_lists(run.extra["cotangent"]))
+        return run.gradient(value, total, names)
 
     return product
 
@@ -215,13 +216,13 @@ class _Run:
         """The value, and the sum of its numbers, each times its weight, with such tangents."""
 
         def swept_back(value: Value, seeds: Sequence[Node]) -> Value:
-            _must_match(value, weights)
+            must_match(value, weights)
             pairs = zip(all_cells(value), (weight.v for weight in all_cells(weights)), strict=True)
             return map_cells(value, lambda cell: Cell(cell.v, cell.e)), Cell(0.0, None, *_swept(list(pairs), seeds))
 
         def forward(value: Value) -> Value:
-            _must_match(value, weights)
-            return value, _weighted(value, weights)
+            must_match(value, weights)
+            return value, weighted(value, weights)
 
         found = self._differentiated(wrt, swept_back, forward)
         assert isinstance(found, tuple)
@@ -278,7 +279,7 @@ class _Run:
         def flat(form: Any) -> list[Any]:
             return [x for item in form for x in flat(item)] if isinstance(form, tuple | list) else [form]
 
-        return tuple(flat(_by_name(slopes, names, self.given, self.whole)))
+        return tuple(flat(by_name(slopes, names, self.given, self.whole)))
 
     def gradient(self, value: Value, moving: Value, wrt: tuple[str, ...]) -> Gradient:
         """The estimate of a value, with the derivatives of `moving` in the form of the parameters."""
@@ -286,7 +287,7 @@ class _Run:
                            else sum(_size(name, self.given[name]) for name in wrt))  # fmt: skip
         tangents = [told(moving, lambda cell, d=d: cell.t[d]) for d in directions]  # type: ignore[misc]
         bounds = [told(moving, lambda cell, d=d: cell.et[d]) for d in directions]  # type: ignore[misc]
-        forms = (_by_name(part, wrt, self.given, self.whole) for part in (tangents, bounds))
+        forms = (by_name(part, wrt, self.given, self.whole) for part in (tangents, bounds))
         found = self.answer(value, *(form[0] if len(wrt) == 1 else form for form in forms))
         return Gradient(**asdict(found), wrt=wrt)
 
@@ -304,13 +305,6 @@ def _plain(found: Estimate) -> Estimate:
 
 def _numbers(value: Value) -> bool:
     return isinstance(value, Cell) or (isinstance(value, tuple | list) and all(map(_numbers, value)))
-
-
-def in_lists(value: Value) -> Value:
-    """A value with its arrays as lists of their elements."""
-    if isinstance(value, tuple | list):
-        return type(value)([in_lists(item) for item in value])
-    return [in_lists(row) for row in value.rows()] if isinstance(value, Rows) else value
 
 
 # Parameters that move
@@ -360,80 +354,7 @@ def _moved(name: str, value: Value, tangent: Value) -> Value:
         return tuple(_moved(name, *pair) for pair in zip(value, tangent, strict=True))
     if isinstance(value, Rows) and isinstance(tangent, Rows) and value.size == tangent.size:
         return Rows(_moved(name, value.item, tangent.item), value.size)
-    raise wrong_call(f"the tangent of `{name}` must have its form, {_form(value)}")
-
-
-def _form(value: Value) -> str:
-    if isinstance(value, Rows | list):
-        return f"an array of {value.size if isinstance(value, Rows) else len(value)}"
-    return f"a tuple of {len(value)}" if isinstance(value, tuple) else "a number"
-
-
-# Derivatives in the form that was asked for
-
-
-def _tangents(cell: Cell) -> tuple[Number | None, ...]:
-    return cell.t
-
-
-def _bounds(cell: Cell) -> tuple[Number | None, ...]:
-    return cell.et
-
-
-def _by_name(numbers: list[Any], wrt: tuple[str, ...], given: dict[str, Value], whole: bool) -> tuple[Any, ...]:
-    """The derivatives in the form of the parameters; `whole`: those by all elements of an array are one array."""
-    rest = iter(numbers)
-
-    def form(value: Value) -> Any:
-        if isinstance(value, tuple):
-            return tuple(form(item) for item in value)
-        if not isinstance(value, Rows):
-            return next(rest)
-        if not whole:
-            return [form(row) for row in value.rows()]
-        return told_rows(cast(Rows, map_cells(value, lambda _: Cell(next(rest)))), lambda cell: cell.v)
-
-    return tuple(form(given[name]) for name in wrt)
-
-
-def _as_matrix(rows: Any, count: int, batch: Batch, one_answer: bool, one_parameter: bool) -> Any:
-    """Rows of `count` numbers, or of arrays over a batch, as an array whose last axes are those of the rows."""
-    whole = np.asarray(rows, dtype=float).reshape((len(rows), count, *(batch.shape or ())))
-    whole = np.moveaxis(whole, (0, 1), (-2, -1))
-    if one_parameter:
-        whole = whole[..., 0]
-    if one_answer:
-        whole = whole[..., 0] if one_parameter else whole[..., 0, :]
-    return whole if whole.ndim else float(whole)
-
-
-def _must_match(value: Value, cotangent: Value) -> None:
-    """Raise PottoError if a cotangent has not the form of the answer."""
-    if isinstance(value, tuple):
-        if not isinstance(cotangent, tuple) or len(cotangent) != len(value):
-            wanted, found = _form(value), _form(cotangent)
-            raise wrong_call(f"the cotangent must have the form of the answer, {wanted}, and is {found}")
-        for pair in zip(value, cotangent, strict=True):
-            _must_match(*pair)
-    elif isinstance(value, list):
-        if not isinstance(cotangent, list) or len(cotangent) != len(value):
-            wanted, found = _form(value), _form(cotangent)
-            raise wrong_call(f"the cotangent must have the form of the answer, {wanted}, and is {found}")
-        for pair in zip(value, cotangent, strict=True):
-            _must_match(*pair)
-    elif not isinstance(cotangent, Cell):
-        raise wrong_call(f"the cotangent must have the form of the answer, a number, and is {_form(cotangent)}")
-
-
-def _weighted(value: Value, weights: Value) -> Value:
-    """The sum of the numbers of an answer, each times its weight: its tangents."""
-    cells, factors = all_cells(value), [weight.v for weight in all_cells(weights)]
-
-    def total(side: Callable[[Cell], tuple[Number | None, ...]], factors: list[Any]) -> tuple[Number, ...]:
-        rows = zip(*map(side, cells), strict=True)
-        return tuple(sum((w * number(x) for w, x in zip(factors, row, strict=True)), start=0.0) for row in rows)
-
-    return Cell(0.0, None, total(_tangents, factors), total(_bounds, [np.abs(w) for w in factors]))
+    raise wrong_call(f"the tangent of `{name}` must have its form, {form_of(value)}")
 
 
 __all__ = ["Gradient", "GradientFunction", "grad", "jacobian", "jvp", "value_and_grad", "vjp"]
