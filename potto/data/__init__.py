@@ -1,16 +1,26 @@
 """Files of data as values: tables, arrays, nested lists, pictures.
 
-`shape_of(path, content)` says what kind of value a file holds, without numpy, for whoever checks programs;
-`values_of(path, content)` is the value; `read(path)` gives the content. Each of them answers with a `DataMistake`
-where something is wrong. `summary` and `thumbnail` show a value. Knows nothing of syntax, types and terms.
+`files.shape_of(path, content)` says what kind of value a file holds, without numpy, for whoever checks programs;
+`files.values_of(path, content)` is the value; `files.read(path)` gives the content. Each of them answers with a
+`DataMistake` where something is wrong. `display.summary` and `display.thumbnail` show a value. Knows nothing of syntax,
+types and terms. What is asked of the package itself is imported when it is: a program without data costs nothing.
 """
 
-from potto.data.display import summary, thumbnail
-from potto.data.files import SUFFIXES, digest, read, shape_of, suggest, values_of
-from potto.data.mistakes import TITLES, DataMistake
-from potto.data.values import Array, Columns, Item, Number, Row, Shape, Sizes, Table, Value, shape
+from __future__ import annotations
 
-__all__ = [
-    "SUFFIXES", "TITLES", "Array", "Columns", "DataMistake", "Item", "Number", "Row", "Shape", "Sizes", "Table",
-    "Value", "digest", "read", "shape", "shape_of", "suggest", "summary", "thumbnail", "values_of",
-]  # fmt: skip
+from importlib import import_module
+from typing import Any
+
+_HOMES = {
+    "display": ("summary", "thumbnail"),
+    "files": ("SUFFIXES", "digest", "read", "shape_of", "suggest", "values_of"),
+    "mistakes": ("TITLES", "DataMistake"),
+    "values": ("Array", "Columns", "Item", "Number", "Row", "Shape", "Sizes", "Table", "Value", "shape"),
+}
+_HOME = {name: home for home, names in _HOMES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(name)
+    return getattr(import_module(f"potto.data.{_HOME[name]}"), name)

@@ -18,6 +18,7 @@ from potto.core.terms import (
     apply,
     array,
     const,
+    data,
     div,
     fold,
     global_,
@@ -33,10 +34,14 @@ from potto.core.terms import (
     tuple_,
     var,
 )
+from potto.data.mistakes import DataMistake
+from potto.data.values import Columns
 from potto.elaborate.context import Elaboration, rule
 from potto.elaborate.shapes import is_vector
 from potto.elaborate.values import Scope, Value
+from potto.modules.data import data_file
 from potto.syntax import nodes
+from potto.types.loading import type_of
 from potto.types.types import ArrayOf, TupleOf, Type, resolve
 from potto.types.vectors import place_in
 
@@ -87,6 +92,18 @@ def _with(elaboration: Elaboration, node: nodes.With, scope: Scope) -> Value:
         return hole("this is no record with such fields")
     parts = [given.get(name) or field(elaboration, whole, name) for name in shape.record.fields]
     return shaped(elaboration, shape, parts)
+
+
+def loaded(elaboration: Elaboration, written: str) -> Term:
+    """What a file of data holds: the columns of a table are the fields of a record."""
+    found = data_file(elaboration.db, elaboration.file, written)
+    if isinstance(found, DataMistake):
+        return hole(f"{written}: {found.message}")
+    names = [name for name, _ in found.shape.fields] if isinstance(found.shape, Columns) else [""]
+    parts = [data(found.path, found.digest, name) for name in names]
+    whole = tuple_(parts) if isinstance(found.shape, Columns) else parts[0]
+    elaboration.shapes.known[whole] = type_of(found.shape, found.path)
+    return whole
 
 
 # What goes through ranges and arrays

@@ -29,7 +29,7 @@ from potto.core.terms import (
     tuple_,
 )
 from potto.elaborate import builtins
-from potto.elaborate.arrays import of_vectors
+from potto.elaborate.arrays import loaded, of_vectors
 from potto.elaborate.context import Elaboration, rule
 from potto.elaborate.filling import Filling, Given, Packed, Spread, fill
 from potto.elaborate.lookups import image, interp
@@ -44,6 +44,9 @@ Arguments = Sequence[Given[Value]]
 
 @rule(nodes.Apply)
 def _apply(elaboration: Elaboration, node: nodes.Apply, scope: Scope) -> Value:
+    only = node.arguments[0].value if len(node.arguments) == 1 else None
+    if isinstance(only, nodes.Text) and elaboration.value(node.function, scope) == Builtin("load"):
+        return loaded(elaboration, only.text)
     function = elaboration.value(node.function, scope)
     given = [Given(argument.name, elaboration.value(argument.value, scope)) for argument in node.arguments]
     return call(elaboration, function, given, node.span)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from potto.primitives import PRIMITIVES
 
 CONSTANTS = ("pi", "inf")
-SPECIALS = ("deriv", "delta")
+SPECIALS = ("deriv", "delta", "load")
 PROJECTIONS = ("fst", "snd")
 LOOK_UPS = ("interp", "image")
 VECTORS = ("len", "dot", "norm", "cross", *LOOK_UPS)

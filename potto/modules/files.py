@@ -2,9 +2,10 @@
 
 Owns `Files`: loading, what is wrong with a file that is no text, the workspace's roots, unsaved texts, and noticing
 what changed on disk. Queries never read the disk. They read the inputs `("file", key)`, `("overlay", key)`,
-`("folder", path)` and `("workspace",)`; an input that was never set is loaded once, at its first reading
-(`Database.on_missing_input`), which is sound because nothing can have read it before. From then on only `refresh`
-changes it, also for files that were not there: that is how a lookup finds out that a candidate has appeared.
+`("folder", path)`, `("data", path)`, which is what a file of data holds, and `("workspace",)`; an input that was never
+set is loaded once, at its first reading (`Database.on_missing_input`), which is sound because nothing can have read it
+before. From then on only `refresh` changes it, also for files that were not there: that is how a lookup finds out that
+a candidate has appeared.
 
 Durability: texts on disk 1, open files 0, so that typing verifies nothing of files that are not open.
 """
@@ -14,7 +15,10 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Hashable, Iterable
+from pathlib import Path
 
+from potto.data.mistakes import DataMistake
+from potto.modules.data import DataFile
 from potto.modules.folders import Programs, list_folder
 from potto.modules.lookup import SUFFIXES
 from potto.modules.texts import Unreadable
@@ -57,6 +61,27 @@ def load(path: str) -> Loaded:
     return Loaded(decode(data), stamp)
 
 
+def load_data(path: str) -> tuple[DataFile | DataMistake, Stamp]:
+    """What a file of data holds, or what is wrong with it."""
+    from potto.data.files import digest, read, shape_of
+
+    stamp = stamp_of(path)
+    content = read(Path(path))
+    if isinstance(content, DataMistake):
+        return content, stamp
+    shape = shape_of(Path(path), content)
+    return (shape if isinstance(shape, DataMistake) else DataFile(path, digest(content), shape)), stamp
+
+
+def stamp_of(path: str) -> Stamp:
+    """What tells whether a file has changed; None where there is none."""
+    try:
+        status = os.stat(path)
+    except (OSError, ValueError):
+        return None
+    return status.st_mtime_ns, status.st_size, status.st_ino
+
+
 def decode(data: bytes) -> str | Unreadable:
     """The text of a file's bytes: UTF-8, with or without a byte order mark (which is no part of the text)."""
     for mark, name in ((b"\xff\xfe", "UTF-16"), (b"\xfe\xff", "UTF-16")):
@@ -75,6 +100,7 @@ class Files:
     def __init__(self, db: Database, roots: Iterable[str | os.PathLike[str]] = ()) -> None:
         self.db = db
         self._stamps: dict[str, Stamp] = {}
+        self._data_stamps: dict[str, Stamp] = {}
         self._found = Programs()
         db.on_missing_input = self._load_input
         self.set_roots(roots)
@@ -129,9 +155,14 @@ class Files:
         seen = dict.fromkeys(self._seen())
         wanted = seen if keys is None else [key for key in dict.fromkeys(keys) if key in seen]
         changed = [(key, fresh) for key in wanted if (fresh := self._look_again(key)) is not None]
+        fresh_data = [(key, load_data(key)) for key in self._data_that_changed(keys)]
         with self.db.evaluating():
             differ = [key for key, fresh in changed if self.db.set_input(("file", key), fresh.content, DISK)]
             self._stamps.update((key, fresh.stamp) for key, fresh in changed)
+            for path, (held, stamp) in fresh_data:
+                self._data_stamps[path] = stamp
+                if self.db.set_input(("data", path), held, DISK):
+                    differ.append(path)
             for key in self.db.input_keys() if keys is None else ():
                 if isinstance(key, tuple) and key[0] == "folder":
                     self.db.set_input(key, list_folder(key[1]), DISK)
@@ -147,6 +178,14 @@ class Files:
     def _seen(self) -> list[str]:
         keys = self.db.input_keys()
         return [key[1] for key in keys if isinstance(key, tuple) and key[0] == "file" and os.path.isabs(key[1])]
+
+    def data_files(self) -> tuple[str, ...]:
+        """The files of data that programs have asked for."""
+        return tuple(self._data_stamps)
+
+    def _data_that_changed(self, keys: Iterable[str] | None) -> list[str]:
+        wanted = self._data_stamps if keys is None else [key for key in keys if key in self._data_stamps]
+        return [key for key in wanted if stamp_of(key) != self._data_stamps[key]]
 
     def _look_again(self, key: str) -> Loaded | None:
         """The file as it is now if it is not as it was."""
@@ -166,6 +205,9 @@ class Files:
                 loaded = load(path)
                 self._stamps[path] = loaded.stamp
                 return loaded.content, DISK
+            case ("data", str(path)):
+                held, self._data_stamps[path] = load_data(path)
+                return held, DISK
             case ("overlay", str()):
                 return None, DISK
             case ("folder", str(path)):

@@ -309,3 +309,11 @@ def _ports_in_tree(tree: PortTree) -> list[Port]:
             return [*ports_in(inputs), *_ports_in_tree(result)]
         case NoPort():
             return []
+
+
+def still(type: Type) -> Value:
+    """The value of what varies with nothing, in the shape of its type."""
+    found = resolve(type)
+    if isinstance(found, TupleOf):
+        return TupleValue(tuple(map(still, found.items)))
+    return ListValue(still(found.item)) if isinstance(found, ArrayOf) else STILL

@@ -17,6 +17,7 @@ from potto.syntax import nodes
 from potto.types import kinds
 from potto.types.context import Inference, Plan, comparison, describe, mismatch, rule
 from potto.types.infer import is_known, special, strip
+from potto.types.loading import loaded
 from potto.types.motionless import check_tangents, takes_duals
 from potto.types.scope import Builtin
 from potto.types.types import (
@@ -48,6 +49,8 @@ def _apply(inference: Inference, node: nodes.Apply) -> Type:
         of_vectors = vector_form(form)
         if of_vectors is not None:
             return of_vectors(inference, node)
+        if form == "load":
+            return loaded(inference, node)
         return _deriv(inference, node) if form == "deriv" else _delta(inference, node)
     callee = resolve(inference.infer(node.function))
     types = [inference.infer(argument.value) for argument in node.arguments]

@@ -8,7 +8,7 @@ from potto.modules.builtins import LOOK_UPS, VECTORS
 from potto.primitives import PRIMITIVES
 from potto.syntax import nodes
 from potto.syntax.printer import print_expression
-from potto.types.algebra import flat, jumps_of, merge
+from potto.types.algebra import flat, jumps_of, merge, still
 from potto.types.apply import call
 from potto.types.calls import callee_name
 from potto.types.context import Plan
@@ -41,6 +41,8 @@ def _apply(walk: Walk, node: nodes.Apply) -> Value:
     name = meaning.name if isinstance(meaning, Builtin) else ""
     if name == "delta":
         return _delta(walk, node)
+    if name == "load":
+        return still(walk.inference.types[id(node)])
     arguments = [walk.value(argument.value) for argument in node.arguments]
     if name == "deriv":
         return dual(arguments[0]) if len(arguments) == 1 else HAZY

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from functools import cache
 
 from potto.diagnostics import Diagnostic
+from potto.modules.builtins import SPECIALS
 from potto.primitives import PRIMITIVES
 from potto.syntax import nodes
 from potto.types import kinds
@@ -111,8 +112,8 @@ def _builtin(inference: Inference, node: nodes.Name | nodes.Member, name: str) -
     if name in ("fst", "snd"):
         pair = (inference.fresh(), inference.fresh())
         return Function((Parameter(None, TupleOf(pair)),), pair[name == "snd"])
-    if name in ("deriv", "delta"):
-        what = "a function, `deriv(f)`" if name == "deriv" else "a diffeomorphism's result, `delta(x - t)`"
+    if name in SPECIALS:
+        what = _APPLIED[name]
         inference.report(
             kinds.SPECIAL(
                 node.span,
@@ -128,6 +129,13 @@ def _builtin(inference: Inference, node: nodes.Name | nodes.Member, name: str) -
         inference.report(kinds.SPECIAL(node.span, message, label="not applied", help=help))
         return UNKNOWN
     return _of_numbers(PRIMITIVES[name].arity or 2)
+
+
+_APPLIED = {
+    "deriv": "a function, `deriv(f)`",
+    "delta": "a diffeomorphism's result, `delta(x - t)`",
+    "load": 'the name of a file, `load("heights.csv")`',
+}
 
 
 @cache
@@ -319,7 +327,7 @@ def special(inference: Inference, expr: nodes.Expr) -> str | None:
     expr = strip(expr)
     if not isinstance(expr, nodes.Name) or inference.scope.find(expr.id):
         return None
-    if expr.id not in ("deriv", "delta") and vector_form(expr.id) is None:
+    if expr.id not in SPECIALS and vector_form(expr.id) is None:
         return None
     return expr.id if isinstance(inference.outside.find(None, expr.id), Builtin) else None
 

@@ -63,6 +63,7 @@ def found_in(example: Example, folder: Path) -> list[Diagnostic]:
     return [
         located.diagnostic
         for name, _ in example.files
+        if name.endswith((".po", ".diffeo"))
         for located in world.diagnostics(world.key(folder / name))
     ]
 

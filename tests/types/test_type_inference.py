@@ -57,8 +57,8 @@ TYPES = [
     ("def f(p) fst(p) + 1", "(p: (Real*, a)) -> Real"),
     ("def f(p) (snd(p), fst(p))", "(p: (a, b)) -> (b, a)"),
     ("def f(x)\n    (a, b) = (x, 2*x)\n    (b, a, 1)", "(x: Real*) -> (Real, Real, Real)"),
-    ("f = [1, 2]", "[Real]"),
-    ("f = [sin, floor]", "[Real* -> Real]"),
+    ("f = [1, 2]", "[2] Real"),
+    ("f = [sin, floor]", "[2] (Real* -> Real)"),
     ("diffeo f(x, y; c) = (x + c, y)", "(x: Real*, y: Real*) -> (c: Real*) -> Diffeo[2]"),
     ("diffeo f(x; c) = (x - c)", "(x: Real*) -> (c: Real*) -> Diffeo[1]"),
     ("def f(c, k) integral [0, 1] (k(x, c) ? 1 : 0) d(x)", "(c: a, k: (Real*, a) -> Diffeo[n]) -> Real"),
@@ -148,7 +148,7 @@ def test_expressions() -> None:
     assert type_text("f") == "(a: Real*, b: Real*) -> Real"
     assert type_text("f(k, 2)") == "Real"
     assert type_text("deriv(f)") == "(da: (Real*, Real*), db: (Real*, Real*)) -> (Real, Real)"
-    assert type_text("[f(1, 2), k]") == "[Real]"
+    assert type_text("[f(1, 2), k]") == "[2] Real"
     assert type_text(r"\x . x") == "(x: a) -> a"
 
 

@@ -193,6 +193,11 @@ class _Walk:
             case nodes.DiffeoDefinition():
                 self.add(node.name_span, node.name, "define")
                 return self._diffeo(node)
+            case nodes.RecordDefinition():
+                self.add(node.name_span, node.name, "define")
+                return self._scoped(self._groups((node.fields,), node.span), self._annotations((node.fields,)))
+            case nodes.NamedType(span=span, name=name) if "." not in name:
+                self.use(span, name)
             case nodes.Inverse():
                 return self._scoped(self._groups((node.parameters,), node.span), node.components)
             case nodes.For():

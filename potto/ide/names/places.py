@@ -32,7 +32,7 @@ class Sketch(Struct, frozen=True):
 def sketch(db: Database, text: str, diffeo: bool) -> Sketch:
     """A chunk in outline. Questions about whole files ask this of every chunk: trees are large, and soon forgotten."""
     match parsed(db, text, diffeo).item:
-        case (nodes.Definition() | nodes.DiffeoDefinition()) as item:
+        case (nodes.Definition() | nodes.DiffeoDefinition() | nodes.RecordDefinition()) as item:
             return Sketch("definition", item.span, item.name, item.name_span)
         case (nodes.Import() | nodes.FromImport()) as item:
             return Sketch("import", item.span)

@@ -85,6 +85,22 @@ _SPECIALS = (
             "an integral over the variables that it varies with.", "", "integral [0, 1] x*delta(x - 0.5) d(x)"),
     Special("fst", "(a, b) -> a", "The first part of a tuple.", "d fst(p) = fst(dp)", "fst((1, 2))"),
     Special("snd", "(a, b) -> b", "The second part of a tuple.", "d snd(p) = snd(dp)", "snd((1, 2))"),
+    Special("len", "[n] a -> Real", "How many elements an array has.", "", "len([1, 2, 3])"),
+    Special("dot", "([n] Real, [n] Real) -> Real", "The inner product of two vectors, tuples or arrays of one size.",
+            "d dot(u, v) = dot(du, v) + dot(u, dv)", "dot((1, 2), (3, 4))"),
+    Special("norm", "[n] Real -> Real", "The length of a vector, a tuple or an array of numbers.",
+            "d norm(u) = dot(u, du)/norm(u)", "norm((3, 4))"),
+    Special("cross", "((Real, Real, Real), (Real, Real, Real)) -> (Real, Real, Real)",
+            "The cross product of two vectors of three numbers.", "d cross(u, v) = cross(du, v) + cross(u, dv)",
+            "cross((1, 0, 0), (0, 1, 0))"),
+    Special("interp", "(xs: [n] Real, ys: [n] a, x: Real*) -> a",
+            "Piecewise linear through the values `ys` at the places `xs`, which rise; beyond them the value "
+            "at the end. The places are kinks that the integrator knows. The values may be tuples, arrays or records.",
+            "", "interp([0, 1, 3], [10, 20, 0], 2)"),
+    Special("image", "(photo: [h, w] a, u: Real*, v: Real*) -> a",
+            "Bilinear between the centres of pixels: `u` from 0 to 1 along the rows, `v` from 0 to 1 down "
+            "the columns; beyond the outer centres the value there.", "",
+            "image([[1, 2], [3, 5]], 0.5, 0.5)"),
     Special("pi", "Real", "The ratio of a circle's circumference to its diameter, 3.14159…", "d pi = 0", "sin(pi/2)"),
     Special("inf", "Real", "Infinity, for bounds of integrals.", "", "integral [0, inf] exp(-x) d(x)"),
 )  # fmt: skip

@@ -53,6 +53,10 @@ def _symbol(db: Database, chunk: ChunkAt, name: str | None) -> DocumentSymbol | 
             detail = type_text(db, chunk.file, name) if name is not None else "defined again below"
             selection, full = chunk.absolute(item.name_span), chunk.absolute(item.span)
             return DocumentSymbol(item.name, detail, kind, full.cover(selection), selection, _children(db, chunk))
+        case nodes.RecordDefinition():
+            detail = type_text(db, chunk.file, name) if name is not None else "defined again below"
+            selection, full = chunk.absolute(item.name_span), chunk.absolute(item.span)
+            return DocumentSymbol(item.name, detail, "function", full.cover(selection), selection, _children(db, chunk))
         case nodes.BrokenItem(span=span, name=str() as guessed):
             return DocumentSymbol(guessed, "cannot be read", "constant", chunk.absolute(span), chunk.absolute(span))
         case nodes.Print(span=span) | nodes.For(span=span) | nodes.ExpressionStatement(span=span):

@@ -75,6 +75,7 @@ class Semantics:
     array: Callable[[Machine, Array, Value, dict[str, Value]], Value]
     element: Callable[[Value, Value], Value]
     length: Callable[[Machine, Value], Value]
+    data: Callable[[Data], Value]
     fold: Callable[[Machine, Fold, Value, Value, Value, dict[str, Value]], Value]
     integral: Callable[[Machine, Integral, dict[str, Value]], Value]
 
@@ -97,6 +98,7 @@ class Linker:
         self.exactness: dict[Term, bool] = {}
         self.reach = Reach(lambda name: self.term(name.module, name.name))
         self.alike: dict[Any, Any] = {}
+        self.data: dict[Data, Value] = {}
         self.placed: dict[tuple[Integral, bool], Integral] = {}
         self.constants: dict[tuple[str, str, Settings], Value] = {}
         self.duals: dict[tuple[Lam, bool], Lam] = {}
@@ -402,7 +404,10 @@ class Machine:
         return self.linker.semantics.fold(self, term, lo, hi, start, env)
 
     def data(self, term: Data) -> Value:
-        raise errors.wrong_call(f"the file {term.path} is not loaded")
+        found = self.linker.data.get(term)
+        if found is None:
+            found = self.linker.data[term] = self.linker.semantics.data(term)
+        return pad(found, self.directions)
 
     # Integrals
 

@@ -1,0 +1,44 @@
+"""Files of data as values while a program runs. Owns `loaded`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from potto.core.terms import Data
+from potto.data.files import digest, read, values_of
+from potto.data.mistakes import DataMistake
+from potto.data.values import Array, Row, Table
+from potto.kernels import errors
+from potto.kernels.cells import Cell, Rows, Value
+
+
+def loaded(term: Data) -> Value:
+    """What a file holds, or one of its columns. Raises PottoError if it is no longer what was checked."""
+    path = Path(term.path)
+    content = read(path)
+    if isinstance(content, DataMistake):
+        raise errors.wrong_call(f"{path.name}: {content.message}", content.hint)
+    if digest(content) != term.content:
+        raise errors.wrong_call(f"{path.name} has changed while the program ran", "evaluate again")
+    found = values_of(path, content)
+    if isinstance(found, DataMistake):
+        raise errors.wrong_call(f"{path.name}: {found.message}", found.hint)
+    if isinstance(found, Table) and term.column:
+        found = found[term.column]
+    if isinstance(found, Array):
+        return _rows(found)
+    assert isinstance(found, float)
+    return Cell(found)
+
+
+def _rows(array: Array) -> Value:
+    numbers: Any = np.asarray(array.values)
+    item: Value = Cell(np.ascontiguousarray(numbers))
+    if isinstance(array.item, Row):
+        item = tuple(Cell(np.ascontiguousarray(numbers[..., place])) for place in range(array.item.length))
+    for size in reversed(array.dimensions):
+        item = Rows(item, size)
+    return item

@@ -1,0 +1,51 @@
+"""The type of `load("heights.csv")`: that of what the file holds; and what is wrong with a file of data."""
+
+from __future__ import annotations
+
+from potto.data.mistakes import TITLES, DataMistake
+from potto.data.values import Columns, Row, Shape, Sizes
+from potto.diagnostics import Diagnostic, declare
+from potto.modules.data import data_file, path_of
+from potto.syntax import nodes
+from potto.types import kinds
+from potto.types.context import Inference
+from potto.types.types import REAL, UNKNOWN, ArrayOf, Count, RecordName, TupleOf, Type
+
+KINDS = {code: declare(code, title) for code, title in TITLES.items()}
+
+
+def loaded(inference: Inference, node: nodes.Apply) -> Type:
+    """The type of what a file holds."""
+    given = node.arguments[0].value if len(node.arguments) == 1 else None
+    if not isinstance(given, nodes.Text):
+        for argument in node.arguments:
+            inference.infer(argument.value)
+        help = 'write the name of a file between quotes: `load("heights.csv")`'
+        inference.report(kinds.MISMATCH(node.span, "`load` takes the name of a file", help=help))
+        return UNKNOWN
+    found = data_file(inference.outside.db, inference.outside.file, given.text)
+    if isinstance(found, DataMistake):
+        inference.report(_wrong(found, given))
+        return UNKNOWN
+    return type_of(found.shape, path_of(inference.outside.file, given.text))
+
+
+def type_of(shape: Shape, path: str) -> Type:
+    """The type of a kind of value: the columns of a table are a record's fields."""
+    if isinstance(shape, Columns):
+        record = RecordName(path, path.replace("\\", "/").rpartition("/")[2], tuple(name for name, _ in shape.fields))
+        return TupleOf(tuple(type_of(item, path) for _, item in shape.fields), record=record)
+    if not isinstance(shape, Sizes):
+        return REAL
+    found: Type = TupleOf((REAL,) * shape.item.length) if isinstance(shape.item, Row) else REAL
+    for size in reversed(shape.dimensions):
+        found = ArrayOf(Count(size), found)
+    return found
+
+
+def _wrong(mistake: DataMistake, text: nodes.Text) -> Diagnostic:
+    where = "" if mistake.row is None else f"row {mistake.row}"
+    if mistake.column is not None:
+        where += f"{', ' if where else ''}column {mistake.column}"
+    message = mistake.message if mistake.row is None else f"{text.text}: {mistake.message}"
+    return KINDS[mistake.code](text.span, message, label=where, help=mistake.hint)
