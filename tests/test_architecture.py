@@ -37,8 +37,8 @@ FORBIDDEN: dict[str, tuple[str, ...]] = {
 OUTSIDERS: dict[str, tuple[str, ...]] = {
     "lark": ("potto.syntax",),
     "numpy": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.python.arguments", "potto.python.arrays",
-              "potto.python.gradients", "potto.applications", "potto.bench", "potto.data", "potto_lsp.preview",
-              "potto_lsp.sampling"),
+              "potto.python.forms", "potto.python.gradients", "potto.applications", "potto.bench", "potto.data",
+              "potto_lsp.preview", "potto_lsp.sampling"),
     "PIL": ("potto.data",),
     "scipy": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.applications.fitting", "potto.bench"),
     "jax": ("potto.bench.peers",),

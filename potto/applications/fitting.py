@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 from msgspec import Struct
+from msgspec.structs import replace
 
 from potto.diagnostics import PottoError
 from potto.kernels.cells import Array
@@ -60,10 +61,11 @@ class Fit(Struct, frozen=True):
     parameters, value, slope: the best place met, what is to be least there, and the steepest slope there, measured for
     each parameter in its own size and left out where a bound stops it. error: a bound of the value's error. converged:
     whether this is a minimum; `reason` says why it was left. steps: the way there, from the start. evaluations: calls
-    of the function with its derivatives. held: the parameters that a bound stops.
+    of the function with its derivatives. held: the parameters that a bound stops. numbers: all parameters one by
+    one, the elements of arrays as `xs[0]`.
     """
 
-    parameters: dict[str, float]
+    parameters: dict[str, Any]
     value: float
     slope: float
     converged: bool
@@ -73,8 +75,9 @@ class Fit(Struct, frozen=True):
     seconds: float
     error: float = 0.0
     held: frozenset[str] = frozenset()
+    numbers: dict[str, float] = {}
 
-    def __getitem__(self, name: str) -> float:
+    def __getitem__(self, name: str) -> Any:
         return self.parameters[name]
 
     def doubts(self) -> dict[str, float]:
@@ -85,17 +88,17 @@ class Fit(Struct, frozen=True):
         """
         step = next((step for step in reversed(self.steps) if step.value - self.value > self.error), None)
         share = 0.0 if step is None else math.sqrt(self.error / (step.value - self.value))
-        away = dict.fromkeys(self.parameters, 0.0)
+        away = dict.fromkeys(self.numbers, 0.0)
         if step is not None:
-            away = {n: abs(v - p) for (n, v), p in zip(self.parameters.items(), step.parameters, strict=True)}
+            away = {n: abs(v - p) for (n, v), p in zip(self.numbers.items(), step.parameters, strict=True)}
         doubts = {n: max(1e-9 * abs(v), min(1e-3 * self.slope, 1e-3 * abs(v)), 1e-12, share * away[n])
-                  for n, v in self.parameters.items()}  # fmt: skip
+                  for n, v in self.numbers.items()}  # fmt: skip
         return doubts | dict.fromkeys(self.held, 0.0)
 
 
 def fit(
     function: Function,
-    start: Mapping[str, float],
+    start: Mapping[str, Any],
     *,
     given: Mapping[str, Any] | None = None,
     bounds: Mapping[str, tuple[float, float]] | None = None,
@@ -104,9 +107,10 @@ def fit(
     progress: Callable[[Step], None] | None = None,
     watch: Callable[[Estimate], object] | None = None,
 ) -> Fit:
-    """Make a function least over the parameters named in `start`, from there on.
+    """Make a function least over the parameters named in `start`, from there on: numbers, or arrays.
 
-    given: the other parameters; arrays among them make the function an array. bounds: what a parameter may be.
+    given: the other parameters; arrays among them make the function an array. bounds: what a parameter, or each
+    element of one, may be.
     target: where the function should come to instead of being least: then what is made least is the mean of the squared
     distances; numbers, tuples and arrays as the function's answer has them. progress: is told every step;
     watch: is given every answer of the function.
@@ -123,25 +127,62 @@ def fit(
             hint = f"did you mean `{near[0]}`?" if near else ""
             raise wrong_call(f"a bound is given for `{name}`, which is not fitted", hint)
     gradient = grad(function, names)
+    begun = {name: _begun(name, value) for name, value in start.items()}
 
     def objective(x: Array) -> Seen:
-        here = {name: float(v) for name, v in zip(names, x, strict=True)}
-        answer = gradient(**here, **given)
+        answer = gradient(**_named(begun, x), **given)
         if watch is not None:
             watch(answer)
-        return _seen(answer, len(names), target)
+        return _seen(answer, [np.ndim(value) for value in begun.values()], target)
 
-    limits = [(bounds or {}).get(name, (-math.inf, math.inf)) for name in names]
-    return minimized(objective, dict(start), limits, steps, progress)
+    limits = [(bounds or {}).get(name, (-math.inf, math.inf)) for name, value in begun.items() for _ in _labels(value)]
+    numbers = {
+        f"{name}{label}": float(number)
+        for name, value in begun.items()
+        for label, number in zip(_labels(value), np.ravel(value), strict=True)
+    }
+    if not numbers:
+        raise wrong_call("the arrays to fit have no elements")
+    found = minimized(objective, numbers, limits, steps, progress)
+    return replace(found, parameters=_named(begun, np.array(list(found.numbers.values()))))
 
 
-def _seen(found: Any, count: int, target: Any) -> Seen:
-    """What is to be least: the function itself, or the mean of its squared distances to the target."""
-    by_parameter = (found.tangent,) if count == 1 else found.tangent
-    errors = (found.tangent_error,) if count == 1 else found.tangent_error
+def _begun(name: str, value: Any) -> Any:
+    try:
+        found = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise wrong_call(f"`{name}` starts at a Python {type(value).__name__}, not at numbers") from None
+    return found if found.ndim else float(found)
+
+
+def _labels(value: Any) -> list[str]:
+    """What is behind a parameter's name for each of its numbers."""
+    return [f"[{', '.join(map(str, place))}]" if place else "" for place in np.ndindex(np.shape(value))]
+
+
+def _named(begun: Mapping[str, Any], x: Array) -> dict[str, Any]:
+    """Numbers in a row as parameters, in the form in which they began."""
+    found, at = {}, 0
+    for name, value in begun.items():
+        size = np.size(value)
+        found[name] = x[at : at + size].reshape(np.shape(value)) if np.ndim(value) else float(x[at])
+        at += size
+    return found
+
+
+def _seen(found: Any, axes: Sequence[int], target: Any) -> Seen:
+    """What is to be least: the function itself, or the mean of its squared distances to the target.
+
+    axes: how many each parameter has.
+    """
+    sides = (
+        [_by_numbers(part, found, n) for part, n in zip(side if len(axes) > 1 else (side,), axes, strict=True)]
+        for side in (found.tangent, found.tangent_error)
+    )
+    tangents, errors = (np.concatenate(parts) for parts in sides)
     value, bound = _flat(found.value), _flat(found.error)
-    tangents = np.stack([_flat(t) for t in by_parameter])
-    error = max((float(np.max(_flat(e), initial=0.0)) for e in errors), default=0.0)
+    tangents = np.broadcast_to(tangents, (len(tangents), value.size))
+    error = float(np.max(errors, initial=0.0))
     if target is None:
         if value.size != 1:
             raise wrong_call(
@@ -156,6 +197,20 @@ def _seen(found: Any, count: int, target: Any) -> Seen:
     scale = float(np.sqrt(np.mean(off**2)))
     value_error = float(np.mean((2 * np.abs(off) + bound) * bound))
     return Seen(float(np.mean(off**2)), 2 * np.mean(off * tangents, axis=1), 2 * scale * error, value_error)
+
+
+def _by_numbers(slopes: Any, found: Any, axes: int) -> Array:
+    """Derivatives by a parameter as rows, one for each of its numbers.
+
+    Those by an array have the axes of the batch, of the array, and of the answer; parts of a tuple are the last one.
+    """
+    if not axes:
+        return _flat(slopes)[None]
+    batch = np.ndim(found.member_converged) if found.member_converged is not None else 0
+    whole = np.moveaxis(np.asarray(slopes), range(batch, batch + axes), range(axes))
+    if isinstance(found.value, tuple):
+        whole = np.moveaxis(whole, -1, axes)
+    return whole.reshape(int(np.prod(whole.shape[:axes])), -1)
 
 
 def _flat(value: Any) -> Array:
@@ -291,7 +346,7 @@ def minimized(
     parameters = {name: float(v) for name, v in zip(names, x, strict=True)}
     held = frozenset(name for name, stops in zip(names, walk.held(x, seen), strict=True) if stops)
     return Fit(parameters, seen.value, walk.slope(x, seen), walk.converged, walk.reason, tuple(walk.steps),
-               walk.evaluations, time.perf_counter() - walk.begun, seen.value_error, held)  # fmt: skip
+               walk.evaluations, time.perf_counter() - walk.begun, seen.value_error, held, parameters)  # fmt: skip
 
 
 def _reason(walk: _Walk, message: str, most: int) -> str:

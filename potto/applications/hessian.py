@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace
 
+from potto.kernels.cells import Cell, Rows, Value, map_cells
 from potto.kernels.errors import wrong_call
 from potto.python.api import Function, bound, deriv
 from potto.python.arguments import batch_of
@@ -29,9 +30,11 @@ def hvp(function: Function, along: Mapping[str, Any]) -> Callable[..., Gradient]
     """
     names = parameters_to_vary(function, tuple(along))
     twice = _twice(function, names)
+    along = {name: function.in_form(f"the tangent of {name}", along[name], name) for name in names}
 
     def product(*args: Any, **kwargs: Any) -> Gradient:
-        return _product(twice(_named(function, args, kwargs), along), names)
+        given = _named(function, args, kwargs)
+        return _product(twice(given, along), given, names)
 
     return product
 
@@ -47,15 +50,16 @@ def hessian(function: Function, wrt: Names = None) -> Callable[..., Estimate]:
 
     def matrix(*args: Any, **kwargs: Any) -> Estimate:
         given = _named(function, args, kwargs)
-        numbers = [number for name in names if name in given for number in _leaves(given[name])]
+        count = sum(_count(given[name]) for name in names if name in given)
         axes = len(batch_of(given.items()).shape or ())
-        units = iter(np.eye(len(numbers)).reshape(len(numbers), len(numbers), *(1,) * axes))
+        units = iter(np.eye(count).reshape(count, count, *(1,) * axes))
         found = twice(given, {name: _like(given[name], units) for name in names if name in given})
         if isinstance(found.value[0], tuple):
             raise wrong_call("only a function that gives one number has a Hessian", "take one component of the answer")
-        product = _product(found, names)
-        single = len(names) == 1 and not isinstance(given[names[0]], tuple)
-        value, error = (_as_matrix(list(_leaves(side)), single) for side in (product.tangent, product.tangent_error))
+        product = _product(found, given, names)
+        single = len(names) == 1 and not isinstance(given[names[0]], tuple | Rows)
+        sides = (product.tangent, product.tangent_error)
+        value, error = (_as_matrix(list(_leaves(side, 1 + axes)), single) for side in sides)
         common = {name: getattr(found, name) for name in Estimate.__struct_fields__}
         told = {"value": value, "error": error, "tangent": None, "tangent_error": None}
         members = np.all(found.member_converged, axis=0) if axes else None
@@ -83,7 +87,7 @@ def _named(function: Function, args: tuple[Any, ...], kwargs: dict[str, Any]) ->
     for name, argument in bound(function, args, kwargs):
         if name not in function.parameters:
             raise wrong_call(f"the parameter for {argument!r} has no name, and second derivatives are taken by names")
-        given[name] = argument.value if isinstance(argument, Estimate) else argument
+        given[name] = function.in_form(name, argument.value if isinstance(argument, Estimate) else argument, name)
     return given
 
 
@@ -95,26 +99,53 @@ def _dual(argument: Any, direction: Any) -> Any:
 
 
 def _like(argument: Any, numbers: Iterator[Any] | None) -> Any:
-    """These numbers, or zeros, in the form of an argument."""
+    """These numbers, or zeros, in the form of an argument; those of an array element by element."""
     if isinstance(argument, tuple):
         return tuple(_like(item, numbers) for item in argument)
+    if isinstance(argument, Rows):
+        if numbers is None:
+            return map_cells(argument, lambda _: Cell(0.0))
+        return _filled(argument, np.stack([next(numbers) for _ in range(_count(argument))]), 0)
     return 0.0 if numbers is None else next(numbers)
 
 
-def _leaves(argument: Any) -> Iterator[Any]:
+def _filled(value: Value, block: Any, inner: int) -> Value:
+    """A value of these numbers: behind `inner` axes of places an axis of its numbers, and then those of a batch."""
+    if isinstance(value, Rows):
+        shape = block.shape
+        split = block.reshape(*shape[:inner], value.size, _count(value.item), *shape[inner + 1 :])
+        return Rows(_filled(value.item, split, inner + 1), value.size)
+    if isinstance(value, tuple):
+        ends = np.cumsum([_count(item) for item in value])[:-1]
+        parts = np.split(block, ends, axis=inner)
+        return tuple(_filled(item, part, inner) for item, part in zip(value, parts, strict=True))
+    return Cell(np.squeeze(block, axis=inner))
+
+
+def _count(argument: Any) -> int:
+    """How many numbers an argument has."""
+    if isinstance(argument, tuple):
+        return sum(map(_count, argument))
+    return argument.size * _count(argument.item) if isinstance(argument, Rows) else 1
+
+
+def _leaves(argument: Any, batch: int) -> Iterator[Any]:
+    """The numbers of derivatives; of arrays, behind the axes of a batch, element by element."""
     if isinstance(argument, tuple):
         for item in argument:
-            yield from _leaves(item)
+            yield from _leaves(item, batch)
+    elif np.ndim(argument) > batch:
+        yield from np.moveaxis(argument.reshape(*argument.shape[:batch], -1), -1, 0)
     else:
         yield argument
 
 
-def _product(found: Gradient, names: tuple[str, ...]) -> Gradient:
+def _product(found: Gradient, given: Mapping[str, Any], names: tuple[str, ...]) -> Gradient:
     """Of the derivatives of (f, f' v) by each parameter and its tangent, those of f' v by the parameter."""
 
     def part(tangents: Any) -> Any:
         items = tangents if len(names) > 1 else (tangents,)
-        parts = tuple(_last(item[0]) for item in items)
+        parts = tuple(_last(item[0], given[name]) for item, name in zip(items, names, strict=True))
         return parts if len(names) > 1 else parts[0]
 
     return replace(
@@ -123,9 +154,11 @@ def _product(found: Gradient, names: tuple[str, ...]) -> Gradient:
     )  # fmt: skip
 
 
-def _last(slopes: Any) -> Any:
+def _last(slopes: Any, argument: Any) -> Any:
     """The second of each pair (that of f, that of f' v), in the form of a parameter."""
-    return tuple(map(_last, slopes)) if isinstance(slopes[0], tuple) else slopes[1]
+    if isinstance(argument, tuple):
+        return tuple(_last(part, item) for part, item in zip(slopes, argument, strict=True))
+    return slopes[..., 1] if isinstance(argument, Rows) else slopes[1]  # of an array, pairs are the last axis
 
 
 def _as_matrix(rows: list[Any], single: bool) -> Any:

@@ -1,15 +1,17 @@
 """What an operation rounds off, where that is known better than as half a unit in the last place of its result.
 
-Owns `ROUNDING`: for each such operation a function of its value and its arguments. What a sum rounds off is known
-exactly, term by term (Knuth's TwoSum), whatever cancels on the way: nothing in 2e8 - (1e8 + 0.5), 1 in 1e16 + 1 - 1e16.
-Products, quotients and powers of whole numbers are exact where they are whole, so that 2*x is 6, and not 6 give or take
-something, where x is 3; a batch is not looked through for those.
+Owns `ROUNDING`, for each such operation a function of its value and its arguments, and `looked_through`. What a sum
+rounds off is known exactly, term by term (Knuth's TwoSum), whatever cancels on the way: nothing in 2e8 - (1e8 + 0.5), 1
+in 1e16 + 1 - 1e16. Products, quotients and powers of whole numbers are exact where they are whole, so that 2*x is 6,
+and not 6 give or take something, where x is 3; a batch is looked through for those only where that is asked for.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -17,6 +19,37 @@ import numpy as np
 UNIT_ROUNDOFF = 2.0**-53
 LARGEST = 2.0**53  # up to here every whole number is a double
 HIGHEST = 64.0  # powers that are worked out again
+
+
+class _Looking(threading.local):
+    """Whether members of batches are looked at one by one, in this thread."""
+
+    through = False
+
+
+_looking = _Looking()
+
+
+@contextmanager
+def looked_through() -> Iterator[None]:
+    """In this block batches are as exact as single numbers: where they are the steps of a loop."""
+    before, _looking.through = _looking.through, True
+    try:
+        yield
+    finally:
+        _looking.through = before
+
+
+def _members(value: Any) -> bool:
+    return _looking.through and isinstance(value, np.ndarray)
+
+
+def _rounded(value: Any, exact: Any) -> Any:
+    return np.where(exact, 0.0, UNIT_ROUNDOFF * abs(value))
+
+
+def _all_whole(*numbers: Any) -> Any:
+    return np.logical_and.reduce(np.broadcast_arrays(*[np.rint(x) == x for x in numbers]))
 
 
 def _whole(*numbers: Any) -> bool:
@@ -29,7 +62,7 @@ def add(value: Any, *args: Any) -> Any:
     Of a batch the last one counts as half a unit in the last place, which takes two passes and not six: only what was
     lost on the way may be more than the value tells.
     """
-    batch = isinstance(value, np.ndarray)
+    batch = isinstance(value, np.ndarray) and not _looking.through
     off: Any = UNIT_ROUNDOFF * abs(value) if batch else 0.0
     total: Any = args[0]
     for number, arg in enumerate(args[1:], 2):
@@ -42,20 +75,30 @@ def add(value: Any, *args: Any) -> Any:
     if batch:
         known = len(args) == 2 or np.add.reduce(off, None) < math.inf
         return off if known else np.where(np.isfinite(off), off, UNIT_ROUNDOFF * abs(value))
+    if isinstance(value, np.ndarray):
+        return np.where(off < math.inf, off, UNIT_ROUNDOFF * abs(value))
     return off if off < math.inf else UNIT_ROUNDOFF * abs(value)  # an infinite sum rounds off nan
 
 
 def mul(value: Any, *args: Any) -> Any:
+    if _members(value):
+        return _rounded(value, _all_whole(*args) & (abs(value) <= LARGEST))
     exact = _whole(*args) and abs(value) <= LARGEST
     return 0.0 if exact else UNIT_ROUNDOFF * abs(value)
 
 
 def div(value: Any, above: Any, below: Any) -> Any:
+    if _members(value):
+        kept = _all_whole(value, above, below) & (abs(above) <= LARGEST)
+        return _rounded(value, kept & (value * below == above))
     exact = _whole(value, above, below) and abs(above) <= LARGEST and value * below == above
     return 0.0 if exact else UNIT_ROUNDOFF * abs(value)
 
 
 def power(value: Any, base: Any, exponent: Any) -> Any:
+    if _members(value):
+        whole = _all_whole(value, base, exponent) & (abs(value) <= LARGEST) & (exponent >= 0)
+        return _rounded(value, whole & (np.broadcast_to(exponent, np.shape(value)) <= HIGHEST))
     exact = _whole(value, base, exponent) and abs(value) <= LARGEST and 0 <= exponent <= HIGHEST
     if exact and int(base) ** int(exponent) == int(value):
         return 0.0

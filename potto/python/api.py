@@ -40,7 +40,7 @@ from potto.types import derivative_type, format_type, infer_expression
 from potto.types.kinds import NO_TANGENT
 from potto.types.motionless import GENERAL, LONGEST, MOTIONLESS
 from potto.types.queries import is_derivative
-from potto.types.types import Diffeo, Parameter, TupleOf, Type, groups_of
+from potto.types.types import Diffeo, Parameter, TupleOf, Type, groups_of, result_of
 from potto.types.types import Function as FunctionType
 
 NOWHERE = Span(0, 0)
@@ -252,6 +252,12 @@ class Function(Travelling):
             for label, argument, type in _labelled(given, groups)
         )
         return tuple((tuple(next(found) for _ in args), {name: next(found) for name in words}) for args, words in given)
+
+    def in_form(self, label: str, argument: Any, parameter: str | None) -> Any:
+        """Something that goes with a parameter, or with the answer, with arrays where that has them."""
+        groups = groups_of(self._whole)
+        types = {p.name: p.type for group in groups for p in group}
+        return with_arrays(label, argument, result_of(self._whole) if parameter is None else types[parameter], {})
 
     def _is_derivative(self) -> bool:
         """Whether this is the derivative of a function, whose arguments are all that moves."""

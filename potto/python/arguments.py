@@ -18,6 +18,7 @@ from msgspec.structs import replace
 from potto.diagnostics import PottoError, declare
 from potto.kernels.cells import Cell, Rows, Value, listed
 from potto.kernels.errors import wrong_call
+from potto.python.arrays import batch_shapes, over_batch
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.printing import format_digits
 from potto.source import Span
@@ -48,6 +49,16 @@ class Batch(Struct, frozen=True):
         if array.size == 1 and math.prod(self.shape) == 1:
             return float(array.item())
         return np.ascontiguousarray(np.broadcast_to(array, self.shape)).reshape(-1)
+
+    def rows(self, part: Any, inner: tuple[int, ...]) -> Any:
+        """A part of an array, with axes of places in front, as a part of the batch."""
+        assert self.shape is not None
+        if 0 in self.shape:
+            return np.ones((*inner, 1))
+        own = part.shape[len(inner) :]
+        wide = part.reshape(*inner, *(1,) * (len(self.shape) - len(own)), *own)
+        flat = np.broadcast_to(wide, (*inner, *self.shape)).reshape(*inner, self.size)
+        return np.ascontiguousarray(flat[..., 0] if self.size == 1 else flat)
 
     def shaped(self, estimate: Estimate) -> Estimate:
         """The estimate with every number as an array of the batch's shape; as a float if there were no arrays."""
@@ -105,7 +116,7 @@ class Batch(Struct, frozen=True):
 
 def batch_of(arguments: Iterable[tuple[str, Any]]) -> Batch:
     """The batch that named arguments make together. Raises PottoError if their shapes do not go together."""
-    shapes = [(name, array.shape) for name, argument in arguments for array in _arrays(argument)]
+    shapes = [(name, shape) for name, argument in arguments for shape in _shapes(argument)]
     if not shapes:
         return Batch(None)
     try:
@@ -117,35 +128,39 @@ def batch_of(arguments: Iterable[tuple[str, Any]]) -> Batch:
 
 def flattened(given: Any, batch: Batch) -> Any:
     """What calls were given, with every array in it as one row over the batch."""
-    return _mapped(given, lambda array: batch.flat(array.astype(np.float64)))
+    return _mapped(given, lambda array: batch.flat(array.astype(np.float64)), batch.rows)
 
 
 def cut(given: Any, members: slice) -> Any:
     """Some members of what calls were given, which is `flattened`."""
-    return _mapped(given, lambda array: array[members])
+    return _mapped(given, lambda array: array[members], lambda part, _: part[..., members])
 
 
-def _mapped(given: Any, change: Callable[[Any], Any]) -> Any:
+def _mapped(given: Any, change: Callable[[Any], Any], rows: Callable[[Any, tuple[int, ...]], Any]) -> Any:
     """What calls were given with `change` done to every array. An answer over a batch becomes its numbers."""
     if isinstance(given, np.ndarray):
         return change(given) if given.ndim else given
     if isinstance(given, tuple | list):
-        return type(given)(_mapped(item, change) for item in given)
+        return type(given)(_mapped(item, change, rows) for item in given)
     if isinstance(given, dict):
-        return {name: _mapped(item, change) for name, item in given.items()}
+        return {name: _mapped(item, change, rows) for name, item in given.items()}
     if isinstance(given, Estimate) and given.value.__class__ is not float and given.value is not None:
-        return _mapped(given.value if given.tangent is None else (given.value, given.tangent), change)
+        return _mapped(given.value if given.tangent is None else (given.value, given.tangent), change, rows)
+    if isinstance(given, Rows):
+        return over_batch(given, rows)
     return given
 
 
-def _arrays(argument: Any) -> Iterable[np.ndarray[Any, Any]]:
+def _shapes(argument: Any) -> Iterable[tuple[int, ...]]:
     if isinstance(argument, Estimate):
         argument = (argument.value, argument.tangent)
     if isinstance(argument, np.ndarray) and argument.ndim:
-        yield argument
+        yield argument.shape
+    elif isinstance(argument, Rows):
+        yield from batch_shapes(argument)
     elif isinstance(argument, tuple | list):
         for item in argument:
-            yield from _arrays(item)
+            yield from _shapes(item)
 
 
 def value_of(name: str, argument: Any, batch: Batch, to_function: ToFunction) -> Value:
@@ -168,7 +183,7 @@ def value_of(name: str, argument: Any, batch: Batch, to_function: ToFunction) ->
     if isinstance(argument, list):
         return listed([value_of(name, item, batch, to_function) for item in argument])
     if isinstance(argument, Rows):
-        return argument
+        return over_batch(argument, batch.rows)
     raise no_kind(name, argument, "numbers, numpy arrays, tuples, lists and functions of Potto are accepted")
 
 

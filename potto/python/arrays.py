@@ -1,17 +1,19 @@
 """Arrays of Python as arrays of Potto: what a parameter's type says which axes of numpy's are.
 
-Owns `with_arrays`. A parameter `[n] Real` takes a numpy array, a column of a table or a list as one array; a parameter
-`Real` takes a numpy array as a batch.
+Owns `with_arrays`, `over_batch` and `batch_shapes`. A parameter `[n] Real` takes a numpy array, a column of a table or
+a list as one array, and the axes before those of the array are a batch; a parameter `Real` takes a numpy array as a
+batch. Until all batches are known, the parts of such an array have its axes first and then those of its own batch.
 """
 
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from potto.kernels.cells import Cell, Rows, Value, listed
+from potto.kernels.cells import Cell, Rows, Value, all_cells, listed, map_cells, parts_of
 from potto.kernels.errors import wrong_call
 from potto.runtime.answers.estimate import Estimate
 from potto.types import format_type
@@ -40,12 +42,14 @@ def has_arrays(type: Type) -> bool:
 
 def _array(name: str, argument: Any, type: ArrayOf, sizes: Sizes) -> Any:
     if isinstance(argument, Estimate) and argument.tangent is None:
-        argument = argument.value
+        return _answer(name, argument, type, sizes)
     if hasattr(argument, "to_numpy"):
         argument = argument.to_numpy()
     if isinstance(argument, list) and _of_numbers(type):
         with contextlib.suppress(TypeError, ValueError):  # of answers, or not of one shape
-            argument = np.array(argument, dtype=float)
+            axes = _axes(type) or 0
+            numbers = np.array(argument, dtype=float) if argument else np.zeros((0,) * axes)
+            argument = numbers if numbers.ndim <= axes else argument  # else of elements that are batches
     if isinstance(argument, np.ndarray):
         return _numpy(name, argument, type, sizes)
     if isinstance(argument, list):
@@ -53,6 +57,17 @@ def _array(name: str, argument: Any, type: ArrayOf, sizes: Sizes) -> Any:
         items = [with_arrays(name, item, type.item, sizes) for item in argument]
         return listed(items) if items and all(isinstance(item, Rows) for item in items) else items
     return argument
+
+
+def _answer(name: str, answer: Estimate, type: ArrayOf, sizes: Sizes) -> Any:
+    """An array that was an answer, with the errors that it has."""
+    value = _array(name, answer.value, type, sizes)
+    off = np.asarray(answer.error, dtype=float) if isinstance(answer.error, np.ndarray | list | float) else None
+    if not isinstance(value, Rows) or off is None or not off.any():
+        return value
+    error = _array(name, np.broadcast_to(off, np.shape(answer.value)), type, sizes)
+    errors = iter(all_cells(error))
+    return map_cells(value, lambda cell: Cell(cell.v, np.broadcast_to(next(errors).v, np.shape(cell.v))))
 
 
 def _of_numbers(type: Type) -> bool:
@@ -70,10 +85,13 @@ def _numpy(name: str, argument: np.ndarray[Any, Any], type: ArrayOf, sizes: Size
     axes = _axes(type)
     if axes is None:
         raise wrong_call(f"`{name}` is {format_type(type)}: give it as a list")
-    if argument.ndim != axes:
-        wanted = f"a numpy array of {axes} axes is needed, not one of shape {argument.shape}"
+    if argument.ndim < axes:
+        plural = "axis" if axes == 1 else "axes"
+        wanted = f"a numpy array of {axes} {plural} or more is needed, not one of shape {argument.shape}"
         raise wrong_call(f"`{name}` is {format_type(type)}: {wanted}")
-    return _made(name, argument.astype(np.float64), type, sizes)
+    batch = argument.ndim - axes
+    numbers = np.moveaxis(argument.astype(np.float64), range(batch), range(axes, argument.ndim))
+    return _made(name, numbers, type, sizes)
 
 
 def _axes(type: Type) -> int | None:
@@ -102,6 +120,29 @@ def _made(name: str, numbers: np.ndarray[Any, Any], type: Type, sizes: Sizes, ax
         raise wrong_call(f"`{name}` holds tuples of {len(found.items)}, and is given rows of {numbers.shape[axis]}")
     parts = (np.take(numbers, place, axis=axis) for place in range(len(found.items)))
     return tuple(_made(name, part, item, sizes, axis) for part, item in zip(parts, found.items, strict=True))
+
+
+# Batches
+
+
+def batch_shapes(rows: Rows) -> list[tuple[int, ...]]:
+    """The shapes of the batches that an array is given in."""
+    return [np.shape(part) for part in rows.batches()]
+
+
+def over_batch(rows: Rows, change: Callable[[Any, tuple[int, ...]], Any]) -> Rows:
+    """The array with `change` done to every part that differs over a batch: it is told the axes of places in front."""
+
+    def changed(value: Value, inner: tuple[int, ...]) -> Value:
+        if isinstance(value, tuple):
+            return tuple([changed(item, inner) for item in value])
+        if isinstance(value, Rows):
+            return Rows(changed(value.item, (*inner, value.size)), value.size)
+        return parts_of(value, lambda part: change(part, inner) if np.ndim(part) > len(inner) else part)
+
+    found = changed(rows, ())
+    assert isinstance(found, Rows)
+    return found
 
 
 def _agree(name: str, count: int, size: Type, sizes: Sizes) -> None:

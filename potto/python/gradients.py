@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from msgspec.structs import asdict, replace
 
-from potto.kernels.cells import Cell, Number, Rows, Value, all_cells, listed, map_cells, pad
+from potto.kernels.cells import Cell, Rows, Value, all_cells, listed, map_cells, pad
 from potto.kernels.chunks import POINTS
 from potto.kernels.errors import wrong_call
 from potto.kernels.tape import Node, Swept, Untaped, swept
@@ -23,6 +23,7 @@ from potto.projects.settings import current
 from potto.python.api import Function, must_be_function
 from potto.python.arguments import Batch, value_of
 from potto.python.calls import Call
+from potto.python.forms import as_matrix, bounds_of, by_name, form_of, in_lists, must_match, tangents_of, weighted
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.evaluate import Clock, number, report, told
 from potto.runtime.evaluation.machine import Machine
@@ -83,11 +84,13 @@ def jacobian(function: Function, wrt: Names = None) -> Callable[..., Estimate]:
         run = _Run(*function.prepared(args, kwargs, {}), {})
         value = run.along_each(names)
         tangents, bounds = (
-            tuple(tuple(map(number, side(cell))) for cell in all_cells(value)) for side in (_tangents, _bounds)
+            tuple(run.one_by_one(list(map(number, side(cell))), names) for cell in all_cells(value))
+            for side in (tangents_of, bounds_of)
         )
         found = run.answer(value, tangents, bounds)
         single = isinstance(value, Cell), len(names) == 1 and isinstance(run.given[names[0]], Cell)
-        slopes, errors = (_as_matrix(part, *single) for part in (found.tangent, found.tangent_error))
+        count = sum(_size(name, run.given[name]) for name in names)
+        slopes, errors = (as_matrix(part, count, run.batch, *single) for part in (found.tangent, found.tangent_error))
         return replace(found, value=slopes, error=errors, tangent=None, tangent_error=None)
 
     return matrix
@@ -103,10 +106,10 @@ def vjp(function: Function, cotangent: Any, wrt: Names = None) -> Callable[..., 
     names = parameters_to_vary(function, wrt)
 
     def product(*args: Any, **kwargs: Any) -> Gradient:
-        extra = {"cotangent": cotangent}
+        extra = {"cotangent": function.in_form("cotangent", cotangent, None)}
         run = _Run(*function.prepared(args, kwargs, extra), extra)
-        value, weighted = run.along_each_together(names, run.extra["cotangent"])
-        return run.gradient(value, weighted, names)
+        value, total = run.along_each_together(names, in_lists(run.extra["cotangent"]))
+        return run.gradient(value, total, names)
 
     return product
 
@@ -121,7 +124,11 @@ def jvp(function: Function, along: Mapping[str, Any]) -> Callable[..., Estimate]
     names = parameters_to_vary(function, tuple(along))
 
     def product(*args: Any, **kwargs: Any) -> Estimate:
-        labels = {f"the tangent of {name}": tangent for name, tangent in along.items()}
+        labels = {
+            label: function.in_form(label, tangent, name)
+            for name, tangent in along.items()
+            if (label := f"the tangent of {name}")
+        }
         run = _Run(*function.prepared(args, kwargs, labels), labels)
         tangents = dict(zip(names, run.extra.values(), strict=True))
         moving = {name: _moved(name, run.own(name), tangents[name]) for name in names}
@@ -209,13 +216,13 @@ class _Run:
         """The value, and the sum of its numbers, each times its weight, with such tangents."""
 
         def swept_back(value: Value, seeds: Sequence[Node]) -> Value:
-            _must_match(value, weights)
+            must_match(value, weights)
             pairs = zip(all_cells(value), (weight.v for weight in all_cells(weights)), strict=True)
             return map_cells(value, lambda cell: Cell(cell.v, cell.e)), Cell(0.0, None, *_swept(list(pairs), seeds))
 
         def forward(value: Value) -> Value:
-            _must_match(value, weights)
-            return value, _weighted(value, weights)
+            must_match(value, weights)
+            return value, weighted(value, weights)
 
         found = self._differentiated(wrt, swept_back, forward)
         assert isinstance(found, tuple)
@@ -266,13 +273,21 @@ class _Run:
         found = report(value, self.machine, self.clock)
         return self.batch.shaped(replace(found, tangent=tangents, tangent_error=bounds))
 
+    def one_by_one(self, slopes: list[Any], names: tuple[str, ...]) -> tuple[Any, ...]:
+        """The derivatives by each number of the parameters, those of an array element by element."""
+
+        def flat(form: Any) -> list[Any]:
+            return [x for item in form for x in flat(item)] if isinstance(form, tuple | list) else [form]
+
+        return tuple(flat(by_name(slopes, names, self.given, self.whole)))
+
     def gradient(self, value: Value, moving: Value, wrt: tuple[str, ...]) -> Gradient:
         """The estimate of a value, with the derivatives of `moving` in the form of the parameters."""
         directions = range(len(all_cells(tuple(self.given[name] for name in wrt))) if self.whole
                            else sum(_size(name, self.given[name]) for name in wrt))  # fmt: skip
         tangents = [told(moving, lambda cell, d=d: cell.t[d]) for d in directions]  # type: ignore[misc]
         bounds = [told(moving, lambda cell, d=d: cell.et[d]) for d in directions]  # type: ignore[misc]
-        forms = (_by_name(part, wrt, self.given, self.whole) for part in (tangents, bounds))
+        forms = (by_name(part, wrt, self.given, self.whole) for part in (tangents, bounds))
         found = self.answer(value, *(form[0] if len(wrt) == 1 else form for form in forms))
         return Gradient(**asdict(found), wrt=wrt)
 
@@ -290,13 +305,6 @@ def _plain(found: Estimate) -> Estimate:
 
 def _numbers(value: Value) -> bool:
     return isinstance(value, Cell) or (isinstance(value, tuple | list) and all(map(_numbers, value)))
-
-
-def in_lists(value: Value) -> Value:
-    """A value with its arrays as lists of their elements."""
-    if isinstance(value, tuple | list):
-        return type(value)([in_lists(item) for item in value])
-    return [in_lists(row) for row in value.rows()] if isinstance(value, Rows) else value
 
 
 # Parameters that move
@@ -344,79 +352,9 @@ def _moved(name: str, value: Value, tangent: Value) -> Value:
         return Cell(value.v, value.e, (tangent.v,), (tangent.e,))
     if isinstance(value, tuple) and isinstance(tangent, tuple) and len(value) == len(tangent):
         return tuple(_moved(name, *pair) for pair in zip(value, tangent, strict=True))
-    raise wrong_call(f"the tangent of `{name}` must have its form, {_form(value)}")
-
-
-def _form(value: Value) -> str:
-    return f"a tuple of {len(value)}" if isinstance(value, tuple) else "a number"
-
-
-# Derivatives in the form that was asked for
-
-
-def _tangents(cell: Cell) -> tuple[Number | None, ...]:
-    return cell.t
-
-
-def _bounds(cell: Cell) -> tuple[Number | None, ...]:
-    return cell.et
-
-
-def _by_name(numbers: list[Any], wrt: tuple[str, ...], given: dict[str, Value], whole: bool) -> tuple[Any, ...]:
-    """The derivatives in the form of the parameters; `whole`: those by all elements of an array are one array."""
-    rest = iter(numbers)
-
-    def form(value: Value) -> Any:
-        if isinstance(value, tuple):
-            return tuple(form(item) for item in value)
-        if not isinstance(value, Rows):
-            return next(rest)
-        return _rows(form(value.item), value) if whole else [form(row) for row in value.rows()]
-
-    return tuple(form(given[name]) for name in wrt)
-
-
-def _rows(found: Any, value: Rows) -> list[Any]:
-    """Derivatives by all elements as a list of those by each."""
-    if isinstance(found, tuple):
-        return list(zip(*(_rows(part, value) for part in found), strict=True))
-    if isinstance(found, list):  # of an array of arrays: by the inner places first
-        return [list(row) for row in zip(*found, strict=True)]
-    return list(found) if np.ndim(found) else [found] * value.size
-
-
-def _as_matrix(rows: Any, one_answer: bool, one_parameter: bool) -> Any:
-    """Rows of numbers, or of arrays over a batch, as an array whose last axes are those of the rows."""
-    whole = np.asarray(rows, dtype=float)
-    whole = np.moveaxis(whole, (0, 1), (-2, -1))
-    if one_parameter:
-        whole = whole[..., 0]
-    if one_answer:
-        whole = whole[..., 0] if one_parameter else whole[..., 0, :]
-    return whole if whole.ndim else float(whole)
-
-
-def _must_match(value: Value, cotangent: Value) -> None:
-    """Raise PottoError if a cotangent has not the form of the answer."""
-    if isinstance(value, tuple):
-        if not isinstance(cotangent, tuple) or len(cotangent) != len(value):
-            wanted, found = _form(value), _form(cotangent)
-            raise wrong_call(f"the cotangent must have the form of the answer, {wanted}, and is {found}")
-        for pair in zip(value, cotangent, strict=True):
-            _must_match(*pair)
-    elif not isinstance(cotangent, Cell):
-        raise wrong_call(f"the cotangent must have the form of the answer, a number, and is {_form(cotangent)}")
-
-
-def _weighted(value: Value, weights: Value) -> Value:
-    """The sum of the numbers of an answer, each times its weight: its tangents."""
-    cells, factors = all_cells(value), [weight.v for weight in all_cells(weights)]
-
-    def total(side: Callable[[Cell], tuple[Number | None, ...]], factors: list[Any]) -> tuple[Number, ...]:
-        rows = zip(*map(side, cells), strict=True)
-        return tuple(sum((w * number(x) for w, x in zip(factors, row, strict=True)), start=0.0) for row in rows)
-
-    return Cell(0.0, None, total(_tangents, factors), total(_bounds, [np.abs(w) for w in factors]))
+    if isinstance(value, Rows) and isinstance(tangent, Rows) and value.size == tangent.size:
+        return Rows(_moved(name, value.item, tangent.item), value.size)
+    raise wrong_call(f"the tangent of `{name}` must have its form, {form_of(value)}")
 
 
 __all__ = ["Gradient", "GradientFunction", "grad", "jacobian", "jvp", "value_and_grad", "vjp"]

@@ -26,8 +26,9 @@ from potto.projects.settings import DEFAULTS, Settings
 from potto.runtime.answers.convergence import CANCELS, Shortfalls, converged_members, members_of, merged, missed
 from potto.runtime.answers.estimate import Estimate, OneSided
 from potto.runtime.answers.inherited_errors import rough, widened
-from potto.runtime.evaluation.arrays import array, element, fold, length
+from potto.runtime.evaluation.arrays import array, element, length
 from potto.runtime.evaluation.duals import call_derivative, call_paired
+from potto.runtime.evaluation.folds import fold
 from potto.runtime.evaluation.functions import Closure, Derivative
 from potto.runtime.evaluation.loading import loaded
 from potto.runtime.evaluation.machine import Linker, Machine, Record, Semantics
@@ -129,6 +130,9 @@ class Clock:
         self.native_points = counts.native_points - points
 
 
+_TANGENTS = "tangent", "tangent_error"
+
+
 def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
     """The estimate of a value; of its tangents the first is told, and all count for whether it converged."""
     record = machine.record
@@ -163,7 +167,9 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
         for part in parts:
             merged(missing, part.shortfalls)
         values, off = [p.value for p in parts], [p.error for p in parts]
-        return answer(values, off, converged=not missing, shortfalls=missing)
+        moving = any(p.tangent is not None for p in parts)
+        tangent, tangent_error = ([getattr(p, side) for p in parts] if moving else None for side in _TANGENTS)
+        return answer(values, off, tangent, tangent_error, converged=not missing, shortfalls=missing)
     numbers, bounds = told(value, lambda cell: cell.v), told(value, lambda cell: cell.e)
     tangents = tangent_bounds = None
     if any(cell.t for cell in all_cells(value)):

@@ -1,6 +1,6 @@
-"""Arrays while a program runs: all elements at once, along an axis in front of the batch; elements at places; folds.
+"""Arrays while a program runs: all elements at once, along an axis in front of the batch; elements at places.
 
-Owns `array`, `element`, `length` and `fold`.
+Owns `array`, `element`, `length` and `at_places`.
 """
 
 from __future__ import annotations
@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 
 from potto.core.terms import Array as ArrayTerm
-from potto.core.terms import Fold, lam
+from potto.core.terms import lam
 from potto.diagnostics import PottoError, declare
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Number, Rows, Value, all_arrays, listed
 from potto.kernels.rows import gathered
 from potto.runtime.evaluation.machine import Machine
-from potto.runtime.evaluation.selection import Pick, apart
 
 OUT_OF_RANGE = declare("P0511", "an index that is out of range")
 NO_PLACE = declare("P0512", "an index or a size that is no whole number")
@@ -140,40 +139,3 @@ def length(machine: Machine, whole: Value) -> Value:
     else:
         raise errors.wrong_call("only an array has a length")
     return Cell(float(count), None, (None,) * machine.directions)
-
-
-# Folds
-
-
-def fold(machine: Machine, term: Fold, lo: Value, hi: Value, start: Value, env: Env) -> Value:
-    """The state after all steps: a loop, however long, in which each step is one call of a kernel."""
-    from potto.runtime.evaluation.sums import bounds
-
-    first, last = bounds(lo, "lower"), bounds(hi, "upper")
-    if isinstance(first, np.ndarray) or isinstance(last, np.ndarray):
-        return _grouped(machine, term, first, last, start, env)
-    body = lam(tuple(sorted(term.body.free | {term.variable, term.state})), term.body)
-    here, still = {**env, term.state: start}, (None,) * machine.directions
-    params, run = body.params, machine.run
-    for place in range(int(first), int(last) + 1):
-        here[term.variable] = Cell(float(place), None, still)
-        here[term.state] = run(body, [here[name] for name in params], None)
-    return here[term.state]
-
-
-def _grouped(machine: Machine, term: Fold, first: Number, last: Number, start: Value, env: Env) -> Value:
-    """Bounds that differ over the batch: the members with equal bounds together."""
-    whole = {**env, "": start}
-    shape = np.broadcast_shapes(
-        np.shape(first), np.shape(last), *(a.shape for value in whole.values() for a in all_arrays(value))
-    )
-    lo, hi = np.broadcast_to(first, shape), np.broadcast_to(last, shape)
-    pairs = np.unique(np.stack([lo.ravel(), hi.ravel()]), axis=1).T
-
-    def evaluated(number: int, here: Env, _: Pick) -> Value:
-        a, b = (Cell(float(end)) for end in pairs[number])
-        return fold(machine, term, a, b, here.pop(""), here)
-
-    return apart([(lo == a) & (hi == b) for a, b in pairs], whole, evaluated)
-
-

@@ -1,0 +1,225 @@
+"""Arrays of Python as arrays of Potto and back: batches of them, derivatives by them, fits of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+import potto
+from potto.python import gradients
+
+MODULE = potto.compile("""
+def total(xs: [n] Real, k) sum i in 0..n-1 (k*xs[i]^2)
+def scaled(xs: [n] Real, k) [k*x^2 for x in xs]
+def grid(a: [n, m] Real) sum i in 0..n-1, j in 0..m-1 ((i + 1)*a[i, j]^3)
+def turned(a: [n, m] Real) [a[i, j] for j in 0..m-1, i in 0..n-1]
+def areas(ps: [n] (Real, Real)) sum p in ps (p.x^2*p.y)
+def mirrored(ps: [n] (Real, Real)) [(p.y, 2*p.x) for p in ps]
+def bent(xs: [n] Real) sum i in 0..n-1 (xs[i]^3*xs[0])
+def mean(xs: [n] Real) (sum x in xs (x))/n
+def ends(xs: [n] Real, k) (xs[0]*k, xs[n - 1])
+def both(u: ([n] Real, Real)) (sum x in u.0 (x^2))*u.1
+""")
+
+numbers = st.integers(-8, 8).map(float)  # so that what is expected is exact
+
+
+def array(*shape: st.SearchStrategy[int] | int) -> st.SearchStrategy[Any]:
+    sizes = st.tuples(*[st.just(n) if isinstance(n, int) else n for n in shape])
+    return arrays.arrays(float, sizes, elements=numbers)
+
+
+few = st.integers(1, 4)
+
+
+# Batches
+
+
+@given(array(few, few, few))
+def test_axes_before_those_of_an_array_are_a_batch(xs: Any) -> None:
+    found = MODULE.total(xs, 2.0)
+    assert found.value.tolist() == (2 * xs**2).sum(axis=-1).tolist()
+    assert MODULE.scaled(xs, 2.0).value.tolist() == (2 * xs**2).tolist()
+
+
+@given(array(3, few), array(2, 1))
+def test_batches_of_arrays_and_of_numbers_broadcast(xs: Any, k: Any) -> None:
+    found = MODULE.scaled(xs, k)
+    assert found.value.tolist() == (k[..., None] * xs**2).tolist()
+    assert found.error.shape == found.value.shape
+
+
+@given(array(few, few, few))
+def test_a_batch_of_matrices(a: Any) -> None:
+    rows = np.arange(1.0, a.shape[1] + 1)[:, None]
+    found = potto.grad(MODULE.grid)(a)
+    assert found.value.tolist() == (rows * a**3).sum(axis=(1, 2)).tolist()
+    assert found.tangent.tolist() == (3 * rows * a**2).tolist()
+    assert MODULE.turned(a).value.tolist() == np.swapaxes(a, -1, -2).tolist()
+
+
+@given(array(few, few, 2))
+def test_tuples_are_the_last_axis(ps: Any) -> None:
+    x, y = ps[..., 0], ps[..., 1]
+    found = potto.grad(MODULE.areas)(ps)
+    assert found.value.tolist() == (x**2 * y).sum(axis=-1).tolist()
+    assert found.tangent.tolist() == np.stack([2 * x * y, x**2], axis=-1).tolist()
+    assert MODULE.mirrored(ps).value.tolist() == np.stack([y, 2 * x], axis=-1).tolist()
+
+
+def test_a_large_batch_of_arrays() -> None:
+    xs = np.arange(15000.0).reshape(5000, 3) % 7
+    found = MODULE.total(xs, np.arange(5000.0))
+    assert found.value.tolist() == (np.arange(5000.0)[:, None] * xs**2).sum(axis=-1).tolist()
+
+
+@pytest.mark.parametrize("shape", [(0,), (2, 0), (0, 3), (0, 0)])
+def test_arrays_and_batches_of_nothing(shape: tuple[int, ...]) -> None:
+    xs = np.zeros(shape)
+    assert MODULE.total(xs, 1.0).value == pytest.approx(np.zeros(shape[:-1]), abs=0)
+    assert np.shape(MODULE.scaled(xs, 1.0).value) == shape
+    found = potto.grad(MODULE.total, ["xs", "k"])(xs, 1.0)
+    assert np.shape(found["xs"]) == shape
+    assert np.shape(found["k"]) == shape[:-1]
+
+
+class Column:
+    """What pandas gives for a column of a table, as far as it is asked."""
+
+    def __init__(self, numbers: list[float]) -> None:
+        self.numbers = numbers
+
+    def to_numpy(self) -> Any:
+        return np.array(self.numbers)
+
+
+def test_columns_lists_and_answers_are_arrays() -> None:
+    assert MODULE.mean(Column([1.0, 2.0, 6.0])).value == 3.0
+    assert MODULE.mean([1, 2, 6]).value == 3.0
+    assert MODULE.mean([np.array([1.0, 2.0]), 3.0]).value.tolist() == [2.0, 2.5]
+    assert MODULE.areas([(1.0, 2.0), (3.0, 4.0)]).value == 38.0
+    assert potto.grad(MODULE.mean)(Column([1.0, 2.0])).tangent.tolist() == [0.5, 0.5]
+
+
+def test_an_answer_keeps_its_error_as_an_array() -> None:
+    rough = potto.compile("def f(t) [integral [0, 1] (exp(sin(k*x*t))) d(x) for k in 1..3]").f(2.0)
+    assert rough.value.shape == rough.error.shape == (3,)
+    assert MODULE.mean(rough).error >= rough.error.mean() * (1 - 1e-12) > 0
+
+
+@pytest.mark.parametrize(
+    ("call", "why"),
+    [
+        (lambda: MODULE.grid(np.ones(3)), "2 axes or more"),
+        (lambda: MODULE.areas(np.ones((2, 3))), "tuples of 2"),
+        (lambda: MODULE.total(np.ones((2, 3)), np.ones(4)), "do not broadcast"),
+        (lambda: MODULE.total(np.array([True]), 1.0), "real numbers"),
+        (lambda: potto.jvp(MODULE.total, {"xs": np.ones(4)})(np.ones(3), 1.0), "an array of 3"),
+        (lambda: potto.vjp(MODULE.scaled, np.ones(2), "xs")(np.ones(3), 1.0), "an array of 3"),
+        (lambda: potto.vjp(MODULE.scaled, 1.0, "xs")(np.ones(3), 1.0), "an array of 3"),
+        (lambda: potto.fit(MODULE.total, {"xs": "one"}, given={"k": 1.0}), "not at numbers"),
+    ],
+)
+def test_what_does_not_fit_is_said(call: Any, why: str) -> None:
+    with pytest.raises(potto.PottoError, match=why):
+        call()
+
+
+# Derivatives
+
+
+@pytest.fixture(params=[1 << 30, 1], ids=["forward", "reverse"])
+def way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(gradients, "MANY", request.param)
+
+
+@pytest.mark.usefixtures("way")
+def test_gradients_have_the_shape_of_the_argument() -> None:
+    a = np.arange(20.0).reshape(4, 5)
+    assert potto.grad(MODULE.grid)(a).tangent.tolist() == (3 * np.arange(1, 5)[:, None] * a**2).tolist()
+    found = potto.grad(MODULE.both)((np.array([1.0, 2.0]), 3.0))
+    assert found.tangent[0].tolist() == [6.0, 12.0]
+    assert found.tangent[1] == 5.0
+
+
+@pytest.mark.usefixtures("way")
+def test_products_with_arrays_from_either_side() -> None:
+    xs, k = np.array([[1.0, 2.0, 3.0], [0.0, -1.0, 4.0]]), 2.0
+    along = np.array([1.0, 0.5, -1.0])
+    forward = potto.jvp(MODULE.scaled, {"xs": along, "k": 3.0})(xs, k)
+    assert forward.tangent.tolist() == (2 * k * xs * along + 3 * xs**2).tolist()
+    back = potto.vjp(MODULE.scaled, along, ["xs", "k"])(xs, k)
+    assert back["xs"].tolist() == (2 * k * xs * along).tolist()
+    assert back["k"].tolist() == (xs**2 * along).sum(axis=-1).tolist()
+    points = np.array([[1.0, 2.0], [3.0, 4.0]])
+    weights = np.array([[1.0, 10.0], [100.0, 1000.0]])
+    assert potto.vjp(MODULE.mirrored, weights)(points).tangent.tolist() == [[20.0, 1.0], [2000.0, 100.0]]
+    assert potto.jvp(MODULE.areas, {"ps": weights})(points).tangent == 4 * 1 + 1 * 10 + 24 * 100 + 9 * 1000
+
+
+@pytest.mark.usefixtures("way")
+def test_jacobians_by_arrays_element_by_element() -> None:
+    xs = np.array([1.0, 2.0, 3.0])
+    found = potto.jacobian(MODULE.scaled, ["xs", "k"])(xs, 2.0)
+    assert found.value.tolist() == np.column_stack([np.diag(4 * xs), xs**2]).tolist()
+    batch = potto.jacobian(MODULE.ends, ["xs", "k"])(np.stack([xs, 2 * xs]), 2.0)
+    assert batch.value.tolist() == [[[2, 0, 0, 1], [0, 0, 1, 0]], [[2, 0, 0, 2], [0, 0, 1, 0]]]
+    a = np.arange(6.0).reshape(2, 3)
+    assert potto.jacobian(MODULE.grid)(a).value.tolist() == [0, 3, 12, 54, 96, 150]
+    assert potto.jacobian(MODULE.areas)(np.array([[1.0, 2.0], [3.0, 4.0]])).value.tolist() == [4, 1, 24, 9]
+    assert potto.jacobian(MODULE.scaled)(np.zeros(0), 1.0).value.shape == (0, 0)
+
+
+def hessian_of_bent(x: Any) -> Any:
+    matrix = np.diag(6 * x * x[0])
+    matrix[0, 1:] = matrix[1:, 0] = 3 * x[1:] ** 2
+    matrix[0, 0] = 12 * x[0] ** 2
+    return matrix
+
+
+def test_second_derivatives_by_arrays() -> None:
+    xs = np.array([[1.0, 2.0, 3.0], [2.0, -1.0, 4.0]])
+    both = np.stack([hessian_of_bent(x) for x in xs])
+    assert potto.hessian(MODULE.bent)(xs[0]).value.tolist() == both[0].tolist()
+    assert potto.hessian(MODULE.bent)(xs).value.tolist() == both.tolist()
+    along = np.array([1.0, -1.0, 2.0])
+    assert potto.hvp(MODULE.bent, {"xs": along})(xs[0]).tangent.tolist() == (both[0] @ along).tolist()
+    found = potto.hessian(MODULE.total, ["xs", "k"])(np.array([1.0, 2.0]), 3.0)
+    assert found.value.tolist() == [[6, 0, 2], [0, 6, 4], [2, 4, 0]]
+    points = potto.hessian(MODULE.areas)(np.array([[0.0, 1.0], [2.0, 3.0]]))
+    assert points.value.tolist() == [[2, 0, 0, 0], [0, 0, 0, 0], [0, 0, 6, 4], [0, 0, 4, 0]]
+
+
+def test_a_hessian_through_a_fold() -> None:
+    fold = potto.compile("def f(xs: [n] Real, k) fold s = k for i in 0..n-1 (s*xs[i] + xs[i]^2)").f
+    found = potto.hessian(fold, ["xs", "k"])(np.array([2.0, 3.0]), 5.0)
+    # (k a + a²) b + b²
+    assert found.value == pytest.approx(np.array([[6, 9, 3], [9, 2, 2], [3, 2, 0]]), rel=1e-13, abs=1e-13)
+
+
+# Fits
+
+
+def test_fits_of_arrays() -> None:
+    found = potto.fit(MODULE.total, {"xs": [1.0, 2.0, 3.0]}, given={"k": 2.0})
+    assert found.converged
+    assert found["xs"] == pytest.approx(np.zeros(3), abs=1e-3)
+    assert set(found.doubts()) == {"xs[0]", "xs[1]", "xs[2]"}
+
+
+def test_fits_of_arrays_to_targets() -> None:
+    found = potto.fit(MODULE.scaled, {"xs": [1.0, 2.0, 3.0]}, given={"k": 2.0}, target=np.array([2.0, 8.0, 32.0]))
+    assert found["xs"] == pytest.approx([1.0, 2.0, 4.0], rel=1e-6, abs=0)
+    pair = potto.fit(MODULE.ends, {"xs": [1.0, 5.0], "k": 3.0}, target=(6.0, 4.0), bounds={"k": (0.0, 2.0)})
+    assert pair["xs"][1] == pytest.approx(4.0, rel=1e-6, abs=0)
+    assert pair["xs"][0] * pair["k"] == pytest.approx(6.0, rel=1e-6, abs=0)
+    assert pair["k"] <= 2.0
+    matrix = potto.fit(MODULE.turned, {"a": np.ones((2, 3))}, target=np.arange(6.0).reshape(3, 2))
+    assert matrix["a"] == pytest.approx(np.arange(6.0).reshape(3, 2).T, rel=1e-6, abs=1e-6)
+    many = potto.fit(MODULE.total, {"xs": [1.0, 2.0], "k": 0.5}, given={}, target=10.0)
+    assert (many["k"] * many["xs"] ** 2).sum() == pytest.approx(10.0, rel=1e-6, abs=0)
