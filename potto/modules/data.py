@@ -32,8 +32,8 @@ def path_of(file: str, written: str) -> str:
 def data_file(db: Database, file: str, written: str) -> DataFile | DataMistake:
     """What a file of data holds, or what is wrong with it."""
     path = path_of(file, written)
-    found: DataFile | DataMistake = db.get_input(("data", path))
-    return found
+    found: DataFile | DataMistake | None = db.get_input(("data", path))
+    return found if found is not None else DataMistake("P0801", "there are no files here")
 
 
 quick(DataFile)
