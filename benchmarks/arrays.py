@@ -1,7 +1,7 @@
 """What programs with arrays cost: meshes, observations, steps in time, beside their goals.
 
-`python benchmarks/arrays.py [--backend numpy|native] [--large]`. Every figure is the least of several warm calls; the error
-of the pictures is against clipping each triangle at each pixel (`clipped`), which knows nothing of Potto.
+`python benchmarks/arrays.py [--backend numpy|native] [--large]`. Every figure is the least of several warm calls; the
+error of the pictures is against clipping each triangle at each pixel (`clipped`), which knows nothing of Potto.
 """
 
 from __future__ import annotations
@@ -103,7 +103,8 @@ def main() -> None:
         triangles, grey = mesh(7)
         seconds, answer = rendered(module, triangles, grey, 128)
         off = np.abs(answer.value - picture(triangles, grey, 128)).max()
-        told("98 triangles on 128 x 128 pixels", seconds, None, f"error {off:.1e}, {answer.stats['integrals culled']:,} culled")
+        more = f"error {off:.1e}, {answer.stats['integrals culled']:,} culled"
+        told("98 triangles on 128 x 128 pixels", seconds, None, more)
         seconds, _ = least(lambda: potto.grad(module.loss, ["mesh", "grey"])(triangles, grey, 128.0))
         told("its loss and gradient in all corners and greys", seconds, 0.05 if native else 1.0)
         for side in (7, 14, 28):
@@ -120,7 +121,8 @@ def main() -> None:
         seconds, answer = least(lambda: potto.grad(module.log_likelihood, ["m", "s"])(0.2, 1.5, xs))
         by_hand, _ = least(lambda: (np.sum(-(((xs - 0.2) / 1.5) ** 2) / 2 - np.log(1.5)), np.sum((xs - 0.2) / 1.5**2),
                                     np.sum((xs - 0.2) ** 2 / 1.5**3 - 1 / 1.5)))  # fmt: skip
-        told("log-likelihood of 100,000 observations and gradient", seconds, 0.5, f"numpy by hand {by_hand * 1e3:.1f} ms")
+        more = f"numpy by hand {by_hand * 1e3:.1f} ms"
+        told("log-likelihood of 100,000 observations and gradient", seconds, 0.5, more)
         seconds, _ = least(lambda: potto.grad(module.log_likelihood, "xs")(0.2, 1.5, xs))
         told("the same by all observations", seconds, 0.5)
         ts = np.random.default_rng(0).exponential(1, 100_000)
