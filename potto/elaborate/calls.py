@@ -16,6 +16,7 @@ from potto.core.terms import (
     Global,
     Hole,
     If,
+    Index,
     Integral,
     Lam,
     Proj,
@@ -25,6 +26,7 @@ from potto.core.terms import (
     Var,
     app,
     hole,
+    if_,
     proj,
     tuple_,
 )
@@ -70,7 +72,12 @@ def call(elaboration: Elaboration, function: Value, given: Arguments, span: Span
             return elaboration.note(found, span) if isinstance(found, Delta) else found
         case Hole():
             return function
-        case Global() | App() | Deriv() | Var() | Proj() | Lam():
+        case If(condition=condition, then=then, orelse=orelse):
+            return if_(
+                condition, elaboration.as_term(call(elaboration, then, given, span)),
+                elaboration.as_term(call(elaboration, orelse, given, span)),
+            )  # fmt: skip
+        case Global() | App() | Deriv() | Var() | Proj() | Index() | Lam():
             groups = groups_of_term(elaboration.db, function)
             if groups:
                 return _call_known(elaboration, function, groups, given, span)

@@ -32,7 +32,7 @@ from potto.runtime.evaluation.folds import fold
 from potto.runtime.evaluation.functions import Closure, Derivative
 from potto.runtime.evaluation.loading import loaded
 from potto.runtime.evaluation.machine import Linker, Machine, Record, Semantics
-from potto.runtime.evaluation.selection import lazy
+from potto.runtime.evaluation.selection import chosen, lazy
 from potto.runtime.evaluation.sums import total
 
 Lookup = Callable[[str, str], Term]
@@ -57,7 +57,7 @@ def _added(machine: Machine, terms: tuple[Term, ...], env: dict[str, Value]) -> 
 
 
 SEMANTICS = Semantics(
-    call_derivative, call_paired, lazy, _added, total, _culled, array, element, length, loaded, fold, _integral
+    call_derivative, call_paired, chosen, lazy, _added, total, _culled, array, element, length, loaded, fold, _integral
 )  # fmt: skip
 
 

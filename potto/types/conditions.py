@@ -5,7 +5,7 @@ from __future__ import annotations
 from potto.diagnostics import Diagnostic
 from potto.syntax import nodes
 from potto.types import kinds
-from potto.types.context import Condition, Inference, describe, mismatch, rule
+from potto.types.context import Condition, Inference, comparison, describe, mismatch, rule
 from potto.types.infer import strip, value_only
 from potto.types.scope import Local
 from potto.types.types import (
@@ -91,9 +91,14 @@ def _if(inference: Inference, node: nodes.If) -> Type:
     then, orelse = inference.infer(node.then), inference.infer(node.orelse)
     if not unify(then, orelse):
         inference.report(mismatch(orelse, then, node.orelse, "both branches must be of one type: the second one"))
+    plain = inference.conditions.get(id(node)) == "plain"
     for branch, type in ((node.then, then), (node.orelse, orelse)):
-        value_only(inference, type, branch, "a conditional chooses between numbers")
-    return UNKNOWN if isinstance(resolve(then), Function | Truth) else then
+        if not plain:
+            value_only(inference, type, branch, "a condition that may vary chooses between numbers")
+        elif isinstance(resolve(type), Truth):
+            inference.report(comparison(branch, "a conditional chooses between numbers or functions"))
+    unfit = Truth if plain else Function | Truth
+    return UNKNOWN if isinstance(resolve(then), unfit) else then
 
 
 def _condition(inference: Inference, node: nodes.If) -> None:

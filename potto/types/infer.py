@@ -175,7 +175,8 @@ def _tuple(inference: Inference, node: nodes.Tuple) -> Type:
         inference.report(kinds.TOO_LARGE(node.span, message, label="too large", help="use an integral or a sum"))
         return UNKNOWN
     for item, type in zip(node.items, items):
-        value_only(inference, type, item, "a tuple holds numbers")
+        if isinstance(resolve(type), Truth):
+            inference.report(comparison(item, "a tuple holds numbers or functions"))
     return TupleOf(items)
 
 
@@ -254,8 +255,8 @@ def _curries(inference: Inference, body: nodes.Expr) -> bool:
         case nodes.Name():
             meaning = inference.meanings.get(id(body))
             return not (isinstance(meaning, Local) and meaning.kind != "local")
-        case nodes.If() | nodes.Tuple() | nodes.ListLiteral():
-            return True  # reported where it chooses between functions
+        case nodes.If(then=then, orelse=orelse):
+            return _curries(inference, then) and _curries(inference, orelse)
         case _:
             return True
 

@@ -149,12 +149,12 @@ def test_comparisons_are_no_values() -> None:
 def test_functions_do_not_escape() -> None:
     check(r"""
         def f(g, x) let y = g(x) in if y > 0 then g else g
-        #                                         ^ error[P0313]: a conditional chooses between numbers
-        #                                                ^ error[P0313]: a conditional chooses between numbers
+        #              ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^ error[P0313]: a function cannot be the result
         def h(g, x) let _y = g(x) in g
         #           ^^^^^^^^^^^^^^^^^^ error[P0313]: a function cannot be the result
-        def i(x) (x, sin)
-        #            ^^^ error[P0313]: a tuple holds numbers
+        def i(x, t) integral [0, 1] (if [s < t] then sin else cos)(s*x) d(s)
+        #                                            ^^^ error[P0313]: a condition that may vary chooses between numbers
+        #                                                     ^^^ error[P0313]: a condition that may vary chooses
         def j(t) integral [0, 1] (\y . x*y*t) d(x)
         #                        ^^^^^^^^^^^^ error[P0313]: the integrand must be a number
         def k(x) 2*sin

@@ -13,7 +13,7 @@ from functools import lru_cache
 from msgspec import Struct
 
 from potto.calculus.differentiation.dual import Differentiator
-from potto.calculus.inlining.expand import Resolve, expanded
+from potto.calculus.inlining.expand import Resolve, expanded, named
 from potto.core.binders import apart
 from potto.core.terms import (
     ZERO,
@@ -23,6 +23,7 @@ from potto.core.terms import (
     Const,
     Data,
     Fold,
+    Global,
     Holding,
     If,
     Index,
@@ -36,6 +37,7 @@ from potto.core.terms import (
     Tuple,
     Var,
     add,
+    app,
     apply,
     array,
     bound_names,
@@ -90,9 +92,26 @@ def inlined(term: Integral, touches: Callable[[Term], bool], resolve: Resolve, a
     found = expanded(term, lambda name: resolve(name) if touches(name) else None, derive)
     if any(isinstance(node, App) and any(_is_array(arg, arrays) for arg in node.args) for node in postorder(found)):
         found = expanded(found, resolve, derive)
-    found = apart(_pushed(found, frozenset(_bound(found))))
+    found = apart(_pushed(_functions(found, resolve), frozenset(_bound(found))))
     assert isinstance(found, Integral)
     return found
+
+
+def _functions(term: Term, resolve: Resolve) -> Term:
+    """With calls of functions in arrays and tuples as calls of those, chosen by the place."""
+
+    def change(_: Term, new: Term) -> Term:
+        if not isinstance(new, App) or not isinstance(new.function, Index | Proj):
+            return new
+        whole = new.function.array if isinstance(new.function, Index) else new.function.term
+        known = named(whole, resolve) if isinstance(whole, Global) else whole
+        if isinstance(new.function, Proj) and isinstance(known, Tuple):
+            return app(known.items[new.function.index], new.args)
+        if isinstance(new.function, Index) and isinstance(known, ListOf) and known.items:
+            return _chosen(tuple(app(item, new.args) for item in known.items), new.function.index)
+        return new
+
+    return expanded(transform(term, change), resolve) if any(isinstance(n, App) for n in postorder(term)) else term
 
 
 def _is_array(term: Term, arrays: frozenset[str]) -> bool:

@@ -15,6 +15,7 @@ from potto.diagnostics import PottoError, declare
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Number, Rows, Value, all_arrays, listed
 from potto.kernels.rows import gathered
+from potto.runtime.evaluation.functions import Chosen, Closure
 from potto.runtime.evaluation.machine import Machine
 
 OUT_OF_RANGE = declare("P0511", "an index that is out of range")
@@ -107,10 +108,13 @@ def element(whole: Value, place: Value) -> Value:
         places = _places(place.v, whole.size)
         return whole.at(int(places)) if not places.ndim else gathered(whole, places)
     if isinstance(whole, list):
-        places = np.unique(_places(place.v, len(whole)))
-        if places.size == 1:
-            return whole[int(places[0])]
-        raise errors.wrong_call("an array of functions has one index for all members of a batch")
+        places = _places(place.v, len(whole))
+        if np.ptp(places) == 0:
+            return whole[int(places.flat[0])]
+        options: list[Any] = whole
+        if all(isinstance(option, Closure) for option in options):
+            return Chosen(options, Cell(places.astype(float)))
+        raise errors.wrong_call("where rows are of different lengths, all members of a batch have one index")
     raise errors.wrong_call("only an array has elements", "to call a function, write parentheses")
 
 

@@ -7,7 +7,8 @@ A function written by hand for duals (`Paired`) is called with pairs instead.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Any
 
 from potto.core.terms import Lam
 from potto.kernels.cells import Cell, Pattern, Rows, Value, pad
@@ -66,6 +67,26 @@ class Paired(Closure):
 
     def change(self, how: Callable[[Value], Value]) -> Closure:
         return Paired(self.pairs.change(how))
+
+
+class Chosen(Closure):
+    """One of several functions for each member of a batch: the one at its place."""
+
+    __slots__ = ("options", "places")
+
+    def __init__(self, options: Sequence[Closure], places: Cell) -> None:
+        first = options[0]
+        super().__init__(first.lam, {}, any(option.inexact for option in options))
+        self.options, self.places = tuple(options), places
+
+    def pattern(self, directions: int) -> Pattern:
+        patterns = [option.pattern(directions) for option in self.options]
+        return (self.inexact, *(any(p[1 + d] for p in patterns) for d in range(directions)))
+
+    def change(self, how: Callable[[Value], Value]) -> Closure:
+        options: list[Any] = [option.change(how) for option in self.options]
+        places: Any = how(self.places)
+        return Chosen(options, places)
 
 
 def _moves(value: Value, direction: int) -> bool:

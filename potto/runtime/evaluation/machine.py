@@ -46,7 +46,7 @@ from potto.kernels.making import counts
 from potto.kernels.written import Kernel
 from potto.projects.settings import Settings
 from potto.runtime.evaluation.arguments import fit, uncurried
-from potto.runtime.evaluation.functions import Closure, Derivative, Paired
+from potto.runtime.evaluation.functions import Chosen, Closure, Derivative, Paired
 from potto.runtime.evaluation.reach import Reach
 from potto.runtime.evaluation.record import Record
 
@@ -68,6 +68,7 @@ class Semantics:
 
     derivative: Callable[[Machine, Derivative, Groups, Trace | None], Value]
     paired: Callable[[Machine, Paired, Groups, Trace | None], Value]
+    chosen: Callable[[Machine, Chosen, Groups], Value]
     conditional: Callable[[Machine, Any, If | Branch, dict[str, Value], tuple[Any, Any]], Value]
     added: Callable[[Machine, tuple[Term, ...], dict[str, Value]], Value]
     sum: Callable[[Machine, Sum, Value, Value, dict[str, Value], Trace | None], Value]
@@ -351,6 +352,8 @@ class Machine:
             return self.linker.semantics.derivative(self, function, groups, trace)
         if isinstance(function, Paired):
             return self.linker.semantics.paired(self, function, groups, trace)
+        if isinstance(function, Chosen):
+            return self.linker.semantics.chosen(self, function, groups)
         self.enter()
         whole, arities = uncurried(function.lam, sizes_of(groups))
         args = [function.captured[n] for n in sorted(function.captured)]

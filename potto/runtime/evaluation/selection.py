@@ -26,6 +26,7 @@ from potto.kernels.cells import (
     map_trace,
 )
 from potto.kernels.tape import Node, scattered
+from potto.runtime.evaluation.functions import Chosen
 from potto.runtime.evaluation.machine import Machine
 
 Pick = Callable[[Array], Array]
@@ -90,3 +91,20 @@ def apart(
 
 def _spoil(value: Value, nan: Number) -> Value:
     return map_cells(value, lambda cell: Cell(cell.v + nan, cell.e, cell.t, cell.et))
+
+
+def chosen(machine: Machine, function: Chosen, groups: tuple[tuple[Value, ...], ...]) -> Value:
+    """Several functions called, each for the members that have chosen it."""
+    given: dict[str, Value] = {f"{i}.{j}": arg for i, group in enumerate(groups) for j, arg in enumerate(group)}
+    where = np.asarray(function.places.v)
+    shape = np.broadcast_shapes(where.shape, *(a.shape for value in given.values() for a in all_arrays(value)))
+    full = np.broadcast_to(where, shape)
+    numbers = [int(place) for place in np.unique(where)]
+    options = [function.options[place] for place in numbers]
+
+    def evaluated(number: int, here: dict[str, Value], pick: Pick) -> Value:
+        option = options[number].change(lambda value: map_arrays(value, pick))
+        called = tuple(tuple(here[f"{i}.{j}"] for j in range(len(group))) for i, group in enumerate(groups))
+        return machine.call(option, called, None)
+
+    return apart([full == place for place in numbers], given, evaluated)
