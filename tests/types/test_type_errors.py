@@ -149,7 +149,7 @@ def test_comparisons_are_no_values() -> None:
 def test_functions_do_not_escape() -> None:
     check(r"""
         def f(g, x) let y = g(x) in if y > 0 then g else g
-        #              ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^ error[P0313]: a function cannot be the result
+        #           ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^ error[P0313]: a function cannot be the result
         def h(g, x) let _y = g(x) in g
         #           ^^^^^^^^^^^^^^^^^^ error[P0313]: a function cannot be the result
         def i(x, t) integral [0, 1] (if [s < t] then sin else cos)(s*x) d(s)
