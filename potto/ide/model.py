@@ -76,7 +76,7 @@ class Hover(Struct, frozen=True):
 
 CompletionKind = Literal[
     "variable", "parameter", "constant", "function", "diffeo", "module", "keyword", "snippet", "builtin", "measure",
-    "symbol", "argument", "type", "command",
+    "symbol", "argument", "type", "command", "field",
 ]  # fmt: skip
 
 

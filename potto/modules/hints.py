@@ -36,7 +36,7 @@ _ELSEWHERE = {
     "None": "every expression has a value; leave it out",
     "null": "every expression has a value; leave it out",
     "len": "a list has no length here; `for v in list: …` goes through it",
-    "range": "write the list, `[1, 2, 3]`; `sum i in 1..n (…)` adds over a range",
+    "range": "write a range, `0..n-1`, as in `[i^2 for i in 0..n-1]` and `sum i in 0..n-1 (…)`",
     "integrate": "write `integral [lo, hi] body d(x)`",
     "quad": "write `integral [lo, hi] body d(x)`",
     "grad": "write `deriv(f)((x, 1))`: the value and the derivative",

@@ -8,7 +8,7 @@ batch. Until all batches are known, the parts of such an array have its axes fir
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from potto.kernels.cells import Cell, Rows, Value, all_cells, listed, map_cells,
 from potto.kernels.errors import wrong_call
 from potto.runtime.answers.estimate import Estimate
 from potto.types import format_type
-from potto.types.types import ArrayOf, Count, Dist, Real, Shifted, SizeVar, TupleOf, Type, resolve
+from potto.types.types import ArrayOf, Count, Dist, Real, RecordName, Shifted, SizeVar, TupleOf, Type, resolve
 
 Sizes = dict[str, tuple[str, int]]  # of names of sizes: the parameter that says how many, and the number
 
@@ -29,15 +29,32 @@ def with_arrays(name: str, argument: Any, type: Type, sizes: Sizes) -> Any:
         return _array(name, argument, found, sizes)
     if isinstance(found, TupleOf) and found.dual and not isinstance(argument, tuple):
         return with_arrays(name, argument, found.items[0], sizes)  # without tangents
+    if isinstance(found, TupleOf) and found.record is not None and not isinstance(argument, tuple):
+        argument = _fields(name, argument, found.record)
     if isinstance(found, TupleOf) and isinstance(argument, tuple) and len(argument) == len(found.items):
         return tuple(with_arrays(name, part, item, sizes) for part, item in zip(argument, found.items, strict=True))
     return argument
 
 
+def _fields(name: str, argument: Any, record: RecordName) -> Any:
+    """A record that is given as a dict, or as an object with attributes, as the tuple of its fields."""
+    given = argument if isinstance(argument, Mapping) else getattr(argument, "__dict__", None)
+    if given is None:
+        return argument
+    missing = [f"`{field}`" for field in record.fields if field not in given]
+    unknown = [f"`{field}`" for field in given if field not in record.fields]
+    if missing or (unknown and isinstance(argument, Mapping)):
+        what = f"has no {', '.join(missing)}" if missing else f"has {', '.join(unknown)}, which it does not know"
+        raise wrong_call(f"`{name}` is {record.name}, and what is given {what}")
+    return tuple(given[field] for field in record.fields)
+
+
 def has_arrays(type: Type) -> bool:
-    """Whether a parameter takes an array."""
+    """Whether a parameter takes an array or a record."""
     found = resolve(type)
-    return isinstance(found, ArrayOf) or (isinstance(found, TupleOf) and any(map(has_arrays, found.items)))
+    if isinstance(found, TupleOf):
+        return found.record is not None or any(map(has_arrays, found.items))
+    return isinstance(found, ArrayOf)
 
 
 def _array(name: str, argument: Any, type: ArrayOf, sizes: Sizes) -> Any:

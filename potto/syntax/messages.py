@@ -102,6 +102,7 @@ class Stop(Struct, frozen=True):
 
 
 _SUM_HELP = "write `sum i in 1..n (body)`"
+_FOLD_HELP = "write `fold s = 0 for i in 1..n (step)`"
 _LET_HELP = "write `let a = 1 in a + 2`; a name that has a line to itself needs no `let`: `a = 1`"
 _LET_BODY = (
     "the result follows `in`, on its line or on the next: `let a = 1 in a + 2`; "
@@ -112,6 +113,9 @@ _PARTS: tuple[tuple[str, tuple[str, ...], str, str], ...] = (
     ("ELSE", ("IF",), "expected `else` after the first choice of `if`", "an `if` has a value either way"),
     ("COLON", ("QMARK",), "expected `:` after the first choice of `? :`", "write `p ? a : b`"),
     ("SUMBODY", ("SUM",), "expected the body of `sum` in parentheses", _SUM_HELP),
+    ("SUMBODY", ("FOLD",), "expected the step of `fold` in parentheses", _FOLD_HELP),
+    ("FOR", ("FOLD",), "expected `for` after the first state of `fold`", _FOLD_HELP),
+    ("EQ", ("FOLD",), "expected `=` and the first state of `fold`", _FOLD_HELP),
     ("DOTDOT", ("SUM",), "expected `..` and the last value of the variable of `sum`", _SUM_HELP),
     ("IN", ("SUM",), "expected `in` after the variable of `sum`", _SUM_HELP),
     ("IN", ("FOR",), "expected `in` after the variable of `for`", "write `for v in list:`"),
@@ -139,6 +143,9 @@ def _special(stop: Stop) -> Diagnostic | None:
     opened, at, before = stop.opened, stop.at, stop.before
     if at.kind == "COMMA" and opened is not None and opened.kind == "LET":
         return kinds.UNEXPECTED(at.span, "unexpected `,`", help="separate the names of a `let` by `;`, or by lines")
+    if at.kind == "COLON" and opened is not None and opened.kind == "ADJACENT":
+        help = "write the elements that are meant: `[xs[k] for k in 1..3]`"
+        return kinds.UNEXPECTED(at.span, "an index is one place, not a range", help=help)
     unpacked = tuple_without_parentheses(stop)
     if unpacked is not None:
         return unpacked

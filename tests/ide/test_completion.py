@@ -242,3 +242,14 @@ def test_behind_a_text_that_is_in_no_file():
     assert (found.span.start, found.span.end) == (4, 6)
     item = next(item for item in found.items if item.label == "half")
     assert "half : Real" in ide.resolve_completion(f.db, item).documentation
+
+
+def test_parts_of_records_tuples_and_vectors():
+    f = fixture("record Camera(eye: (Real, Real, Real), focal: Real)\ndef f(c: Camera) c.$0\n")
+    assert f.labels() == ["eye", "focal"]
+    f = fixture("record Camera(eye: (Real, Real, Real), focal: Real)\ndef f(c: Camera) c.eye.$0\n")
+    assert f.labels() == ["x", "y", "z", "0", "1", "2"]
+    f = fixture("origin = (1, [2, 3])\ny = origin.$0\n")
+    assert f.labels() == ["0", "1"]
+    f = fixture("def f(a) a.$0\n")
+    assert f.labels() == []

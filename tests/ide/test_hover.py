@@ -311,3 +311,21 @@ def test_why_a_boundary_has_no_closed_form_is_said_once():
 def test_why_a_parameter_must_not_vary():
     assert "must not vary: its annotation says so" in fixture("def f(k: Real) k^2\n").hover("k:")
     assert "must not vary: it decides a plain condition" in fixture("def f(k) if k > 0 then 1 else 2\n").hover("k)")
+
+
+def test_what_a_file_of_data_holds(tmp_path):
+    from potto.checking.library import Library
+    from potto.ide.hover.hovers import hover
+
+    (tmp_path / "people.csv").write_text("height,weight\n1.5,60\n1.75,80\n")
+    (tmp_path / "main.po").write_text('people = load("people.csv")\nmean = sum h in people.height (h)/2\n')
+    library = Library([tmp_path])
+    key = library.key(tmp_path / "main.po")
+    said = hover(library.db, key, 2)
+    assert said is not None
+    assert "height [2] from 1.5 to 1.75" in said.markdown
+    (tmp_path / "people.csv").write_text("height,weight\n1.5,60\n1.75,80\n2,90\n")
+    assert library.refresh()
+    said = hover(library.db, key, 2)
+    assert said is not None
+    assert "height [3] from 1.5 to 2" in said.markdown

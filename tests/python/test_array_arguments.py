@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -223,3 +224,26 @@ def test_fits_of_arrays_to_targets() -> None:
     assert matrix["a"] == pytest.approx(np.arange(6.0).reshape(3, 2).T, rel=1e-6, abs=1e-6)
     many = potto.fit(MODULE.total, {"xs": [1.0, 2.0], "k": 0.5}, given={}, target=10.0)
     assert (many["k"] * many["xs"] ** 2).sum() == pytest.approx(10.0, rel=1e-6, abs=0)
+
+
+def test_records_as_dicts_objects_and_tuples() -> None:
+    module = potto.compile("""
+record Camera(eye: (Real, Real, Real), focal: Real)
+def share(c: Camera, depth) c.focal/(depth - c.eye.z)
+""")
+
+    @dataclass
+    class Camera:
+        eye: tuple[float, float, float]
+        focal: float
+
+    eye = (0.0, 0.0, -5.0)
+    for camera in ((eye, 1.5), {"focal": 1.5, "eye": eye}, Camera(eye, 1.5)):
+        found = potto.grad(module.share)(camera, 1.0)
+        assert found.value == 0.25
+        by_eye, by_focal = found.tangent
+        assert (*by_eye, by_focal) == pytest.approx((0, 0, 1.5 / 36, 1 / 6), rel=1e-15)
+    with pytest.raises(potto.PottoError, match="`c` is Camera, and what is given has no `focal`"):
+        module.share({"eye": eye}, 1.0)
+    with pytest.raises(potto.PottoError, match="has `zoom`, which it does not know"):
+        module.share({"eye": eye, "focal": 1.0, "zoom": 2.0}, 1.0)

@@ -337,3 +337,12 @@ def test_a_broken_definition_keeps_its_name_and_parameters(broken: str) -> None:
     assert parsed.diagnostics
     assert parsed.item is not None
     assert print_item(parsed.item).startswith("def f(x, y)(z)\n    a = x\n")
+
+
+def test_arrays_and_folds() -> None:
+    check_messages("""
+        x = fold s = 0 for i in 1..3
+        #                          ^ error[P0104]: expected the step of `fold` in parentheses
+        x = xs[0:2]
+        #       ^ error[P0103]: an index is one place, not a range
+    """)

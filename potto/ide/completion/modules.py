@@ -7,11 +7,13 @@ from collections.abc import Iterator
 
 from msgspec.structs import replace
 
+from potto.ide.completion.fields import field_items
 from potto.ide.completion.place import Place
 from potto.ide.model import Completion
 from potto.ide.names.documents import written_kind
 from potto.ide.names.places import Site
 from potto.modules import DefinitionTarget, ModuleTarget, find_module, names, resolve, resolve_module
+from potto.modules.graph import owner
 from potto.modules.lookup import bindings, folders
 from potto.modules.texts import imports
 from potto.modules.workspace import files, module_name
@@ -64,8 +66,10 @@ def member_items(db: Database, site: Site, place: Place) -> Iterator[Completion]
     file, chunk = site.file, site.chunk
     head = place.path.partition(".")[0]
     start = place.span.start - len(place.path) - 1  # of the path: what is being typed behind it may not be read yet
-    if chunk is not None and any(b.name == head for _, b in chunk.index(db).visible(start - chunk.start)):
-        return  # a parameter, and the dot of a lambda
+    local = chunk is not None and any(b.name == head for _, b in chunk.index(db).visible(start - chunk.start))
+    if local or (resolve_module(db, file, place.path) is None and owner(db, file, head) is not None):
+        yield from field_items(db, site, place, start)
+        return
     module = resolve_module(db, file, place.path)
     if module is not None:
         yield from _names_of(db, module, place)

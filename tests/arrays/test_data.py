@@ -1,0 +1,89 @@
+"""Files of data in programs: what `load` gives, on the command line, from Python; what an edited file changes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import potto
+from potto.__main__ import main
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "people.csv").write_text("height,weight\n1.5,60\n1.75,80\n2,90\n")
+    np.save(tmp_path / "grid.npy", np.arange(6.0).reshape(2, 3))
+    np.savez(tmp_path / "mesh.npz", corners=np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), h=np.array(0.25))
+    (tmp_path / "nested.json").write_text('{"a": [1, 2], "b": 3}')
+    (tmp_path / "main.po").write_text("""
+people = load("people.csv")
+grid = load("grid.npy")
+mesh = load("mesh.npz")
+nested = load("nested.json")
+tallest = max h in people.height (h)
+def misfit(a, b) sum i in 0..len(people.height)-1 ((people.weight[i] - a - b*people.height[i])^2)
+def below(t) integral [0, 3] sum h in people.height ([x < h*t]) d(x)
+corner = grid[1, 2] + mesh.corners[1, 0] + mesh.h + nested.a[1] + nested.b
+""")
+    return tmp_path
+
+
+def test_what_files_hold(folder: Path) -> None:
+    module = potto.load(folder / "main.po")
+    assert module.tallest.value == 2
+    assert module.corner.value == 5 + 1 + 0.25 + 2 + 3
+    heights, weights = np.array([1.5, 1.75, 2]), np.array([60.0, 80, 90])
+    found = potto.grad(module.misfit, ["a", "b"])(1.0, 2.0)
+    rest = weights - 1 - 2 * heights
+    assert found.value == pytest.approx((rest**2).sum(), rel=1e-15)
+    assert found.tangent == pytest.approx((-2 * rest.sum(), -2 * (rest * heights).sum()), rel=1e-15)
+    assert potto.grad(module.below)(0.9).tangent == pytest.approx(heights.sum(), rel=1e-14)
+
+
+def test_types_come_from_the_file(folder: Path) -> None:
+    (folder / "types.po").write_text('grid = load("grid.npy")\ndef row(i) grid[i]\nlast = grid[2, 0]\n')
+    workspace = potto.Workspace(folder)
+    with pytest.warns(potto.ProgramWarning, match="the index 2 is out of range: the array has 2 elements"):
+        module = workspace.module("types")
+    assert module.row.type == "(i: Real) -> [3] Real"
+
+
+def test_an_edited_file_counts_again(folder: Path) -> None:
+    workspace = potto.Workspace(folder)
+    module = workspace.module("main")
+    assert module.tallest.value == 2
+    (folder / "people.csv").write_text("height,weight\n1.5,60\n2.25,80\n")
+    assert workspace.reload()
+    assert module.tallest.value == 2.25
+    assert not workspace.reload()
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "code", "place"),
+    [
+        ("people.csv", None, "P0801", "1:17"),
+        ("people.csv", "a,b\n1,2\n3,x\n", "P0803", "1:17"),
+        ("people.csv", "a,b\n1,2\n3\n", "P0803", "1:17"),
+        ("people.json", "[1, 2", "P0805", "1:17"),
+        ("people.docx", "1", "P0802", "1:17"),
+    ],
+)
+def test_what_is_wrong_with_a_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, content: str | None, code: str, place: str
+) -> None:
+    if content is not None:
+        (tmp_path / name).write_text(content)
+    (tmp_path / "main.po").write_text(f'people   = load("{name}")\n')
+    assert main(["check", str(tmp_path / "main.po")]) == 1
+    assert f"main.po:{place}: error[{code}]" in capsys.readouterr().out
+
+
+def test_data_on_the_command_line(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "one.csv").write_text("1\n2\n4\n")
+    program, table = str(folder / "main.po"), folder / "people.csv"
+    assert main(["eval", program, "sum x in xs (x)", "--set", f"xs=@{folder / 'one.csv'}"]) == 0
+    assert main(["eval", program, "sum h in hs (h)", "--set", f"hs=@{table}:height"]) == 0
+    assert main(["eval", program, "len(t.weight) + k", "--set", f"t=@{table}", "--set", "k=0.5"]) == 0
+    assert capsys.readouterr().out.split() == ["7", "5.25", "3.5"]
