@@ -34,7 +34,7 @@ def _index(inference: Inference, node: nodes.Index) -> Type:
         what = "only an array has elements" if not place else f"this array has no {_ordinal(place)} index"
         type = expect_array(inference, array, node.array, what)
         if isinstance(array, ArrayOf):
-            _in_range(inference, resolve(array.size), index)
+            _in_range(inference, shifted(array.size, 0), index)
     return type
 
 
@@ -46,12 +46,16 @@ def _in_range(inference: Inference, size: Type, index: nodes.Expr) -> None:
     known = _constant(index)
     if known is None or not isinstance(size, Count) or 0 <= known < size.number:
         return
-    last = f"the last one is {size.number - 1}" if size.number else "it has no elements"
-    from_end = f"; the last element is `[{size.number - 1}]`" if known < 0 and size.number else ""
-    inference.report(kinds.OUT_OF_RANGE(
-        index.span, f"the index {known} is out of range: the array has {size.number} elements",
-        label=f"not in 0..{size.number - 1}", help=f"indices count from 0, so that {last}{from_end}",
-    ))  # fmt: skip
+    last = size.number - 1
+    if last < 0:
+        count, label, help = "no elements", "there are none", "an array without elements has no index"
+    else:
+        count = f"{size.number} element{'s' if last else ''}"
+        label, help = f"not in 0..{last}", f"indices count from 0, so that the last one is {last}"
+    if known < 0 <= last:
+        help += f"; the last element is `[{last}]`"
+    message = f"the index {known} is out of range: the array has {count}"
+    inference.report(kinds.OUT_OF_RANGE(index.span, message, label=label, help=help))
 
 
 def _constant(expr: nodes.Expr) -> int | None:

@@ -27,6 +27,7 @@ from potto.types.types import (
     Unknown,
     Var,
     resolve,
+    shifted,
 )
 from potto.types.unify import size_name
 
@@ -49,6 +50,8 @@ class _Printer:
 
     def text(self, type: Type) -> str:
         type = resolve(type)
+        if isinstance(type, Shifted):
+            type = shifted(type, 0)
         match type:
             case Real(star, variables):
                 return "Real" + ("*" if star else "") + _over(variables)

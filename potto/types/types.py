@@ -162,7 +162,7 @@ def resolve(type: Type) -> Type:
 
 
 def shifted(size: Type, offset: int) -> Type:
-    """A size so much larger."""
+    """A size so much larger. By 0: the same in the form that others are compared with, whatever was found since."""
     size = resolve(size)
     match size:
         case Count(number):

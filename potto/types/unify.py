@@ -39,7 +39,7 @@ MAX_LEAVES = 4096  # numbers in one tuple: beyond it a program is wrong (or host
 
 def unify(a: Type, b: Type) -> bool:
     """Whether the types fit; makes them equal."""
-    a, b = resolve(a), resolve(b)
+    a, b = _reduced(a), _reduced(b)
     if a is b or isinstance(a, Unknown) or isinstance(b, Unknown):
         return True
     if isinstance(a, Meta):
@@ -60,6 +60,12 @@ def unify(a: Type, b: Type) -> bool:
     if isinstance(a, Var) and isinstance(b, Var):
         return a.name == b.name
     return isinstance(a, Truth) and isinstance(b, Truth)
+
+
+def _reduced(type: Type) -> Type:
+    """What is known about a type. What a size is shifted from may be shifted itself: `n + 1 - 1` is `n`."""
+    type = resolve(type)
+    return shifted(type, 0) if isinstance(type, Shifted) else type
 
 
 def _unify_sizes(a: Type, b: Type) -> bool:

@@ -58,6 +58,32 @@ def test_sizes_that_do_not_agree() -> None:
     """)
 
 
+def test_sizes_that_follow_from_each_other_agree_in_any_order() -> None:
+    check("""
+        def diff(xs: [n] Real) [xs[i + 1] - xs[i] for i in 0..n-2]
+        def pair(xs: [n + 1] Real, ys: [n] Real) dot(ys, diff(xs))
+        def before(xs, ys) pair(xs, ys) + dot(diff(xs), ys)
+        def after(ys, xs) dot(ys, diff(xs)) + pair(xs, ys)
+        k = pair([1, 2, 3], [1, 2, 3])
+        #                   ^^^^^^^^^ error[P0306]: `ys` of `pair` must be `[2] Real`, but this is `[3] Real`
+        def last(xs: [n] Real, ys: [n - 1] Real) xs[0] + ys[0]
+        l = last([1, 2, 3], [1, 2, 3])
+        #                   ^^^^^^^^^ error[P0306]: `ys` of `last` must be `[2] Real`, but this is `[3] Real`
+    """)
+
+
+def test_an_index_into_few_elements() -> None:
+    check("""
+        def none(xs: [0] Real) xs[0]
+        #                         ^ error[P0328]: the index 0 is out of range: the array has no elements
+        k = [7][1]
+        #       ^ error[P0328]: the index 1 is out of range: the array has 1 element
+    """)
+    found = only("k = [][0]")
+    assert found.label == "there are none" and found.help == "an array without elements has no index"
+    assert only("k = [7][1]").help == "indices count from 0, so that the last one is 0"
+
+
 def test_indices() -> None:
     check("""
         k = [1, 2, 3]
