@@ -90,9 +90,13 @@ def _all_of(values: Sequence[Value]) -> Scalar:
 
 def _with_sources(value: Value, more: Scalar) -> Value:
     """A number, or each of a tuple, that varies with more."""
-    if isinstance(value, TupleValue):
-        return TupleValue(tuple(_with_sources(item, more) for item in value.items))
-    return ListValue(_with_sources(value.item, more)) if isinstance(value, ListValue) else more
+    match value:
+        case TupleValue(items):
+            return TupleValue(tuple([_with_sources(item, more) for item in items]))
+        case ListValue(item):
+            return ListValue(_with_sources(item, more))
+        case _:
+            return more
 
 
 def _leaves(values: Sequence[Value]) -> Iterator[Scalar]:
