@@ -157,7 +157,9 @@ def resolve(type: Type) -> Type:
     while isinstance(root, Meta) and root.found is not None:
         root = root.found
     while isinstance(type, Meta) and type.found is not None:
-        type.found, type = root, type.found
+        after = type.found  # held while nothing else may: the compiler of the front end would only borrow it
+        type.found = root
+        type = after
     return root
 
 
