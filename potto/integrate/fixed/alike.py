@@ -27,6 +27,9 @@ MEMBERS, POINTS = 1 << 16, 1 << 15
 # How many members tell the order for all, where there are many, and for how many of them it must do.
 PILOTS = 16
 ENOUGH = 0.9
+# What rounding may leave where what is added up cancels, as a part of that, in the end (`convergence`): of 18,233 pairs
+# of a triangle and a pixel 1,082 would be done again for less, at a hundred times the cost.
+ROUNDED = 1e-12
 
 
 def together(
@@ -55,8 +58,10 @@ def together(
         return None
     number, truncated, rounding, gross = total
     asked = 0.5 * np.maximum(machine.atol, machine.rtol * np.abs(number))
-    most = CANCELS * gross.max(axis=0) if batch > 1 else 0.0  # for one there are other ways
-    fine = (rounding <= np.maximum(asked, most)) & (truncated <= np.maximum(asked, most))
+    added = gross.max(axis=0)
+    most = CANCELS * added if batch > 1 else 0.0  # for one there are other ways
+    left = np.maximum(most, min(machine.rtol, ROUNDED) * np.minimum(added, 1.0)) if batch > 1 else 0.0
+    fine = (rounding <= np.maximum(asked, left)) & (truncated <= np.maximum(asked, most))
     done &= fine.all(axis=0)
     if not done.any():
         return None

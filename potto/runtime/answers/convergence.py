@@ -1,10 +1,11 @@
 """Whether an answer is as accurate as was asked for; and if not, why, member by member.
 
-Owns `Shortfalls`, `missed`, `missing` and `allowance`. Converged means: the error is within `rtol * |value|`, or within
-`atol`. An answer that is 0 because its parts cancel has no digits that could be relative to it. It is accurate enough
-if it is relative to what is added up without regard to sign: there its error is within `rtol`, and within CANCELS,
-which is what rounding leaves. That is no licence to lose a small summand beside large ones (1e16 - 1e16 + 1): where the
-integrand adds anything, what is added up counts as 1 at most, so that CANCELS is an absolute bound.
+Owns `Shortfalls`, `missed`, `missing`, `rounded` and `allowance`. Converged means: the error is within
+`rtol * |value|`, or within `atol`. An answer that is 0 because its parts cancel has no digits that could be relative to
+it. It is accurate enough if it is relative to what is added up without regard to sign: there its error is within
+`rtol`, and within CANCELS, which is what rounding leaves. That is no licence to lose a small summand beside large ones
+(1e16 - 1e16 + 1): where the integrand adds anything, what is added up counts as 1 at most, so that CANCELS is an
+absolute bound.
 """
 
 from __future__ import annotations
@@ -85,6 +86,15 @@ def missing(term: Integral, sums: Sums, settings: Settings) -> Bools:
         speck = SPECK * np.max(size, axis=-1, keepdims=True, initial=0.0, where=np.isfinite(size))
         fine = error <= np.maximum(np.maximum(settings.atol, settings.rtol * size), np.maximum(within, speck))
         out |= ~fine.reshape(-1, out.size).all(axis=0)
+    return out
+
+
+def rounded(sums: Sums) -> Bools:
+    """The members of a batch whose errors, beside what they come to, are so small that they are made of rounding."""
+    out: Bools = np.ones(sums.v.shape[-1], dtype=bool)
+    for number, error in ((sums.v, sums.e), (sums.t, sums.et)):
+        most = np.abs(number).reshape(-1, out.size).max(axis=0, initial=0.0)
+        out &= (error.reshape(-1, out.size) <= ONLY_ROUNDED * most).all(axis=0)
     return out
 
 

@@ -15,6 +15,7 @@ from potto.core.terms import Integral
 from potto.integrate.events import Degenerate, Fold, Shortfall, TwoSided, Unsearched
 from potto.integrate.pieces import Sums
 from potto.kernels.cells import Array
+from potto.runtime.answers.convergence import missing
 from potto.runtime.integration.choices import TRIAL, orders
 from potto.runtime.integration.problem import Problem
 from potto.runtime.integration.quadrature import in_parts, iterated, within
@@ -99,7 +100,7 @@ def in_another_order(problem: Problem, order: Integral, sums: Sums) -> Sums:
     """
     machine = problem.machine
     spoilt = ((sums.et > machine.rtol * np.abs(sums.t)) & (sums.et > STEEP * sums.e[:, None])).any(axis=(0, 1))
-    spoilt &= ~np.isinf(sums.et).any(axis=(0, 1))
+    spoilt &= ~np.isinf(sums.et).any(axis=(0, 1)) & missing(problem.term, sums, machine.settings)
     if problem.events.every(Shortfall) or not spoilt.any() or spoilt.sum() > MOST_SPOILT:
         return sums
     index = np.nonzero(spoilt)[0]
