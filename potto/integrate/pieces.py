@@ -59,6 +59,10 @@ class Evaluator(Protocol):
     def note(self, event: Event, members: Members = None) -> None: ...
 
 
+# The name under which members of a batch that are summands have the number of the sum into which each goes.
+INTO = "#into"
+
+
 class Sums(Columns):
     """Integrals of a batch: value (m, B) and tangents (m, k, B) with their error bounds; m components.
 
@@ -237,6 +241,17 @@ def mostly(owner: Ints, root: Ints | None, size: int) -> Ints:
 def gather(env: dict[str, Value], index: Ints | Bools | slice | int) -> dict[str, Value]:
     """The environment at some members of its batch."""
     return {name: map_arrays(value, lambda a: a[index]) for name, value in env.items()}
+
+
+def together(env: dict[str, Value], rows: Array) -> Array:
+    """Numbers of members (..., B), those that go into the same sum added up: what rounding is measured by there."""
+    into = env.get(INTO)
+    if not isinstance(into, Cell) or not isinstance(into.v, np.ndarray):
+        return rows
+    _, place = np.unique(into.v, return_inverse=True)
+    flat = rows.reshape(-1, place.size)
+    added: list[Array] = [np.bincount(place, row)[place] for row in flat]  # type: ignore[misc]
+    return np.stack(added).reshape(rows.shape)
 
 
 def column(env: dict[str, Value]) -> dict[str, Value]:

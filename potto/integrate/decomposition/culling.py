@@ -18,7 +18,8 @@ from msgspec import Struct
 from potto.calculus.solving.enclosable import enclosable
 from potto.core.terms import ZERO as NOTHING
 from potto.core.terms import Branch, If, Integral, Prim, Term, Tuple, postorder_by
-from potto.integrate.rules.intervals import Interval, enclosure
+from potto.integrate.rules.intervals import Interval
+from potto.integrate.rules.lowered_intervals import enclosures
 from potto.kernels.cells import Array, Bools, Ints
 
 FAN = 4  # blocks in a block
@@ -36,10 +37,13 @@ class Pairs(Struct, frozen=True):
     summands: Ints
 
 
-def remaining(term: Integral, members: Numbers, summands: Numbers, shared: Numbers, sizes: tuple[int, int]) -> Pairs:
+def remaining(
+    term: Integral, members: Numbers, summands: Numbers, shared: Numbers, sizes: tuple[int, int], backend: str
+) -> Pairs:
     """The pairs of a member and a summand whose integral is not 0 for certain.
 
     members, summands: the numbers of each, by name; shared: those of all. sizes: how many there are of both.
+    backend: by which boxes are enclosed.
     """
     tree = _Tree(members, sizes[0])
     found: list[tuple[Ints, Ints]] = []
@@ -50,7 +54,7 @@ def remaining(term: Integral, members: Numbers, summands: Numbers, shared: Numbe
             here, those = blocks[start : start + AT_ONCE], others[start : start + AT_ONCE]
             box = {**{name: (value, value) for name, value in shared.items()}, **tree.box(level, here)}
             box |= {name: (value[those], value[those]) for name, value in summands.items()}
-            kept = ~_vanishing(term, box, here.size)
+            kept = ~_vanishing(term, box, here.size, backend)
             here, those = here[kept], those[kept]
             if level == tree.depth:
                 found.append((tree.order[here], those))
@@ -143,15 +147,15 @@ def _surfaces(body: Term) -> tuple[Term, ...]:
     return tuple(surface for surface in found if enclosable(surface, jumps=True))
 
 
-def _vanishing(term: Integral, box: dict[str, Interval], count: int) -> Bools:
+def _vanishing(term: Integral, box: dict[str, Interval], count: int, backend: str) -> Bools:
     """For each box, whether the integrand is 0 in all of it, and remains so for all parameters nearby."""
     with np.errstate(all="ignore"):
         for over in (term, *(n for n in _structure(term.body) if isinstance(n, Integral))):
             for name, ends in zip(over.variables, over.bounds, strict=True):
-                (a, b), (c, d) = enclosure(ends, box)
+                (a, b), (c, d) = enclosures(ends, box, count, backend)
                 box = {**box, name: (np.minimum(a, c), np.maximum(b, d))}
         surfaces = _surfaces(term.body)
-        sides = dict(zip(surfaces, enclosure(surfaces, box), strict=True))
+        sides = dict(zip(surfaces, enclosures(surfaces, box, count, backend), strict=True))
         known: dict[Term, Any] = {}
         for node in _structure(term.body):
             known[node] = _zero(node, known, sides)

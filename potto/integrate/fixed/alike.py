@@ -1,6 +1,6 @@
 """Members of a batch whose cells are alike, by one product rule for all cells of a shape.
 
-Owns `together`. What `a_priori` does for one member, with orders that are proved, is done here for many at once, with
+Owns `by_shapes`. What `a_priori` does for one member, with orders that are proved, is done here for many at once, with
 orders that the Legendre coefficients at the nodes show to be enough. Nodes move with the ends of their cells (Reynolds'
 transport theorem), so that the tangents of the sums are the derivatives and no boundary term is left. Rounding is kept
 track of, as everywhere outside of integrals, at a few nodes of each cell, spread over it.
@@ -16,7 +16,7 @@ import numpy as np
 from potto.integrate.fixed.a_priori import Straight
 from potto.integrate.fixed.product_rule import CANCELS, FEW, Rule
 from potto.integrate.fixed.topologies import Alike, topologies
-from potto.integrate.pieces import Evaluator, Sums, gather
+from potto.integrate.pieces import Evaluator, Sums, gather, together
 from potto.kernels.cells import Array, Bools, Cell, Value
 
 # Nodes per variable that are tried, one after the other.
@@ -32,7 +32,7 @@ ENOUGH = 0.9
 ROUNDED = 1e-12
 
 
-def together(
+def by_shapes(
     plan: Straight, degrees: Sequence[int | None], machine: Evaluator, env: dict[str, Value], batch: int
 ) -> tuple[Bools, Sums] | None:
     """Which members were integrated here, and the sums of all (zero for the others); None if none were.
@@ -57,8 +57,9 @@ def together(
     if not done.any():
         return None
     number, truncated, rounding, gross = total
-    asked = 0.5 * np.maximum(machine.atol, machine.rtol * np.abs(number))
-    added = gross.max(axis=0)
+    whole, added = np.abs(number), together(env, gross.max(axis=0))
+    whole[0] = np.abs(together(env, number[0]))
+    asked = 0.5 * np.maximum(machine.atol, machine.rtol * whole)
     most = CANCELS * added if batch > 1 else 0.0  # for one there are other ways
     left = np.maximum(most, min(machine.rtol, ROUNDED) * np.minimum(added, 1.0)) if batch > 1 else 0.0
     fine = (rounding <= np.maximum(asked, left)) & (truncated <= np.maximum(asked, most))

@@ -28,7 +28,8 @@ from potto.integrate.fixed.axes import Axis
 from potto.integrate.fixed.lowered import lowered
 from potto.integrate.pieces import Evaluator, Sums, dense, gather, still
 from potto.integrate.rules.gauss import EPS, gauss, truncation
-from potto.integrate.rules.intervals import Interval, enclosure
+from potto.integrate.rules.intervals import Interval
+from potto.integrate.rules.lowered_intervals import enclosures
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays
 
 MOST_VARIABLES = 3
@@ -136,8 +137,8 @@ def _free_of_surfaces(box: Box, machine: Evaluator, env: dict[str, Value], low: 
         at = np.broadcast_to(value.v, (len(corners), low.shape[1]))
         near = NEAR * np.abs(at).max(axis=0)
         free = np.asarray(free & ((at > near).all(axis=0) | (at < -near).all(axis=0)))
-    index = np.nonzero(free)[0] if box.curved else ()
-    if len(index):
+    index: Ints = np.nonzero(free)[0] if box.curved else np.zeros(0, dtype=np.int64)
+    if index.size:
         ranges: dict[str, Interval] = {}
         for name in union_of(box.curved) - set(box.variables):
             cell = map_arrays(env[name], lambda a: a[index])
@@ -145,7 +146,7 @@ def _free_of_surfaces(box: Box, machine: Evaluator, env: dict[str, Value], low: 
             off = 0.0 if cell.e is None else cell.e
             ranges[name] = (cell.v - off, cell.v + off)
         ranges |= {x: (low[n, index], high[n, index]) for n, x in enumerate(box.variables)}
-        for least, most in enclosure(box.curved, ranges):
+        for least, most in enclosures(box.curved, ranges, index.size, machine.backend):
             free[index] &= (least > 0) | (most < 0)
     return free
 

@@ -15,6 +15,7 @@ from msgspec import Struct
 from potto.core.terms import Const, Term, children
 from potto.integrate.columns import distinct
 from potto.integrate.fixed.a_priori import CLEAR, Straight
+from potto.integrate.fixed.lowered_order import by_numpy, sorted_rows
 from potto.integrate.fixed.moving_sums import evaluated
 from potto.integrate.pieces import Evaluator, gather
 from potto.kernels.cells import Array, Bools, Cell, Ints, Number, Value
@@ -71,7 +72,7 @@ def _along(plan: Straight, i: int, machine: Evaluator, cells: _Cells, plain: Boo
         for surface, rows in plan.jumps[i]:
             roots = [(values[row].v, values[row].t) for row in rows]
             machine.costs.saw(surface, roots, places[0], places[1], machine.directions > 0)
-    order, count, fine = in_order(places, off)
+    order, count, fine = in_order(places, off, machine.backend)
     plain[cells.members[~fine]] = False
     at, index = np.nonzero((np.arange(1, len(places))[:, None] < count) & fine)
     low, high = order[at, index], order[at + 1, index]
@@ -133,11 +134,19 @@ def _rows(values: tuple[Cell, ...], count: int) -> tuple[Array, Array]:
     return places, off
 
 
-def in_order(places: Array, off: Array) -> tuple[Ints, Ints, Bools]:
+def in_order(places: Array, off: Array, backend: str) -> tuple[Ints, Ints, Bools]:
     """Per member its rows in order, (R, M), how many of them lie between the bounds, these included, and for whom that
     is sure. A row that is no number is a root that is not there.
     """
     near = CLEAR * off
+    found = sorted_rows(places, near, backend)
+    if found is not None:
+        return found[0].astype(np.int64), found[1].astype(np.int64), found[2] > 0
+    with by_numpy(len(places)).by_numpy():
+        return _in_order(places, near)
+
+
+def _in_order(places: Array, near: Array) -> tuple[Ints, Ints, Bools]:
     lying = (places >= places[0] - near[0] - near) & (places <= places[1] + near[1] + near)
     lying[:2] = True
     key = np.where(lying, places, np.inf)

@@ -15,6 +15,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from msgspec.structs import replace
 
 from potto.core.terms import Branch, Const, Integral, Prim, Proj, Term, Tuple, Var, children
 from potto.integrate.events import (
@@ -28,8 +29,8 @@ from potto.integrate.events import (
     TOO_LARGE,
     Shortfall,
 )
-from potto.integrate.pieces import Sums
-from potto.kernels.cells import Array, Bools
+from potto.integrate.pieces import Sums, together
+from potto.kernels.cells import Array, Bools, Value
 from potto.projects.settings import Settings
 
 CANCELS = 1e-12
@@ -76,9 +77,12 @@ def allowance(term: Integral, sums: Sums, rtol: float) -> Any:
     return share * np.maximum(value, np.where(np.isfinite(rate), np.minimum(rate, UNIT), 0.0))
 
 
-def missing(term: Integral, sums: Sums, settings: Settings) -> Bools:
+def missing(term: Integral, sums: Sums, settings: Settings, env: dict[str, Value]) -> Bools:
     """The members of a batch of integrals for which it pays to look further: values or derivatives are not as accurate
-    as was asked for, and what is off is no speck beside what the others come to."""
+    as was asked for, and what is off is no speck beside what the others come to. Those that go into one sum are
+    measured by it."""
+    gross = None if sums.gross is None else together(env, sums.gross)
+    sums = replace(sums, v=together(env, sums.v), gross=gross)
     within = allowance(term, sums, settings.rtol)
     out: Bools = np.zeros(sums.v.shape[-1], dtype=bool)
     for number, error in ((sums.v, sums.e), (sums.t, sums.et)):

@@ -68,6 +68,14 @@ def _integral(body: Term, reach: Reach) -> Integral | None:
     return body if isinstance(body, Integral) else None
 
 
+@lru_cache(maxsize=1024)
+def _plain(body: Term, reach: Reach) -> bool:
+    """Whether a summand is an integral without a factor, so that what is added up is what it comes to."""
+    if not isinstance(body, Integral) and Integral in reach.kinds(body):
+        body = expanded(body, reach.resolve)
+    return isinstance(body, Integral)
+
+
 class _Open(Struct, frozen=True):
     """An integral of numbers, and what these are beside it."""
 
@@ -124,13 +132,13 @@ def _pairs(
             into[own] = float(wanted) if into is shared else np.broadcast_to(wanted, size).reshape(-1)
     found_term = substitute(opened.term, {name: part for name, part in parts.items() if not isinstance(part, Var)})
     assert isinstance(found_term, Integral)
-    return remaining(found_term, members, others, shared, (int(np.prod(shape)), places.size))
+    sizes = int(np.prod(shape)), places.size
+    return remaining(found_term, members, others, shared, sizes, machine.backend)
 
 
 def _added(machine: Machine, term: Sum, pairs: Pairs, first: int, env: Env, shape: tuple[int, ...]) -> Value | None:
     """The answers for pairs, added up by members."""
-    params = tuple(sorted(term.body.free | {term.variable}))
-    body, size = lam(params, term.body), int(np.prod(shape))
+    params, size = tuple(sorted(term.body.free | {term.variable})), int(np.prod(shape))
     order = np.argsort(pairs.members, kind="stable")
     whole: Value | None = None
     for start in range(0, max(1, order.size), PAIRS):
@@ -144,7 +152,7 @@ def _added(machine: Machine, term: Sum, pairs: Pairs, first: int, env: Env, shap
 
         here = {name: map_arrays(env[name], picked) for name in params if name != term.variable}
         here[term.variable] = Cell(first + those.astype(float), None, (None,) * machine.directions)
-        value = _evaluated(machine, body, here, at, size, shape)
+        value = _evaluated(machine, term, here, at, size, shape)
         part = map_cells(value, lambda cell, at=at: _summed(cell, at, size, shape))  # type: ignore[misc]
         whole = part if whole is None else _plus(whole, part)
     return whole
@@ -155,13 +163,14 @@ def _rows(node: Node, shape: tuple[int, ...], at: Ints) -> Any:
     return flat[at]
 
 
-def _evaluated(machine: Machine, body: Any, here: Env, at: Ints, size: int, shape: tuple[int, ...]) -> Value:
+def _evaluated(machine: Machine, term: Sum, here: Env, at: Ints, size: int, shape: tuple[int, ...]) -> Value:
     """The answers for pairs; what there is to be said of one is said of its member."""
-    record = machine.record
+    record, body = machine.record, lam(tuple(sorted(here)), term.body)
     kept = record.shortfalls, record.within
     record.shortfalls, record.within = {}, 0.0
     try:
-        value = machine.run(body, [here[name] for name in body.params], None)
+        alone = machine.changed(into=at) if _plain(term.body, machine.linker.reach) else machine
+        value = alone.run(body, [here[name] for name in body.params], None)
         told, within = record.shortfalls, record.within
     finally:
         record.shortfalls, record.within = kept

@@ -122,7 +122,7 @@ def _together(problem: Problem, todo: Ints, settled: Settled, found: Whole) -> l
                 with here.among(group) as part:
                     part.events.take(here.events.of(group, TwoSided), np.arange(group.size))
                     own = settled(part, order, sums.pick(group))
-                    rough = missing(problem.term, own, problem.machine.settings)
+                    rough = missing(problem.term, own, problem.machine.settings, part.env)
                     spoilt = rough & rounded(own)
                     if spoilt.sum() > FEW_MEMBERS:
                         by_cuts(part, order, own, spoilt)

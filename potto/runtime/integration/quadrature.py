@@ -14,7 +14,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from potto.integrate.adaptive.iterated import Iteration
-from potto.integrate.fixed.alike import together
+from potto.integrate.fixed.alike import by_shapes
 from potto.integrate.fixed.tensor_product import uncut
 from potto.integrate.pieces import Sums, gather
 from potto.integrate.plan import Plan
@@ -86,7 +86,7 @@ def _alike(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> t
         return None
     if batch == 1 and len(plan.levels) - sum(d is not None for d in plan.degrees) > MOST_AXES:
         return None
-    return together(plan.straight, plan.degrees, machine, env, batch)
+    return by_shapes(plan.straight, plan.degrees, machine, env, batch)
 
 
 def iterated(
