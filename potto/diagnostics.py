@@ -29,10 +29,43 @@ class Related(Struct, frozen=True):
     owner: str | None = None
 
 
+class Replacement(Struct, frozen=True):
+    """A text for a place. An empty place is one to insert at; an empty text takes out what stands there."""
+
+    span: Span
+    text: str
+
+
+class Suggestion(Struct, frozen=True):
+    """A change that would answer a diagnostic: what it is called, and what it writes. Its places are relative like the
+    diagnostic's own, in the same text, and don't overlap."""
+
+    title: str
+    edits: tuple[Replacement, ...]
+
+    def shift(self, start: int) -> Suggestion:
+        """The same change of a text that begins further on."""
+        return Suggestion(self.title, tuple(Replacement(e.span.shift(start), e.text) for e in self.edits))
+
+
+LONGEST = 40  # characters of a text that a title shows
+
+
+def shortened(text: str) -> str:
+    """A text as titles show it."""
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…"
+
+
+def suggest(span: Span, text: str, title: str = "") -> Suggestion:
+    """One text for one place; called "Write `text`" if nothing else is said."""
+    return Suggestion(title or f"Write `{shortened(text)}`", (Replacement(span, text),))
+
+
 class Diagnostic(Struct, frozen=True):
     """One message. `span` is relative to its chunk until `shift` has made it absolute.
 
-    `label` stands beside the underlined place ("varies inside the integral"), `notes` explain, `help` says what to do.
+    `label` stands beside the underlined place ("varies inside the integral"), `notes` explain, `help` says what to do,
+    `suggestions` do it: each is another way, the likeliest first.
     """
 
     code: str
@@ -44,6 +77,7 @@ class Diagnostic(Struct, frozen=True):
     notes: tuple[str, ...] = ()
     help: str = ""
     tags: tuple[Literal["unnecessary", "deprecated"], ...] = ()
+    suggestions: tuple[Suggestion, ...] = ()
 
 
 class Kind(Struct, frozen=True):
@@ -63,8 +97,9 @@ class Kind(Struct, frozen=True):
         notes: tuple[str, ...] = (),
         help: str = "",
         tags: tuple[Literal["unnecessary", "deprecated"], ...] = (),
+        suggestions: tuple[Suggestion, ...] = (),
     ) -> Diagnostic:
-        return Diagnostic(self.code, self.severity, message, span, label, related, notes, help, tags)
+        return Diagnostic(self.code, self.severity, message, span, label, related, notes, help, tags, suggestions)
 
 
 KINDS: dict[str, Kind] = {}

@@ -16,13 +16,13 @@ import re
 import stat
 import sys
 import tempfile
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Iterator, Mapping
 from hashlib import blake2b
 from pathlib import Path
 from typing import Any
 
 from potto import store
-from potto.diagnostics import Diagnostic, Related
+from potto.diagnostics import Diagnostic, Related, Replacement, Suggestion
 from potto.modules.texts import content
 from potto.query import Database
 from potto.reports.render import Located
@@ -195,6 +195,7 @@ def _plain(located: Located) -> dict[str, Any]:
         "file": located.file, "code": said.code, "severity": said.severity, "message": said.message,
         "span": [said.span.start, said.span.end], "label": said.label, "notes": said.notes, "help": said.help,
         "tags": said.tags,
+        "suggestions": [[s.title, [[e.span.start, e.span.end, e.text] for e in s.edits]] for s in said.suggestions],
         "related": [[r.span.start, r.span.end, r.message, r.file, r.owner] for r in said.related],
     }  # fmt: skip
 
@@ -211,9 +212,14 @@ def _located(plain: Mapping[str, Any]) -> Located:
     )
     said = Diagnostic(
         code, severity, str(plain["message"]), _span(*plain["span"]), str(plain["label"]), related,
-        tuple(map(str, plain["notes"])), str(plain["help"]), tags,
+        tuple(map(str, plain["notes"])), str(plain["help"]), tags, tuple(_suggestions(plain["suggestions"])),
     )  # fmt: skip
     return Located(_optional(plain["file"]), said)
+
+
+def _suggestions(plain: Any) -> Iterator[Suggestion]:
+    for title, edits in plain:
+        yield Suggestion(str(title), tuple(Replacement(_span(start, end), str(text)) for start, end, text in edits))
 
 
 def _span(start: Any, end: Any) -> Span:

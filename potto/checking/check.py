@@ -12,7 +12,7 @@ from potto.calculus.checking.diffeo import check_conditions
 from potto.diagnostics import Diagnostic, Related
 from potto.modules import chunk_start, module_diagnostics, names, statements
 from potto.modules.graph import runs
-from potto.modules.texts import syntax_diagnostics
+from potto.modules.texts import moved, syntax_diagnostics
 from potto.query import Database, query
 from potto.quick import replace
 from potto.reports.render import Located
@@ -36,9 +36,7 @@ def diagnostics(db: Database, file: str) -> tuple[Located, ...]:
 
 
 @query(keep=2048)
-def run_diagnostics(
-    db: Database, file: str, run: tuple[str, ...]
-) -> tuple[tuple[str, tuple[Diagnostic, ...]], ...]:
+def run_diagnostics(db: Database, file: str, run: tuple[str, ...]) -> tuple[tuple[str, tuple[Diagnostic, ...]], ...]:
     """What is said of some neighbouring definitions, by name, of those of which there is something to say."""
     found = ((name, definition_diagnostics(db, file, name)) for name in run)
     return tuple((name, said) for name, said in found if said)
@@ -68,7 +66,7 @@ def errors_of(located: Iterable[Located]) -> tuple[Located, ...]:
 def absolute(db: Database, file: str, diagnostic: Diagnostic, start: int) -> Diagnostic:
     """A diagnostic of a chunk with all its places counted from the start of their files."""
     related = tuple(_place(db, file, item, start) for item in diagnostic.related)
-    return replace(diagnostic, span=diagnostic.span.shift(start), related=related)
+    return replace(moved(diagnostic, start), related=related)
 
 
 def _place(db: Database, file: str, related: Related, start: int) -> Related:

@@ -82,12 +82,14 @@ def _absent(path: Path) -> DataMistake:
     except OSError:
         hint = "names of files count from the folder of the program"
         return _unreadable(f"there is no folder {quoted(str(path.parent))}", hint)
-    near = " or ".join(f"`{name}`" for name in suggest(path, beside))
-    return _unreadable(f"there is no file {quoted(path.name)}", f"did you mean {near}?" if near else "")
+    meant = suggest(path, beside)
+    near = " or ".join(f"`{name}`" for name in meant)
+    hint = f"did you mean {near}?" if near else ""
+    return _unreadable(f"there is no file {quoted(path.name)}", hint, meant)
 
 
-def _unreadable(message: str, hint: str) -> DataMistake:
-    return DataMistake(UNREADABLE, message, hint=hint)
+def _unreadable(message: str, hint: str, meant: tuple[str, ...] = ()) -> DataMistake:
+    return DataMistake(UNREADABLE, message, hint=hint, meant=meant)
 
 
 def suggest(path: Path, siblings: Iterable[str]) -> tuple[str, ...]:

@@ -27,6 +27,7 @@ class DataMistake(Struct, frozen=True):
     row: the line of a text, or the first index of an array in numpy's files, both counted from 1.
     column: the column of a table, or of an array, counted from 1.
     found, expected: what stands there, and what ought to.
+    meant: names of files beside a missing one that may have been meant.
     """
 
     code: str
@@ -36,6 +37,7 @@ class DataMistake(Struct, frozen=True):
     found: str = ""
     expected: str = ""
     hint: str = ""
+    meant: tuple[str, ...] = ()
 
 
 class Refused(Exception):

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import os.path
 
-from potto.data.mistakes import DataMistake
+from potto.data.mistakes import UNREADABLE, DataMistake
 from potto.data.values import Shape
 from potto.query import Database, query
 from potto.quick import quick, value
+
+_NO_FILES = "it is a text by itself, without a folder: save it in a file, or give the data as an argument"
 
 
 @value
@@ -33,7 +35,7 @@ def data_file(db: Database, file: str, written: str) -> DataFile | DataMistake:
     """What a file of data holds, or what is wrong with it."""
     path = path_of(file, written)
     found: DataFile | DataMistake | None = db.get_input(("data", path))
-    return found if found is not None else DataMistake("P0801", "there are no files here")
+    return found if found is not None else DataMistake(UNREADABLE, "this program can read no files", hint=_NO_FILES)
 
 
 quick(DataFile)

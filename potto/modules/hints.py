@@ -5,10 +5,12 @@ from __future__ import annotations
 import os.path
 from collections.abc import Iterable
 
+from potto.diagnostics import Suggestion, suggest
 from potto.modules.builtins import is_builtin
 from potto.modules.lookup import SUFFIXES, folders
 from potto.modules.workspace import definers, module_name
 from potto.query import Database
+from potto.source import Span
 
 _ELSEWHERE = {
     "ln": "the natural logarithm is `log`",
@@ -49,12 +51,24 @@ _ELSEWHERE = {
 }
 """What is called otherwise in other languages, and how it is written here."""
 
+_CALLED = {
+    "ln": "log", "arcsin": "asin", "arccos": "acos", "arctan": "atan", "arctan2": "atan2", "fabs": "abs", "sgn": "sign",
+    "π": "pi", "Pi": "pi", "PI": "pi", "∞": "inf", "infinity": "inf", "True": "1", "true": "1", "False": "0",
+    "false": "0", "dirac": "delta",
+}  # fmt: skip
+"""What can be written in the place of a name of elsewhere as it stands."""
+
 _LIBRARIES = frozenset({"math", "cmath", "numpy", "np", "scipy", "sympy", "jax", "jnp", "torch", "random", "maths"})
 
 
 def known_elsewhere(name: str) -> str:
     """How to write what another language calls `name`; nothing if it is not known."""
     return _ELSEWHERE.get(name, "")
+
+
+def called_here(name: str) -> tuple[str, ...]:
+    """What another language's name is called here, if it is one name for another."""
+    return (_CALLED[name],) if name in _CALLED else ()
 
 
 def library_hint(module: str, names: Iterable[str] = ()) -> str:
@@ -83,6 +97,11 @@ def did_you_mean(near: Iterable[str]) -> str:
     """A question, or nothing if there is nothing near."""
     names = [f"`{name}`" for name in near]
     return f"did you mean {' or '.join(names)}?" if names else ""
+
+
+def instead(span: Span, near: Iterable[str]) -> tuple[Suggestion, ...]:
+    """The names that may have been meant, as changes of what stands in a place."""
+    return tuple(suggest(span, name, f"Change to `{name}`") for name in near)
 
 
 def near_modules(db: Database, file: str, dotted: str) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from potto.diagnostics import Diagnostic, Kind
 from potto.modules.builtins import is_builtin
 from potto.modules.graph import import_cycle
-from potto.modules.hints import did_you_mean, elsewhere, library_hint, looked_in, near_modules, near_names
+from potto.modules.hints import did_you_mean, elsewhere, instead, library_hint, looked_in, near_modules, near_names
 from potto.modules.kinds import (
     CIRCULAR,
     HIDES_BUILTIN,
@@ -104,6 +104,7 @@ def _no_module(db: Database, file: str, item: Importing) -> Diagnostic:
         label="not found",
         notes=looked_in(db, file, item.module),
         help=did_you_mean(near) or library_hint(item.module, wanted),
+        suggestions=instead(item.module_span, near),
     )
 
 
@@ -165,7 +166,9 @@ def _not_in_module(
     helps = [did_you_mean(near)] if near else []
     if other is not None:
         helps.append(f"it is defined in the module `{other}`: `from {other} import {last.name}`")
-    return NOT_IN_MODULE(imported.name_span, message, label=label, help="; ".join(helps))
+    return NOT_IN_MODULE(
+        imported.name_span, message, label=label, help="; ".join(helps), suggestions=instead(imported.name_span, near)
+    )
 
 
 def _repeated(db: Database, file: str, items: tuple[Importing, ...]) -> Iterator[Said]:

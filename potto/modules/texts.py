@@ -32,6 +32,8 @@ class Unreadable:
 
 
 ChunkRef = Chunk
+
+
 @value
 class StatementRef:
     """A top-level statement of a script; its spans are relative to `start`."""
@@ -284,13 +286,19 @@ def syntax_diagnostics(db: Database, file: str) -> tuple[Diagnostic, ...]:
     )
 
 
+def moved(diagnostic: Diagnostic, start: int) -> Diagnostic:
+    """A diagnostic of a text that begins further on, with its suggestions; related places stay."""
+    suggestions = tuple(suggestion.shift(start) for suggestion in diagnostic.suggestions)
+    return replace(diagnostic, span=diagnostic.span.shift(start), suggestions=suggestions)
+
+
 def shift(diagnostic: Diagnostic, start: int) -> Diagnostic:
     """A diagnostic of a chunk with absolute spans. Related places in other chunks are left to who knows them."""
     related = tuple(
         replace(place, span=place.span.shift(start), owner="") if place.file is None and place.owner is None else place
         for place in diagnostic.related
     )
-    return replace(diagnostic, span=diagnostic.span.shift(start), related=related)
+    return replace(moved(diagnostic, start), related=related)
 
 
 quick(Head, Place, Unreadable, StatementRef, Layout, Outline)

@@ -14,7 +14,7 @@ from typing import Any
 
 from msgspec import Struct
 
-from potto.diagnostics import Diagnostic, PottoError, Related
+from potto.diagnostics import Diagnostic, PottoError, Related, Suggestion
 from potto.reports.excerpt import WIDTH, Excerpt, Mark, excerpt, printable
 from potto.source import Position, SourceText, Span
 
@@ -163,17 +163,19 @@ def _footer(diagnostic: Diagnostic, palette: Palette, width: int, columns: int |
 def to_json(located: Located, sources: Sources) -> dict[str, Any]:
     """One diagnostic as the object that interfaces promise to machines."""
     diagnostic, file = located.diagnostic, located.file
+    source = sources(file) if file is not None else None
     return {
         "code": diagnostic.code,
         "severity": diagnostic.severity,
         "message": diagnostic.message,
         "file": None if file is None else display_name(file),
-        "range": range_json(sources(file) if file is not None else None, diagnostic.span),
+        "range": range_json(source, diagnostic.span),
         "label": diagnostic.label,
         "related": [_related_json(related, file, sources) for related in diagnostic.related],
         "notes": list(diagnostic.notes),
         "help": diagnostic.help,
         "tags": list(diagnostic.tags),
+        "suggestions": [_suggestion_json(s, source) for s in diagnostic.suggestions],
     }
 
 
@@ -202,6 +204,11 @@ def _related_json(related: Related, file: str | None, sources: Sources) -> dict[
         "range": range_json(sources(other) if other is not None else None, related.span),
         "message": related.message,
     }
+
+
+def _suggestion_json(suggestion: Suggestion, source: SourceText | None) -> dict[str, Any]:
+    edits = [{"range": range_json(source, edit.span), "text": edit.text} for edit in suggestion.edits]
+    return {"title": suggestion.title, "edits": edits}
 
 
 def summary(diagnostics: Sequence[Located]) -> str:

@@ -20,6 +20,7 @@ from potto.integrate.events import DIVERGENT, ROUGH, UNDEFINED
 from potto.kernels.cells import Rows, Value
 from potto.kernels.errors import wrong_call
 from potto.modules import statements
+from potto.modules.texts import moved
 from potto.projects.settings import Settings
 from potto.query import Database
 from potto.reports.render import Located, ProgramError
@@ -154,7 +155,7 @@ def evaluate_in(
 def placed(diagnostic: Diagnostic, place: Span, start: int) -> Diagnostic:
     """A diagnostic of an evaluation with a place: its own, or that of the expression that was evaluated."""
     if len(diagnostic.span):
-        return replace(diagnostic, span=diagnostic.span.shift(start))
+        return moved(diagnostic, start)
     return replace(diagnostic, span=place)
 
 
@@ -168,8 +169,9 @@ def remarks(estimate: Estimate, place: Span, settings: Settings) -> Iterator[Dia
         yield NO_NUMBER(
             place,
             f"this is not a number: {'; '.join(map(str, why))}" if why else "this is not a number",
-            help=why[0].advice if why else "a builtin was used where it is not defined, or a parameter is not a number"
-            " itself",
+            help=why[0].advice
+            if why
+            else "a builtin was used where it is not defined, or a parameter is not a number itself",
         )
     elif not estimate.converged and settings.method in ("auto", "quadrature") and {*estimate.shortfalls} != {ROUGH}:
         reason = "; ".join(estimate.reasons)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from potto.diagnostics import suggest
 from potto.source import Span
 from potto.syntax import kinds
 from potto.syntax.build_types import as_type
@@ -34,6 +35,7 @@ from potto.syntax.nodes import (
     Statement,
     Tuple,
 )
+from potto.syntax.suggesting import take_out
 from potto.syntax.tokens import Token
 
 Groups = tuple[tuple[Parameter, ...], ...]
@@ -45,7 +47,12 @@ def definition(context: Context, v: Values) -> Item:
     _def, name, groups, result, separator, lines = v
     if isinstance(separator, Token) and separator.kind == "EQ":
         context.report(
-            kinds.DEFINITION_HEAD(separator.span, "no `=` between the head of a `def` and its body", help="take it out")
+            kinds.DEFINITION_HEAD(
+                separator.span,
+                "no `=` between the head of a `def` and its body",
+                help="take it out",
+                suggestions=take_out(context.text, separator.span),
+            )
         )
     if not groups and name.text:
         context.report(
@@ -99,6 +106,7 @@ def _block(context: Context, lines: list[Binding | Expr]) -> tuple[tuple[Binding
                     line.span,
                     "a definition's last line must be its result: the value of this line is lost",
                     help="name it, `name = …`, or take it out",
+                    suggestions=take_out(context.text, line.span),
                 )
             )
     last = lines[-1]
@@ -137,9 +145,10 @@ def equation(context: Context, v: Values) -> Item:
         shown = function.id + "".join(f"({', '.join(p.name for p in group)})" for group in groups)
         context.report(
             kinds.DEFINITION_HEAD(
-                left.span, "a function with parameters is defined with `def`", help=f"write `def {shown} …`"
+                left.span, "a function with parameters is defined with `def`", help=f"write `def {shown} …`",
+                suggestions=(suggest(Span(left.span.start, body.span.start), f"def {shown} ", f"Write `def {shown}`"),),
             )
-        )
+        )  # fmt: skip
         return Definition(span, function.id, function.span, groups, None, (), body, True)
     several = [item.id for item in left.items if isinstance(item, Name)] if isinstance(left, Tuple) else []
     if isinstance(left, Tuple) and len(several) == len(left.items):

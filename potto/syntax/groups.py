@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from potto.diagnostics import Diagnostic, Related
+from potto.diagnostics import Diagnostic, Related, suggest
 from potto.source import Span
 from potto.syntax import kinds
 from potto.syntax.nodes import (
@@ -31,6 +31,7 @@ from potto.syntax.nodes import (
     TypeExpr,
     Unary,
 )
+from potto.syntax.suggesting import write
 from potto.syntax.tokens import Token
 
 Values = list[Any]
@@ -140,6 +141,7 @@ def plain(context: Context, written: Written) -> Expr:
             span,
             f"`{target.id} = …` names an argument, but this is no call",
             help=f"to compare, write `{target.id} == …`",
+            suggestions=(suggest(Span(target.span.end, written.value.span.start), " == ", "Write `==`"),),
         )
     )
     op = Operand("==", Span(target.span.end, target.span.end), written.value)
@@ -155,6 +157,7 @@ def _semicolon(context: Context, written: Written) -> None:
             Span(at, at + 1) if near else value.span,
             "a `;` separates bindings of a `let`, or the variables of a `diffeo` from its parameters",
             help="write `,` here",
+            suggestions=write(context.text, Span(at, at + 1), ","),
         )
     )
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from potto.diagnostics import Diagnostic
+from potto.diagnostics import Diagnostic, suggest
 from potto.source import Span
 from potto.syntax import kinds
 from potto.syntax.tokens import Token
@@ -42,7 +42,9 @@ def foreign_statement(tokens: list[Token]) -> Diagnostic | None:
     help = _STATEMENTS.get(tokens[0].text)
     if help is None:
         return None
-    return kinds.OTHER_LANGUAGE(tokens[0].span, f"Potto has no `{tokens[0].text}`", help=help)
+    word, until = tokens[0].text, tokens[1].start
+    taken_out = suggest(Span(tokens[0].start, until), "", f"Take out `{word}`")
+    return kinds.OTHER_LANGUAGE(tokens[0].span, f"Potto has no `{word}`", help=help, suggestions=(taken_out,))
 
 
 def habit(stop: Stop) -> Diagnostic | None:

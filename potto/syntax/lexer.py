@@ -14,6 +14,7 @@ from potto.diagnostics import Diagnostic
 from potto.quick import quick, value
 from potto.source import Span
 from potto.syntax import kinds
+from potto.syntax.contextual import BEHIND, ENDS_OPERAND, contextual
 from potto.syntax.head import BlockTracker
 from potto.syntax.nesting import Nesting
 from potto.syntax.sums import mark_bodies
@@ -38,22 +39,9 @@ _RETURNED = re.compile(r"[ \t]+[^\s=]")
 _DEFINES = re.compile(rf"[ \t]+{FIRST_NAME.pattern}")
 _CONTINUES = re.compile(r"(?:then|else|in|and|or)\b|[*/^?:,)\].=<>≤≥≠+]|!=|->")
 _CLAUSE = re.compile(r"(?:inverse|where)\b(?![ \t]*=(?!=))")
-_ENDS_OPERAND = frozenset({"NAME", "NUMBER", "MEMBER", "FIELD", "RPAR", "RSQB"})
 _LINE = re.compile(r"([ \t\f\v]*)([^\n]?)")
-_BEHIND = _ENDS_OPERAND - {"NUMBER"} | {"FIELD"}
-"""What a bracket or a dot belongs to that stands directly behind it."""
 _FIELD = re.compile(rf"\.(?:{FIRST_NAME.pattern}|[0-9]+)")
-_THROUGH = re.compile(rf"[ \t\n]+{FIRST_NAME.pattern}[ \t\n]+in\b")
 _ALSO = re.compile(rf"[ \t\n]*{FIRST_NAME.pattern}[ \t\n]+in\b")
-_CONTEXTUAL = {
-    "fold": ("FOLD", re.compile(rf"[ \t\n]*(?:[ \t\n]{FIRST_NAME.pattern}|\([^()]*\))[ \t\n]*=(?!=)")),
-    "with": ("WITH", re.compile(rf"[ \t\n]+(?:\([ \t\n]*)?{FIRST_NAME.pattern}[ \t\n]*=(?!=)")),
-    "record": ("RECORDDEF", re.compile(rf"[ \t]+{FIRST_NAME.pattern}[ \t]*\(")),
-    "product": ("SUM", _THROUGH),
-    "min": ("SUM", _THROUGH),
-    "max": ("SUM", _THROUGH),
-}
-"""Words where this follows them, and names elsewhere."""
 
 
 @value
@@ -128,14 +116,14 @@ class _Lexer:
             # In `\x.x` the dot is the lambda's.
             word = word.partition(".")[0]
             end = start + len(word)
-        kind = KEYWORDS.get(word) or self._contextual(word, end)
+        kind = KEYWORDS.get(word) or contextual(tokens, word, self.text, end)
         if kind is not None and len(tokens) == 1 and tokens[0].kind == "DEF":
             nesting.report(reserved_word(word, Span(start, end)))
             kind = "NAME"
         elif kind is None:
             kind = "MEMBER" if "." in word else "NAME"
             if word == "return" and self._returns(end):
-                nesting.report(no_return(Span(start, end)))
+                nesting.report(no_return(self.text, Span(start, end)))
                 return end
             if word == "d" and nesting.words and _D.match(self.text, end) and nesting.close_integral():
                 kind = "D"
@@ -154,16 +142,6 @@ class _Lexer:
         self._add(kind, word, start, end)
         return end
 
-    def _contextual(self, word: str, end: int) -> str | None:
-        """The kind of a word that is one only where the right thing follows."""
-        found = _CONTEXTUAL.get(word)
-        if found is None or found[1].match(self.text, end) is None:
-            return None
-        tokens = self.tokens
-        if (word == "record" and tokens) or (tokens and tokens[-1].kind in ("DEF", "DIFFEODEF")):
-            return None
-        return found[0] if word != "with" or (tokens and tokens[-1].kind in _BEHIND) else None
-
     def _starts_clause(self, start: int) -> bool:
         """Whether `inverse` or `where` stands after the components of a diffeomorphism; elsewhere they are names."""
         tokens = self.tokens
@@ -171,7 +149,7 @@ class _Lexer:
             not self.nesting.brackets
             and _CLAUSE.match(self.text, start) is not None
             and len(tokens) > 2
-            and tokens[-1].kind in _ENDS_OPERAND
+            and tokens[-1].kind in ENDS_OPERAND
             and (tokens[1].kind == "EQ" or self.blocks.state not in ("diffeo", "start"))
         )
 
@@ -204,7 +182,7 @@ class _Lexer:
     def _is_behind(self, start: int) -> bool:
         """Whether what starts here stands directly behind a value."""
         tokens = self.tokens
-        return bool(tokens) and tokens[-1].end == start and tokens[-1].kind in _BEHIND and bool(tokens[-1].text)
+        return bool(tokens) and tokens[-1].end == start and tokens[-1].kind in BEHIND and bool(tokens[-1].text)
 
     def _operator(self, word: str, start: int, end: int) -> int:
         """An operator or a bracket; gives where to go on."""
@@ -217,7 +195,7 @@ class _Lexer:
                 self._add("FIELD", found.group(), start, found.end())
                 return found.end()
         if kind is None:
-            word, diagnostic = foreign_operator(word, Span(start, end))
+            word, diagnostic = foreign_operator(self.text, word, Span(start, end))
             self.nesting.report(diagnostic)
             kind = "BINOP"
         if kind == "LPAR" or kind == "LSQB":
@@ -250,10 +228,10 @@ class _Lexer:
         elif kind == "STRING" and self._is_loaded(word):
             self._add("STRING", word, start, end)
         elif kind == "STRING":
-            self.nesting.report(string_literal(word, Span(start, end)))
+            self.nesting.report(string_literal(self.text, word, Span(start, end)))
             self._add("NAME", "", start, end)
         elif kind == "FOREIGN":
-            plain, said = foreign_arithmetic(word, Span(start, end))
+            plain, said = foreign_arithmetic(self.text, word, Span(start, end))
             self.nesting.report(said)
             self._add("BINOP", plain, start, end)
         else:
@@ -291,7 +269,7 @@ class _Lexer:
                 if char == "#":
                     self.comments.append(Comment(Span(at, end), text[at:end], True))
                 else:
-                    self.nesting.report(foreign_comment(Span(at, at + 2)))
+                    self.nesting.report(foreign_comment(self.text, Span(at, at + 2)))
                 at = end
             elif char:
                 self._set_indent(blanks, position, at, first)

@@ -15,6 +15,7 @@ from potto.source import Span
 from potto.syntax import kinds
 from potto.syntax.habits import tuple_without_parentheses
 from potto.syntax.repair import Edit
+from potto.syntax.suggesting import write
 from potto.syntax.tokens import RESERVED, Token
 from potto.syntax.unknown import reserved_word
 
@@ -151,15 +152,18 @@ def _special(stop: Stop) -> Diagnostic | None:
         return unpacked
     if at.kind == "DOT" and stop.after is not None and stop.after.kind == "NUMBER" and stop.after.start == at.end:
         number = at.text + stop.after.text
+        place = Span(at.start, stop.after.end)
         return kinds.BAD_NUMBER(
-            Span(at.start, stop.after.end), "a number starts with a digit", help=f"write `0{number}`"
-        )
+            place, "a number starts with a digit", help=f"write `0{number}`",
+            suggestions=write(stop.text, place, f"0{number}"),
+        )  # fmt: skip
     if at.kind == "DOT" and before is not None and before.end == at.start and before.kind in ("NAME", "MEMBER"):
         return kinds.NOT_A_NAME(before.span.cover(at.span), f"expected a name after `{_shown(before)}.`")
     if at.kind == "COLON" and opened is not None and opened.kind == "IF":
         return kinds.UNFINISHED(
-            at.span, "expected `then` after the condition of `if`", related=_from(opened), help="write `then`, not `:`"
-        )
+            at.span, "expected `then` after the condition of `if`", related=_from(opened), help="write `then`, not `:`",
+            suggestions=write(stop.text, at.span, "then"),
+        )  # fmt: skip
     if at.kind in ("DOT", "DOTDOT") and before is not None and before.kind in ("FROM", "IMPORT"):
         return kinds.BAD_IMPORT(
             at.span,
@@ -200,7 +204,10 @@ def _replaced(stop: Stop, edit: Edit) -> Diagnostic:
             help="indent the lines of a block alike",
         )
     if at.kind == "EQ":
-        return kinds.EQUALS(at.span, "`=` names a value; it does not compare", help="to compare, write `==`")
+        help = "to compare, write `==`"
+        return kinds.EQUALS(
+            at.span, "`=` names a value; it does not compare", help=help, suggestions=write(stop.text, at.span, "==")
+        )
     if at.kind == "BINOP":
         return _missing_expression(stop)
     named = stop.after is not None and stop.after.kind in ("EQ", "COMMA", "RPAR", "DOT")

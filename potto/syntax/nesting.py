@@ -9,9 +9,10 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
-from potto.diagnostics import Diagnostic, Related
+from potto.diagnostics import Diagnostic, Related, Suggestion
 from potto.source import Span
 from potto.syntax import kinds
+from potto.syntax.suggesting import insert, take_out, write
 from potto.syntax.tokens import FIRST_NAME, Token
 
 MAX_NESTING = 100
@@ -109,6 +110,7 @@ class Nesting:
                 label="which variables does it integrate over?",
                 related=(Related(Span(last, last), "the integral ends here"),),
                 help=f"write `d({written[1]})`" if written else "end the integral with its variables: `d(x)`",
+                suggestions=(insert(last, f" d({written[1]})"),) if written else (),
             )
         )
         self.tokens += [Token(kind, "", last, last) for kind in ("D", "LPAR", "RPAR")]
@@ -130,8 +132,9 @@ class Nesting:
         """A closing bracket: adds its token, mended if it is the wrong one, or none if nothing is open."""
         if not self.brackets:
             self.report(
-                kinds.BRACKETS(Span(start, end), f"this `{word}` closes nothing", help=f"take the `{word}` out")
-            )
+                kinds.BRACKETS(Span(start, end), f"this `{word}` closes nothing", help=f"take the `{word}` out",
+                               suggestions=take_out(self.text, Span(start, end)))
+            )  # fmt: skip
             return
         if any(_CLOSER[bracket.kind] == kind for bracket in self.brackets):
             # What is open inside the bracket that is meant was never closed.
@@ -146,6 +149,7 @@ class Nesting:
                     f"this `{word}` does not close the `{_CHARACTER[opener.kind]}`",
                     related=(Related(Span(opener.start, opener.start + 1), "opened here"),),
                     help=f"write `{_CHARACTER[wanted]}`",
+                    suggestions=write(self.text, Span(start, end), _CHARACTER[wanted]),
                 )
             )
         self.end_words()
@@ -167,9 +171,17 @@ class Nesting:
                 f"this `{_CHARACTER[opener.kind]}` is never closed",
                 related=(Related(Span(last, max(last, before)), f"a `{_CHARACTER[closer]}` is missing here"),),
                 help=f"write `{_CHARACTER[closer]}`",
+                suggestions=self._closings(opener.start, last, _CHARACTER[closer]),
             )
         )
         self.tokens.append(Token(closer, "", last, last))
+
+    def _closings(self, start: int, last: int, closer: str) -> tuple[Suggestion, ...]:
+        """Where a closing bracket may be meant: at the end of the line of the opening one, where it is missed, at the
+        very end."""
+        line = self.text.find("\n", start)
+        ends = (len(self.text[: line if line >= 0 else None].rstrip()), last, len(self.text.rstrip()))
+        return tuple(insert(end, closer) for end in dict.fromkeys(ends))
 
     def close_by_indentation(self, at: int, indent: int) -> None:
         """Before a line: close the brackets without an end that its indentation shows to be over."""

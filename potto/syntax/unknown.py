@@ -5,62 +5,66 @@ from __future__ import annotations
 import re
 import unicodedata
 
-from potto.diagnostics import Diagnostic
+from potto.diagnostics import Diagnostic, shortened, suggest
 from potto.source import Span
 from potto.syntax import kinds
+from potto.syntax.suggesting import take_out, write
 from potto.syntax.tokens import FIRST_NAME, PLAIN_OPERATOR
 
 _MEANT = {
-    "!": "write `not`",
-    "%": "Potto has no remainder; `x - floor(x/n)*n` is one",
-    "|": "write `abs(x)`, or `or` between conditions",
-    "&": "write `and` between conditions",
-    "{": "group with `(` and `)`",
-    "}": "group with `(` and `)`",
-    "·": "write `*`",
-    "×": "write `*`",
-    "÷": "write `/`",
-    "√": "write `sqrt(x)`",
-    "π": "write `pi`",
-    "∞": "write `inf`",
-    "→": "write `->`",
-    "∑": "write `sum i in 1..n (body)`",
-    "∧": "write `and`",
-    "∨": "write `or`",
-    "¬": "write `not`",
-    "²": "write `^2`",
-    "³": "write `^3`",
-    "–": "write `-`",
-    "—": "write `-`",
-    "⋅": "write `*`",
-    "∗": "write `*`",
-    "'": "the derivative of `f` is `deriv(f)`; a name has letters, digits and `_`",
-    "’": "the derivative of `f` is `deriv(f)`; a name has letters, digits and `_`",
-    "“": "Potto has no text strings",
-    "”": "Potto has no text strings",
-    "`": "Potto has no backquotes",
+    "!": ("write `not`", "not"),
+    "%": ("Potto has no remainder; `x - floor(x/n)*n` is one", ""),
+    "|": ("write `abs(x)`, or `or` between conditions", "or"),
+    "&": ("write `and` between conditions", "and"),
+    "{": ("group with `(` and `)`", "("),
+    "}": ("group with `(` and `)`", ")"),
+    "·": ("write `*`", "*"),
+    "×": ("write `*`", "*"),
+    "÷": ("write `/`", "/"),
+    "√": ("write `sqrt(x)`", "sqrt"),
+    "π": ("write `pi`", "pi"),
+    "∞": ("write `inf`", "inf"),
+    "→": ("write `->`", "->"),
+    "∑": ("write `sum i in 1..n (body)`", ""),
+    "∧": ("write `and`", "and"),
+    "∨": ("write `or`", "or"),
+    "¬": ("write `not`", "not"),
+    "²": ("write `^2`", "^2"),
+    "³": ("write `^3`", "^3"),
+    "–": ("write `-`", "-"),
+    "—": ("write `-`", "-"),
+    "⋅": ("write `*`", "*"),
+    "∗": ("write `*`", "*"),
+    "'": ("the derivative of `f` is `deriv(f)`; a name has letters, digits and `_`", ""),
+    "’": ("the derivative of `f` is `deriv(f)`; a name has letters, digits and `_`", ""),
+    "“": ("Potto has no text strings", ""),
+    "”": ("Potto has no text strings", ""),
+    "`": ("Potto has no backquotes", ""),
 }
+"""What is said of a character, and what may be written for it."""
 
 
-def foreign_operator(word: str, span: Span) -> tuple[str, Diagnostic]:
+def foreign_operator(text: str, word: str, span: Span) -> tuple[str, Diagnostic]:
     """What an operator of another language means here, and the message that says so."""
     plain = PLAIN_OPERATOR[word]
     message = f"`{word}` is written `{plain}` in Potto"
-    return plain, kinds.OTHER_LANGUAGE(span, message, help=f"write `{plain}`")
+    return plain, kinds.OTHER_LANGUAGE(span, message, help=f"write `{plain}`", suggestions=write(text, span, plain))
 
 
-def foreign_arithmetic(word: str, span: Span) -> tuple[str, Diagnostic]:
+def foreign_arithmetic(text: str, word: str, span: Span) -> tuple[str, Diagnostic]:
     """What stands for `//` or `+=` in the tree, and the message that says what to write."""
     if word == "//":
-        return "/", kinds.OTHER_LANGUAGE(span, "Potto has no `//`", help="write `/`, or `floor(x/y)` to round down")
+        help = "write `/`, or `floor(x/y)` to round down"
+        return "/", kinds.OTHER_LANGUAGE(span, "Potto has no `//`", help=help, suggestions=write(text, span, "/"))
     plain = word[0]
     help = f"give the new value a name of its own: `y = x {plain} …`"
     return plain, kinds.OTHER_LANGUAGE(span, f"Potto has no `{word}`: a name keeps its value", help=help)
 
 
-def foreign_comment(span: Span) -> Diagnostic:
+def foreign_comment(text: str, span: Span) -> Diagnostic:
     """The message for a line that starts with `//`."""
-    return kinds.OTHER_LANGUAGE(span, "a comment starts with `#`, not with `//`", help="write `#`")
+    message, suggestions = "a comment starts with `#`, not with `//`", write(text, span, "#")
+    return kinds.OTHER_LANGUAGE(span, message, help="write `#`", suggestions=suggestions)
 
 
 def reserved_word(word: str, span: Span) -> Diagnostic:
@@ -72,25 +76,31 @@ def reserved_word(word: str, span: Span) -> Diagnostic:
 def bad_number(word: str, good: str, span: Span) -> Diagnostic:
     """The message for a word that starts like a number; `good` is as much of it as is one."""
     tail = word[len(good) :]
+    meant = ""
     if re.fullmatch("[0-9_]+[0-9]", word):
-        help = f"write `{word.replace('_', '')}`"
+        meant = word.replace("_", "")
     elif re.fullmatch("0[xX][0-9a-fA-F]+|0[bB][01]+|0[oO][0-7]+", word):
-        help = f"write `{int(word, 0)}`"
-    else:
-        help = f"to multiply, write `{good}*{tail}`" if FIRST_NAME.fullmatch(tail) else "write `2`, `0.5` or `1e-3`"
-    shown = word if len(word) <= 40 else word[:39] + "…"
-    return kinds.BAD_NUMBER(span, f"`{shown}` is not a number", help=help)
+        meant = str(int(word, 0))
+    elif FIRST_NAME.fullmatch(tail):
+        meant = f"{good}*{tail}"
+    head = "to multiply, write" if "*" in meant else "write"
+    help = f"{head} `{meant}`" if meant else "write `2`, `0.5` or `1e-3`"
+    suggestions = (suggest(span, meant),) if meant else ()
+    return kinds.BAD_NUMBER(span, f"`{shortened(word)}` is not a number", help=help, suggestions=suggestions)
 
 
-def string_literal(word: str, span: Span) -> Diagnostic:
+def string_literal(text: str, word: str, span: Span) -> Diagnostic:
     """The message for a quoted text."""
-    return kinds.OTHER_LANGUAGE(span, "Potto has no text strings", help="take the quotes out to use a name")
+    inner = word.strip(word[0])
+    name = (suggest(span, inner),) if FIRST_NAME.fullmatch(inner) else ()
+    help, suggestions = "take the quotes out to use a name", (*name, *take_out(text, span))
+    return kinds.OTHER_LANGUAGE(span, "Potto has no text strings", help=help, suggestions=suggestions)
 
 
-def no_return(span: Span) -> Diagnostic:
+def no_return(text: str, span: Span) -> Diagnostic:
     """The message for `return`."""
     message = "Potto has no `return`: the last line of a definition is its result"
-    return kinds.OTHER_LANGUAGE(span, message, help="take `return` out")
+    return kinds.OTHER_LANGUAGE(span, message, help="take `return` out", suggestions=take_out(text, span))
 
 
 def unknown_character(text: str, start: int) -> tuple[int, Diagnostic | None]:
@@ -100,6 +110,7 @@ def unknown_character(text: str, start: int) -> tuple[int, Diagnostic | None]:
         end += 1
     if char.isspace():
         return end, None
+    span, meant = Span(start, end), ""
     if char == "\0":
         message, help = "this is not text: it has NUL bytes", "is it a binary file, or text in UTF-16?"
     else:
@@ -108,5 +119,7 @@ def unknown_character(text: str, start: int) -> tuple[int, Diagnostic | None]:
         message = f"Potto does not know the character {shown}" + (
             f" ({name.lower()})" if ord(char) > 126 and name else ""
         )
-        help = _MEANT.get(char, "take it out")
-    return end, kinds.UNKNOWN_CHARACTER(Span(start, end), message, help=help)
+        help, meant = _MEANT.get(char, ("take it out", ""))
+    known = char in _MEANT or char == "\0"
+    suggestions = write(text, span, meant) if meant else () if known else take_out(text, span)
+    return end, kinds.UNKNOWN_CHARACTER(span, message, help=help, suggestions=suggestions)

@@ -27,11 +27,12 @@ from potto.types import (  # noqa: F401  (imported for their rules)
 from potto.types.algebra import fitted, flat, symbolic
 from potto.types.annotations import written_type
 from potto.types.closing import declared, reasons_of
-from potto.types.context import Inference, ensure_stack, mismatch
+from potto.types.context import Inference, ensure_stack
 from potto.types.flow import Walk
 from potto.types.infer import bindings, returned
 from potto.types.interfaces import Closing, Decorating, Interface, chain_of
 from potto.types.lints import lints
+from potto.types.mismatches import mismatch
 from potto.types.motionless import is_derivative
 from potto.types.reasons import NO_REASONS, Reasons
 from potto.types.records import labelled
@@ -181,9 +182,7 @@ def _infer_diffeo(inference: Inference, item: nodes.DiffeoDefinition, result: Ty
                 inference.number(component, "a coordinate of an inverse")
 
 
-def _walk(
-    inference: Inference, item: Written, flows: dict[DefinitionTarget, Value]
-) -> tuple[Walk, Value]:
+def _walk(inference: Inference, item: Written, flows: dict[DefinitionTarget, Value]) -> tuple[Walk, Value]:
     walk = Walk(inference, flows)
 
     def body() -> Value:

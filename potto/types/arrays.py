@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import math
+
+from potto.diagnostics import Suggestion, shortened, suggest
+from potto.source import Span
 from potto.syntax import nodes
+from potto.syntax.printer import print_expression
 from potto.types import kinds
-from potto.types.context import Inference, describe, mismatch, rule
+from potto.types.context import Inference, rule
 from potto.types.infer import strip, value_only
 from potto.types.integrals import summed
+from potto.types.mismatches import between, describe, mismatch
 from potto.types.scope import Local
 from potto.types.types import (
     ANY_SIZE,
@@ -32,9 +38,9 @@ def _index(inference: Inference, node: nodes.Index) -> Type:
         array = resolve(type)
         inference.number(index, "an index")
         what = "only an array has elements" if not place else f"this array has no {_ordinal(place)} index"
-        type = expect_array(inference, array, node.array, what)
+        type = expect_array(inference, array, node.array, what, _not_indexed(array, node))
         if isinstance(array, ArrayOf):
-            _in_range(inference, shifted(array.size, 0), index)
+            _in_range(inference, shifted(array.size, 0), node, place)
     return type
 
 
@@ -42,20 +48,75 @@ def _ordinal(place: int) -> str:
     return ("first", "second", "third")[place] if place < 3 else f"{place + 1}th"
 
 
-def _in_range(inference: Inference, size: Type, index: nodes.Expr) -> None:
+def _not_indexed(found: Type, node: nodes.Index) -> tuple[Suggestion, ...]:
+    """What an index into something else may be meant as: a call of a function, a part of a tuple."""
+    whole = Span(node.array.span.end, node.span.end)
+    inner = node.indices[0].span.cover(node.indices[-1].span)
+    if isinstance(found, Function):
+        arguments = tuple(nodes.Argument(index.span, None, None, index) for index in node.indices)
+        call = nodes.Apply(node.span, node.array, arguments, True)
+        return (between(whole, inner, "(", ")", f"Write `{shortened(print_expression(call))}`"),)
+    known = _constant(node.indices[0])
+    if isinstance(found, TupleOf) and len(node.indices) == 1 and known is not None and 0 <= known < len(found.items):
+        return (suggest(whole, f".{known}"),)
+    return ()
+
+
+def _in_range(inference: Inference, size: Type, node: nodes.Index, place: int) -> None:
+    index = node.indices[place]
     known = _constant(index)
-    if known is None or not isinstance(size, Count) or 0 <= known < size.number:
+    if known is None:
+        _whole(inference, index)
+    elif not isinstance(size, Count):
+        _from_the_end(inference, known, node, place)
+    elif not 0 <= known < size.number:
+        _out_of_range(inference, known, size.number, index)
+
+
+def _whole(inference: Inference, index: nodes.Expr) -> None:
+    """Report an index that is written as a number that is not whole."""
+    written = strip(index)
+    sign = 1.0
+    if isinstance(written, nodes.Unary) and written.op == "-":
+        written, sign = strip(written.operand), -1.0
+    if not isinstance(written, nodes.Number):
         return
-    last = size.number - 1
+    value = sign * written.value
+    lower = max(math.floor(value), 0) if math.isfinite(value) else 0
+    near = dict.fromkeys((lower, lower + 1)) if 0 < value < 1e9 else (0,)
+    inference.report(kinds.NOT_WHOLE(
+        index.span, f"an index must be a whole number, but this is {value:g}", label="not a whole number",
+        help="elements are counted: `xs[0]`, `xs[1]`; between them looks `interp(places, xs, x)`",
+        suggestions=tuple(suggest(index.span, str(number)) for number in near),
+    ))  # fmt: skip
+
+
+def _from_the_end(inference: Inference, known: int, node: nodes.Index, place: int) -> None:
+    """Report an index below 0 into an array of any size."""
+    if known >= 0:
+        return
+    index, array = node.indices[place], strip(node.array)
+    help, suggestions = "indices count from 0", tuple[Suggestion, ...]()
+    if isinstance(array, nodes.Name) and not place:
+        help += f"; the last element is `{array.id}[len({array.id}) - 1]`"
+        suggestions = (suggest(index.span, f"len({array.id}) - {-known}"),)
+    message = f"the index {known} is out of range: no array has one below 0"
+    inference.report(kinds.OUT_OF_RANGE(index.span, message, label="below 0", help=help, suggestions=suggestions))
+
+
+def _out_of_range(inference: Inference, known: int, size: int, index: nodes.Expr) -> None:
+    last = size - 1
     if last < 0:
         count, label, help = "no elements", "there are none", "an array without elements has no index"
     else:
-        count = f"{size.number} element{'s' if last else ''}"
+        count = f"{size} element{'s' if last else ''}"
         label, help = f"not in 0..{last}", f"indices count from 0, so that the last one is {last}"
     if known < 0 <= last:
         help += f"; the last element is `[{last}]`"
     message = f"the index {known} is out of range: the array has {count}"
-    inference.report(kinds.OUT_OF_RANGE(index.span, message, label=label, help=help))
+    meant = size + known if -size <= known < 0 else last
+    suggestions = (suggest(index.span, str(meant)),) if last >= 0 else ()
+    inference.report(kinds.OUT_OF_RANGE(index.span, message, label=label, help=help, suggestions=suggestions))
 
 
 def _constant(expr: nodes.Expr) -> int | None:
@@ -69,7 +130,7 @@ def _constant(expr: nodes.Expr) -> int | None:
 
 @rule(nodes.Field)
 def _field(inference: Inference, node: nodes.Field) -> Type:
-    return field(inference, inference.infer(node.value), node.name, node)
+    return field(inference, inference.infer(node.value), node.name, node, node.name_span)
 
 
 @rule(nodes.Text)

@@ -10,14 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from potto.diagnostics import Diagnostic
-from potto.modules.hints import did_you_mean, near_names
+from potto.diagnostics import Diagnostic, Suggestion, shortened
+from potto.modules.hints import did_you_mean, instead, near_names
 from potto.primitives import PRIMITIVES
+from potto.source import Span
 from potto.syntax import nodes
+from potto.syntax.printer import print_expression
 from potto.types import kinds
-from potto.types.context import Inference, Plan, comparison, describe, mismatch, rule
+from potto.types.context import Inference, Plan, rule
 from potto.types.infer import is_known, special, strip
 from potto.types.loading import loaded
+from potto.types.mismatches import between, comparison, describe, mismatch
 from potto.types.motionless import check_tangents, takes_duals
 from potto.types.scope import Builtin
 from potto.types.types import (
@@ -121,16 +124,27 @@ def _variadic(inference: Inference, node: nodes.Apply, types: Sequence[Type]) ->
 def _not_a_function(inference: Inference, node: nodes.Apply, callee: Type) -> Diagnostic:
     after = node.arguments[0].value if node.arguments else None
     is_number = isinstance(callee, Real)
-    help = ""
+    help, suggestions = "", tuple[Suggestion, ...]()
     if is_number and after is not None:
         help = "to multiply, write `*` between the two"
     elif isinstance(callee, TupleOf | Diffeo):
         help = "a call binds to what stands before it: write the operator between the two, or a comma"
     elif isinstance(callee, ArrayOf):
         help = "an element of an array is written with brackets: `xs[i]`"
+        suggestions = _bracketed(node)
     label = "a number" if is_number else describe(callee)
     message = f"this is {describe(callee)}, not a function, so it cannot be applied"
-    return kinds.NOT_A_FUNCTION(node.function.span, message, label=label, help=help)
+    return kinds.NOT_A_FUNCTION(node.function.span, message, label=label, help=help, suggestions=suggestions)
+
+
+def _bracketed(node: nodes.Apply) -> tuple[Suggestion, ...]:
+    """A call written as an index: `xs(i)` as `xs[i]`."""
+    if not node.arguments or any(argument.name for argument in node.arguments):
+        return ()
+    inner = node.arguments[0].value.span.cover(node.arguments[-1].value.span)
+    whole = Span(node.function.span.end, node.span.end)
+    index = nodes.Index(node.span, node.function, tuple(argument.value for argument in node.arguments))
+    return (between(whole, inner, "[", "]", f"Write `{shortened(print_expression(index))}`"),)
 
 
 def _no_names(argument: nodes.Argument, node: nodes.Apply) -> Diagnostic:
@@ -201,6 +215,7 @@ class _Filling:
             f"{callee_name(self.node)} has no parameter `{argument.name}`",
             label="no such parameter",
             help=did_you_mean(near) or "it has " + ", ".join(f"`{name}`" for name in names),
+            suggestions=instead(argument.name_span or argument.span, near),
         )
 
     def _pack(self) -> bool:

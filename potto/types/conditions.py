@@ -5,8 +5,9 @@ from __future__ import annotations
 from potto.diagnostics import Diagnostic
 from potto.syntax import nodes
 from potto.types import kinds
-from potto.types.context import Condition, Inference, comparison, describe, mismatch, rule
+from potto.types.context import Condition, Inference, rule
 from potto.types.infer import strip, value_only
+from potto.types.mismatches import comparison, describe, mismatch
 from potto.types.scope import Local
 from potto.types.types import (
     REAL,
@@ -122,11 +123,7 @@ def _condition(inference: Inference, node: nodes.If) -> None:
 
 def _coordinates(found: Type, expr: nodes.Expr) -> bool:
     """Whether a value can pass for a diffeomorphism's result: a tuple of numbers, but not one that is written out."""
-    return (
-        isinstance(found, TupleOf)
-        and not isinstance(expr, nodes.Tuple)
-        and unify(found, Diffeo(len(found.items)))
-    )
+    return isinstance(found, TupleOf) and not isinstance(expr, nodes.Tuple) and unify(found, Diffeo(len(found.items)))
 
 
 def is_bracket(inference: Inference, expr: nodes.Expr) -> bool:

@@ -11,26 +11,23 @@ import sys
 from collections.abc import Callable
 from typing import Any, Literal, TypeVar
 
-from potto.diagnostics import Diagnostic, Related
+from potto.diagnostics import Diagnostic
 from potto.modules.lookup import DefinitionTarget
 from potto.quick import quick, value
 from potto.source import Span
 from potto.syntax import nodes
-from potto.types import kinds
-from potto.types.format import format_type, format_types
+from potto.types.mismatches import mismatch, misused_derivative, not_a_number, shadowing
 from potto.types.scope import Local, LocalKind, Meaning, Member, Outside, Scope
 from potto.types.types import (
     REAL,
     UNKNOWN,
     ArrayOf,
-    Count,
     Diffeo,
     Dist,
     Function,
     Meta,
     Parameter,
     Real,
-    Truth,
     TupleOf,
     Type,
     Unknown,
@@ -142,7 +139,7 @@ class Inference:
             return
         if isinstance(found, Unknown | Dist):
             return
-        self.report(_not_a_number(found, expr, where))
+        self.report(not_a_number(found, expr, where))
 
     def fresh(self) -> Meta:
         return Meta(self.level)
@@ -169,7 +166,7 @@ class Inference:
         """Bring a name into scope."""
         before = self.scope.find(local.name)
         if before is not None and local.name and not local.name.startswith("_"):
-            self.report(_shadowing(local, before))
+            self.report(shadowing(local, before))
         self.scope.bind(local)
         self.binders[id(node)] = local
         self.locals.append(local)
@@ -262,7 +259,7 @@ class Inference:
             self._generation = item.generation
             if item.is_endless or not unify(item.derived, self.dual(item.primal, item.node)):
                 unify(item.derived, UNKNOWN)
-                self.report(_misused_derivative(item.node))
+                self.report(misused_derivative(item.node))
             pending += self._duals
             self._duals = []
         self._duals, self._generation = waiting, 0
@@ -287,130 +284,6 @@ class Inference:
         checks, self._late = self._late, []
         for check in checks:
             check()
-
-
-def _misused_derivative(node: nodes.Expr) -> Diagnostic:
-    return kinds.MISMATCH(
-        node.span,
-        "the derivative of this function takes and gives pairs, `(value, tangent)`, but is used otherwise",
-        label="its derivative does not fit",
-        help="take the value or the tangent of the derivative: `fst(…)`, `snd(…)`",
-    )
-
-
-def describe(type: Type) -> str:
-    """A type in the middle of a sentence."""
-    found = resolve(type)
-    match found:
-        case Real() | Dist():
-            return "a number"
-        case Function():
-            return f"a function `{format_type(found)}`"
-        case TupleOf(record=record) if record is not None:
-            return f"a record `{record.name}`"
-        case TupleOf(items):
-            return f"a tuple of {len(items)}"
-        case ArrayOf(size):
-            known = resolve(size)
-            return f"an array of {known.number}" if isinstance(known, Count) else "an array"
-        case Truth():
-            return "a comparison"
-        case Diffeo():
-            return "a diffeomorphism's result"
-        case _:
-            return f"`{format_type(found)}`"
-
-
-def mismatch(actual: Type, expected: Type, expr: nodes.Expr, what: str) -> Diagnostic:
-    """`what` is the sentence's head: "the argument `x` of `f`"."""
-    if isinstance(resolve(actual), Truth):
-        return comparison(expr, f"{what} must be {describe(expected)}")
-    shown, wanted = format_types((actual, expected))
-    help = ""
-    if isinstance(resolve(actual), Function) and isinstance(resolve(expected), Function):
-        undone = _needs_deriv(actual, expected)
-        help = "give the derivative of the function: `deriv(…)`" if undone else ""
-    elif isinstance(resolve(actual), Function):
-        help = "apply the function to arguments"
-    elif isinstance(resolve(actual), Real) and isinstance(resolve(expected), Diffeo):
-        help = "it decides a condition there; a number is compared first: `if t > 0 then … else …`"
-    elif isinstance(resolve(actual), Real) and isinstance(resolve(expected), Function):
-        help = "it is applied there, as a function; if a product is meant, write it with `*`"
-    return kinds.MISMATCH(
-        expr.span, f"{what} must be `{wanted}`, but this is `{shown}`", label=f"this is `{shown}`", help=help
-    )
-
-
-def _needs_deriv(actual: Type, expected: Type) -> bool:
-    """Whether a function was given where the derivative of one is expected."""
-    given, wanted = resolve(actual), resolve(expected)
-    while isinstance(given, Function) and isinstance(wanted, Function):
-        if len(given.parameters) != len(wanted.parameters):
-            return False
-        for mine, theirs in zip(given.parameters, wanted.parameters):
-            expects = resolve(theirs.type)
-            if isinstance(expects, TupleOf) and expects.dual and isinstance(resolve(mine.type), Real):
-                return True
-        given, wanted = resolve(given.result), resolve(wanted.result)
-    return isinstance(wanted, TupleOf) and wanted.dual and isinstance(given, Real)
-
-
-def comparison(expr: nodes.Expr, what: str) -> Diagnostic:
-    """A comparison stands where it cannot."""
-    return kinds.TRUTH_ESCAPES(
-        expr.span,
-        f"{what}, but this is a comparison",
-        label="neither true nor false is a value",
-        help="put it in brackets, `[x < t]`, for 1 where it holds and 0 elsewhere",
-    )
-
-
-def _not_a_number(found: Type, expr: nodes.Expr, where: str) -> Diagnostic:
-    match found:
-        case TupleOf(record=record):
-            parts = "`u.0`, or all of them, `(a, b) = …`" if record is None else f"`c.{record.fields[0]}`"
-            return kinds.TUPLE_ARITHMETIC(
-                expr.span,
-                f"{where} must be a number, but this is {describe(found)}",
-                label="a tuple" if record is None else "a record",
-                help=f"take one of its parts, {parts}",
-            )
-        case Diffeo():
-            return kinds.TUPLE_ARITHMETIC(
-                expr.span,
-                f"{where} must be a number, but this is a diffeomorphism's result",
-                label="a tuple of coordinates",
-                help="use it as a condition, `… ? a : b`, or take it apart, `(u, v) = …`",
-            )
-        case ArrayOf():
-            return kinds.LIST_INSIDE(
-                expr.span,
-                f"{where} must be a number, but this is {describe(found)}",
-                label=describe(found),
-                help="take one of its elements, `xs[i]`, or add them up, `sum x in xs (x)`",
-            )
-        case Function():
-            return kinds.ESCAPES(
-                expr.span,
-                f"{where} must be a number, but this is a function",
-                label=f"this is `{format_type(found)}`",
-                help="apply it to arguments",
-            )
-        case Truth():
-            return comparison(expr, f"{where} must be a number")
-        case _:
-            return mismatch(found, REAL, expr, where)
-
-
-def _shadowing(local: Local, before: Local) -> Diagnostic:
-    what = {"parameter": "parameter", "variable": "variable of integration"}.get(before.kind, "local name")
-    return kinds.SHADOWED(
-        local.span,
-        f"`{local.name}` hides the {what} of the same name",
-        label="hides it from here on",
-        related=(Related(before.span, f"the {what} `{before.name}` is bound here"),),
-        help="give one of them another name",
-    )
 
 
 quick(Plan, _Pending)

@@ -15,7 +15,8 @@ from potto.primitives import PRIMITIVES
 from potto.syntax import nodes
 from potto.types import kinds
 from potto.types.annotations import written_type
-from potto.types.context import Inference, comparison, describe, mismatch, rule
+from potto.types.context import Inference, rule
+from potto.types.mismatches import comparison, describe, mismatch
 from potto.types.scope import Builtin, Global, Local, Meaning, Member, Module, undefined, undefined_member
 from potto.types.types import (
     REAL,

@@ -12,11 +12,12 @@ from potto.diagnostics import Diagnostic
 from potto.measures import COMPOSITIONS, MEASURES
 from potto.measures.composed import problem
 from potto.modules.free import free_references
-from potto.modules.hints import did_you_mean, near_names
+from potto.modules.hints import did_you_mean, instead, near_names
 from potto.syntax import nodes
 from potto.types import kinds
-from potto.types.context import Inference, comparison, describe, rule
+from potto.types.context import Inference, rule
 from potto.types.infer import bindings, escape
+from potto.types.mismatches import comparison, describe
 from potto.types.scope import Local
 from potto.types.types import (
     ANY_SIZE,
@@ -98,10 +99,11 @@ def _measure(inference: Inference, bounds: nodes.MeasureBound) -> None:
     span = (bounds.measure_span, *(span for _, span in bounds.inner))[found.place]
     every = (*MEASURES, *COMPOSITIONS)
     if found.wanted is None:
-        help = did_you_mean(near_names(found.name, every))
+        near = near_names(found.name, every)
         message = f"there is no measure `{found.name}`"
         known = f"the measures are {', '.join(f'`{name}`' for name in every)}"
-        inference.report(kinds.MEASURE(span, message, label="not a measure", help=help or known))
+        help, suggestions = did_you_mean(near) or known, instead(span, near)
+        inference.report(kinds.MEASURE(span, message, label="not a measure", help=help, suggestions=suggestions))
         return
     call = f"{found.name}({', '.join(found.wanted)})"
     if found.name in COMPOSITIONS:

@@ -36,6 +36,7 @@ SIZES = declare("P0326", "sizes that do not agree")
 NO_FIELD = declare("P0327", "something that has no such part")
 OUT_OF_RANGE = declare("P0328", "an index that is out of range")
 NOT_AN_ARRAY = declare("P0329", "something that is no array")
+NOT_WHOLE = declare("P0330", "an index that is not a whole number")
 
 UNUSED_LOCAL = declare("P0610", "a local name that is not used", "warning")
 UNUSED_VARIABLE = declare("P0611", "a variable of integration that is not used", "warning")

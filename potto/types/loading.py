@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
+
 from potto.data.mistakes import TITLES, DataMistake
 from potto.data.values import Columns, Row, Shape, Sizes
 from potto.diagnostics import Diagnostic, declare
 from potto.modules.data import data_file, path_of
+from potto.modules.hints import instead
+from potto.source import Span
 from potto.syntax import nodes
 from potto.types import kinds
 from potto.types.context import Inference
@@ -21,7 +25,10 @@ def loaded(inference: Inference, node: nodes.Apply) -> Type:
         for argument in node.arguments:
             inference.infer(argument.value)
         help = 'write the name of a file between quotes: `load("heights.csv")`'
-        inference.report(kinds.MISMATCH(node.span, "`load` takes the name of a file", help=help))
+        place, label = node.span, f"{len(node.arguments)} given"
+        if given is not None:
+            place, label = given.span, "not a name in quotes"
+        inference.report(kinds.MISMATCH(place, "`load` takes the name of a file", label=label, help=help))
         return UNKNOWN
     found = data_file(inference.outside.db, inference.outside.file, given.text)
     if isinstance(found, DataMistake):
@@ -48,4 +55,8 @@ def _wrong(mistake: DataMistake, text: nodes.Text) -> Diagnostic:
     if mistake.column is not None:
         where += f"{', ' if where else ''}column {mistake.column}"
     message = mistake.message if mistake.row is None else f"{text.text}: {mistake.message}"
-    return KINDS[mistake.code](text.span, message, label=where, help=mistake.hint)
+    folder = text.text[: len(text.text) - len(re.split(r"[/\\]", text.text)[-1])]
+    return KINDS[mistake.code](
+        text.span, message, label=where or "named here", help=mistake.hint,
+        suggestions=instead(Span(text.span.start + 1, text.span.end - 1), [folder + name for name in mistake.meant]),
+    )  # fmt: skip

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from potto.syntax import nodes
 from potto.types import kinds
-from potto.types.context import Inference, describe, mismatch
+from potto.types.context import Inference
 from potto.types.format import format_type
+from potto.types.mismatches import describe, mismatch
 from potto.types.types import REAL, UNKNOWN, ArrayOf, Count, Function, Meta, Truth, Type, resolve
 from potto.types.unify import unify
 

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from potto.diagnostics import Diagnostic
+from potto.diagnostics import Diagnostic, Suggestion, shortened
 from potto.quick import replace
 from potto.source import Span
 from potto.syntax import nodes
 from potto.syntax.printer import print_expression
 from potto.types import kinds
 from potto.types.context import Inference, Plan
+from potto.types.mismatches import around
 from potto.types.scope import Builtin, Global, Local
 from potto.types.types import REAL, Dist, Function, Parameter, Real, TupleOf, Type, groups_of, resolve
 
@@ -132,7 +133,18 @@ def _motionless(
     else:
         help = f"for the derivative by the first write `{text}`" if several else f"write `{text}`"
     label = "as all others, without a tangent" if several else "a plain number has the tangent 0"
-    return kinds.NO_TANGENT(first.span, MOTIONLESS, label=label, help=help)
+    suggestions = () if moved is None else (_paired(first, moved, calls),)
+    return kinds.NO_TANGENT(first.span, MOTIONLESS, label=label, help=help, suggestions=suggestions)
+
+
+def _paired(first: nodes.Expr, moved: nodes.Expr, calls: Sequence[nodes.Apply]) -> Suggestion:
+    """The number with its tangent; in parentheses of its own where it is an argument without any."""
+    twice = isinstance(moved, nodes.Tuple) and isinstance(moved.items[0], nodes.Tuple)
+    before, behind = ("((", ", 1), (1, 0))") if twice else ("(", ", 1)")
+    bare = any(not c.parenthesized and any(a.value is first for a in c.arguments) for c in calls)
+    if bare:
+        before, behind = f"({before}", f"{behind})"
+    return around(first.span, before, behind, f"Write `{shortened(print_expression(moved))}`")
 
 
 def _moving(first: nodes.Expr, derivative: Type) -> nodes.Expr | None:

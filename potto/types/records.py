@@ -6,11 +6,11 @@ A record is a tuple whose type has the name of its definition. Its definition is
 from __future__ import annotations
 
 from potto.diagnostics import Diagnostic
-from potto.modules.hints import did_you_mean, near_names
 from potto.syntax import nodes
 from potto.syntax.kinds import BAD_TYPE
 from potto.types import kinds
-from potto.types.context import Inference, describe, rule
+from potto.types.context import Inference, rule
+from potto.types.mismatches import describe, no_field
 from potto.types.scope import Global
 from potto.types.types import UNKNOWN, Meta, RecordName, TupleOf, Type, Unknown, resolve, result_of
 from potto.types.unify import open_type
@@ -54,11 +54,8 @@ def _with(inference: Inference, node: nodes.With) -> Type:
         if record is None or not isinstance(found, TupleOf):
             continue
         if argument.name not in record.fields:
-            near = did_you_mean(near_names(argument.name or "", record.fields))
-            inference.report(kinds.NO_FIELD(
-                argument.name_span or argument.span, f"a record `{record.name}` has no field `{argument.name}`",
-                label=f"of `{record.name}`", help=near or "it has " + ", ".join(f"`{name}`" for name in record.fields),
-            ))  # fmt: skip
+            name, span = argument.name or "", argument.name_span or argument.span
+            inference.report(no_field(span, name, record, f"of `{record.name}`"))
             continue
         place = record.fields.index(argument.name)
         inference.expect(given, found.items[place], argument.value, f"the field `{argument.name}`")

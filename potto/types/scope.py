@@ -13,7 +13,7 @@ from typing import Literal
 
 from potto.diagnostics import Diagnostic
 from potto.modules.builtins import CONSTANTS, PROJECTIONS, SPECIALS, VECTORS, is_builtin
-from potto.modules.hints import did_you_mean, elsewhere, known_elsewhere, near_names
+from potto.modules.hints import called_here, did_you_mean, elsewhere, instead, known_elsewhere, near_names
 from potto.modules.lookup import Defined, DefinitionTarget, find_module, meaning, preludes, resolve_module
 from potto.modules.texts import imports, names
 from potto.primitives import PRIMITIVES
@@ -157,7 +157,11 @@ def undefined(outside: Outside, scope: Iterable[str], node: nodes.Name) -> Diagn
     module = elsewhere(outside.db, outside.file, name)
     if module is not None:
         help = f"the module `{module}` defines it: add `from {module} import {name}`"
-    return NOT_DEFINED(node.span, f"`{name}` is not defined", label="not defined here", help=help)
+    meant = called_here(name) or (() if known_elsewhere(name) or module is not None else near)
+    return NOT_DEFINED(
+        node.span, f"`{name}` is not defined", label="not defined here", help=help,
+        suggestions=instead(node.span, meant),
+    )  # fmt: skip
 
 
 def undefined_member(outside: Outside, scope: Scope, node: nodes.Member) -> Diagnostic | None:
@@ -166,9 +170,12 @@ def undefined_member(outside: Outside, scope: Scope, node: nodes.Member) -> Diag
     local = scope.find(head) is not None
     module = None if local else resolve_module(db, file, node.path)
     if module is not None:
-        near = [f"{node.path}.{name}" for name in near_names(node.name, names(db, module))]
+        near = near_names(node.name, names(db, module))
         message = f"the module `{node.path}` defines no `{node.name}`"
-        return NOT_DEFINED(node.name_span, message, label="not defined there", help=did_you_mean(near))
+        return NOT_DEFINED(
+            node.name_span, message, label="not defined there",
+            help=did_you_mean([f"{node.path}.{name}" for name in near]), suggestions=instead(node.name_span, near),
+        )  # fmt: skip
     bound = None if local else (meaning(db, file, node.path) or meaning(db, file, head))
     if isinstance(bound, Defined):
         return _no_module(node, f"`{head}` is a definition, not a module")

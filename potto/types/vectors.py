@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from potto.diagnostics import Diagnostic
-from potto.modules.hints import did_you_mean, near_names
+from potto.diagnostics import Diagnostic, Suggestion, suggest
+from potto.source import Span
 from potto.syntax import nodes
 from potto.types import kinds
-from potto.types.context import Inference, describe
+from potto.types.context import Inference
 from potto.types.format import format_type, format_types
 from potto.types.lookups import image, interp
+from potto.types.mismatches import describe, no_field
 from potto.types.types import REAL, UNKNOWN, ArrayOf, Count, Diffeo, Meta, TupleOf, Type, Unknown, resolve
 from potto.types.unify import SIZES, unify
 
@@ -96,14 +97,16 @@ def _disagree(left: Type, right: Type, operand: nodes.Operand, problem: tuple[Ty
 
 def fields(inference: Inference, type: Type, node: nodes.Member) -> Type:
     """The type of `u.a.b`, where `u` is no module."""
-    names = [*node.path.split(".")[1:], node.name]
+    head, *names = node.path.split(".")
+    at = node.path_span.start + len(head) + 1
     for name in names:
-        type = field(inference, type, name, node)
-    return type
+        type = field(inference, type, name, node, Span(at, at + len(name)))
+        at += len(name) + 1
+    return field(inference, type, node.name, node, node.name_span)
 
 
-def field(inference: Inference, type: Type, name: str, node: nodes.Member | nodes.Field) -> Type:
-    """The type of a part of a value."""
+def field(inference: Inference, type: Type, name: str, node: nodes.Member | nodes.Field, span: Span) -> Type:
+    """The type of a part of a value; its name stands at `span`."""
     found = resolve(type)
     if isinstance(found, Unknown):
         return UNKNOWN
@@ -113,7 +116,7 @@ def field(inference: Inference, type: Type, name: str, node: nodes.Member | node
     if isinstance(found, TupleOf) and place is not None and place < len(found.items):
         inference.fields.setdefault(id(node), []).append(place)
         return found.items[place]
-    inference.report(_no_field(found, name, node, place))
+    inference.report(_no_part(found, name, span, place))
     return UNKNOWN
 
 
@@ -132,25 +135,25 @@ def place_of(name: str) -> int | None:
     return AXES.index(name) if len(name) == 1 and name in AXES else None
 
 
-def _no_field(found: Type, name: str, node: nodes.Member | nodes.Field, place: int | None) -> Diagnostic:
-    help = ""
+def _no_part(found: Type, name: str, span: Span, place: int | None) -> Diagnostic:
+    help, label, suggestions = "", f"of `{format_type(found)}`", tuple[Suggestion, ...]()
+    if isinstance(found, TupleOf) and found.record is not None:
+        return no_field(span, name, found.record, label)
     if isinstance(found, Meta):
         help = "say in the head what it is: `(u: (Real, Real))`"
         message = f"it is not known what `.{name}` is a part of"
-    elif isinstance(found, TupleOf) and found.record is not None:
-        names = found.record.fields
-        message = f"a record `{found.record.name}` has no field `{name}`"
-        help = did_you_mean(near_names(name, names)) or "it has " + ", ".join(f"`{other}`" for other in names)
     elif isinstance(found, TupleOf):
         count = len(found.items)
         message = f"a tuple of {count} has no part `.{name}`"
         numbers = ", ".join(f"`.{number}`" for number in range(min(count, 4)))
-        help = did_you_mean(()) or f"its parts are {numbers}{' and so on' if count > 4 else ''}"
+        help = f"its parts are {numbers}{' and so on' if count > 4 else ''}"
     else:
         message = f"this is {describe(found)}, which has no part `.{name}`"
         if isinstance(found, ArrayOf):
             help = f"an element is `xs[{place or 0}]`"
-    return kinds.NO_FIELD(node.name_span, message, label=f"of `{format_type(found)}`", help=help)
+            if place is not None:
+                suggestions = (suggest(Span(span.start - 1, span.end), f"[{place}]"),)
+    return kinds.NO_FIELD(span, message, label=label, help=help, suggestions=suggestions)
 
 
 # Builtins
@@ -249,7 +252,9 @@ def _numbers(inference: Inference, type: Type, expr: nodes.Expr, name: str) -> b
     return False
 
 
-def expect_array(inference: Inference, type: Type, expr: nodes.Expr, what: str) -> Type:
+def expect_array(
+    inference: Inference, type: Type, expr: nodes.Expr, what: str, suggestions: tuple[Suggestion, ...] = ()
+) -> Type:
     """The type of the elements of what must be an array; UNKNOWN if it is none, as is reported."""
     found = resolve(type)
     if isinstance(found, ArrayOf):
@@ -261,12 +266,12 @@ def expect_array(inference: Inference, type: Type, expr: nodes.Expr, what: str) 
     if not isinstance(found, Unknown):
         inference.report(kinds.NOT_AN_ARRAY(
             expr.span, f"{what}, but this is {describe(found)}", label=f"this is `{format_type(found)}`",
-            help=_instead(found, expr),
+            help=_instead(found), suggestions=suggestions,
         ))  # fmt: skip
     return UNKNOWN
 
 
-def _instead(found: Type, expr: nodes.Expr) -> str:
+def _instead(found: Type) -> str:
     from potto.types.types import Function
 
     if isinstance(found, Function):

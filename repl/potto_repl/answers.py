@@ -18,6 +18,7 @@ from potto.core.terms import App, Deriv, Global, Lam, Term
 from potto.elaborate import elaborate_expression
 from potto.evaluating.session import Defined, Imported, Outcome, Said, Valued
 from potto.modules import statements
+from potto.modules.hints import elsewhere
 from potto.reports.render import Located
 from potto.runtime.answers.estimate import Estimate
 from potto.source import Span
@@ -40,7 +41,7 @@ def entry_parts(session: Conversation, text: str) -> Iterator[Part]:
     for outcome in session.enter(text):
         if isinstance(outcome, Said):
             found = outcome.located.diagnostic
-            otherwise |= outcome.is_error and (found.code != NOT_DEFINED or "defines it" in found.help)
+            otherwise |= outcome.is_error and (found.code != NOT_DEFINED or _is_elsewhere(session, outcome.located))
             session.last_code = found.code
             if found.code == NOT_DEFINED and outcome.located.file == f"<In {session.number}>":
                 name = plain_names(session.entries[-1].text)[found.span.start : found.span.end]
@@ -52,6 +53,14 @@ def entry_parts(session: Conversation, text: str) -> Iterator[Part]:
     advice = "" if otherwise else _advice(session, list(dict.fromkeys(missing)))
     if advice:
         yield Part("help", advice)
+
+
+def _is_elsewhere(session: Conversation, located: Located) -> bool:
+    """Whether a module defines the name that means nothing here, as the message then says."""
+    place, source = located.diagnostic.span, session.source(located.file) if located.file is not None else None
+    if source is None or located.file is None:
+        return False
+    return elsewhere(session.db, located.file, source.text[place.start : place.end]) is not None
 
 
 def _no_answer(session: Conversation, located: Located, name: str) -> Located:
@@ -162,4 +171,3 @@ def _advice(session: Conversation, missing: list[str]) -> str:
         return f"define {named} first, such as `def {called[0]}(x) x^2`; `:load FILE` brings what a file defines"
     function = f"\\({', '.join(missing)}) . {expression}"
     return f"define {named} first, such as `{missing[0]} = 0.5`; or make a function: `{function}`"
-

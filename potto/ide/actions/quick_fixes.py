@@ -1,40 +1,31 @@
 """Quick fixes: what can be done about a diagnostic.
 
-Owns `fixes`. Names are in `fixing_names`, conditions in `fixing_conditions`, texts that can't be read in
-`fixing_texts`; here is what any diagnostic may bring: a replacement that it asks about (did you mean `x`?), and the
-removal of what is not used.
+Owns `fixes`. Most are the suggestions that a diagnostic carries. What takes more than its place is found here: names
+that could be imported or defined (`fixes_of_names`), conditions (`fixes_of_conditions`), what is not used.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from potto.diagnostics import Diagnostic
-from potto.ide.actions.edits import one_file
+from potto.ide.actions.edits import applied, one_file
 from potto.ide.actions.fixes_of_conditions import bracket_fixes, inverse_fixes
 from potto.ide.actions.fixes_of_names import undefined_fixes
-from potto.ide.actions.fixes_of_texts import bracketed, suggested_fixes
-from potto.ide.actions.offers import At, Offer, diagnostics_at, reads
+from potto.ide.actions.offers import At, Offer, diagnostics_at
 from potto.ide.model import Change, Edit
 from potto.ide.names.places import ChunkAt, chunk_at, line_end, line_start
 from potto.modules.kinds import IMPORTED_TWICE, UNUSED_IMPORT
 from potto.source import Span
-from potto.syntax import nodes, walk
-from potto.types.kinds import NO_TANGENT, NOT_DEFINED, TRUTH_ESCAPES, UNUSED_LOCAL, UNUSED_VARIABLE, VARYING_CONDITION
-
-_MEANT = re.compile(r"did you mean `([^`]+)`(?: or `([^`]+)`)?\?")
+from potto.syntax import nodes, parse_chunk, walk
+from potto.types.kinds import NOT_DEFINED, UNUSED_LOCAL, UNUSED_VARIABLE, VARYING_CONDITION
 
 
 def fixes(place: At) -> Iterator[Offer]:
     """What can be done about the diagnostics that the selection touches."""
     for said in diagnostics_at(place.db, place.file, place.span):
-        yield from _meant(place, said)
-        if said.code.startswith("P01"):
-            yield from suggested_fixes(place, said)
-        elif said.code == TRUTH_ESCAPES.code:
-            yield from bracketed(place, said)
-        elif said.code == NOT_DEFINED.code:
+        yield from _suggested(place, said)
+        if said.code == NOT_DEFINED.code:
             yield from undefined_fixes(place, said)
         elif said.code == VARYING_CONDITION.code:
             yield from bracket_fixes(place, said)
@@ -42,36 +33,30 @@ def fixes(place: At) -> Iterator[Offer]:
             yield from inverse_fixes(place, said)
         elif said.code in (UNUSED_IMPORT.code, IMPORTED_TWICE.code):
             yield from _unused_import(place, said)
-        elif said.code == NO_TANGENT.code:
-            yield from _with_tangent(place, said)
         elif said.code in (UNUSED_LOCAL.code, UNUSED_VARIABLE.code):
             yield from _unused_local(place, said)
 
 
-def _meant(place: At, said: Diagnostic) -> Iterator[Offer]:
-    """The names that a diagnostic asks about, in the place of what it is about."""
-    found = _MEANT.search(said.help)
-    written = place.text[said.span.start : said.span.end]
-    if found is None or not re.fullmatch(r"[\w.]+", written):
-        return
-    for number, meant in enumerate(name for name in found.groups() if name):
-        text = meant if "." in written or said.code.startswith("P0202") else meant.rpartition(".")[2]
-        change = one_file(place.file, Edit(said.span, text))
-        yield Offer(f"Change to `{text}`", "quickfix", lambda c=change: c, said, preferred=number == 0)  # type: ignore[misc]
-
-
-def _with_tangent(place: At, said: Diagnostic) -> Iterator[Offer]:
-    """A number with the tangent 1, where none was given."""
+def _suggested(place: At, said: Diagnostic) -> Iterator[Offer]:
+    """The changes that a diagnostic carries. What can't be read was guessed at, so that a change is kept if more can be
+    read after it; any other must leave as much."""
     chunk = chunk_at(place.db, place.file, said.span.start)
-    written = place.text[said.span.start : said.span.end]
-    before = place.text[: said.span.start].rstrip(" ")[-1:]
-    both = f"(({written}, 1), (1, 0))"  # of a second derivative
-    pair = both if both in said.help else f"({written}, 1)"
-    written_as = pair if before in ("(", ",", "=") else f"({pair})"
-    if chunk is None or reads(chunk, [Edit(said.span.shift(-chunk.start), written_as)]) is None:
+    if chunk is None:
         return
-    change = one_file(place.file, Edit(said.span, written_as))
-    yield Offer(f"Write `{pair}`", "quickfix", lambda: change, said, preferred=True)
+    before, preferred = _errors(chunk, ()), True
+    for suggestion in said.suggestions:
+        edits = [Edit(edit.span, edit.text) for edit in suggestion.edits]
+        after = _errors(chunk, [Edit(edit.span.shift(-chunk.start), edit.text) for edit in edits])
+        if after < before or (after == before and not said.code.startswith("P01")):
+            change = one_file(place.file, *edits)
+            yield Offer(suggestion.title, "quickfix", lambda c=change: c, said, preferred)  # type: ignore[misc]
+            preferred = False
+
+
+def _errors(chunk: ChunkAt, edits: Iterable[Edit]) -> int:
+    """How many errors a chunk has, as far as it can't be read, after some edits."""
+    found = parse_chunk(applied(chunk.text, edits), chunk.diffeo).diagnostics
+    return sum(said.severity == "error" for said in found)
 
 
 # What is not used

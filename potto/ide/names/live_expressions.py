@@ -9,6 +9,7 @@ from collections.abc import Iterator
 
 from potto.diagnostics import Diagnostic
 from potto.ide.names.places import ChunkAt, all_chunks
+from potto.modules.texts import moved
 from potto.query import Database, query
 from potto.quick import replace
 from potto.source import Span
@@ -57,4 +58,4 @@ def wrong_with(db: Database, file: str, text: str) -> tuple[Diagnostic, ...]:
 def _placed(said: Diagnostic, start: int, where: Span) -> Diagnostic:
     shift = start + where.start
     related = tuple(r if r.file else replace(r, span=r.span.shift(shift)) for r in said.related)
-    return replace(said, span=said.span.shift(shift), related=related)
+    return replace(moved(said, shift), related=related)

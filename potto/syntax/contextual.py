@@ -1,0 +1,31 @@
+"""Words that are words of the language only where the right thing stands around them, and names elsewhere."""
+
+from __future__ import annotations
+
+import re
+
+from potto.syntax.tokens import FIRST_NAME, Token
+
+ENDS_OPERAND = frozenset({"NAME", "NUMBER", "MEMBER", "FIELD", "RPAR", "RSQB"})
+BEHIND = ENDS_OPERAND - {"NUMBER"}
+"""What a bracket or a dot belongs to that stands directly behind it."""
+_THROUGH = re.compile(rf"[ \t\n]+{FIRST_NAME.pattern}[ \t\n]+in\b")
+_CONTEXTUAL = {
+    "fold": ("FOLD", re.compile(rf"[ \t\n]*(?:[ \t\n]{FIRST_NAME.pattern}|\([^()]*\))[ \t\n]*=(?!=)")),
+    "with": ("WITH", re.compile(rf"[ \t\n]+(?:\([ \t\n]*)?{FIRST_NAME.pattern}[ \t\n]*=(?!=)")),
+    "record": ("RECORDDEF", re.compile(rf"[ \t]+{FIRST_NAME.pattern}[ \t]*\(")),
+    "product": ("SUM", _THROUGH),
+    "min": ("SUM", _THROUGH),
+    "max": ("SUM", _THROUGH),
+}
+"""The kind of each, and what has to follow."""
+
+
+def contextual(tokens: list[Token], word: str, text: str, end: int) -> str | None:
+    """The kind of a word that ends here, behind these tokens; None where it is a name."""
+    found = _CONTEXTUAL.get(word)
+    if found is None or found[1].match(text, end) is None:
+        return None
+    if (word == "record" and tokens) or (tokens and tokens[-1].kind in ("DEF", "DIFFEODEF")):
+        return None
+    return found[0] if word != "with" or (tokens and tokens[-1].kind in BEHIND) else None

@@ -1,0 +1,180 @@
+"""What is said of a type that does not fit where it stands, in the same words wherever that is.
+
+Owns `describe`, a type in the middle of a sentence, and the diagnostics that several rules share.
+"""
+
+from __future__ import annotations
+
+from potto.diagnostics import Diagnostic, Related, Replacement, Suggestion, shortened
+from potto.modules.hints import did_you_mean, instead, near_names
+from potto.source import Span
+from potto.syntax import nodes
+from potto.syntax.printer import print_expression
+from potto.types import kinds
+from potto.types.format import format_type, format_types
+from potto.types.scope import Local
+from potto.types.types import (
+    REAL,
+    ArrayOf,
+    Count,
+    Diffeo,
+    Dist,
+    Function,
+    Real,
+    RecordName,
+    Truth,
+    TupleOf,
+    Type,
+    resolve,
+)
+
+_TABLES = (".csv", ".tsv")
+
+
+def misused_derivative(node: nodes.Expr) -> Diagnostic:
+    return kinds.MISMATCH(
+        node.span,
+        "the derivative of this function takes and gives pairs, `(value, tangent)`, but is used otherwise",
+        label="its derivative does not fit",
+        help="take the value or the tangent of the derivative: `fst(…)`, `snd(…)`",
+    )
+
+
+def describe(type: Type) -> str:
+    """A type in the middle of a sentence."""
+    found = resolve(type)
+    match found:
+        case Real() | Dist():
+            return "a number"
+        case Function():
+            return f"a function `{format_type(found)}`"
+        case TupleOf(record=record) if record is not None:
+            return f"a record `{record.name}`"
+        case TupleOf(items):
+            return f"a tuple of {len(items)}"
+        case ArrayOf(size):
+            known = resolve(size)
+            return f"an array of {known.number}" if isinstance(known, Count) else "an array"
+        case Truth():
+            return "a comparison"
+        case Diffeo():
+            return "a diffeomorphism's result"
+        case _:
+            return f"`{format_type(found)}`"
+
+
+def mismatch(actual: Type, expected: Type, expr: nodes.Expr, what: str) -> Diagnostic:
+    """`what` is the sentence's head: "the argument `x` of `f`"."""
+    if isinstance(resolve(actual), Truth):
+        return comparison(expr, f"{what} must be {describe(expected)}")
+    shown, wanted = format_types((actual, expected))
+    help = ""
+    if isinstance(resolve(actual), Function) and isinstance(resolve(expected), Function):
+        undone = _needs_deriv(actual, expected)
+        help = "give the derivative of the function: `deriv(…)`" if undone else ""
+    elif isinstance(resolve(actual), Function):
+        help = "apply the function to arguments"
+    elif isinstance(resolve(actual), Real) and isinstance(resolve(expected), Diffeo):
+        help = "it decides a condition there; a number is compared first: `if t > 0 then … else …`"
+    elif isinstance(resolve(actual), Real) and isinstance(resolve(expected), Function):
+        help = "it is applied there, as a function; if a product is meant, write it with `*`"
+    return kinds.MISMATCH(
+        expr.span, f"{what} must be `{wanted}`, but this is `{shown}`", label=f"this is `{shown}`", help=help
+    )
+
+
+def _needs_deriv(actual: Type, expected: Type) -> bool:
+    """Whether a function was given where the derivative of one is expected."""
+    given, wanted = resolve(actual), resolve(expected)
+    while isinstance(given, Function) and isinstance(wanted, Function):
+        if len(given.parameters) != len(wanted.parameters):
+            return False
+        for mine, theirs in zip(given.parameters, wanted.parameters):
+            expects = resolve(theirs.type)
+            if isinstance(expects, TupleOf) and expects.dual and isinstance(resolve(mine.type), Real):
+                return True
+        given, wanted = resolve(given.result), resolve(wanted.result)
+    return isinstance(wanted, TupleOf) and wanted.dual and isinstance(given, Real)
+
+
+def comparison(expr: nodes.Expr, what: str) -> Diagnostic:
+    """A comparison stands where it cannot."""
+    return kinds.TRUTH_ESCAPES(
+        expr.span,
+        f"{what}, but this is a comparison",
+        label="neither true nor false is a value",
+        help="put it in brackets, `[x < t]`, for 1 where it holds and 0 elsewhere",
+        suggestions=(around(expr.span, "[", "]", f"Write `[{shortened(print_expression(expr))}]`"),),
+    )
+
+
+def not_a_number(found: Type, expr: nodes.Expr, where: str) -> Diagnostic:
+    match found:
+        case TupleOf(record=record):
+            parts = "`u.0`, or all of them, `(a, b) = …`" if record is None else f"`c.{record.fields[0]}`"
+            return kinds.TUPLE_ARITHMETIC(
+                expr.span,
+                f"{where} must be a number, but this is {describe(found)}",
+                label="a tuple" if record is None else "a record",
+                help=f"take one of its parts, {parts}",
+            )
+        case Diffeo():
+            return kinds.TUPLE_ARITHMETIC(
+                expr.span,
+                f"{where} must be a number, but this is a diffeomorphism's result",
+                label="a tuple of coordinates",
+                help="use it as a condition, `… ? a : b`, or take it apart, `(u, v) = …`",
+            )
+        case ArrayOf():
+            return kinds.LIST_INSIDE(
+                expr.span,
+                f"{where} must be a number, but this is {describe(found)}",
+                label=describe(found),
+                help="take one of its elements, `xs[i]`, or add them up, `sum x in xs (x)`",
+            )
+        case Function():
+            return kinds.ESCAPES(
+                expr.span,
+                f"{where} must be a number, but this is a function",
+                label=f"this is `{format_type(found)}`",
+                help="apply it to arguments",
+            )
+        case Truth():
+            return comparison(expr, f"{where} must be a number")
+        case _:
+            return mismatch(found, REAL, expr, where)
+
+
+def shadowing(local: Local, before: Local) -> Diagnostic:
+    what = {"parameter": "parameter", "variable": "variable of integration"}.get(before.kind, "local name")
+    return kinds.SHADOWED(
+        local.span,
+        f"`{local.name}` hides the {what} of the same name",
+        label="hides it from here on",
+        related=(Related(before.span, f"the {what} `{before.name}` is bound here"),),
+        help="give one of them another name",
+    )
+
+
+def no_field(span: Span, name: str, record: RecordName, label: str) -> Diagnostic:
+    """What is said of a field that a record doesn't have."""
+    near = near_names(name, record.fields)
+    help = did_you_mean(near) or "it has " + ", ".join(f"`{name}`" for name in record.fields)
+    message = f"a record `{record.name}` has no field `{name}`"
+    if record.name.endswith(_TABLES):
+        message = f"`{record.name}` has no column `{name}`"
+    elif "." in record.name:  # another file of data
+        message = f"`{record.name}` holds no `{name}`"
+    return kinds.NO_FIELD(span, message, label=label, help=help, suggestions=instead(span, near))
+
+
+def around(span: Span, before: str, after: str, title: str) -> Suggestion:
+    """Something written on both sides of what stands in a place."""
+    edits = (Replacement(Span(span.start, span.start), before), Replacement(Span(span.end, span.end), after))
+    return Suggestion(title, edits)
+
+
+def between(whole: Span, inner: Span, before: str, after: str, title: str) -> Suggestion:
+    """Other brackets around what stands within a place."""
+    left, right = Span(whole.start, inner.start), Span(inner.end, whole.end)
+    return Suggestion(title, (Replacement(left, before), Replacement(right, after)))
