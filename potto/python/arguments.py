@@ -110,8 +110,10 @@ class Batch(Struct, frozen=True):
             return float(part)
         if 0 in self.shape:
             return np.empty(self.shape)
-        count = int(np.prod(self.shape))
-        return np.broadcast_to(np.asarray(part, dtype=float).reshape(-1), (count,)).reshape(self.shape).copy()
+        count, array = int(np.prod(self.shape)), np.asarray(part, dtype=float)
+        if array.ndim > 1 and len(array) == count:  # arrays of members, put together from tiles
+            return array.reshape(*self.shape, *array.shape[1:])
+        return np.broadcast_to(array.reshape(-1), (count,)).reshape(self.shape).copy()
 
 
 def batch_of(arguments: Iterable[tuple[str, Any]]) -> Batch:

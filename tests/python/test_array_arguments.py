@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
 
@@ -247,3 +249,29 @@ def share(c: Camera, depth) c.focal/(depth - c.eye.z)
         module.share({"eye": eye}, 1.0)
     with pytest.raises(potto.PottoError, match="has `zoom`, which it does not know"):
         module.share({"eye": eye, "focal": 1.0, "zoom": 2.0}, 1.0)
+
+
+@pytest.mark.parametrize("pool", [None, ThreadPoolExecutor, ProcessPoolExecutor])
+def test_a_batch_in_tiles_has_gradients_in_the_shape_of_the_array(pool: Any) -> None:
+    """Of 6,000 members in a shape of two axes: each is what it is by itself, whoever evaluates its tile."""
+    module = potto.compile("""
+def covered(ts: [n] (Real, Real), p) integral [p, p + 1/8] sum i in 0..n-1 ([x > ts[i].0]*ts[i].1) d(x)
+""")
+    ts, places = np.array([[0.3, 1.0], [0.5, 2.0], [0.7, 0.5]]), np.linspace(0, 1, 6_000).reshape(60, 100)
+    gradient = potto.grad(module.covered, "ts")
+    with ExitStack() as stack:
+        if pool is not None:
+            stack.enter_context(potto.settings(executor=stack.enter_context(pool(2))))
+        found = gradient(ts, places)
+    assert found.value.shape == (60, 100) and found.tangent.shape == found.tangent_error.shape == (60, 100, 3, 2)
+    over = np.clip(places[..., None] + 1 / 8 - np.maximum(ts[:, 0], places[..., None]), 0, None)
+    moves = (ts[:, 0] > places[..., None]) & (ts[:, 0] < places[..., None] + 1 / 8)
+    exact = np.stack((-ts[:, 1] * moves, over), axis=-1)
+    assert np.abs(found.value - (over * ts[:, 1]).sum(axis=-1)).max() <= 1e-14
+    assert np.abs(found.tangent - exact).max() <= 1e-14
+
+
+def test_arrays_of_a_batch_in_tiles_keep_their_axes() -> None:
+    f = potto.compile("def f(a) [a, a^2, integral [0, a] x d(x)]").f
+    a = np.linspace(0.1, 2, 5_000)
+    assert np.abs(f(a).value - np.stack((a, a**2, a**2 / 2), axis=-1)).max() <= 1e-14
