@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -13,6 +14,7 @@ from mpmath import mp, mpf
 
 import potto
 from potto.python import gradients
+from potto.runtime.evaluation import folds, linear
 
 DIGITS = 400  # what is chaotic loses one in two steps
 
@@ -270,3 +272,28 @@ def test_every_index_at_every_bound(size: int) -> None:
             element(xs, i)
     with pytest.raises(potto.PottoError, match="P0512"):
         element(xs, 0.5)
+
+
+@pytest.mark.parametrize("way", ["forward", "reverse"])
+def test_more_steps_than_are_looked_at_at_once_are_taken_in_stretches(way: str, monkeypatch: Any) -> None:
+    """A rotation by k at every step: after n of them (cos(n k), sin(n k)). Errors are no larger than those of all steps
+    at once, but for what is forgotten of their signs at six places."""
+    text = """
+def turned(k, n)
+    (x, y) = fold (x, y) = (1, 0) for i in 1..n ((x*cos(k) - y*sin(k), x*sin(k) + y*cos(k)))
+    x
+"""
+
+    def answer() -> Any:
+        f = potto.compile(text).turned
+        if way == "forward":
+            return potto.deriv(f)((0.3, 1.0), (600.0, 0.0))
+        monkeypatch.setattr(gradients, "MANY", 0)
+        return potto.grad(f, "k")(0.3, 600.0)
+
+    whole = answer()
+    monkeypatch.setattr(folds, "LEAST", 64)
+    monkeypatch.setattr(linear, "MOST_WORK", 8 * 100)
+    found = answer()
+    assert abs(found.value - math.cos(180)) <= found.error <= 4 * whole.error < 2e-12
+    assert abs(found.tangent + 600 * math.sin(180)) <= found.tangent_error <= 4 * whole.tangent_error < 1e-9

@@ -14,12 +14,14 @@ import numpy as np
 
 from potto.core.terms import Fold, Lam, lam
 from potto.kernels.cells import Cell, Number, Value, all_arrays, map_cells, pad, pattern
-from potto.runtime.evaluation.linear import along, fits
+from potto.runtime.evaluation.linear import along, steps_at_once
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.reduction import reduced
 from potto.runtime.evaluation.selection import Pick, apart
 from potto.runtime.evaluation.signed import can_be_sampled, stepped
 from potto.runtime.evaluation.sums import bounds
+
+LEAST = 4096  # steps that it pays to look at all at once where there are more
 
 Env = dict[str, Value]
 
@@ -36,11 +38,14 @@ def fold(machine: Machine, term: Fold, lo: Value, hi: Value, start: Value, env: 
     if found is not None:
         return found
     body = lam(tuple(sorted(term.body.free | {term.variable, term.state})), term.body)
-    if fits(machine, term, places, start, env):
-        states = _bare(machine, term, body, places, start, env)
-        found = along(machine, term, body, places, states, start, env)
-        if found is not None:
-            return found
+    while 0 < min(LEAST, len(places)) <= (most := steps_at_once(machine, term, start, env)):
+        here = places[:most]
+        found = along(machine, term, body, here, _bare(machine, term, body, here, start, env), start, env)
+        if found is None:
+            break
+        start, places = found, places[most:]
+    if not places:
+        return start
     if can_be_sampled(machine, term, start):
         return stepped(machine, term, body, places, start, env)
     return _carrying(machine, term, body, places, start, env)

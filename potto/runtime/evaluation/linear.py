@@ -1,6 +1,6 @@
 """The steps of a fold as linear maps around the states that were met, for all steps at once.
 
-Owns `fits` and `along`. The state of n steps is a batch of n members: the step's kernel gives its derivatives by the
+Owns `steps_at_once` and `along`. The state of n steps is a batch of n members: the step's kernel gives its derivatives by the
 state and what it rounds off, and `steps` adds up what that does to the end. On a tape the end is a sum over the steps
 of what each takes from elsewhere, times what the steps after it make of that: the cost is that of the steps.
 """
@@ -27,13 +27,13 @@ Env = dict[str, Value]
 Shape = tuple[int, ...]
 
 
-def fits(machine: Machine, term: Fold, places: range, start: Value, env: Env) -> bool:
-    """Whether the steps can be looked at all at once: few numbers, which no integral is in."""
+def steps_at_once(machine: Machine, term: Fold, start: Value, env: Env) -> int:
+    """How many steps can be looked at all at once, with few numbers, which no integral is in; 0 if none can."""
     kinds = _sizes(start)
     if kinds is None or machine.linker.inexact(term.body) or any(map(_closed, env.values())):
-        return False
+        return 0
     d, members = sum(kinds), int(np.prod(_shape(start, env)))
-    return 0 < d <= MOST_NUMBERS and d**3 * members * len(places) <= MOST_WORK
+    return MOST_WORK // (d**3 * members) if 0 < d <= MOST_NUMBERS and members else 0
 
 
 def _closed(value: Value) -> bool:
