@@ -1,8 +1,8 @@
 """The steps of a fold as linear maps around the states that were met, for all steps at once.
 
-Owns `steps_at_once` and `along`. The state of n steps is a batch of n members: the step's kernel gives its derivatives by the
-state and what it rounds off, and `steps` adds up what that does to the end. On a tape the end is a sum over the steps
-of what each takes from elsewhere, times what the steps after it make of that: the cost is that of the steps.
+Owns `steps_at_once` and `along`. The state of n steps is a batch of n members: the step's kernel gives its derivatives
+by the state and what it rounds off, and `steps` adds up what that does to the end. On a tape the end is a sum over the
+steps of what each takes from elsewhere, times what the steps after it make of that: the cost is that of the steps.
 """
 
 from __future__ import annotations
