@@ -27,7 +27,7 @@ from potto.types import (  # noqa: F401  (imported for their rules)
 from potto.types.algebra import fitted, flat, symbolic
 from potto.types.annotations import written_type
 from potto.types.closing import declared, reasons_of
-from potto.types.context import Inference, ensure_stack
+from potto.types.context import Inference, Part, ensure_stack
 from potto.types.flow import Walk
 from potto.types.infer import bindings, returned
 from potto.types.interfaces import Closing, Decorating, Interface, chain_of
@@ -64,6 +64,7 @@ class Analysis:
     diagnostics: tuple[Diagnostic, ...]
     reasons: Reasons = NO_REASONS
     names: tuple[Typed, ...] = ()
+    parts: tuple[Part, ...] = ()
 
 
 def analyse(
@@ -226,7 +227,8 @@ def _conclude(
     found = _sorted((*inference.diagnostics, *walk.diagnostics, *lints(inference, walk, item)))
     if not details:
         return Analysis(interface, found)
-    return Analysis(interface, found, reasons_of(value, closing, decorating), typed(inference, walk))
+    names, reasons = typed(inference, walk), reasons_of(value, closing, decorating)
+    return Analysis(interface, found, reasons, names, parts(inference))
 
 
 def _named(sources: object, decorating: Decorating) -> tuple[str, ...]:
@@ -245,6 +247,11 @@ def typed(inference: Inference, walk: Walk) -> tuple[Typed, ...]:
     return tuple(
         Typed(local.span, local.name, local_type(local.type, walk.locals.get(local))) for local in inference.locals
     )
+
+
+def parts(inference: Inference) -> tuple[Part, ...]:
+    """The names of parts that a definition writes, with the types of what they are of."""
+    return tuple(Part(p.span, p.name, close_type(p.whole), close_type(p.type)) for p in inference.parts)
 
 
 def local_type(type: Type, value: Value | None) -> Type:

@@ -75,6 +75,16 @@ class Plan:
 
 
 @value
+class Part:
+    """The name of a part where it is written (`u.x`, `c with x = 1`): what it is of, and its type."""
+
+    span: Span
+    name: str
+    whole: Type
+    type: Type
+
+
+@value
 class _Pending:
     """A type that is not known yet, and what is to be its dual; `node` is what is derived.
 
@@ -112,6 +122,7 @@ class Inference:
         self.brackets: set[int] = set()
         self.owners: dict[int, Meaning] = {}  # of members of no module, `u.x`: what `u` is
         self.fields: dict[int, list[int]] = {}  # of `u.x`, and of `c with x = 1`: where in the tuple it is
+        self.parts: list[Part] = []
         self.sizes: dict[str, Type] = {}  # the names of sizes in annotations
         self.mixed: set[int] = set()  # the `and`, `or`, `not` of conditions, where brackets may stand
         self.integrals = 0  # how many integrals are around the place that is looked at
@@ -286,4 +297,4 @@ class Inference:
             check()
 
 
-quick(Plan, _Pending)
+quick(Plan, Part, _Pending)

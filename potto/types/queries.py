@@ -20,8 +20,8 @@ from potto.quick import quick, value
 from potto.syntax import nodes
 from potto.types import motionless
 from potto.types.algebra import symbolic
-from potto.types.analysis import Analysis, Typed, analyse, local_type, typed
-from potto.types.context import Inference, ensure_stack
+from potto.types.analysis import Analysis, Typed, analyse, local_type, parts, typed
+from potto.types.context import Inference, Part, ensure_stack
 from potto.types.flow import Walk
 from potto.types.flow_binders import walk_statement
 from potto.types.integrals import statement as infer_statement
@@ -67,6 +67,13 @@ def typed_names(db: Database, file: str, name: str) -> tuple[Typed, ...]:
     """The names that a definition binds, with their types there: `Real[x]` inside an integral over x."""
     found = db.entry(_details, (_group(db, file, name),), DefinitionTarget(file, name))
     return () if found is None else found.names
+
+
+@query
+def typed_parts(db: Database, file: str, name: str) -> tuple[Part, ...]:
+    """The names of parts that a definition writes, `u.x` and `c with x = 1`, and what they are parts of."""
+    found = db.entry(_details, (_group(db, file, name),), DefinitionTarget(file, name))
+    return () if found is None else found.parts
 
 
 def _analysis(db: Database, file: str, name: str) -> Analysis | None:
@@ -150,6 +157,16 @@ def check_statement(db: Database, file: str, statement: nodes.Statement) -> tupl
     walk_statement(walk, statement)
     found = [*inference.diagnostics, *walk.diagnostics, *lints(inference, walk, statement)]
     return tuple(sorted(found, key=lambda diagnostic: (diagnostic.span, diagnostic.code)))
+
+
+@query(keep=1024)
+def statement_parts(db: Database, file: str, statement: nodes.Statement) -> tuple[Part, ...]:
+    """The names of parts in a statement of a script, or in an expression by itself."""
+    ensure_stack()
+    inference = Inference(_outside(db, file, _used(statement)), {})
+    infer_statement(inference, statement)
+    inference.finish()
+    return parts(inference)
 
 
 @query(keep=1024)

@@ -9,7 +9,7 @@ from potto.diagnostics import Diagnostic
 from potto.syntax import nodes
 from potto.syntax.kinds import BAD_TYPE
 from potto.types import kinds
-from potto.types.context import Inference, rule
+from potto.types.context import Inference, Part, rule
 from potto.types.mismatches import describe, no_field
 from potto.types.scope import Global
 from potto.types.types import UNKNOWN, Meta, RecordName, TupleOf, Type, Unknown, resolve, result_of
@@ -60,6 +60,7 @@ def _with(inference: Inference, node: nodes.With) -> Type:
         place = record.fields.index(argument.name)
         inference.expect(given, found.items[place], argument.value, f"the field `{argument.name}`")
         places.append(place)
+        inference.parts.append(Part(argument.name_span or argument.span, argument.name, found, found.items[place]))
     inference.fields[id(node)] = places
     if record is None and not isinstance(found, Unknown):
         inference.report(_no_record(node, found))

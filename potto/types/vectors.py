@@ -12,7 +12,7 @@ from potto.diagnostics import Diagnostic, Suggestion, suggest
 from potto.source import Span
 from potto.syntax import nodes
 from potto.types import kinds
-from potto.types.context import Inference
+from potto.types.context import Inference, Part
 from potto.types.format import format_type, format_types
 from potto.types.lookups import image, interp
 from potto.types.mismatches import describe, no_field
@@ -115,6 +115,7 @@ def field(inference: Inference, type: Type, name: str, node: nodes.Member | node
     place = place_in(found, name)
     if isinstance(found, TupleOf) and place is not None and place < len(found.items):
         inference.fields.setdefault(id(node), []).append(place)
+        inference.parts.append(Part(span, name, found, found.items[place]))
         return found.items[place]
     inference.report(_no_part(found, name, span, place))
     return UNKNOWN

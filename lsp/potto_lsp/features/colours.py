@@ -9,8 +9,7 @@ from typing import Any
 
 from potto import ide
 from potto.ide.display.semantic_tokens import Word, definition_words, loose_words
-from potto.ide.names.places import all_chunks
-from potto.ide.names.symbols import owner
+from potto.ide.names.places import all_chunks, owner
 from potto.modules import chunk_text
 from potto.query import Database, query
 from potto_lsp.asking import Ask

@@ -14,8 +14,7 @@ from potto.checking.check import absolute, definition_diagnostics
 from potto.diagnostics import Diagnostic
 from potto.ide.actions.edits import applied
 from potto.ide.model import ActionKind, Change, Edit
-from potto.ide.names.places import ChunkAt, all_chunks, chunk_at, text_of
-from potto.ide.names.symbols import owner
+from potto.ide.names.places import ChunkAt, all_chunks, chunk_at, owner, text_of
 from potto.modules import module_diagnostics, names, parsed
 from potto.modules.lookup import scope
 from potto.modules.texts import shift

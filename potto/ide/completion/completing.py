@@ -21,8 +21,8 @@ from potto.ide.hover.hovers import builtin_markdown, measure_markdown, measure_s
 from potto.ide.hover.local_names import TITLES, local_type
 from potto.ide.model import Completion, CompletionKind, Completions
 from potto.ide.names.documents import definition_head, documentation, type_text, written_kind, written_kinds
-from potto.ide.names.places import Site, chunk_at, site_after, site_at
-from potto.ide.names.symbols import LocalSymbol, owner
+from potto.ide.names.places import Site, chunk_at, owner, site_after, site_at
+from potto.ide.names.symbols import LocalSymbol
 from potto.ide.names.words import KEYWORDS, LETTERS, SPECIALS, TYPES, Keyword
 from potto.measures import COMPOSITIONS, MEASURES, Measure
 from potto.measures.composed import Composition

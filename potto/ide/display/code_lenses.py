@@ -10,9 +10,9 @@ from potto.ide.hover.derivatives import derivative_text
 from potto.ide.model import CodeLens
 from potto.ide.names.documents import kind_of
 from potto.ide.names.live_expressions import lives
-from potto.ide.names.places import all_chunks
+from potto.ide.names.places import all_chunks, owner
 from potto.ide.names.points import points
-from potto.ide.names.symbols import DefinitionSymbol, owner
+from potto.ide.names.symbols import DefinitionSymbol
 from potto.ide.navigation.references import occurrences_of
 from potto.query import Database
 from potto.source import Span

@@ -11,8 +11,8 @@ from msgspec.structs import replace
 
 from potto.ide.hover.derivatives import ConditionInfo, condition_infos, condition_markdown, fence
 from potto.ide.model import Edit, InlayHint
-from potto.ide.names.places import ChunkAt, all_chunks
-from potto.ide.names.symbols import owner, parameters, placeless
+from potto.ide.names.places import ChunkAt, all_chunks, owner
+from potto.ide.names.symbols import parameters, placeless
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import nodes, walk

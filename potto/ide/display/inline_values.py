@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from potto.ide.model import InlineValue
 from potto.ide.names.documents import kind_of
-from potto.ide.names.places import all_chunks
-from potto.ide.names.symbols import owner
+from potto.ide.names.places import all_chunks, owner
 from potto.query import Database
 from potto.source import Span
 from potto.syntax import live_expressions, nodes

@@ -15,8 +15,7 @@ from msgspec.structs import replace
 
 from potto.ide.names.function_arguments import fits, numbers, of_numbers
 from potto.ide.names.live_expressions import lives, wrong_with
-from potto.ide.names.places import NOWHERE, all_chunks
-from potto.ide.names.symbols import owner
+from potto.ide.names.places import NOWHERE, all_chunks, owner
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import nodes, parse_expression

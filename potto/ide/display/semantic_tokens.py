@@ -11,15 +11,16 @@ from collections.abc import Iterator
 from potto.ide.model import SemanticToken
 from potto.ide.names.documents import written_kind
 from potto.ide.names.index import Binder, Occurrence
-from potto.ide.names.places import ChunkAt, all_chunks
+from potto.ide.names.parts import is_part, occurrences
+from potto.ide.names.places import ChunkAt, all_chunks, owner
 from potto.ide.names.symbols import (
     BuiltinSymbol,
     DefinitionSymbol,
     LocalSymbol,
     MeasureSymbol,
     ModuleSymbol,
+    PartSymbol,
     meaning_of,
-    owner,
     placeless,
 )
 from potto.ide.names.words import SPECIALS, TYPES
@@ -69,7 +70,7 @@ def _coloured(db: Database, chunk: ChunkAt, name: str | None = None) -> list[Wor
     names: dict[int, Word] = {}
     plain = frozenset() if name is None else frozenset(interface(db, chunk.file, name).plain)
     functions = frozenset() if name is None else functions_in(db, chunk.file, name)
-    for occurrence in chunk.index(db).occurrences:
+    for occurrence in occurrences(db, chunk):
         coloured = _name(db, chunk, occurrence, plain, functions)
         if coloured is not None:
             names[occurrence.span.start] = (occurrence.span.start, occurrence.span.end, *coloured)
@@ -120,11 +121,13 @@ def _word(kind: str, text: str, start: int) -> Iterator[Word]:
 def _name(
     db: Database, chunk: ChunkAt, occurrence: Occurrence, plain: frozenset[str], functions: frozenset[int]
 ) -> tuple[str, tuple[str, ...]] | None:
-    if occurrence.role == "keyword":
+    if occurrence.role == "keyword" or is_part(db, chunk.file, occurrence):
         return "property", ()
     symbol = meaning_of(db, chunk, occurrence)
     made: tuple[str, ...] = ("declaration",) if occurrence.role in ("bind", "define", "alias") else ()
     match symbol:
+        case LocalSymbol(where) if where.sketch(db).record:
+            return "property", made
         case LocalSymbol(_, _, binder):
             return _local(binder, made, plain, functions)
         case DefinitionSymbol(file, name):
@@ -140,6 +143,8 @@ def _name(
             return ("variable" if constant else "function"), ("readonly", "defaultLibrary")
         case MeasureSymbol():
             return "type", ("defaultLibrary",)
+        case PartSymbol():
+            return "property", ()
         case None:
             return _unknown(occurrence)
 

@@ -15,7 +15,7 @@ from potto.core.printer import format_term
 from potto.core.simplify import simplify
 from potto.core.terms import Branch, Term, var
 from potto.ide.hover.conditions import RULE, at_condition, condition_after
-from potto.ide.hover.data import data_markdown
+from potto.ide.hover.data import data_markdown, part_markdown
 from potto.ide.hover.derivatives import (
     code,
     condition_infos,
@@ -27,15 +27,15 @@ from potto.ide.hover.derivatives import (
 from potto.ide.hover.local_names import local_markdown
 from potto.ide.model import Hover
 from potto.ide.names.documents import definition_head, documentation, module_documentation
-from potto.ide.names.places import ChunkAt, chunk_at, word_at
+from potto.ide.names.places import ChunkAt, chunk_at, owner, word_at
 from potto.ide.names.symbols import (
     BuiltinSymbol,
     DefinitionSymbol,
     LocalSymbol,
     MeasureSymbol,
     ModuleSymbol,
+    PartSymbol,
     Symbol,
-    owner,
     symbol_at,
 )
 from potto.ide.names.words import KEYWORDS, SPECIALS, TYPES
@@ -76,6 +76,8 @@ def symbol_markdown(db: Database, file: str, symbol: Symbol) -> str:
             return builtin_markdown(name)
         case MeasureSymbol(name):
             return measure_markdown(name)
+        case PartSymbol():
+            return part_markdown(symbol)
 
 
 @query

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from potto.ide.hover.derivatives import code, condition_infos, fence
-from potto.ide.names.places import ChunkAt
-from potto.ide.names.symbols import LocalSymbol, owner, parameters
+from potto.ide.names.places import ChunkAt, owner
+from potto.ide.names.symbols import LocalSymbol, parameters
 from potto.query import Database
 from potto.quick import replace
 from potto.source import Span
@@ -41,6 +41,8 @@ def local_markdown(db: Database, symbol: LocalSymbol, file: str) -> str:
     """What there is to say about a local name."""
     chunk, binder = symbol.chunk, symbol.binder
     name = owner(db, chunk)
+    if chunk.sketch(db).record:
+        return _field(db, symbol)
     type = local_type(db, symbol)
     shown = type
     for _ in symbol.prefix:
@@ -61,6 +63,16 @@ def local_markdown(db: Database, symbol: LocalSymbol, file: str) -> str:
         case "local" | "loop" | "index":
             parts += _value(db, chunk, binder.span, type)
     return "\n\n".join(parts)
+
+
+def _field(db: Database, symbol: LocalSymbol) -> str:
+    """A field of a record, as it is declared."""
+    chunk, binder = symbol.chunk, symbol.binder
+    item = chunk.parsed(db).item
+    fields = item.fields if isinstance(item, nodes.RecordDefinition) else ()
+    declared = next((f for f in fields if f.span.start == binder.span.start), None)
+    shown = binder.name if declared is None else " ".join(chunk.text[declared.span.start : declared.span.end].split())
+    return f"{fence(shown.replace(':', ' :', 1))}\n\nfield of {code(chunk.sketch(db).name or '')}"
 
 
 def local_type(db: Database, symbol: LocalSymbol) -> Type:

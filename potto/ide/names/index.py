@@ -20,8 +20,9 @@ from potto.source import Span
 from potto.syntax import RESERVED, children, live_expressions, nodes, parse_expression
 
 BinderKind = Literal["parameter", "local", "variable", "index", "loop"]
-Role = Literal["bind", "use", "member", "path", "keyword", "define", "module", "import", "alias", "measure"]
+Role = Literal["bind", "use", "member", "path", "field", "keyword", "define", "module", "import", "alias", "measure"]
 
+NOWHERE = Span(0, 0)
 _WORD = re.compile(r"[^\W\d]\w*")
 
 
@@ -165,8 +166,14 @@ class _Walk:
             case nodes.Name(span=span, id=name):
                 self.use(span, name)
             case nodes.Member():
-                self.add(node.path_span, node.path, "path", self.meant(node.path.partition(".")[0]))
-                self.add(node.name_span, node.name, "member", path=node.path)
+                self._member(node)
+            case nodes.Field():
+                self._part(node.name_span, node.name)
+                return (node.value,)
+            case nodes.With():
+                for argument in node.arguments:
+                    self._part(argument.name_span or NOWHERE, argument.name or "")
+                return (node.record, *(argument.value for argument in node.arguments))
             case nodes.ErrorExpr(span=span) | nodes.BrokenItem(span=span):
                 self.words(span)
             case nodes.Argument():
@@ -210,6 +217,25 @@ class _Walk:
             case _:
                 return children(node)
         return ()
+
+    def _member(self, node: nodes.Member) -> None:
+        """`u.a.b`, parts of a local name; else a name in a module, or what only who knows files can tell apart."""
+        head, *names = node.path.split(".")
+        at = node.path_span.start
+        if self.meant(head) < 0:
+            self.add(node.path_span, node.path, "path")
+            self.add(node.name_span, node.name, "member", path=node.path)
+            return
+        self.use(Span(at, at + len(head)), head)
+        at += len(head) + 1
+        for name in names:
+            self._part(Span(at, at + len(name)), name)
+            at += len(name) + 1
+        self._part(node.name_span, node.name)
+
+    def _part(self, span: Span, name: str) -> None:
+        if not name.isdigit():
+            self.add(span, name, "field")
 
     def _apply(self, node: nodes.Apply) -> Sequence[Any]:
         for argument in node.arguments:

@@ -11,7 +11,7 @@ from typing import Literal
 from msgspec import Struct
 
 from potto.ide.names.index import Index, index
-from potto.modules import ChunkRef, chunks, is_diffeo, parsed, source
+from potto.modules import ChunkRef, chunk_start, chunks, is_diffeo, parsed, source
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import ParsedChunk, nodes
@@ -26,14 +26,17 @@ class Sketch(Struct, frozen=True):
     span: Span = NOWHERE
     name: str | None = None
     name_span: Span = NOWHERE
+    record: bool = False
 
 
 @query(keep=16384)
 def sketch(db: Database, text: str, diffeo: bool) -> Sketch:
     """A chunk in outline. Questions about whole files ask this of every chunk: trees are large, and soon forgotten."""
     match parsed(db, text, diffeo).item:
-        case (nodes.Definition() | nodes.DiffeoDefinition() | nodes.RecordDefinition()) as item:
+        case (nodes.Definition() | nodes.DiffeoDefinition()) as item:
             return Sketch("definition", item.span, item.name, item.name_span)
+        case nodes.RecordDefinition() as item:
+            return Sketch("definition", item.span, item.name, item.name_span, record=True)
         case (nodes.Import() | nodes.FromImport()) as item:
             return Sketch("import", item.span)
         case (nodes.Print() | nodes.For() | nodes.ExpressionStatement()) as item:
@@ -65,6 +68,12 @@ class ChunkAt(Struct, frozen=True):
     def absolute(self, span: Span) -> Span:
         """A place in it as a place in the file."""
         return span.shift(self.start)
+
+
+def owner(db: Database, chunk: ChunkAt) -> str | None:
+    """The name that a chunk defines, if it is the definition that counts."""
+    name = chunk.sketch(db).name
+    return name if name is not None and chunk_start(db, chunk.file, name) == chunk.start else None
 
 
 def text_of(db: Database, file: str) -> str:

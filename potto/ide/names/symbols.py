@@ -8,6 +8,7 @@ from __future__ import annotations
 from msgspec import Struct
 
 from potto.ide.names.index import Binder, Occurrence, call_head
+from potto.ide.names.parts import part_at, split
 from potto.ide.names.places import ChunkAt, chunk_at
 from potto.measures import COMPOSITIONS, MEASURES
 from potto.modules import (
@@ -26,6 +27,7 @@ from potto.modules.builtins import is_builtin
 from potto.query import Database
 from potto.source import Span
 from potto.syntax import nodes
+from potto.types import TupleOf, Type
 
 MOST_ALIASES = 20
 
@@ -66,7 +68,21 @@ class MeasureSymbol(Struct, frozen=True):
     name: str
 
 
-Symbol = LocalSymbol | DefinitionSymbol | ModuleSymbol | BuiltinSymbol | MeasureSymbol
+class PartSymbol(Struct, frozen=True):
+    """A part that has no definition: a column of a table, the `x` of a tuple. `whole` is the type of what it is of."""
+
+    name: str
+    whole: Type
+    type: Type
+
+    @property
+    def data(self) -> str | None:
+        """The file that it is a column of."""
+        record = self.whole.record if isinstance(self.whole, TupleOf) else None
+        return record.file if record is not None and "." in record.name else None
+
+
+Symbol = LocalSymbol | DefinitionSymbol | ModuleSymbol | BuiltinSymbol | MeasureSymbol | PartSymbol
 
 
 class Found(Struct, frozen=True):
@@ -83,9 +99,11 @@ def symbol_at(db: Database, file: str, offset: int) -> Found | None:
     chunk = chunk_at(db, file, offset)
     if chunk is None:
         return None
-    occurrence = chunk.index(db).at(offset - chunk.start)
-    if occurrence is None:
+    whole = chunk.index(db).at(offset - chunk.start)
+    if whole is None:
         return None
+    pieces = split(db, chunk.file, whole)
+    occurrence = next((o for o in pieces if offset - chunk.start <= o.span.end), whole)
     return Found(chunk.absolute(occurrence.span), occurrence, chunk, meaning_of(db, chunk, occurrence))
 
 
@@ -104,12 +122,17 @@ def meaning_of(db: Database, chunk: ChunkAt, occurrence: Occurrence) -> Symbol |
     match occurrence.role:
         case "define":
             return DefinitionSymbol(file, name)
-        case "module" | "path":
-            found = find_module(db, file, name) if occurrence.role == "module" else resolve_module(db, file, name)
+        case "module":
+            found = find_module(db, file, name)
             return None if found is None else ModuleSymbol(found, name)
+        case "path":
+            found = resolve_module(db, file, name)
+            return outer(db, file, name) if found is None else ModuleSymbol(found, name)
         case "member":
             target = resolve_member(db, file, occurrence.path, name)
-            return None if target is None else DefinitionSymbol(target.file, target.name)
+            return part(db, chunk, occurrence) if target is None else DefinitionSymbol(target.file, target.name)
+        case "field":
+            return part(db, chunk, occurrence)
         case "keyword":
             return None if occurrence.callee is None else keyword_symbol(db, chunk, occurrence.callee, name)
         case "measure":
@@ -118,6 +141,16 @@ def meaning_of(db: Database, chunk: ChunkAt, occurrence: Occurrence) -> Symbol |
             return imported(db, file, occurrence.path, name)
         case _:
             return outer(db, file, name)
+
+
+def part(db: Database, chunk: ChunkAt, occurrence: Occurrence) -> Symbol | None:
+    """What the name of a part means: a field of a record is the parameter of the record's definition."""
+    found = part_at(db, chunk, occurrence.span)
+    if found is None:
+        return None
+    record = found.whole.record if isinstance(found.whole, TupleOf) else None
+    field = None if record is None else parameter_symbol(db, record.file, record.name, occurrence.name)
+    return PartSymbol(found.name, found.whole, found.type) if field is None else field
 
 
 def outer(db: Database, file: str, name: str) -> Symbol | None:
@@ -225,9 +258,3 @@ def placeless(db: Database, file: str, name: str) -> ChunkAt | None:
     """The chunk of a definition as if it stood at the head of its file: for queries, which must not read places."""
     text = chunk_text(db, file, name)
     return None if text is None else ChunkAt(file, 0, text, is_diffeo(file))
-
-
-def owner(db: Database, chunk: ChunkAt) -> str | None:
-    """The name that a chunk defines, if it is the definition that counts."""
-    name = chunk.sketch(db).name
-    return name if name is not None and chunk_start(db, chunk.file, name) == chunk.start else None

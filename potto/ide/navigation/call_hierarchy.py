@@ -9,8 +9,8 @@ import os.path
 
 from potto.ide.model import Call, CallItem, Location
 from potto.ide.names.documents import kind_of, type_text
-from potto.ide.names.places import ChunkAt, chunk_at
-from potto.ide.names.symbols import DefinitionSymbol, home, meaning_of, owner, symbol_at
+from potto.ide.names.places import ChunkAt, chunk_at, owner
+from potto.ide.names.symbols import DefinitionSymbol, home, meaning_of, symbol_at
 from potto.ide.navigation.references import occurrences_of
 from potto.ide.navigation.targets import location
 from potto.modules import definition, names

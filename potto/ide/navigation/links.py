@@ -37,7 +37,7 @@ def linked_editing(db: Database, file: str, offset: int) -> tuple[Span, ...]:
     Parameters that calls name are left to a rename: their places are in other chunks too.
     """
     found = symbol_at(db, file, offset)
-    if found is None or not isinstance(found.symbol, LocalSymbol) or found.occurrence.role == "keyword":
+    if found is None or not isinstance(found.symbol, LocalSymbol) or found.occurrence.binder < 0:
         return ()
     places = found.chunk.index(db).of(found.symbol.number)
     name = found.symbol.binder.name

@@ -11,8 +11,8 @@ from potto.ide.actions.imports import exports
 from potto.ide.model import DocumentSymbol, Location, SymbolKind, WorkspaceSymbol
 from potto.ide.names.documents import item_span, name_span, type_text, written_kind
 from potto.ide.names.index import Binder
-from potto.ide.names.places import ChunkAt, all_chunks
-from potto.ide.names.symbols import owner, placeless
+from potto.ide.names.places import ChunkAt, all_chunks, owner
+from potto.ide.names.symbols import placeless
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import nodes

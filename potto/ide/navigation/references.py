@@ -10,17 +10,18 @@ from collections.abc import Iterator, Mapping
 
 from potto.ide.model import Highlight, Location
 from potto.ide.names.index import Occurrence
-from potto.ide.names.places import ChunkAt, all_chunks
+from potto.ide.names.parts import is_part, occurrences
+from potto.ide.names.places import ChunkAt, all_chunks, owner
 from potto.ide.names.symbols import (
     BuiltinSymbol,
     DefinitionSymbol,
     LocalSymbol,
     MeasureSymbol,
     ModuleSymbol,
+    PartSymbol,
     Symbol,
     callee,
     meaning_of,
-    owner,
     parameters,
     symbol_at,
 )
@@ -55,8 +56,10 @@ def highlights(db: Database, file: str, offset: int) -> tuple[Highlight, ...]:
     if found is None:
         return ()
     if found.symbol is None:  # not defined: its namesakes in the same chunk
-        name, same = found.occurrence.name, found.chunk.index(db).occurrences
-        return tuple(Highlight(found.chunk.absolute(o.span), "text") for o in same if o.name == name and o.binder < 0)
+        name, part = found.occurrence.name, is_part(db, file, found.occurrence)
+        same = (o for o in occurrences(db, found.chunk) if o.name == name and o.binder < 0)
+        here = (o.span for o in same if is_part(db, file, o) == part)
+        return tuple(Highlight(found.chunk.absolute(span), "text") for span in here)
     places = occurrences_of(db, file, found.symbol, (file,))
     return tuple(
         Highlight(chunk.absolute(o.span), "write" if o.role in ("bind", "define") else "read") for chunk, o in places
@@ -78,6 +81,9 @@ def occurrences_of(db: Database, file: str, symbol: Symbol, only: tuple[str, ...
             for each in only if only is not None else _files(db, file):
                 if mentions(db, each, name):
                     yield from _in_file(db, each, symbol, frozenset((name,)))
+        case PartSymbol(name):
+            for each in only if only is not None else _files(db, file):
+                yield from _parts(db, each, symbol, name)
 
 
 def _files(db: Database, *own: str) -> tuple[str, ...]:
@@ -115,7 +121,7 @@ def _in_file(db: Database, file: str, symbol: Symbol, words: frozenset[str] | No
     if words is not None and not any(mentions(db, file, word) for word in words):
         return
     for chunk in all_chunks(db, file):
-        for occurrence in chunk.index(db).occurrences:
+        for occurrence in occurrences(db, chunk):
             if occurrence.binder >= 0 or (words is not None and occurrence.name not in words):
                 continue
             if _same(meaning_of(db, chunk, occurrence), symbol):
@@ -139,6 +145,19 @@ def _local(db: Database, symbol: LocalSymbol, only: tuple[str, ...] | None) -> I
         return
     for each in only if only is not None else _files(db, chunk.file):
         yield from _keywords(db, each, symbol, chunk.file, name)
+        if chunk.sketch(db).record:
+            yield from _parts(db, each, symbol, symbol.binder.name)
+
+
+def _parts(db: Database, file: str, symbol: LocalSymbol | PartSymbol, name: str) -> Iterator[Place]:
+    """Where a part of a value is named: `c.focal`, `c with focal = 2`."""
+    for chunk in all_chunks(db, file):
+        if name not in chunk.text:
+            continue
+        for occurrence in occurrences(db, chunk):
+            named = occurrence.name == name and is_part(db, file, occurrence)
+            if named and meaning_of(db, chunk, occurrence) == symbol:
+                yield chunk, occurrence
 
 
 def _starts(parameter: nodes.Parameter, symbol: LocalSymbol) -> bool:

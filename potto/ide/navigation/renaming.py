@@ -14,8 +14,17 @@ from collections.abc import Sequence
 from potto.ide.actions.edits import applied, change_of
 from potto.ide.model import Change, Edit, FileRename, Refused, Renaming
 from potto.ide.names.index import Index, Occurrence, index
+from potto.ide.names.parts import occurrences, split
 from potto.ide.names.places import ChunkAt, all_chunks
-from potto.ide.names.symbols import BuiltinSymbol, Found, LocalSymbol, MeasureSymbol, ModuleSymbol, symbol_at
+from potto.ide.names.symbols import (
+    BuiltinSymbol,
+    Found,
+    LocalSymbol,
+    MeasureSymbol,
+    ModuleSymbol,
+    PartSymbol,
+    symbol_at,
+)
 from potto.ide.navigation.moved_files import rename_files
 from potto.ide.navigation.references import occurrences_of
 from potto.modules import find_module, resolve_module, source
@@ -39,6 +48,10 @@ def prepare_rename(db: Database, file: str, offset: int) -> Renaming | Refused |
         return Refused(f"`{found.occurrence.name}` is not defined")
     if isinstance(found.symbol, BuiltinSymbol | MeasureSymbol):
         return Refused(f"`{found.symbol.name}` is a builtin")
+    if isinstance(found.symbol, PartSymbol):
+        file_of = found.symbol.data
+        where = "of a tuple" if file_of is None else f"of `{os.path.basename(file_of)}`: rename it there"
+        return Refused(f"`{found.symbol.name}` is a {'part' if file_of is None else 'column'} {where}")
     span = found.span
     if isinstance(found.symbol, ModuleSymbol) and _is_file_name(db, found):
         leaf = found.occurrence.name.rpartition(".")[2]
@@ -91,6 +104,8 @@ def _rename_local(
     if not new_name.startswith(prefix) or len(new_name) == len(prefix):
         return Refused(f"the name of a tangent begins with `{prefix}`: call it `{prefix}{new_name}`")
     plain, old = new_name[len(prefix) :], symbol.binder.name
+    if symbol.chunk.sketch(db).record and any(b.name == plain for b in symbol.chunk.index(db).binders):
+        return Refused(f"`{symbol.chunk.sketch(db).name}` has a field `{plain}` already")
     if not _NAME.fullmatch(plain) or plain in RESERVED:
         return Refused(f"`{plain}` cannot be the name of a parameter")
     places: list[tuple[ChunkAt, Occurrence, str]] = []
@@ -120,7 +135,7 @@ def _rename_bound(db: Database, found: Found, new_name: str) -> Change | Refused
         if not mentions(db, each, name):
             continue
         for chunk in all_chunks(db, each):
-            for occurrence in chunk.index(db).occurrences:
+            for occurrence in occurrences(db, chunk):
                 if occurrence.name == name and occurrence.binder < 0 and _refers(db, chunk, occurrence) in wanted:
                     places.append((chunk, occurrence, new_name))
     return _change(db, places)
@@ -209,11 +224,20 @@ def _change(db: Database, places: Sequence[tuple[ChunkAt, Occurrence, str]]) -> 
     for chunk, given in by_chunk.items():
         local = [Edit(occurrence.span, text) for occurrence, text in given]
         after = index(db, applied(chunk.text, local), chunk.diffeo)
-        captured = _captured(chunk.index(db), after, dict(given))
+        captured = _captured(chunk.index(db), after, _wholes(db, chunk, dict(given)))
         if captured is not None:
             return Refused(f"`{captured}` would mean something else in `{os.path.basename(chunk.file)}`")
         edits.setdefault(chunk.file, []).extend(Edit(chunk.absolute(e.span), e.text) for e in local)
     return change_of(edits)
+
+
+def _wholes(db: Database, chunk: ChunkAt, renamed: dict[Occurrence, str]) -> dict[Occurrence, str]:
+    """What the names of a chunk's index are called afterwards, where a part of one is renamed: `front.eye`."""
+    for whole in chunk.index(db).occurrences:
+        pieces = split(db, chunk.file, whole)
+        if any(piece in renamed for piece in pieces):
+            renamed[whole] = ".".join(renamed.get(piece, piece.name) for piece in pieces)
+    return renamed
 
 
 def _captured(before: Index, after: Index, renamed: dict[Occurrence, str]) -> str | None:
