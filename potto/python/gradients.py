@@ -36,12 +36,15 @@ NOTHING: Swept = (None, None)
 Names = Sequence[str] | str | None
 
 
-class Gradient(Estimate, frozen=True):
+class Gradient(Estimate, frozen=True, eq=False):
     """An estimate with derivatives by several parameters: `gradient["c"]`, or `tangent` for all of them."""
 
     wrt: tuple[str, ...] = ()
 
-    def __getitem__(self, name: str) -> Any:
+    def __getitem__(self, name: Any) -> Any:
+        """The derivative by a parameter; at a place, the value (0) or the derivatives (1) as an estimate."""
+        if not isinstance(name, str):
+            return super().__getitem__(name)
         if name not in self.wrt:
             raise KeyError(name)
         return self.tangent if len(self.wrt) == 1 else self.tangent[self.wrt.index(name)]

@@ -220,7 +220,7 @@ class _Tiles(Struct):
         """All that is done, in order."""
         some = next(iter(self.done.values()))
         blocks = self.blocks or [(0, some.member_converged.size), (some.member_converged.size, self.count)]
-        parts = [self.done.get(first) or unfinished(some, stop - first) for first, stop in blocks]
+        parts = [self.done[first] if first in self.done else unfinished(some, stop - first) for first, stop in blocks]
         found = joined(parts)
         stats = {**found.stats, "blocks": len(blocks)}
         if self.again:
