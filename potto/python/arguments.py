@@ -79,19 +79,22 @@ class Batch(Struct, frozen=True):
     def _array(self, items: list[Any]) -> Any:
         """An array of Potto as one of numpy: behind the axes of the batch those of the array, then of tuples in it.
         What is ragged, or holds functions, stays a list."""
-        axis = 0 if self.shape is None else len(self.shape)
-
-        def whole(item: Any) -> Any:
-            parts = list(map(whole, item)) if isinstance(item, tuple | list) else None
-            return np.asarray(item, dtype=float) if parts is None else np.stack(parts, axis=axis)
-
-        found = [self._restored(item) for item in items]
-        if not found:
+        if not items:
             return np.zeros((*(self.shape or ()), 0))
         try:
-            return whole(found)
+            return self._columns(items)
         except (TypeError, ValueError):
-            return found
+            return [self._restored(item) for item in items]
+
+    def _columns(self, items: list[Any]) -> Any:
+        """Items of one form, part by part: arrays have hundreds of thousands of them. Raises TypeError, ValueError."""
+        first, axis = items[0], 0 if self.shape is None else len(self.shape)
+        if isinstance(first, tuple | list):
+            columns = zip(*items, strict=True)
+            return np.stack([self._columns(list(column)) for column in columns], axis=axis + 1)
+        if self.shape is None:
+            return np.array(list(map(float, items)))
+        return np.stack([self._restored(item) for item in items], axis=axis)
 
     def _mask(self, mask: Any) -> Any:
         """A mask of the batch's members in its shape."""

@@ -20,7 +20,7 @@ from potto.integrate.fixed.a_priori import certain
 from potto.integrate.pieces import Sums
 from potto.kernels.cells import Array, Bools, Ints
 from potto.runtime.answers.convergence import missing, rounded
-from potto.runtime.integration.choices import preferred
+from potto.runtime.integration.choices import orders, preferred
 from potto.runtime.integration.one_sided import one_direction
 from potto.runtime.integration.problem import Problem
 from potto.runtime.integration.quadrature import in_parts, iterated
@@ -108,7 +108,8 @@ def _together(problem: Problem, todo: Ints, settled: Settled, found: Whole) -> l
     alone = [NOBODY]
     for order in preferred(problem):
         with problem.among(todo) as here:
-            sums = in_parts(here.plan(order), here.machine, here.env, here.batch)
+            others = (here.plan(other) for other in orders(problem.term) if other is not order)
+            sums = in_parts(here.plan(order), here.machine, here.env, here.batch, others)
         kinds = _kinds(here.events, todo.size)
         if kinds is None and todo.size > MOST_UNKNOWN:
             for half in np.array_split(todo, 2):

@@ -6,8 +6,10 @@ Owns `within`, `in_parts` and `iterated`.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from contextlib import AbstractContextManager
 from functools import lru_cache
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -25,6 +27,7 @@ START_ORDER = 11
 ORDERS = (4, 6, 8, 10)
 PILOTS = 64
 BATCH = 4096  # members integrated at once
+FEW_TURNED = 16  # members up to which it does not pay to look for rules along other variables
 FEW = 64  # members for which it does not pay to look for those that nothing cuts
 MOST_AXES = 2  # of a product rule for one member: with 4,096 nodes 14 of each of three, which hardly ever are enough
 
@@ -42,14 +45,22 @@ def within(most: int | None, plan: Plan, machine: Machine, env: dict[str, Value]
     return sums
 
 
-def in_parts(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> Sums:
-    """Quadrature: what a product rule settles first, then a bounded number of members of the batch at a time."""
+def in_parts(
+    plan: Plan, machine: Machine, env: dict[str, Value], batch: int, turned: Iterable[Plan] = ()
+) -> Sums:
+    """Quadrature: what a product rule settles first, then a bounded number of members of the batch at a time.
+
+    turned: plans with other variables innermost, by which a rule may settle members that it did not, since a surface is
+    steep in the one and flat in the other.
+    """
     places: list[Ints] = []
     parts: list[Sums] = []
     rest = np.arange(batch)
-    for way in (_uncut, _alike):
+    for way, own in chain(((_uncut, plan), (_alike, plan)), ((_alike, other) for other in turned)):
+        if own is not plan and rest.size <= FEW_TURNED:
+            break
         with one_thread():
-            found = way(plan, machine, gather(env, rest) if parts else env, rest.size)
+            found = way(own, machine, gather(env, rest) if parts else env, rest.size)
         if found is not None:
             done, sums = found
             places.append(rest[done])
