@@ -88,6 +88,15 @@ def _absent(path: Path) -> DataMistake:
     return _unreadable(f"there is no file {quoted(path.name)}", hint, meant)
 
 
+def beside(folder: Path) -> tuple[str, ...]:
+    """The names of the files of data in a folder, in order; none where it can't be read."""
+    try:
+        names = sorted(entry.name for entry in folder.iterdir())
+    except OSError:
+        return ()
+    return tuple(name for name in names if Path(name).suffix.lower() in _KINDS)
+
+
 def _unreadable(message: str, hint: str, meant: tuple[str, ...] = ()) -> DataMistake:
     return DataMistake(UNREADABLE, message, hint=hint, meant=meant)
 

@@ -76,7 +76,7 @@ class Hover(Struct, frozen=True):
 
 CompletionKind = Literal[
     "variable", "parameter", "constant", "function", "diffeo", "module", "keyword", "snippet", "builtin", "measure",
-    "symbol", "argument", "type", "command", "field",
+    "symbol", "argument", "type", "command", "field", "record", "file",
 ]  # fmt: skip
 
 
@@ -136,7 +136,9 @@ class SignatureHelp(Struct, frozen=True):
 
 # Symbols, highlights, hierarchies
 
-SymbolKind = Literal["function", "constant", "diffeo", "module", "variable", "parameter", "local", "statement"]
+SymbolKind = Literal[
+    "function", "constant", "diffeo", "module", "variable", "parameter", "local", "statement", "record", "field",
+]  # fmt: skip
 
 
 class DocumentSymbol(Struct, frozen=True):

@@ -154,6 +154,37 @@ def test_code_actions(server: Server, uri: Uri) -> None:
         assert "edit" in resolved or "disabled" in resolved or "command" in resolved
 
 
+RECORDS = """\
+record Camera(eye: Real, focal: Real)
+front = Camera(eye=0, focal=2)
+near = front with focal = 3
+wide = front.fokal
+"""
+
+
+def test_fields_of_records(server: Server, uri: Uri) -> None:
+    client = server(RICH, main=RECORDS)
+    client.open(uri("main"), RECORDS)
+    (said,) = client.note("textDocument/publishDiagnostics", uri=uri("main"))["diagnostics"]
+    assert (said["code"], cut(said["range"], RECORDS)) == ("P0327", "fokal")
+    params = {"textDocument": {"uri": uri("main")}, "range": said["range"], "context": {"diagnostics": [said]}}
+    action = next(a for a in client.ask("textDocument/codeAction", params) if a["title"] == "Change to `focal`")
+    action = action if "edit" in action else client.ask("codeAction/resolve", action)
+    (change,) = action["edit"]["documentChanges"]
+    assert [(cut(e["range"], RECORDS), e["newText"]) for e in change["edits"]] == [("fokal", "focal")]
+    change = client.ask("textDocument/rename", {**at(uri("main"), 2, 20), "newName": "zoom"})
+    (edited,) = change["documentChanges"]
+    assert [cut(edit["range"], RECORDS) for edit in edited["edits"]] == ["focal"] * 3
+    (target,) = client.ask("textDocument/definition", at(uri("main"), 2, 20))
+    assert target["targetRange"]["start"]["line"] == 0
+    items = client.ask("textDocument/completion", at(uri("main"), 2, 18))["items"]
+    assert [item["label"] for item in items] == ["eye", "focal"]
+    help = client.ask("textDocument/signatureHelp", at(uri("main"), 1, 22))
+    assert help["signatures"][0]["label"].startswith("Camera(eye: Real*, focal: Real*)")
+    (camera, *_) = client.ask("textDocument/documentSymbol", {"textDocument": {"uri": uri("main")}})
+    assert camera["kind"] == 23 and [child["kind"] for child in camera["children"]] == [8, 8]
+
+
 def test_lenses(client: Client, uri: Uri) -> None:
     found = client.ask("textDocument/codeLens", {"textDocument": {"uri": uri("main")}})
     done = [lens if "command" in lens else client.ask("codeLens/resolve", lens) for lens in found]

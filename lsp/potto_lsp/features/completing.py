@@ -15,6 +15,7 @@ from potto_lsp.asking import Ask
 KINDS = {
     "variable": 6, "parameter": 6, "constant": 21, "function": 3, "diffeo": 3, "module": 9, "keyword": 14,
     "snippet": 15, "builtin": 3, "measure": 7, "symbol": 1, "argument": 10, "type": 25, "command": 1, "field": 5,
+    "record": 22, "file": 17,
 }  # fmt: skip
 PLAIN, SNIPPET = 1, 2
 ITEM = "textDocument.completion.completionItem."

@@ -8,7 +8,7 @@ from potto_lsp.asking import Ask
 
 KINDS = {
     "function": 12, "constant": 14, "diffeo": 12, "module": 2, "variable": 13, "parameter": 13, "local": 13,
-    "statement": 24,
+    "statement": 24, "record": 23, "field": 8,
 }  # fmt: skip
 
 

@@ -8,10 +8,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from pathlib import Path
 
 from msgspec.structs import replace
 
+from potto.data.files import beside
 from potto.ide.actions.imports import import_edit, importable, new_line
+from potto.ide.completion.fields import changed_items, part_items
 from potto.ide.completion.modules import member_items, module_items, name_items
 from potto.ide.completion.pending_calls import call_in
 from potto.ide.completion.place import Place, place_in
@@ -27,6 +30,7 @@ from potto.ide.names.words import KEYWORDS, LETTERS, SPECIALS, TYPES, Keyword
 from potto.measures import COMPOSITIONS, MEASURES, Measure
 from potto.measures.composed import Composition
 from potto.modules import DefinitionTarget, ModuleTarget, resolve
+from potto.modules.data import path_of
 from potto.modules.lookup import bindings, preludes
 from potto.modules.texts import imports
 from potto.modules.workspace import module_name
@@ -71,7 +75,13 @@ def _at(db: Database, site: Site, trigger: str) -> Completions:
         case "measure":
             return Completions(place.span, tuple(_measures(place)))
         case "type":
-            return Completions(place.span, tuple(_types(place)))
+            return Completions(place.span, (*_types(place), *_records(db, site.file, place)))
+        case "part":
+            return Completions(place.span, tuple(part_items(db, site, place)))
+        case "file":
+            return Completions(place.span, tuple(_data_files(site.file, place)))
+        case "changed" if fields := tuple(changed_items(db, site, place)):
+            return Completions(place.span, fields)
         case "clause":
             return Completions(place.span, (_keyword(KEYWORDS[place.path], place, _WORD),))
         case "new" | "nothing":
@@ -114,6 +124,21 @@ def _types(place: Place) -> Iterator[Completion]:
     for name in ("Real", "Real*", "Diffeo[2]"):
         doc = TYPES[name.rstrip("*").partition("[")[0]]
         yield Completion(name, "type", place.span, name, name, documentation=doc)
+
+
+def _records(db: Database, file: str, place: Place) -> Iterator[Completion]:
+    """The records of a file and of its imports, as types."""
+    for item in _file_names(db, site_after(file, ""), place):
+        if item.kind == "record":
+            yield item
+
+
+def _data_files(file: str, place: Place) -> Iterator[Completion]:
+    """The files of data in the folder that is written so far."""
+    folder = place.word[: place.word.rfind("/") + 1]
+    span = Span(place.span.start + len(folder), place.span.end)
+    for name in beside(Path(path_of(file, folder or "."))):
+        yield Completion(name, "file", span, name, name)
 
 
 def _arguments(db: Database, site: Site, place: Place) -> Iterator[Completion]:

@@ -1,52 +1,101 @@
-"""Completion of the parts of a value: the fields of a record, `0`, `1`, … of a tuple, `x`, `y`, `z` of a vector."""
+"""Completion of the parts of a value: the fields of a record, `0`, `1`, … of a tuple, `x`, `y`, `z` of a vector.
+
+Owns `part_items`, for what follows a dot, and `changed_items`, for what follows `with`. What stands in front may be any
+expression; it is read by itself, as what is being typed behind it may not be read yet.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
-from potto.ide.completion.place import Place
+from potto.ide.completion.place import Place, operand_start
 from potto.ide.hover.local_names import local_type
 from potto.ide.model import Completion
 from potto.ide.names.places import Site
 from potto.ide.names.symbols import LocalSymbol
-from potto.modules.graph import owner
 from potto.query import Database
-from potto.types import Real, TupleOf, Type, format_type, interface
+from potto.source import Span
+from potto.syntax import parse_expression
+from potto.types import Real, TupleOf, Type, format_type, infer_expression
 from potto.types.types import resolve
-from potto.types.vectors import AXES, place_in
+from potto.types.vectors import AXES
 
 MOST = 12  # numbered parts that are proposed
+_WITH = re.compile(r"\bwith\s+(?=\w*$|\(|\w+\s*=)")
+_GIVEN = re.compile(r"(?:^|[(,])\s*([^\W\d]\w*)\s*=(?!=)")
 
 
-def field_items(db: Database, site: Site, place: Place, start: int) -> Iterator[Completion]:
-    """What can stand behind `u.`, where `u` is a local name or a definition. start: of what is in front of the dot."""
-    type = _whole(db, site, place, start)
-    for name in place.path.split(".")[1:]:
-        type = None if type is None else part_of(type, name)
+def part_items(db: Database, site: Site, place: Place) -> Iterator[Completion]:
+    """What can stand behind `u.`."""
+    type = _before(db, site, place.span.start - 1)
     if isinstance(type, TupleOf):
         for number, (name, part) in enumerate(_named(type)):
             detail = format_type(part)
             yield Completion(name, "field", place.span, name, f"{number:03}", detail=detail)
 
 
-def _whole(db: Database, site: Site, place: Place, start: int) -> Type | None:
-    """The type of what the path begins with."""
-    head, chunk = place.path.partition(".")[0], site.chunk
-    if chunk is not None:
-        for number, binder in chunk.index(db).visible(start - chunk.start):
-            if binder.name == head:
-                return resolve(local_type(db, LocalSymbol(chunk, number, binder)))
-    target = owner(db, site.file, head)
-    return None if target is None else resolve(interface(db, target.file, target.name).type)
+def changed_items(db: Database, site: Site, place: Place) -> Iterator[Completion]:
+    """The fields of a record that can stand behind `with`, those that are given already left out."""
+    found = changed_at(site.text, place.span.start)
+    if found is None or found[2]:
+        return
+    type = _before(db, site, found[0])
+    if isinstance(type, TupleOf) and type.record is not None:
+        for number, (name, item) in enumerate(zip(type.record.fields, type.items)):
+            if name not in found[1]:
+                text, detail = f"{name} = ", format_type(item)
+                yield Completion(name, "field", place.span, text, f"{number:03}", name, detail=detail)
 
 
-def part_of(type: Type, name: str) -> Type | None:
-    """The type of a part."""
-    found = resolve(type)
-    place = place_in(found, name)
-    if not isinstance(found, TupleOf) or place is None or place >= len(found.items):
+def changed_at(text: str, offset: int) -> tuple[int, tuple[str, ...], str] | None:
+    """The `with` that an offset is behind: where the record in front of it ends, the fields that are given so far, and
+    the one whose value is being written."""
+    line = text[text.rfind("\n", 0, offset) + 1 : offset]
+    for found in reversed(list(_WITH.finditer(line))):
+        rest = line[found.end() :]
+        inner = rest[1:] if rest.startswith("(") else rest
+        depth = lowest = last = 0
+        for place, char in enumerate(inner):
+            depth += (char in "([") - (char in ")]")
+            lowest = min(lowest, depth)
+            last = place + 1 if char == "," and depth == 0 else last
+        if lowest < 0 or depth > 0 or (not rest.startswith("(") and last):
+            continue  # closed, or within something else
+        given = tuple(_GIVEN.findall(_flat(inner)))
+        current = _GIVEN.match(inner[last:])
+        end = offset - len(line) + len(line[: found.start()].rstrip())
+        return end, given, "" if current is None else current[1]
+    return None
+
+
+def _flat(text: str) -> str:
+    """A text without what stands in brackets."""
+    out, depth = "", 0
+    for char in text:
+        depth += (char in "([") - (char in ")]")
+        out += char if depth == 0 else ""
+    return out
+
+
+def whole_type(db: Database, site: Site, span: Span) -> Type | None:
+    """The type of an expression that stands at a place, with the local names that it uses."""
+    written = parse_expression(site.text[span.start : span.end])
+    if written.diagnostics:
         return None
-    return resolve(found.items[place])
+    locals: list[tuple[str, Type]] = []
+    words = set(re.findall(r"[^\W\d]\w*", site.text[span.start : span.end]))
+    if site.chunk is not None:
+        chunk = site.chunk
+        for number, binder in chunk.index(db).visible(span.start - chunk.start):
+            if binder.name in words:
+                locals.append((binder.name, local_type(db, LocalSymbol(chunk, number, binder))))
+    return resolve(infer_expression(db, site.file, written.expr, tuple(locals)).type)
+
+
+def _before(db: Database, site: Site, end: int) -> Type | None:
+    start = operand_start(site.text, end)
+    return None if start is None else whole_type(db, site, Span(start, end))
 
 
 def _named(type: TupleOf) -> Iterator[tuple[str, Type]]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from msgspec.structs import replace
 
-from potto.ide.completion.fields import field_items
+from potto.ide.completion.fields import part_items
 from potto.ide.completion.place import Place
 from potto.ide.model import Completion
 from potto.ide.names.documents import written_kind
@@ -68,7 +68,7 @@ def member_items(db: Database, site: Site, place: Place) -> Iterator[Completion]
     start = place.span.start - len(place.path) - 1  # of the path: what is being typed behind it may not be read yet
     local = chunk is not None and any(b.name == head for _, b in chunk.index(db).visible(start - chunk.start))
     if local or (resolve_module(db, file, place.path) is None and owner(db, file, head) is not None):
-        yield from field_items(db, site, place, start)
+        yield from part_items(db, site, place)
         return
     module = resolve_module(db, file, place.path)
     if module is not None:

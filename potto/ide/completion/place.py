@@ -11,8 +11,9 @@ from potto.ide.names.places import line_start
 from potto.source import Span
 
 Kind = Literal[
-    "letter", "module", "imported", "member", "measure", "type", "new", "nothing", "clause", "top", "expression"
-]
+    "letter", "module", "imported", "member", "measure", "type", "new", "nothing", "clause", "top", "expression",
+    "part", "changed", "file",
+]  # fmt: skip
 
 _LETTER = re.compile(r"\\(\w*)$")
 _WORD = re.compile(r"[^\W\d]\w*$")
@@ -22,6 +23,9 @@ _NAMES = re.compile(r"^from\s+([\w.]+)\s+import\s+(?:[\w\s,]*,\s*)?(\w*)$")
 _MODULE_ONLY = re.compile(r"^from\s+[\w.]+\s+(\w*)$")
 _ALIAS = re.compile(r"^(?:from|import)\b.*\bas\s+\w*$")
 _MEMBER = re.compile(r"((?:[^\W\d]\w*\.)+)(\w*)$")
+_PART = re.compile(r"[)\]]((?:\.[^\W\d]\w*)*)\.(\w*)$")
+_CHANGED = re.compile(r"\bwith\s+(?:\(.*)?(\w*)$")
+_FILE = re.compile(r"\bload\s*\(\s*[\"\']([^\"\']*)$")
 _MEASURE = re.compile(r"~\s*(\w*)$")
 _NEW = re.compile(r"(?:\bfor\s+|\blet\s+|\bsum\s+|\\\s*\((?:\s*\w+\s*,)*\s*)\w*$")
 _HEAD = re.compile(r"(def|diffeo)\s+\w*")
@@ -55,11 +59,39 @@ def place_in(text: str, offset: int) -> Place:
             return Place("nothing", span, word)
         line = line[hash_at + 2 :].lstrip() or " "
         return _expression(" " + line, span, word)
-    if _NUMBER.search(line):
+    if _NUMBER.search(line) and not _FILE.search(line):
         return Place("nothing", span, word)
     continued = _IMPORT_LINES.search(text[max(0, start - 2000) : offset]) if line[:1] in (" ", "\t") else None
     logical = " ".join(continued.group(1).split("\n")) if continued else line
     return _import(logical, span) or _expression(line, span, word)
+
+
+def operand_start(text: str, end: int) -> int | None:
+    """Where the operand begins that ends at an offset: a name, a call, an index, parentheses, with their parts."""
+    at = end
+    while at > 0:
+        if text[at - 1] in ")]":
+            depth, place = 0, at - 1
+            while place >= 0:
+                depth += (text[place] in ")]") - (text[place] in "([")
+                if depth == 0:
+                    break
+                place -= 1
+            if place < 0:
+                return None
+            at = place
+            if at == 0 or not (text[at - 1].isalnum() or text[at - 1] in "_)]"):
+                return at
+            continue
+        begin = at
+        while begin and (text[begin - 1].isalnum() or text[begin - 1] in "_."):
+            begin -= 1
+        if begin == at:
+            return at if at < end else None
+        at = begin
+        if text[begin] != ".":
+            return begin
+    return at if at < end else None
 
 
 def _import(line: str, span: Span) -> Place | None:
@@ -83,6 +115,12 @@ def _import(line: str, span: Span) -> Place | None:
 
 
 def _expression(line: str, span: Span, word: str) -> Place:
+    loaded = _FILE.search(line)
+    if loaded is not None:
+        return Place("file", Span(span.end - len(loaded.group(1)), span.end), loaded.group(1))
+    part = _PART.search(line)
+    if part is not None:
+        return Place("part", span, part.group(2))
     member = _MEMBER.search(line)
     if member is not None:
         return Place("member", span, member.group(2), member.group(1).rstrip("."))
@@ -93,6 +131,8 @@ def _expression(line: str, span: Span, word: str) -> Place:
         return Place(headed, span, word)
     if _NEW.search(line):
         return Place("new", span, word)
+    if _CHANGED.search(line):
+        return Place("changed", span, word)
     return Place("top" if line == word else "expression", span, word)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from msgspec import Struct
 
+from potto.ide.completion.forms import form_help, signature
 from potto.ide.completion.pending_calls import PendingCall, call_at, juxtaposed_at
 from potto.ide.hover.hovers import typed_parameters
 from potto.ide.hover.local_names import local_type
@@ -42,6 +43,10 @@ def signature_help(db: Database, file: str, offset: int) -> SignatureHelp | None
     applied = None if beside is None else called_at(db, file, beside)
     if beside is not None and applied is not None and (found := _groups(applied, beside)) is not None:
         return found
+    return _of_call(db, file, offset) or form_help(db, file, offset)
+
+
+def _of_call(db: Database, file: str, offset: int) -> SignatureHelp | None:
     call = call_at(db, file, offset)
     if call is None:
         return None
@@ -140,7 +145,9 @@ def _measure(head: nodes.Expr, call: PendingCall) -> SignatureHelp | None:
     if not isinstance(head, nodes.Name):
         return None
     measure = MEASURES.get(head.id) or COMPOSITIONS.get(head.id)
-    return None if measure is None else _simple(measure.name, measure.parameters, "", measure.doc, call.positional)
+    if measure is None:
+        return None
+    return signature(f"{measure.name}(", measure.parameters, ")", measure.doc, _within(call, measure.parameters))
 
 
 def _builtin(db: Database, file: str, name: str, call: PendingCall) -> SignatureHelp | None:
@@ -148,20 +155,14 @@ def _builtin(db: Database, file: str, name: str, call: PendingCall) -> Signature
         return None
     special = SPECIALS.get(name)
     if special is not None and "->" in special.type:
-        only = ("f",) if name == "deriv" else ("x",)
-        return _simple(name, only, f" : {special.type}", special.doc, call.positional)
+        taken = special.parameters
+        return signature(f"{name}(", taken, f") : {special.type}", special.doc, _within(call, taken))
     primitive = PRIMITIVES.get(name)
     if primitive is None or not primitive.surface:
         return None
     parameters = typed_parameters(primitive)
-    return _simple(name, parameters, " -> Real", primitive.doc, min(call.positional, len(parameters) - 1))
+    return signature(f"{name}(", parameters, ") -> Real", primitive.doc, min(call.positional, len(parameters) - 1))
 
 
-def _simple(name: str, parameters: tuple[str, ...], tail: str, doc: str, active: int) -> SignatureHelp:
-    text, places = f"{name}(", []
-    for number, parameter in enumerate(parameters):
-        text += ", " if number else ""
-        places.append(ParameterText(Span(len(text), len(text) + len(parameter))))
-        text += parameter
-    shown = active if active < len(parameters) else None
-    return SignatureHelp((Signature(f"{text}){tail}", doc, tuple(places), shown),), 0)
+def _within(call: PendingCall, parameters: tuple[str, ...]) -> int | None:
+    return call.positional if call.positional < len(parameters) else None

@@ -13,10 +13,27 @@ from potto.ide.hover.derivatives import ConditionInfo, condition_infos, conditio
 from potto.ide.model import Edit, InlayHint
 from potto.ide.names.places import ChunkAt, all_chunks, owner
 from potto.ide.names.symbols import parameters, placeless
+from potto.modules import DefinitionTarget
+from potto.modules import resolve as target_of
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import nodes, walk
-from potto.types import Real, Unknown, Var, format_type, groups_of, interface, result_of, typed_names
+from potto.types import (
+    ArrayOf,
+    Diffeo,
+    Function,
+    Real,
+    TupleOf,
+    Type,
+    Unknown,
+    Var,
+    format_type,
+    groups_of,
+    interface,
+    result_of,
+    typed_names,
+)
+from potto.types.types import Count, RecordName, resolve
 
 LONG = 60  # characters of a type beyond which a hint shows its beginning
 
@@ -53,7 +70,7 @@ def _types(db: Database, chunk: ChunkAt, name: str) -> Iterator[InlayHint]:
     binders = {binder.span.start: binder for binder in chunk.index(db).binders}
     for typed in typed_names(db, chunk.file, name):
         binder = binders.get(typed.span.start)
-        if binder is None or binder.kind not in ("parameter", "local"):
+        if binder is None or binder.kind not in ("parameter", "local", "loop"):
             continue
         parameter = written.get(typed.span.start)
         if parameter is not None and parameter.annotation is not None:
@@ -61,17 +78,32 @@ def _types(db: Database, chunk: ChunkAt, name: str) -> Iterator[InlayHint]:
         type = public.get(typed.name, typed.type) if parameter is not None else typed.type
         if isinstance(type, Unknown | Var) or (binder.kind == "parameter" and parameter is None):
             continue
-        if binder.kind == "local" and isinstance(type, Real) and not type.variables:
+        if binder.kind != "parameter" and isinstance(type, Real) and not type.variables:
             continue  # a plain number: nothing to say
         text = format_type(type)
         label = f": {text if len(text) <= LONG else text[: LONG - 1] + '…'}"
         edit = Edit(Span(binder.span.end, binder.span.end), f": {text}")
-        edits = (edit,) if typed.span.start in heads and _writable(text) else ()
+        edits = (edit,) if typed.span.start in heads and _writable(db, chunk.file, type) else ()
         yield InlayHint(binder.span.end, label, "type", edits=edits, data=("type", f"{typed.name} : {text}"))
 
 
-def _writable(text: str) -> bool:
-    return "[" not in text and "?" not in text
+def _writable(db: Database, file: str, type: Type) -> bool:
+    """Whether a type can be written in a file as it is shown: a type that may be any can't, nor can what varies."""
+    match resolve(type):
+        case Real(variables=variables):
+            return not variables
+        case TupleOf(record=RecordName() as record):
+            return target_of(db, file, record.name) == DefinitionTarget(record.file, record.name)
+        case TupleOf(items=items):
+            return all(_writable(db, file, item) for item in items)
+        case ArrayOf(size, item):  # a size by its name may be that of another array
+            return isinstance(resolve(size), Count) and _writable(db, file, item)
+        case Function(parameters=parameters, result=result):
+            return all(_writable(db, file, p.type) for p in parameters) and _writable(db, file, result)
+        case Diffeo():
+            return True
+        case _:
+            return False
 
 
 def _head_parameters(db: Database, chunk: ChunkAt) -> frozenset[int]:
@@ -96,7 +128,8 @@ def _result(db: Database, chunk: ChunkAt, name: str) -> Iterator[InlayHint]:
         last = item.groups[-1]
         end = chunk.text.find(")", last[-1].span.end if last else item.name_span.end)
         if end >= 0:
-            edits = (Edit(Span(end + 1, end + 1), f" -> {text}"),) if _writable(text) else ()
+            writable = _writable(db, chunk.file, shown)
+            edits = (Edit(Span(end + 1, end + 1), f" -> {text}"),) if writable else ()
             yield InlayHint(end + 1, f"-> {label}", "type", True, True, edits=edits, data=("type", f"{name} : {text}"))
     elif not item.groups:
         yield InlayHint(item.name_span.end, f": {label}", "type", data=("type", f"{name} : {text}"))

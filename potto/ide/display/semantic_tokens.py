@@ -133,6 +133,8 @@ def _name(
         case DefinitionSymbol(file, name):
             kind = written_kind(db, file, name)
             made = (*made, "definition") if occurrence.role == "define" else made
+            if kind == "record":
+                return "type", made
             if kind == "diffeo":
                 return "function", (*made, "readonly", "diffeo")
             return ("variable" if kind == "constant" else "function"), (*made, "readonly")

@@ -61,7 +61,7 @@ def type_text(db: Database, file: str, name: str) -> str:
     return format_type(interface(db, file, name).type)
 
 
-Kind = Literal["function", "diffeo", "constant"]
+Kind = Literal["function", "diffeo", "constant", "record"]
 
 
 @query
@@ -77,6 +77,8 @@ def chunk_kind(db: Database, text: str, diffeo: bool) -> Kind:
     item = parsed(db, text, diffeo).item
     if isinstance(item, nodes.DiffeoDefinition):
         return "diffeo"
+    if isinstance(item, nodes.RecordDefinition):
+        return "record"
     function = isinstance(item, nodes.Definition) and (item.groups or isinstance(item.body, nodes.Lambda))
     derived = isinstance(item, nodes.Definition) and call_head(item.body)[2] > 0 and not item.bindings
     return "function" if function or derived else "constant"
@@ -91,8 +93,10 @@ def written_kinds(db: Database, file: str) -> tuple[tuple[str, Kind], ...]:
 
 @query
 def kind_of(db: Database, file: str, name: str) -> Kind:
-    """What a definition is: a function, a diffeomorphism, or a constant."""
+    """What a definition is when it is used: a function, as a record is too, a diffeomorphism, or a constant."""
     written = written_kind(db, file, name)
+    if written == "record":
+        return "function"
     if written != "constant":
         return written
     return "function" if isinstance(interface(db, file, name).type, Function) else "constant"

@@ -41,7 +41,7 @@ _ALL = (
     Keyword("integral", "An integral over bounds, one interval for each variable; the first variable is the "
             "outermost. Its derivative counts what happens inside and on the surfaces at which the body jumps.",
             "integral ([0, 1], [0, 1]) body d(x, y)", "integral [${1:0}, ${2:1}] ${0:body} d(${3:x})", "expression"),
-    Keyword("sum", "A sum over whole numbers, with fixed bounds.", "sum i in 1..n (1/i)",
+    Keyword("sum", "A sum over whole numbers or the elements of an array.", "sum i in 1..n (1/i)",
             "sum ${1:i} in ${2:1}..${3:n} (${0:i})", "expression"),
     Keyword("product", "A product over whole numbers or the elements of an array; `min` and `max` are written alike.",
             "product i in 1..n (i)", "product ${1:i} in ${2:1}..${3:n} (${0:i})", "expression"),
@@ -83,35 +83,36 @@ class Special(Struct, frozen=True):
     doc: str
     derivative: str
     example: str
+    parameters: tuple[str, ...] = ("x",)
 
 
 _SPECIALS = (
     Special("deriv", "(A -> B) -> D A -> D B", "The derivative of a function: it takes duals `(value, tangent)` under "
             "the names of the parameters with a `d` in front and gives the dual of the result. A plain number stands "
-            "for one with tangent 0.", "", "deriv(f)(dc=(0.5, 1))"),
+            "for one with tangent 0.", "", "deriv(f)(dc=(0.5, 1))", ("f",)),
     Special("delta", "Real -> Dist", "The Dirac delta of a diffeomorphism's first coordinate. It has a meaning under "
             "an integral over the variables that it varies with.", "", "integral [0, 1] x*delta(x - 0.5) d(x)"),
-    Special("fst", "(a, b) -> a", "The first part of a tuple.", "d fst(p) = fst(dp)", "fst((1, 2))"),
-    Special("snd", "(a, b) -> b", "The second part of a tuple.", "d snd(p) = snd(dp)", "snd((1, 2))"),
-    Special("len", "[n] a -> Real", "How many elements an array has.", "", "len([1, 2, 3])"),
+    Special("fst", "(a, b) -> a", "The first part of a tuple.", "d fst(p) = fst(dp)", "fst((1, 2))", ("p",)),
+    Special("snd", "(a, b) -> b", "The second part of a tuple.", "d snd(p) = snd(dp)", "snd((1, 2))", ("p",)),
+    Special("len", "[n] a -> Real", "How many elements an array has.", "", "len([1, 2, 3])", ("xs",)),
     Special("dot", "([n] Real, [n] Real) -> Real", "The inner product of two vectors, tuples or arrays of one size.",
-            "d dot(u, v) = dot(du, v) + dot(u, dv)", "dot((1, 2), (3, 4))"),
+            "d dot(u, v) = dot(du, v) + dot(u, dv)", "dot((1, 2), (3, 4))", ("u", "v")),
     Special("norm", "[n] Real -> Real", "The length of a vector, a tuple or an array of numbers.",
-            "d norm(u) = dot(u, du)/norm(u)", "norm((3, 4))"),
+            "d norm(u) = dot(u, du)/norm(u)", "norm((3, 4))", ("u",)),
     Special("cross", "((Real, Real, Real), (Real, Real, Real)) -> (Real, Real, Real)",
             "The cross product of two vectors of three numbers.", "d cross(u, v) = cross(du, v) + cross(u, dv)",
-            "cross((1, 0, 0), (0, 1, 0))"),
+            "cross((1, 0, 0), (0, 1, 0))", ("u", "v")),
     Special("interp", "(xs: [n] Real, ys: [n] a, x: Real*) -> a",
             "Piecewise linear through the values `ys` at the places `xs`, which rise; beyond them the value "
             "at the end. The places are kinks that the integrator knows. The values may be tuples, arrays or records.",
-            "", "interp([0, 1, 3], [10, 20, 0], 2)"),
+            "", "interp([0, 1, 3], [10, 20, 0], 2)", ("xs", "ys", "x")),
     Special("image", "(photo: [h, w] a, u: Real*, v: Real*) -> a",
             "Bilinear between the centres of pixels: `u` from 0 to 1 along the rows, `v` from 0 to 1 down "
             "the columns; beyond the outer centres the value there.", "",
-            "image([[1, 2], [3, 5]], 0.5, 0.5)"),
+            "image([[1, 2], [3, 5]], 0.5, 0.5)", ("photo", "u", "v")),
     Special("load", "the name of a file -> a", "What a file of data holds: the columns of a table (`.csv`) as the "
             "fields of a record, arrays (`.npy`, `.npz`), nested lists (`.json`), pictures (`.png`, `.jpg`).", "",
-            'load("heights.csv")'),
+            'load("heights.csv")', ("file",)),
     Special("pi", "Real", "The ratio of a circle's circumference to its diameter, 3.14159…", "d pi = 0", "sin(pi/2)"),
     Special("inf", "Real", "Infinity, for bounds of integrals.", "", "integral [0, inf] exp(-x) d(x)"),
 )  # fmt: skip

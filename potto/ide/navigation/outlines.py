@@ -56,7 +56,7 @@ def _symbol(db: Database, chunk: ChunkAt, name: str | None) -> DocumentSymbol | 
         case nodes.RecordDefinition():
             detail = type_text(db, chunk.file, name) if name is not None else "defined again below"
             selection, full = chunk.absolute(item.name_span), chunk.absolute(item.span)
-            return DocumentSymbol(item.name, detail, "function", full.cover(selection), selection, _children(db, chunk))
+            return DocumentSymbol(item.name, detail, "record", full.cover(selection), selection, _children(db, chunk))
         case nodes.BrokenItem(span=span, name=str() as guessed):
             return DocumentSymbol(guessed, "cannot be read", "constant", chunk.absolute(span), chunk.absolute(span))
         case nodes.Print(span=span) | nodes.For(span=span) | nodes.ExpressionStatement(span=span):
@@ -78,11 +78,14 @@ def _children(db: Database, chunk: ChunkAt) -> tuple[DocumentSymbol, ...]:
     """What a chunk binds, without what live expressions bind in its comments."""
     item = chunk.parsed(db).item
     inside = Span(0, 0) if item is None else item.span
-    return tuple(
-        DocumentSymbol(b.name, b.kind, _child_kind(b), chunk.absolute(b.span), chunk.absolute(b.span))
-        for b in chunk.index(db).binders
-        if inside.start <= b.span.start and b.span.end <= inside.end
-    )
+    record = isinstance(item, nodes.RecordDefinition)
+    found: list[DocumentSymbol] = []
+    for b in chunk.index(db).binders:
+        if inside.start <= b.span.start and b.span.end <= inside.end:
+            place = chunk.absolute(b.span)
+            detail, kind = ("field", "field") if record else (b.kind, _child_kind(b))
+            found.append(DocumentSymbol(b.name, detail, kind, place, place))
+    return tuple(found)
 
 
 def _child_kind(binder: Binder) -> SymbolKind:
