@@ -83,8 +83,8 @@ def _children(db: Database, chunk: ChunkAt) -> tuple[DocumentSymbol, ...]:
     for b in chunk.index(db).binders:
         if inside.start <= b.span.start and b.span.end <= inside.end:
             place = chunk.absolute(b.span)
-            detail, kind = ("field", "field") if record else (b.kind, _child_kind(b))
-            found.append(DocumentSymbol(b.name, detail, kind, place, place))
+            kind: SymbolKind = "field" if record else _child_kind(b)
+            found.append(DocumentSymbol(b.name, "field" if record else b.kind, kind, place, place))
     return tuple(found)
 
 
