@@ -1,7 +1,8 @@
 """What programs with arrays cost: meshes, observations, steps in time, beside their goals.
 
-`python benchmarks/arrays.py [--backend numpy|native] [--large]`. Every figure is the least of several warm calls; the
-error of the pictures is against clipping each triangle at each pixel (`clipped`), which knows nothing of Potto.
+`python benchmarks/arrays.py [--backend numpy|native] [--large] [--plot FILE]`. Every figure is the least time of the
+processor of several warm calls; the error of the pictures is against clipping each triangle at each pixel (`clipped`),
+which knows nothing of Potto. A plot shows time against triangles and against pixels.
 """
 
 from __future__ import annotations
@@ -76,9 +77,9 @@ def least(run: Callable[[], Any], times: int = 3) -> tuple[float, Any]:
     """The least time of several calls, and the answer; the first call is not counted."""
     answer, found = run(), []
     for _ in range(times):
-        start = time.perf_counter()
+        start = time.process_time()
         answer = run()
-        found.append(time.perf_counter() - start)
+        found.append(time.process_time() - start)
     return min(found), answer
 
 
@@ -92,9 +93,30 @@ def rendered(module: Any, triangles: np.ndarray, grey: np.ndarray, size: int, ti
     return least(lambda: module.pixel(triangles, grey, places[:, None], places[None, :], 1 / size), times)
 
 
+def plot(path: str, found: dict[str, dict[int, float]]) -> None:
+    """Time against size, with a line of slope 1 through the last point."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(1, len(found), figsize=(9, 3.6), squeeze=False)
+    for axis, (name, times) in zip(axes.flat, found.items(), strict=True):
+        sizes, seconds = np.array(list(times)), np.array(list(times.values()))
+        axis.loglog(sizes, seconds, "o-", label="potto")
+        axis.loglog(sizes, seconds[-1] * sizes / sizes[-1], ":", color="gray", label="linear")
+        axis.set_xlabel(name)
+        axis.set_ylabel("seconds of the processor")
+        axis.legend(frameon=False)
+    figure.tight_layout()
+    figure.savefig(path, dpi=120)
+    print(f"{path}: time against triangles and pixels")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--backend", default="numpy", choices=["numpy", "native"])
+    parser.add_argument("--plot", metavar="FILE", help="draw time against size (needs matplotlib)")
     parser.add_argument("--large", action="store_true", help="also 10,082 triangles on 512 x 512 pixels")
     options = parser.parse_args()
     native = options.backend == "native"
@@ -107,11 +129,17 @@ def main() -> None:
         told("98 triangles on 128 x 128 pixels", seconds, None, more)
         seconds, _ = least(lambda: potto.grad(module.loss, ["mesh", "grey"])(triangles, grey, 128.0))
         told("its loss and gradient in all corners and greys", seconds, 0.05 if native else 1.0)
-        for side in (7, 14, 28):
+        by_triangles: dict[int, float] = {}
+        for side in (7, 14, 28, 56):
             some, greys = mesh(side)
-            told(f"{2 * side * side:,} triangles on 128 x 128 pixels", rendered(module, some, greys, 128)[0], None)
-        for size in (64, 128, 256):
-            told(f"98 triangles on {size} x {size} pixels", rendered(module, triangles, grey, size)[0], None)
+            by_triangles[2 * side * side] = seconds = rendered(module, some, greys, 128)[0]
+            told(f"{2 * side * side:,} triangles on 128 x 128 pixels", seconds, None)
+        by_pixels: dict[int, float] = {}
+        for size in (64, 128, 256, 512):
+            by_pixels[size * size] = seconds = rendered(module, triangles, grey, size)[0]
+            told(f"98 triangles on {size} x {size} pixels", seconds, None)
+        if options.plot:
+            plot(options.plot, {"triangles, 128 x 128 pixels": by_triangles, "pixels, 98 triangles": by_pixels})
         if options.large:
             many, greys = mesh(71)
             seconds, answer = rendered(module, many, greys, 512, 1)
