@@ -44,6 +44,8 @@ class _Bracket:
     bounds: bool
     questions: int = 0
     lets: int = 0
+    bound: bool = False
+    """Whether the next `=` is that of a `fold` or a `with`."""
 
 
 class _Pass:
@@ -89,6 +91,7 @@ class _Pass:
         self.out.append(Spaced(token, blank, depth, may_break, self.level, self.starts, self.body))
         self.body = self.starts = self.marked = self.bounds_closed = False
         if kind in _OPENERS:
+            self.brackets[-1].bound &= before is not None and before.kind == "FOLD"
             self.brackets.append(_Bracket(kind, before is not None and before.kind == "INTEGRAL"))
         elif kind in _CLOSERS:
             self.bounds_closed = closed.bounds
@@ -98,6 +101,10 @@ class _Pass:
             self.brackets[-1].questions -= 1
         elif kind == "LET":
             self.brackets[-1].lets += 1
+        elif kind in ("FOLD", "WITH"):
+            self.brackets[-1].bound = True
+        elif before is not None and before.kind == "EQ":
+            self.brackets[-1].bound = False
         elif kind == "IN" and self.brackets[-1].lets:
             self.brackets[-1].lets -= 1
             self.body = True
@@ -151,7 +158,8 @@ class _Pass:
 
     def _names_argument(self) -> bool:
         """Whether an `=` here names an argument of a call."""
-        return self.brackets[-1].kind == "LPAR" and not self.brackets[-1].lets
+        inner = self.brackets[-1]
+        return inner.kind == "LPAR" and not inner.lets and not inner.bound
 
     def _blank_before_bracket(self, before: Token, token: Token) -> bool:
         if before.kind in ("D", "DIFFEO"):
