@@ -30,7 +30,11 @@ MOST_STEPS = 200
 SLOPE = 1e-8
 FIRST = 0.25  # of the size of a parameter: how far the first step goes at most, before any curvature is known
 MEMORY = 20  # steps that the curvature is learned from
+CREEPING = 8  # steps by slopes alone, where values have no digits left to tell one place from another
+ROUNDING = 1e-14
 FAR = 1e9  # how far a parameter may run from where it started, in its own size, before we say that it runs away
+
+STUCK = "no step along the derivative makes it smaller, though a slope is left: a kink, or the limit of accuracy"
 
 Objective = Callable[[Array], "Seen"]
 
@@ -279,6 +283,21 @@ class _Walk:
         steep = (1 + abs(seen.value) + float(np.abs(seen.gradient @ away))) / max(float(away @ away), 1e-300)
         return seen.value + steep * float(away @ away), 2 * steep * away
 
+    def creep(self, x: Array) -> bool:
+        """Take a place as the best if its slope is less than half and its value the same but for rounding."""
+        assert self.best is not None
+        place, best = self.best
+        self.evaluations += 1
+        try:
+            seen = self.objective(x)
+        except PottoError:
+            return False
+        close = seen.value - best.value <= seen.value_error + best.value_error + ROUNDING * abs(best.value)
+        if not (close and self.slope(x, seen) < self.slope(place, best) / 2):
+            return False
+        self.best = x.copy(), seen
+        return True
+
     def held(self, x: Array, seen: Seen) -> Any:
         """Whether a bound stops a parameter."""
         return ((x <= self.low) & (seen.gradient > 0)) | ((x >= self.high) & (seen.gradient < 0))
@@ -339,6 +358,8 @@ def minimized(
             options={"maxiter": most, "ftol": 0.0, "gtol": 0.0, "maxcor": MEMORY, "maxls": 40, "maxfun": 40 * most},
         )  # fmt: skip
         walk.reason = _reason(walk, str(result.message), most)
+        if walk.reason == STUCK:
+            _creep(walk, lambda slopes: unit * np.asarray(result.hess_inv @ (unit * slopes)))
     except _Done:
         pass
     assert walk.best is not None
@@ -349,6 +370,19 @@ def minimized(
                walk.evaluations, time.perf_counter() - walk.begun, seen.value_error, held, parameters)  # fmt: skip
 
 
+def _creep(walk: _Walk, newton: Callable[[Array], Array]) -> None:
+    """Go on by the slopes: near a minimum they have all their digits, where the values have half of theirs.
+
+    newton: the step for a slope, by the curvature that the method has learned.
+    """
+    for _ in range(CREEPING):
+        assert walk.best is not None
+        x, seen = walk.best
+        if not walk.creep(np.clip(x - newton(seen.gradient), walk.low, walk.high)):
+            return
+        walk.step()
+
+
 def _reason(walk: _Walk, message: str, most: int) -> str:
     """Why the method left without a minimum."""
     if len(walk.steps) > most or "LIMIT" in message.upper():
@@ -357,7 +391,7 @@ def _reason(walk: _Walk, message: str, most: int) -> str:
         return f"it ends where the program has no value: {walk.trouble.diagnostics[0].message}"
     if walk.walls:
         return "it ends beside places where the value is no number"
-    return "no step along the derivative makes it smaller, though a slope is left: a kink, or the limit of accuracy"
+    return STUCK
 
 
 def column(numbers: Sequence[float]) -> Array:

@@ -18,6 +18,7 @@ def box(x, a, b) integral [0, 1] a*[u < b*x] d(u)
 def line(t) t
 def kink(t) abs(t - 0.3)
 def root(t) sqrt(t)
+def trough(t) 2 + (t - 0.3)^2 + (t - 0.3)^3/8
 def shaded(t, shader) integral [0, 1] shader(x)*[x < t] d(x) - t/4
 """
 
@@ -76,6 +77,12 @@ def test_a_function_among_what_is_given(m):
 def test_what_is_no_minimum_is_said(m, name, reason):
     found = potto.fit(getattr(m, name), {"t": 0.9})
     assert not found.converged and reason in found.reason
+
+
+def test_where_values_have_no_digits_left_slopes_have(m):
+    """Around a minimum of 2 a value tells places apart to 1e-8, half of its digits; the slope tells them all."""
+    found = potto.fit(m.trough, {"t": 1.9})
+    assert found.converged and abs(found["t"] - 0.3) < 1e-8
 
 
 def test_too_few_steps_are_said(m):
