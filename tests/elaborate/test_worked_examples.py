@@ -15,12 +15,13 @@ from potto.evaluating.world import World
 from potto.runtime.script import Shown
 
 ROOT = Path(__file__).resolve().parents[2] / "examples"
-WORKED = sorted((ROOT / "worked").rglob("*.po"))
+WORLDS = ("worked", "dynamics", "probability", "fields")
+PROGRAMS = sorted(path for world in WORLDS for path in (ROOT / world).rglob("*.po"))
 
 
-@pytest.mark.parametrize("path", WORKED, ids=lambda p: p.stem)
+@pytest.mark.parametrize("path", PROGRAMS, ids=lambda p: p.stem)
 def test_live_expressions_hold(path):
-    world = World([ROOT / "worked"])
+    world = World([ROOT / path.relative_to(ROOT).parts[0]])
     file = world.key(path)
     complaints = [item.diagnostic for item in world.diagnostics(file)]
     assert [d.message for d in complaints if d.severity in ("error", "warning")] == []
