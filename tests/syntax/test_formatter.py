@@ -32,7 +32,7 @@ def check(written: str, expected: str) -> None:
         ("x = p?a:b", "x = p ? a : b"),
         ("x = f(dc = (-2,1) ,g)", "x = f(dc=(-2, 1), g)"),
         ("x = (let a=1 ;b=f(c = 2) in a)", "x = (let a = 1; b = f(c=2) in a)"),
-        ("x = f(fold(a,b)=(1,2)for i in 1..n(g(k = b)),k = 1)", "x = f(fold (a, b) = (1, 2) for i in 1..n (g(k=b)), k=1)"),
+        ("x = f(fold(a,b)=(1,2)for i in 1..n(g(k = b)))", "x = f(fold (a, b) = (1, 2) for i in 1..n (g(k=b)))"),
         ("x = f(fold s=1 for i in 1..n(s),k = 1)", "x = f(fold s = 1 for i in 1..n (s), k=1)"),
         ("x = f(c with a=2,k = 1)", "x = f(c with a = 2, k=1)"),
         ("x = f(c with (a = 2,b = 3),k = 1)", "x = f(c with (a=2, b=3), k=1)"),
