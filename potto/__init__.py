@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from potto.applications.fitting import fit
     from potto.applications.hessian import hessian, hvp
     from potto.integrate.costs import counting
-    from potto.python.api import Function, Module, ProgramWarning, Workspace, compile, deriv, load
+    from potto.python.api import Module, ProgramWarning, Workspace, compile, load
+    from potto.python.functions import Function, deriv
     from potto.python.gradients import grad, jacobian, jvp, value_and_grad, vjp
     from potto.python.tiles import Interrupted
     from potto.runtime.answers.estimate import Estimate
@@ -46,8 +47,10 @@ __all__ = [
 
 _HOMES = {
     "Estimate": "potto.runtime.answers.estimate",
+    "Function": "potto.python.functions",
     "Interrupted": "potto.python.tiles",
     "counting": "potto.integrate.costs",
+    "deriv": "potto.python.functions",
     "fit": "potto.applications.fitting",
     "grad": "potto.python.gradients",
     "hessian": "potto.applications.hessian",

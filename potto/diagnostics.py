@@ -115,8 +115,16 @@ def declare(code: str, title: str, severity: Severity = "error") -> Kind:
 
 
 class PottoError(Exception):
-    """The program, not Potto, is at fault: carries the diagnostics that say how."""
+    """The program, not Potto, is at fault: carries the diagnostics that say how. As text it starts with the message."""
 
     def __init__(self, diagnostics: tuple[Diagnostic, ...] | list[Diagnostic]) -> None:
         self.diagnostics = tuple(diagnostics)
-        super().__init__("; ".join(f"{d.code}: {d.message}" for d in self.diagnostics))
+        super().__init__("; ".join(map(headline, self.diagnostics)))
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return type(self), (self.diagnostics,)
+
+
+def headline(diagnostic: Diagnostic) -> str:
+    """`` `f` takes 1 argument, but is given 2 [P0308]``."""
+    return f"{diagnostic.message} [{diagnostic.code}]"

@@ -36,9 +36,9 @@ FORBIDDEN: dict[str, tuple[str, ...]] = {
 # Who may import a package that is not ours; nobody else may, at the top of a module or inside of a function.
 OUTSIDERS: dict[str, tuple[str, ...]] = {
     "lark": ("potto.syntax",),
-    "numpy": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.python.arguments", "potto.python.arrays",
-              "potto.python.forms", "potto.python.gradients", "potto.applications", "potto.bench", "potto.data",
-              "potto_lsp.preview", "potto_lsp.sampling"),
+    "numpy": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.python.accepting", "potto.python.arguments",
+              "potto.python.arrays", "potto.python.forms", "potto.python.gradients", "potto.applications",
+              "potto.bench", "potto.data", "potto_lsp.preview", "potto_lsp.sampling"),
     "PIL": ("potto.data",),
     "scipy": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.applications.fitting", "potto.bench"),
     "jax": ("potto.bench.peers",),

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from potto.diagnostics import PottoError
-from potto.python.api import Function, Module
+from potto.python.api import Module
+from potto.python.functions import Function
 from potto.runtime.answers.printing import format_digits, format_range
 from potto_lsp.sampling import NoSamples, argument
 

@@ -15,7 +15,8 @@ import numpy as np
 from potto.diagnostics import PottoError
 from potto.modules import find_module, resolve_module
 from potto.projects.settings import settings
-from potto.python.api import Function, Module, expression
+from potto.python.api import Module, expression
+from potto.python.functions import Function
 from potto.python.gradients import grad
 from potto.runtime.answers.estimate import Estimate
 from potto.syntax import nodes

@@ -20,7 +20,7 @@ from msgspec.structs import replace
 from potto.diagnostics import PottoError
 from potto.kernels.cells import Array
 from potto.kernels.errors import wrong_call
-from potto.python.api import Function
+from potto.python.functions import Function
 from potto.python.gradients import grad
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.printing import format_digits

@@ -1,8 +1,8 @@
 """Second derivatives: the Hessian times a vector, all its components in one run, and the whole of it.
 
-Owns `hvp` and `hessian`. The derivative of a function along a direction is a function of duals; its gradient, with one
-tangent for each parameter, is the product. It is taken through the boundary terms of the first derivative. The matrix
-is the products with all unit vectors, as one batch.
+Owns `hvp`, `hessian` and `second_gradient`. The derivative of a function along a direction is a function of duals; its
+gradient, with one tangent for each parameter, is the product. It is taken through the boundary terms of the first
+derivative. The matrix is the products with all unit vectors, as one batch.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from msgspec.structs import replace
 
 from potto.kernels.cells import Cell, Rows, Value, map_cells
 from potto.kernels.errors import wrong_call
-from potto.python.api import Function, bound, deriv
 from potto.python.arguments import batch_of
-from potto.python.gradients import Gradient, Names, grad, parameters_to_vary
+from potto.python.functions import Function, bound, deriv
+from potto.python.gradients import Gradient, Names, grad, in_given_form, parameters_to_vary
 from potto.runtime.answers.estimate import Estimate
 
 
@@ -34,7 +34,7 @@ def hvp(function: Function, along: Mapping[str, Any]) -> Callable[..., Gradient]
 
     def product(*args: Any, **kwargs: Any) -> Gradient:
         given = _named(function, args, kwargs)
-        return _product(twice(given, along), given, names)
+        return in_given_form(_product(twice(given, along), given, names), function, args, kwargs)
 
     return product
 
@@ -67,6 +67,43 @@ def hessian(function: Function, wrt: Names = None) -> Callable[..., Estimate]:
         return Estimate(**{**common, **told, "member_converged": members, "shortfalls": reasons})
 
     return matrix
+
+
+def second_gradient(function: Function, first: tuple[str, ...], then: tuple[str, ...]) -> Callable[..., Gradient]:
+    """The derivatives by `first`, as value, and theirs by `then`: what `grad(grad(f, first), then)` is.
+
+    In the form of a gradient: `tangent` is, for each parameter of `then`, of the form of the value. Raises PottoError
+    where one of the parameters is not one number.
+    """
+    names = tuple(dict.fromkeys((*first, *then)))
+    slopes, curvatures = grad(function, first), hessian(function, names)
+
+    def twice(*args: Any, **kwargs: Any) -> Gradient:
+        slope, matrix = slopes(*args, **kwargs), curvatures(*args, **kwargs)
+        sizes = [0 if np.ndim(part) > np.ndim(slope.value) or isinstance(part, tuple | dict | list) else 1
+                 for part in (slope.tangent if len(first) > 1 else (slope.tangent,))]  # fmt: skip
+        axes = 2 if len(names) > 1 else 0
+        if not all(sizes) or matrix.ndim != np.ndim(slope.value) + axes:
+            raise wrong_call("the gradient of a gradient is taken by numbers", "`potto.hessian` is for all others")
+
+        def block(whole: Any) -> Any:
+            if len(names) == 1:
+                return whole
+            each = [[_cell(whole[..., names.index(a), names.index(b)]) for a in first] for b in then]
+            rows = [tuple(row) if len(row) > 1 else row[0] for row in each]
+            return tuple(rows) if len(rows) > 1 else rows[0]
+
+        common = {name: getattr(matrix, name) for name in Estimate.__struct_fields__}
+        told = {"value": slope.tangent, "error": slope.tangent_error, "tangent": block(matrix.value),
+                "tangent_error": block(matrix.error), "evals": slope.evals + matrix.evals, "seconds":
+                slope.seconds + matrix.seconds, "converged": slope.converged and matrix.converged}  # fmt: skip
+        return Gradient(**{**common, **told, "wrt": then})
+
+    return twice
+
+
+def _cell(part: Any) -> Any:
+    return part if np.ndim(part) else float(part)
 
 
 def _twice(function: Function, names: tuple[str, ...]) -> Callable[[dict[str, Any], Mapping[str, Any]], Gradient]:

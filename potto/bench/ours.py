@@ -13,7 +13,8 @@ from msgspec import Struct
 from potto.bench.adapter import Answer, Solve
 from potto.bench.problems import Problem, Quantity
 from potto.projects.settings import settings
-from potto.python.api import Workspace, deriv
+from potto.python.api import Workspace
+from potto.python.functions import deriv
 from potto.runtime.answers.estimate import Estimate
 
 TOLERANCES = (1e-1, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)

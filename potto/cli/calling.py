@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from potto.evaluating.world import World
-    from potto.python.api import Function
+    from potto.python.functions import Function
 
 
 def assignment(text: str) -> tuple[str, str]:
@@ -54,7 +54,7 @@ def with_names(expression: str, given: Sequence[tuple[str, str]]) -> str:
 def function_in(world: World, file: str, text: str) -> Function:
     """The function that an expression stands for. Raises ProgramError, PottoError."""
     from potto.kernels.errors import wrong_call
-    from potto.python.api import Function
+    from potto.python.functions import Function
     from potto.types.types import Diffeo
     from potto.types.types import Function as FunctionType
 
@@ -66,7 +66,7 @@ def function_in(world: World, file: str, text: str) -> Function:
 
 def argument_in(world: World, file: str, text: str) -> Any:
     """What a parameter is given: a function, or numbers. Raises ProgramError."""
-    from potto.python.api import Function
+    from potto.python.functions import Function
     from potto.types.types import Diffeo
     from potto.types.types import Function as FunctionType
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from potto.applications.images import Grid, Sampled
     from potto.evaluating.world import World
     from potto.projects.settings import Settings
-    from potto.python.api import Function
+    from potto.python.functions import Function
     from potto.runtime.answers.estimate import Estimate
 
 SUMMARY = "draw a function of two numbers as an image, and its derivatives"

@@ -1,7 +1,8 @@
 """Python values as values of Potto, and answers over arrays in the shape that was asked for.
 
 Owns the conversion of arguments and its complaints. Numbers are doubles; arrays broadcast against each other and
-become one flat batch; tuples are tuples, lists are lists, functions of Potto are functions. Nothing else is accepted.
+become one flat batch; tuples are tuples, lists are lists, functions of Potto are functions. Nothing else comes here
+(`accepting` makes these of what Python has).
 """
 
 from __future__ import annotations
@@ -211,6 +212,8 @@ def _estimate(name: str, argument: Estimate, batch: Batch, to_function: ToFuncti
     """An answer as an argument, with the error that it has."""
     if isinstance(argument.value, float) and argument.tangent is None:
         return Cell(argument.value, argument.error or None)
+    if isinstance(argument.value, np.ndarray) and argument.tangent is None and np.any(argument.error):
+        return Cell(batch.flat(argument.value), batch.flat(np.broadcast_to(argument.error, argument.value.shape)))
     plain = argument.value if argument.tangent is None else (argument.value, argument.tangent)
     if plain is None:
         raise no_kind(name, argument, "this answer is a function and not a number")

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 from msgspec.structs import asdict, replace
@@ -20,10 +20,11 @@ from potto.kernels.chunks import POINTS
 from potto.kernels.errors import wrong_call
 from potto.kernels.tape import Node, Swept, Untaped, swept
 from potto.projects.settings import current
-from potto.python.api import Function, must_be_function
+from potto.python.accepting import as_given
 from potto.python.arguments import Batch, value_of
 from potto.python.calls import Call
 from potto.python.forms import as_matrix, bounds_of, by_name, form_of, in_lists, must_match, tangents_of, weighted
+from potto.python.functions import Function, bound, must_be_function
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.evaluate import Clock, number, report, told
 from potto.runtime.evaluation.machine import Machine
@@ -50,13 +51,22 @@ class Gradient(Estimate, frozen=True, eq=False):
         return self.tangent if len(self.wrt) == 1 else self.tangent[self.wrt.index(name)]
 
 
-def grad(function: Function, wrt: Names = None) -> GradientFunction:
+@overload
+def grad(function: Function, wrt: Names = None) -> GradientFunction: ...
+@overload
+def grad(function: GradientFunction, wrt: Names = None) -> Callable[..., Gradient]: ...
+def grad(function: Function | GradientFunction, wrt: Names = None) -> Any:
     """The function with its derivatives by the parameters named in `wrt`, or by the first one.
 
     It takes plain numbers. In the answer, `tangent` is the derivative by the one parameter, or a tuple of them in the
-    order of `wrt`; `answer["c"]` is the one by `c`. The derivative by a tuple is a tuple. Raises PottoError if the
-    function has no such parameter, or one of them is no number.
+    order of `wrt`; `answer["c"]` is the one by `c`. The derivative by a tuple is a tuple, that by a record that is
+    given as a dict a dict. Of `grad(f)` it is the second derivative: `value` is what `grad(f)` has as `tangent`.
+    Raises PottoError if the function has no such parameter, or one of them is no number.
     """
+    if isinstance(function, GradientFunction):
+        from potto.applications.hessian import second_gradient  # which differentiates by what is here
+
+        return second_gradient(function._function, function._wrt, parameters_to_vary(function._function, wrt))
     return GradientFunction(function, parameters_to_vary(function, wrt))
 
 
@@ -112,7 +122,7 @@ def vjp(function: Function, cotangent: Any, wrt: Names = None) -> Callable[..., 
         extra = {"cotangent": function.in_form("cotangent", cotangent, None)}
         run = _Run(*function.prepared(args, kwargs, extra), extra)
         value, total = run.along_each_together(names, in_lists(run.extra["cotangent"]))
-        return run.gradient(value, total, names)
+        return in_given_form(run.gradient(value, total, names), function, args, kwargs)
 
     return product
 
@@ -151,7 +161,7 @@ class GradientFunction:
     def __call__(self, *args: Any, **kwargs: Any) -> Gradient:
         found = self._function.in_tiles(args, kwargs, self._wrt)
         assert isinstance(found, Gradient)
-        return found
+        return in_given_form(found, self._function, args, kwargs)
 
     def __repr__(self) -> str:
         return f"<gradient of {self._function!r} by {', '.join(self._wrt)}>"
@@ -164,6 +174,21 @@ def gradient(
     run = _Run(call, arguments, batch, {})
     value = run.along_each(wrt)
     return run.gradient(value, value, wrt)
+
+
+def in_given_form(found: Gradient, function: Function, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Gradient:
+    """The gradient in the form of what was given: by a record that is a dict a dict, by a tuple that is an array an
+    array."""
+    given = dict(bound(function, args, kwargs))
+    if not any(isinstance(argument, Mapping | tuple | np.ndarray) for argument in given.values()):
+        return found
+
+    def form(parts: Any) -> Any:
+        each = [as_given(given.get(name), part, function.type_of(name))
+                for name, part in zip(found.wrt, parts if len(found.wrt) > 1 else (parts,), strict=True)]  # fmt: skip
+        return tuple(each) if len(each) > 1 else each[0]
+
+    return replace(found, tangent=form(found.tangent), tangent_error=form(found.tangent_error))
 
 
 def parameters_to_vary(function: Function, wrt: Names) -> tuple[str, ...]:

@@ -28,7 +28,7 @@ from potto.runtime.answers.estimate import Estimate
 from potto.runtime.evaluation.record import advancing
 
 if TYPE_CHECKING:
-    from potto.python.api import Function
+    from potto.python.functions import Function
 
 LEAST = 2048  # members, from which on a batch has blocks: below, the calls for some would cost as much as all
 # Members of a block: as many as take ENOUGH seconds at least, tried from PILOT on; after less than LITTLE with 64 times

@@ -9,12 +9,12 @@ from __future__ import annotations
 import os
 import re
 import textwrap
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from msgspec import Struct
 
-from potto.diagnostics import Diagnostic, PottoError, Related, Suggestion
+from potto.diagnostics import Diagnostic, PottoError, Related, Suggestion, headline
 from potto.reports.excerpt import WIDTH, Excerpt, Mark, excerpt, printable
 from potto.source import Position, SourceText, Span
 
@@ -230,4 +230,18 @@ class ProgramError(PottoError):
         self.sources = sources
 
     def __str__(self) -> str:
-        return "\n" + "\n".join(render(item, self.sources) for item in self.located)
+        """The first message, its place, and then the other diagnostics."""
+        texts = [render(item, self.sources) for item in self.located]
+        if texts:
+            _, newline, rest = texts[0].partition("\n")
+            texts[0] = f"{printable(headline(self.located[0].diagnostic))}{newline}{rest}"
+        return "\n".join(texts)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        files = {item.file for item in self.located} | {r.file for d in self.diagnostics for r in d.related}
+        return _arrived, (self.located, {file: self.sources(file) for file in files if file is not None})
+
+
+def _arrived(located: Sequence[Located], texts: Mapping[str, SourceText | None]) -> ProgramError:
+    """An error that was raised in another process, with the texts that it shows."""
+    return ProgramError(located, texts.get)

@@ -18,8 +18,8 @@ from potto.applications.images import flat, sampled
 from potto.modules.builtins import is_builtin
 from potto.modules.free import free_references
 from potto.projects.settings import Settings, settings
-from potto.python.api import Function
 from potto.python.arguments import evenly
+from potto.python.functions import Function
 from potto.runtime.answers.estimate import Estimate
 from potto.syntax import nodes, parse_expression
 from potto.types.types import Diffeo, Real, TupleOf, resolve

@@ -243,7 +243,9 @@ def share(c: Camera, depth) c.focal/(depth - c.eye.z)
     for camera in ((eye, 1.5), {"focal": 1.5, "eye": eye}, Camera(eye, 1.5)):
         found = potto.grad(module.share)(camera, 1.0)
         assert found.value == 0.25
-        by_eye, by_focal = found.tangent
+        slopes = found.tangent
+        assert isinstance(slopes, dict) == isinstance(camera, dict)  # in the form of what was given
+        by_eye, by_focal = (slopes["eye"], slopes["focal"]) if isinstance(slopes, dict) else slopes
         assert (*by_eye, by_focal) == pytest.approx((0, 0, 1.5 / 36, 1 / 6), rel=1e-15)
     with pytest.raises(potto.PottoError, match="`c` is Camera, and what is given has no `focal`"):
         module.share({"eye": eye}, 1.0)

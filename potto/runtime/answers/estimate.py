@@ -18,7 +18,14 @@ from msgspec.structs import replace
 
 from potto.integrate.events import Shortfall
 from potto.runtime.answers.arithmetic import Operators, Pair, applied, operand, reduced
-from potto.runtime.answers.printing import concisely, format_list, format_number, format_seconds, format_tuple
+from potto.runtime.answers.printing import (
+    concisely,
+    format_fields,
+    format_list,
+    format_number,
+    format_seconds,
+    format_tuple,
+)
 from potto.runtime.answers.rich import as_html, as_latex
 
 
@@ -284,11 +291,14 @@ def _plain(estimate: Estimate, changes: Mapping[str, Any]) -> Estimate:
 
 
 def _number_or(part: Any) -> Any:
-    return float(part) if isinstance(part, float) or (np.ndim(part) == 0 and not isinstance(part, tuple)) else part
+    """A number of numpy as a float; everything else as it is."""
+    return part if isinstance(part, tuple | dict) or np.ndim(part) else float(part)
 
 
 def _same(mine: Any, theirs: Any) -> bool:
     """Whether two values of one form have the same numbers."""
+    if isinstance(mine, dict) and isinstance(theirs, dict):
+        return mine.keys() == theirs.keys() and all(_same(item, theirs[name]) for name, item in mine.items())
     if isinstance(mine, tuple | list) and isinstance(theirs, tuple | list | np.ndarray):
         return len(mine) == len(theirs) and all(_same(a, b) for a, b in zip(mine, theirs, strict=True))
     if isinstance(mine, tuple | list) or isinstance(theirs, tuple | list | str):
@@ -299,6 +309,8 @@ def _same(mine: Any, theirs: Any) -> bool:
 def _formatted(value: Any, spec: str) -> str:
     if isinstance(value, tuple):
         return format_tuple([_formatted(item, spec) for item in value])
+    if isinstance(value, dict):
+        return format_fields({name: _formatted(item, spec) for name, item in value.items()})
     if isinstance(value, list) or np.ndim(value):
         return format_list([_formatted(item, spec) for item in value], len(value))
     return format(float(value), spec)

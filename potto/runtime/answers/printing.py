@@ -207,6 +207,8 @@ def _joined(value: Any, error: Any, form: Callable[[float, float], str]) -> str:
         shown = value[:MOST_ITEMS] if isinstance(value, list) else value
         parts = [_joined(v, e, form) for v, e in zip(shown, error, strict=False)]
         return format_tuple(parts) if isinstance(value, tuple) else format_list(parts, len(value))
+    if isinstance(value, dict):
+        return format_fields({name: _joined(item, error[name], form) for name, item in value.items()})
     if value is None:
         return "<function>"
     if getattr(value, "ndim", 0):
@@ -242,6 +244,8 @@ def _bars(value: Any, error: Any) -> str:
         if isinstance(value, list) and len(value) > MOST_ITEMS:
             return f"at most {format_error(largest(error))}"
         return format_tuple([_bars(v, e) for v, e in zip(value, error, strict=True)])
+    if isinstance(value, dict):
+        return format_fields({name: _bars(item, error[name]) for name, item in value.items()})
     if getattr(value, "ndim", 0):
         bars = [_bar(v, e)[1] for v, e in _first(value, error)]
         return f"at most {max([*bars, format_error(largest(error))], key=float)}"
@@ -259,6 +263,8 @@ def format_bounds(error: Any) -> str:
     """Error estimates to two digits, in the form of the value."""
     if isinstance(error, tuple | list):
         return format_tuple([format_bounds(item) for item in error])
+    if isinstance(error, dict):
+        return format_fields({name: format_bounds(item) for name, item in error.items()})
     if getattr(error, "ndim", 0):
         return f"at most {format_error(largest(error))}"
     return format_error(float(error))
@@ -270,6 +276,8 @@ def largest(error: Any) -> float:
         return float(error.max(initial=0.0))
     if isinstance(error, tuple | list):
         return max((largest(item) for item in error), default=0.0)
+    if isinstance(error, dict):
+        return largest(tuple(error.values()))
     return float(error) if error is not None and error == error else math.inf
 
 
@@ -282,6 +290,11 @@ def format_list(parts: Sequence[str], size: int) -> str:
 def format_tuple(parts: Sequence[str]) -> str:
     """`(a, b)`."""
     return f"({', '.join(parts)})"
+
+
+def format_fields(parts: dict[str, str]) -> str:
+    """`(a=1, b=2)`."""
+    return format_tuple([f"{name}={text}" for name, text in parts.items()])
 
 
 # Digits that somebody wrote

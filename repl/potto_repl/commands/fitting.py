@@ -15,7 +15,7 @@ from msgspec.structs import asdict
 from potto.applications.fitting import Step
 from potto.applications.fitting import fit as fitted
 from potto.projects.settings import settings
-from potto.python.api import Function
+from potto.python.functions import Function
 from potto.runtime.answers.printing import format_digits, format_error, format_number, format_seconds, with_error
 from potto_repl.drawing import braille, room_for_curves
 from potto_repl.expressions import checked, split_items

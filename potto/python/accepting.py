@@ -1,0 +1,93 @@
+"""What Python has for numbers, arrays and tuples, as the few kinds that arguments are made of.
+
+Owns `accepted`, and `as_given`, the way back. Decimals and tensors become floats and arrays; a list where a number is
+wanted is a batch of numbers; a list, or an array whose last axis has its length, where a tuple is wanted, is that
+tuple. What it cannot place it hands on unchanged: the check of arguments says what is wrong with it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import numbers
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from potto.kernels.cells import Rows
+from potto.runtime.answers.estimate import Estimate
+from potto.types.types import Dist, Real, RecordName, TupleOf, Type, resolve
+
+PLAIN = (numbers.Real, np.ndarray, np.bool_, Estimate, Rows, str, bytes, tuple, list, Mapping)
+
+
+def accepted(argument: Any, type: Type | None) -> Any:
+    """An argument for a parameter of this type, if that is known, without what only Python knows about it."""
+    if argument.__class__ is float or argument.__class__ is int:
+        return argument
+    if not isinstance(argument, PLAIN):
+        argument = _standard(argument)
+    found = None if type is None else resolve(type)
+    if isinstance(found, Real | Dist) and isinstance(argument, list):
+        return _batch(argument)
+    if isinstance(found, TupleOf):
+        return _tuple(argument, found)
+    return argument
+
+
+def _standard(argument: Any) -> Any:
+    if isinstance(argument, type):
+        return argument
+    with contextlib.suppress(TypeError, ValueError, RuntimeError):  # which tensors raise that are elsewhere
+        if hasattr(argument, "__array__"):
+            return np.asarray(argument)
+        if hasattr(argument, "__float__"):
+            return float(argument)
+    return argument
+
+
+def _batch(items: list[Any]) -> Any:
+    """Numbers, or rows of them, as an array; with their errors where they are answers."""
+    with contextlib.suppress(TypeError, ValueError):
+        values = np.array(items)
+        if values.dtype.kind not in "fiuO" or not values.size:
+            return items
+        values = values.astype(float)
+        errors = np.array([item.error for item in items if isinstance(item, Estimate)])
+        return Estimate(values, errors) if errors.shape == values.shape else values
+    return items
+
+
+def _tuple(argument: Any, type: TupleOf) -> Any:
+    if isinstance(argument, list) and len(argument) == len(type.items) and not type.dual:
+        argument = tuple(argument)
+    if isinstance(argument, np.ndarray) and argument.ndim and argument.shape[-1] == len(type.items):
+        plain = not type.dual and type.record is None and all(isinstance(resolve(t), Real | Dist) for t in type.items)
+        if plain:
+            parts = np.moveaxis(argument, -1, 0)
+            return tuple(float(part) if argument.ndim == 1 else part for part in parts)
+    if isinstance(argument, tuple) and len(argument) == len(type.items):
+        return tuple(accepted(part, item) for part, item in zip(argument, type.items, strict=True))
+    if isinstance(argument, Mapping) and type.record is not None and argument.keys() == set(type.record.fields):
+        return {name: accepted(argument[name], item) for name, item in _fields(type, type.record)}
+    return argument
+
+
+def _fields(type: TupleOf, record: RecordName) -> list[tuple[str, Type]]:
+    return list(zip(record.fields, type.items, strict=True))
+
+
+def as_given(argument: Any, part: Any, type: Type | None) -> Any:
+    """A derivative in the form of the argument: a dict by a record that was given as a dict, an array by a tuple
+    that was given as an array."""
+    found = None if type is None else resolve(type)
+    if not isinstance(found, TupleOf) or not isinstance(part, tuple):
+        return part
+    if isinstance(argument, np.ndarray):
+        return np.stack(part, axis=-1)
+    if isinstance(argument, Mapping) and found.record is not None:
+        fields = zip(_fields(found, found.record), part, strict=True)
+        return {name: as_given(argument[name], item, its) for (name, its), item in fields}
+    if isinstance(argument, tuple | list) and len(argument) == len(part):
+        return tuple(as_given(*three) for three in zip(argument, part, found.items, strict=True))
+    return part
