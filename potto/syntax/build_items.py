@@ -180,11 +180,13 @@ def record(context: Context, v: Values) -> Item:
     fields = as_parameters(context, group, "field")
     if not fields and not group.virtual:
         message = "a record needs at least one field"
-        context.report(kinds.MISSING_EXPRESSION(group.span, message, help="write `x: Real`"))
+        context.report(kinds.RECORD_FORM(group.span, message, label="empty", help="write `x: Real`"))
     for found in fields:
         if found.annotation is None and found.name:
             help = f"write `{found.name}: Real`"
-            context.report(kinds.BAD_TYPE(found.span, f"the field `{found.name}` has no type", help=help))
+            typed = suggest(found.span, f"{found.name}: Real")
+            message = f"the field `{found.name}` has no type"
+            context.report(kinds.RECORD_FORM(found.span, message, label="no type", help=help, suggestions=(typed,)))
     span = Span(v[0].start, group.span.end)
     return RecordDefinition(span, name.text, name.span, fields) if name.text else BrokenItem(span, None)
 

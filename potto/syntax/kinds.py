@@ -28,6 +28,7 @@ BAD_IMPORT = declare("P0118", "an import that is not well formed")
 DEFINITION_HEAD = declare("P0119", "the head of a definition is not well formed")
 DIFFEO_FORM = declare("P0120", "a diffeomorphism that is not well formed")
 NAMED_ARGUMENT = declare("P0121", "a named argument outside of a call")
+RECORD_FORM = declare("P0122", "a record that is not well formed")
 
 
 def several_names(span: Span, names: Sequence[str]) -> Diagnostic:

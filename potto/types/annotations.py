@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import assert_never
 
+from potto.diagnostics import Diagnostic, Related
 from potto.syntax import nodes
 from potto.types import kinds
 from potto.types.context import Inference
@@ -68,9 +69,24 @@ def _size(inference: Inference, size: nodes.Size) -> Type:
     known = inference.sizes.get(size.name)
     if known is None:
         known = inference.sizes[size.name] = Meta(1, size=size.name)
-        if inference.scope.find(size.name) is None:
+        before = inference.scope.find(size.name)
+        if before is None:
             inference.scope.bind(Local(size.name, size.span, "size", REAL, used=True))
+        elif before.kind == "parameter":
+            inference.report(_two_names(size, before))
     return shifted(known, size.offset)
+
+
+def _two_names(size: nodes.Size, before: Local) -> Diagnostic:
+    """A size that is called as a parameter is: the name is the parameter's, and the size has none."""
+    name = size.name or ""
+    return kinds.SHADOWED(
+        size.span,
+        f"the size `{name}` is not the parameter `{name}`, which hides it",
+        label="a size of its own",
+        related=(Related(before.span, f"`{name}` means this number"),),
+        help="leave the parameter out, since a size is a number in the body; or give one of them another name",
+    )
 
 
 def _parameter(inference: Inference, parameter: nodes.Parameter) -> Type:

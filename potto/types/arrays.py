@@ -194,12 +194,27 @@ def _size(inference: Inference, expr: nodes.Expr) -> Type:
 def _reduction(inference: Inference, node: nodes.Reduction) -> Type:
     what = {"sum": "a sum", "product": "a product"}.get(node.op, f"`{node.op}`")
     with inference.scope.inside():
-        _clauses(inference, node.clauses, what)
+        sizes = _clauses(inference, node.clauses, what)
+        if node.op in ("min", "max"):
+            _not_empty(inference, node, sizes)
         if node.op != "sum":
             inference.number(node.body, f"what `{node.op}` is taken of")
             return REAL
         body = inference.infer(node.body)
     return summed(inference, body, node.body, "what is summed")
+
+
+def _not_empty(inference: Inference, node: nodes.Reduction, sizes: list[Type]) -> None:
+    """Report a least or greatest of what is known to have no elements."""
+    which = {"min": "least", "max": "greatest"}[node.op]
+    for clause, size in zip(node.clauses, sizes):
+        count = resolve(size)
+        if isinstance(count, Count) and count.number <= 0:
+            what = "range" if isinstance(clause.over, nodes.Range) else "array"
+            inference.report(kinds.EMPTY(
+                clause.over.span, f"`{node.op}` goes through an empty {what}: nothing is the {which}",
+                label="empty", help=f"give a value that counts as well: `{node.op}(a, b)` of two numbers",
+            ))  # fmt: skip
 
 
 @rule(nodes.Fold)

@@ -83,6 +83,9 @@ def _member(inference: Inference, node: nodes.Member) -> Type:
         if whole is not None and not isinstance(type, Unknown | Meta | Real):
             inference.owners[id(node)] = whole
             return fields(inference, type, node)
+        if isinstance(local, Local) and isinstance(type, Unknown):
+            local.used = True
+            return UNKNOWN  # what is wrong with it is said where it is bound
         inference.say(undefined_member(inference.outside, inference.scope, node))
         return UNKNOWN
     inference.meanings[id(node)] = meaning

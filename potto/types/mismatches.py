@@ -146,7 +146,8 @@ def not_a_number(found: Type, expr: nodes.Expr, where: str) -> Diagnostic:
 
 
 def shadowing(local: Local, before: Local) -> Diagnostic:
-    what = {"parameter": "parameter", "variable": "variable of integration"}.get(before.kind, "local name")
+    kinds_of = {"parameter": "parameter", "variable": "variable of integration", "size": "size"}
+    what = kinds_of.get(before.kind, "local name")
     return kinds.SHADOWED(
         local.span,
         f"`{local.name}` hides the {what} of the same name",
@@ -165,7 +166,7 @@ def no_field(span: Span, name: str, record: RecordName, label: str) -> Diagnosti
         message = f"`{record.name}` has no column `{name}`"
     elif "." in record.name:  # another file of data
         message = f"`{record.name}` holds no `{name}`"
-    return kinds.NO_FIELD(span, message, label=label, help=help, suggestions=instead(span, near))
+    return kinds.UNKNOWN_FIELD(span, message, label=label, help=help, suggestions=instead(span, near))
 
 
 def around(span: Span, before: str, after: str, title: str) -> Suggestion:

@@ -199,10 +199,10 @@ def _no_module(node: nodes.Member, what: str, help: str = "") -> Diagnostic:
 def _near_at_top(db: Database, file: str, name: str) -> tuple[str, ...]:
     """The names at the top of a file, and the builtins, that `name` may have been meant to be. A query, since an import
     that goes leaves the same name undefined in many definitions."""
-    return near_names(name, (*_file_names(db, file), *builtin_names()))
+    return near_names(name, (*names_at_top(db, file), *builtin_names()))
 
 
-def _file_names(db: Database, top: str) -> tuple[str, ...]:
+def names_at_top(db: Database, top: str) -> tuple[str, ...]:
     """The names at the top of a file, and behind an entry of a prompt those of the entries before."""
     found: list[str] = []
     for file in (top, *preludes(db, top)):

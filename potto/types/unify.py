@@ -27,6 +27,7 @@ from potto.types.types import (
     Type,
     Unknown,
     Var,
+    groups_of,
     resolve,
     shifted,
     with_items,
@@ -217,7 +218,8 @@ def open_type(type: Type, level: int) -> Type:
 
 
 def close_type(type: Type) -> Type:
-    """A type without `Meta`: what is unknown at the end holds for all types, and gets a name."""
+    """A type without `Meta`: what is unknown at the end holds for all types, and gets a name; no size that of a
+    parameter, which is another number."""
     names: dict[Meta, Type] = {}
     sizes: set[str] = set()
 
@@ -225,6 +227,8 @@ def close_type(type: Type) -> Type:
         if not isinstance(part, Meta):
             return part
         if part.size is not None and part not in names:
+            if not sizes:
+                sizes.update(p.name for group in groups_of(type) for p in group if p.name is not None)
             names[part] = SizeVar(size_name(part.size, sizes))
         return names.setdefault(part, Var(_variable_name(len(names))))
 

@@ -57,6 +57,12 @@ def test_fields(text: str, title: str, after: str) -> None:
     assert fixture(RECORD + text + "\n").actions()[title].preferred
 
 
+def test_types() -> None:
+    assert fixed("def f(x: $0float) x\n", "Change to `Real`") == "def f(x: Real) x\n"
+    assert fixed(RECORD + "def f(c: $0Camra) c.focal\n", "Change to `Camera`") == RECORD + "def f(c: Camera) c.focal\n"
+    assert fixed("record P($0x, y: Real)\n", "Write `x: Real`") == "record P(x: Real, y: Real)\n"
+
+
 def test_a_name_of_elsewhere() -> None:
     assert fixed("def f(x) $0ln(x)\n", "Change to `log`") == "def f(x) log(x)\n"
 

@@ -166,7 +166,7 @@ def test_fields_of_records(server: Server, uri: Uri) -> None:
     client = server(RICH, main=RECORDS)
     client.open(uri("main"), RECORDS)
     (said,) = client.note("textDocument/publishDiagnostics", uri=uri("main"))["diagnostics"]
-    assert (said["code"], cut(said["range"], RECORDS)) == ("P0327", "fokal")
+    assert (said["code"], cut(said["range"], RECORDS)) == ("P0332", "fokal")
     params = {"textDocument": {"uri": uri("main")}, "range": said["range"], "context": {"diagnostics": [said]}}
     action = next(a for a in client.ask("textDocument/codeAction", params) if a["title"] == "Change to `focal`")
     action = action if "edit" in action else client.ask("codeAction/resolve", action)

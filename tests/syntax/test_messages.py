@@ -253,6 +253,15 @@ def test_indentation(text: str, place: str) -> None:
     assert (found.code, under) == ("P0113", place)
 
 
+def test_records() -> None:
+    check_messages("""
+        record Nothing()
+        #             ^^ error[P0122]: a record needs at least one field
+        record Untyped(x, y: Real)
+        #              ^ error[P0122]: the field `x` has no type
+    """)
+
+
 def test_names() -> None:
     check_messages("""
         def f(3) x

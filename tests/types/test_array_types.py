@@ -139,3 +139,36 @@ def test_an_array_has_no_power() -> None:
 
 def test_a_call_of_an_array_is_an_index_meant() -> None:
     assert only("xs = [1, 2]\nk = xs(0)").help == "an element of an array is written with brackets: `xs[i]`"
+
+
+def test_an_index_is_a_whole_number() -> None:
+    check("""
+        k = [1, 2][0.5]
+        #          ^^^ error[P0330]: an index must be a whole number, but this is 0.5
+        def f(xs: [n] Real) xs[-1.5] + xs[1e0]
+        #                      ^^^^ error[P0330]: but this is -1.5
+        def g(xs: [n, m] Real) xs[0, -1]
+        #                            ^^ error[P0328]: the index -1 is out of range: no array has one below 0
+    """)
+
+
+def test_nothing_has_no_least() -> None:
+    check("""
+        a = min x in [] (x)
+        #            ^^ error[P0334]: `min` goes through an empty array
+        def f(t) max i in 3..1 (t*i)
+        #                 ^^^^ error[P0334]: `max` goes through an empty range
+        b = sum x in [] (x)
+        c = product i in 3..1 (i)
+        def g(xs: [n] Real) min x in xs (x)
+    """)
+
+
+def test_a_size_and_a_parameter_of_one_name() -> None:
+    check("""
+        def f(n: Real, xs: [n] Real) n*xs[0]
+        #                   ^ warning[P0612]: the size `n` is not the parameter `n`
+    """)
+    assert type_of("def f(n, xs) n*norm(xs)") == "(n: Real*, xs: [m] Real*) -> Real"
+    shown = type_of("def g(xs, m: Real, n)(ys) norm(xs)*m*n*norm(ys)")
+    assert shown == "(xs: [k] Real*, m: Real, n: Real*) -> (ys: [l] Real*) -> Real"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from marks import FOLDER, check, database
+from marks import FOLDER, check, database, only
 
 from potto.types import derivative_type, format_type, interface
 
@@ -40,9 +40,9 @@ def test_mistakes():
         record Vec(x: Real, y: Real)
         record Camera(eye: Vec, focal: Real)
         def unknown(c: Camera) c.foca
-        #                        ^^^^ error[P0327]: has no field
+        #                        ^^^^ error[P0332]: has no field
         def changed(c: Camera) c with fokal = 2
-        #                             ^^^^^ error[P0327]: has no field
+        #                             ^^^^^ error[P0332]: has no field
         def added(c: Camera) c + 1
         #                    ^ error[P0315]: a record
         def given(c: Camera) c.focal
@@ -57,9 +57,9 @@ def test_mistakes():
         def none(c: Camra) 1
         #           ^^^^^ error[P0116]: no type
         def function(c: given) 1
-        #               ^^^^^ error[P0116]: no record
+        #               ^^^^^ error[P0116]: not a record
         def number(t) t with x = 2
-        #             ^ error[P0327]: which record
+        #             ^ error[P0333]: which record
     """)
 
 
@@ -77,3 +77,33 @@ def test_fields_vary_one_by_one():
 def test_the_derivative_of_a_record_has_its_name():
     found = interface(database("record P(x: Real, y: Real)\ndef f(p: P) p"), MAIN, "f").type
     assert format_type(derivative_type(found)) == "(dp: (P, P)) -> (P, P)"
+
+
+def test_a_record_within_itself():
+    check("""
+        record Node(v: Real, next: Node)
+        #                          ^^^^ error[P0331]: a record cannot contain itself: `Node` is a field of `Node`
+        record A(b: [3] B)
+        #               ^ error[P0331]: records cannot contain each other: `A`, `B`
+        record B(a: (A, Real))
+        #            ^ error[P0331]: records cannot contain each other
+    """)
+
+
+def test_with_behind_what_has_no_fields():
+    check("""
+        record Camera(focal: Real)
+        t = (1, 2) with x = 3
+        #   ^^^^^^ error[P0333]: this is a tuple of 2, not a record
+        def f(c) c with focal = 3
+        #        ^ error[P0333]: it is not known which record this is
+    """)
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"), [("Camra", ("Camera",)), ("float", ("Real",)), ("camera", ("Camera",)), ("Mesh", ())]
+)
+def test_the_type_that_may_be_meant(written, meant):
+    found = only(f"record Camera(focal: Real)\ncamer = 1\ndef f(c: {written}) c.focal")
+    assert found.code == "P0116"  # and no more is said of `c`
+    assert [edit.text for suggestion in found.suggestions for edit in suggestion.edits] == list(meant)

@@ -47,7 +47,8 @@ def _suggested(place: At, said: Diagnostic) -> Iterator[Offer]:
     for suggestion in said.suggestions:
         edits = [Edit(edit.span, edit.text) for edit in suggestion.edits]
         after = _errors(chunk, [Edit(edit.span.shift(-chunk.start), edit.text) for edit in edits])
-        if after < before or (after == before and not said.code.startswith("P01")):
+        of_reading = before > 0 and said.code.startswith("P01")
+        if after < before or (after == before and not of_reading):
             change = one_file(place.file, *edits)
             yield Offer(suggestion.title, "quickfix", lambda c=change: c, said, preferred)  # type: ignore[misc]
             preferred = False

@@ -128,8 +128,11 @@ def _places(place: Number, size: int) -> Any:
         out = (at < 0) | (at >= size)
     if np.any(out):
         first = int(at[out].ravel()[0])
-        last = f"indices go from 0 to {size - 1}" if size else "it has no elements"
-        message = f"the index {first} is out of range: the array has {size} elements"
+        last = f"indices go from 0 to {size - 1}"
+        message = f"the index {first} is out of range: the array has {size} element{'s' if size > 1 else ''}"
+        if not size:
+            message = f"this array is empty: it has no element {first}"
+            last = "nothing is the least or the greatest of an empty array either, as in `min x in xs (x)`"
         raise PottoError([OUT_OF_RANGE(errors.NOWHERE, message, notes=(last,))])
     return at.astype(np.int64)
 
