@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import argparse
+import os
 from typing import Any
 
 from potto.cli.calling import assignment, with_names
 from potto.cli.console import Console
 from potto.cli.numbers import accounts, add_options, settings_of, show_stats, totals
 
-SUMMARY = "evaluate an expression with a file's names in scope"
+SUMMARY = "evaluate an expression, with a file's names in scope"
 EXAMPLE = "  potto eval examples/paper/renderer.po 'deriv(renderer)((-0.7, 1), deriv(\\(x, y) . \\c . c))'"
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", metavar="FILE", help="the program; `-` reads it from standard input")
+    parser.add_argument(
+        "file", metavar="FILE", nargs="?", help="the program; `-` reads it from standard input; without one, no names"
+    )  # fmt: skip
     parser.add_argument("expression", metavar="EXPR", help="the expression")
     parser.add_argument(
         "--set", dest="given", metavar="NAME=EXPR", action="append", default=[], type=assignment,
@@ -29,10 +32,14 @@ def prepare(arguments: list[str]) -> list[str]:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    from potto.cli.opening import fail, opened, others_json, report_others
+    from potto.cli.opening import fail, nothing_opened, opened, others_json, report_others
 
     settings = settings_of(options, console)
     if settings is None:
+        return 2
+    alone = options.expression.strip() if options.file is None else ""
+    if alone.endswith((".po", ".diffeo")) or os.path.exists(alone):
+        console.complain(f"potto eval: say what to evaluate: `potto eval {alone} EXPR`")
         return 2
     from potto.evaluating.world import World
     from potto.reports.render import ProgramError, to_json
@@ -41,7 +48,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     world = World(["."])
     text = with_names(options.expression.strip(), options.given)
     try:
-        file = opened(world, options.file)
+        file = nothing_opened(world) if options.file is None else opened(world, options.file)
         with accounts(options):
             answer = world.evaluate(file, text, settings)
     except ProgramError as error:

@@ -15,6 +15,8 @@ from potto.source import SourceText
 if TYPE_CHECKING:
     from potto.checking.library import Library
 
+NO_FILE = "<no file>"
+
 
 def opened(world: Library, path: str) -> str:
     """The key of a file that a command works on, of a folder its `main.po`. Raises ProgramError if there is no
@@ -37,6 +39,11 @@ def open_stdin(world: Library) -> str:
     if problem is not None:
         raise ProgramError([problem], no_sources)
     return key
+
+
+def nothing_opened(world: Library) -> str:
+    """A file of the working folder with nothing in it: for expressions that need none."""
+    return world.put(os.path.join(os.getcwd(), NO_FILE), "")
 
 
 def no_sources(file: str) -> SourceText | None:

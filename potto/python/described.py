@@ -1,6 +1,6 @@
 """What Python's own tools say about functions of Potto: signatures, annotations and docstrings, from the program.
 
-Owns `signature_of`, `annotations_of`, `comment_of` and `Doc`.
+Owns `signature_of`, `annotations_of`, `comment_of`, `identifier` and `Doc`.
 """
 
 from __future__ import annotations
@@ -38,9 +38,12 @@ def signature_of(type: Type) -> Signature:
 def _named(parameter: Parameter, place: int) -> tuple[str, bool]:
     """The name of a parameter in Python, and whether it can be given by it."""
     name = parameter.name
-    if name is not None and name.isidentifier() and not iskeyword(name):
-        return name, True
-    return f"argument_{place + 1}", False
+    return (name, True) if name is not None and identifier(name) else (f"argument_{place + 1}", False)
+
+
+def identifier(name: str) -> bool:
+    """Whether Python can write a name."""
+    return name.isidentifier() and not iskeyword(name)
 
 
 def annotations_of(type: Type) -> dict[str, str]:

@@ -335,6 +335,15 @@ def test_every_command_helps_with_an_example(potto: Potto, command: str) -> None
     assert ran.status == 0 and "example:" in ran.out and f"potto {command}" in ran.out
 
 
+def test_an_expression_needs_no_file(potto: Potto) -> None:
+    assert potto("eval", "1 + 1").out == "2\n"
+    assert potto("eval", "integral [0, 1] [x < 0.25] d(x)").out == "0.25\n"
+    assert json.loads(potto("eval", "--json", "2^3").out)["value"] == 8
+    assert potto("eval", "--set", "t=3", "t^2").out == "9\n"
+    wrong = potto("eval", "nothing + 1")
+    assert wrong.status == 1 and "`nothing` is not defined" in wrong.err
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
