@@ -44,11 +44,13 @@ def _only(whole: str, path: str) -> str:
     return f"({whole}).{shape.fields[0][0]}" if isinstance(shape, Columns) and len(shape.fields) == 1 else whole
 
 
-def with_names(expression: str, given: Sequence[tuple[str, str]]) -> str:
-    """An expression with names for parts of it."""
-    if not given:
-        return expression
-    return f"let {'; '.join(f'{name} = {text}' for name, text in given)} in {expression}"
+def add_set(parser: argparse.ArgumentParser) -> None:
+    """The option that gives names of the program other values."""
+    parser.add_argument(
+        "--set", dest="set", metavar="NAME=EXPR", action="append", default=[], type=assignment,
+        help="what a name of the program stands for instead, or one more name; `xs=@heights.csv` is what a file holds, "
+             "`xs=@people.csv:height` a column",
+    )  # fmt: skip
 
 
 def function_in(world: World, file: str, text: str) -> Function:

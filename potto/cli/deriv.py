@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from msgspec import to_builtins
 from msgspec.structs import asdict
 
-from potto.cli.calling import argument_in, arguments_in, assignment, function_in
+from potto.cli.calling import add_set, argument_in, arguments_in, assignment, function_in
 from potto.cli.console import Console
 from potto.cli.numbers import accounts, add_options, settings_of, show_stats
 
@@ -30,6 +30,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--wrt", metavar="A,B", help="the parameters to differentiate by (default: all numbers)")
     parser.add_argument("--along", metavar="NAME=EXPR", action="append", default=[], type=assignment,
                         help="also the Hessian times the vector that has these components")  # fmt: skip
+    add_set(parser)
     add_options(parser)
 
 
@@ -47,7 +48,7 @@ def _symbols(options: argparse.Namespace, console: Console) -> int:
 
     world = Library(["."])
     try:
-        file = opened(world, options.file)
+        file = opened(world, options.file, options.set)
         world.need(file, nodes.Name(NOWHERE, options.name))
         target = resolve(world.db, file, options.name)
         facts = None
@@ -83,7 +84,7 @@ def _numbers(options: argparse.Namespace, console: Console) -> int:
 
     world = World(["."])
     try:
-        file = opened(world, options.file)
+        file = opened(world, options.file, options.set)
         with settings(**asdict(chosen)), accounts(options):
             once, twice = _taken(world, file, options)
     except PottoError as error:

@@ -6,7 +6,7 @@ import argparse
 import os
 from typing import Any
 
-from potto.cli.calling import assignment, with_names
+from potto.cli.calling import add_set
 from potto.cli.console import Console
 from potto.cli.numbers import accounts, add_options, settings_of, show_stats, totals
 
@@ -19,10 +19,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "file", metavar="FILE", nargs="?", help="the program; `-` reads it from standard input; without one, no names"
     )  # fmt: skip
     parser.add_argument("expression", metavar="EXPR", help="the expression")
-    parser.add_argument(
-        "--set", dest="given", metavar="NAME=EXPR", action="append", default=[], type=assignment,
-        help="a name for the expression; `xs=@heights.csv` is what a file holds, `xs=@people.csv:height` a column",
-    )  # fmt: skip
+    add_set(parser)
     add_options(parser)
 
 
@@ -32,7 +29,7 @@ def prepare(arguments: list[str]) -> list[str]:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    from potto.cli.opening import fail, nothing_opened, opened, others_json, report_others
+    from potto.cli.opening import fail, opened, others_json, report_others
 
     settings = settings_of(options, console)
     if settings is None:
@@ -46,9 +43,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
     from potto.runtime.answers.shown import estimate_json, format_answer, interval
 
     world = World(["."])
-    text = with_names(options.expression.strip(), options.given)
+    text = options.expression.strip()
     try:
-        file = nothing_opened(world) if options.file is None else opened(world, options.file)
+        file = opened(world, options.file, options.set)
         with accounts(options):
             answer = world.evaluate(file, text, settings)
     except ProgramError as error:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgspec.structs import asdict
 
-from potto.cli.calling import argument_in, arguments_in, assignment, function_in
+from potto.cli.calling import add_set, argument_in, arguments_in, assignment, function_in
 from potto.cli.console import Console
 from potto.cli.numbers import accounts, add_options, settings_of, show_stats
 
@@ -38,6 +38,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--data", metavar="FILE.csv", help="parameters as columns of a table with a line of names")
     parser.add_argument("--steps", type=int, default=200, help="the most steps (default 200)")
     parser.add_argument("--trace", metavar="FILE", help="write every step to a .csv or .json file")
+    add_set(parser)
     add_options(parser)
 
 
@@ -80,7 +81,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     world = World(["."])
     answers: list[Estimate] = []
     try:
-        file = opened(world, options.file)
+        file = opened(world, options.file, options.set)
         with settings(**asdict(chosen)), accounts(options):
             found = _fitted(world, file, options, console, answers)
     except PottoError as error:

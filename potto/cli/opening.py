@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from potto.cli.console import Console
@@ -18,9 +19,21 @@ if TYPE_CHECKING:
 NO_FILE = "<no file>"
 
 
-def opened(world: Library, path: str) -> str:
-    """The key of a file that a command works on, of a folder its `main.po`. Raises ProgramError if there is no
-    program there."""
+def opened(world: Library, path: str | None, given: Sequence[tuple[str, str]] = ()) -> str:
+    """The key of a file that a command works on, of a folder its `main.po`, of None a file with nothing in it. given:
+    names, and what they stand for instead. Raises ProgramError if there is no program there, or something wrong with
+    what is given."""
+    key = _found(world, path)
+    if given:
+        from potto.evaluating.given import give
+
+        give(world, key, given)
+    return key
+
+
+def _found(world: Library, path: str | None) -> str:
+    if path is None:
+        return _nothing(world)
     if path == "-":
         return open_stdin(world)
     if not os.path.exists(path):
@@ -41,7 +54,7 @@ def open_stdin(world: Library) -> str:
     return key
 
 
-def nothing_opened(world: Library) -> str:
+def _nothing(world: Library) -> str:
     """A file of the working folder with nothing in it: for expressions that need none."""
     return world.put(os.path.join(os.getcwd(), NO_FILE), "")
 

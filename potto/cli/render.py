@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgspec import Struct
 
-from potto.cli.calling import arguments_in, assignment, function_in
+from potto.cli.calling import add_set, arguments_in, assignment, function_in
 from potto.cli.console import Console
 from potto.cli.numbers import accounts, add_options, add_workers, settings_of, show_stats
 
@@ -39,6 +39,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--range", metavar="LO,HI", type=_range, help="what is black and what is white")
     parser.add_argument("--error", action="store_true", help="draw also the estimated error, by powers of ten")
     add_workers(parser)
+    add_set(parser)
     add_options(parser)
 
 
@@ -122,7 +123,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     grid = Grid(options.size[0], options.size[1], options.box)
     start = time.perf_counter()
     try:
-        file = opened(world, options.file)
+        file = opened(world, options.file, options.set)
         picture = _picture(world, file, options)
         with accounts(options):
             found = _sampled(picture, grid, settings, options.workers, console)

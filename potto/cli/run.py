@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from potto.cli.calling import add_set
 from potto.cli.console import Console
 from potto.cli.numbers import accounts, add_options, settings_of, show_stats
 
@@ -14,6 +15,7 @@ EXAMPLE = "  potto run examples/paper/main.po"
 
 def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", help="the script; `-` reads it from standard input")
+    add_set(parser)
     add_options(parser)
 
 
@@ -34,7 +36,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     said: list[Located] = []
     estimates: list[Estimate] = []
     try:
-        file = opened(world, options.file)
+        file = opened(world, options.file, options.set)
         with accounts(options):
             for event in world.run(file, settings):
                 if isinstance(event, Located):

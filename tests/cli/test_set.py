@@ -1,0 +1,83 @@
+"""`--set NAME=EXPR`: programs with other values for their names, in every command that evaluates."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from potto.__main__ import main
+
+PROGRAM = """\
+# a scene
+c = 1  # grey
+def shade(x)
+    c*x
+def pixel(x, y) shade(x + y)
+#> shade(2)
+def loss(a) (a - c)^2
+"""
+
+
+@pytest.fixture
+def program(tmp_path: Path) -> str:
+    path = tmp_path / "scene.po"
+    path.write_text(PROGRAM)
+    return str(path)
+
+
+def answered(capsys: pytest.CaptureFixture[str], *words: str, status: int = 0) -> str:
+    assert main(list(words)) == status
+    found = capsys.readouterr()
+    return found.out + found.err
+
+
+@pytest.mark.parametrize(
+    ("given", "value"),
+    [
+        ([], "2"),
+        (["c=3"], "6"),
+        (["c=3", "c=k + 1", "k=4"], "10"),
+        (["shade=\\x . 7*x"], "14"),
+        (["shade=\\x . c*x^2", "c=5"], "20"),
+    ],
+)
+def test_who_uses_a_name_gets_its_value(
+    program: str, capsys: pytest.CaptureFixture[str], given: list[str], value: str
+) -> None:
+    options = [word for text in given for word in ("--set", text)]
+    assert answered(capsys, "eval", program, "shade(2)", *options).strip() == value
+    assert Path(program).read_text() == PROGRAM
+
+
+def test_names_without_a_file(capsys: pytest.CaptureFixture[str]) -> None:
+    assert answered(capsys, "eval", "f(2) + k", "--set", "f=\\x . k*x", "--set", "k=3").strip() == "9"
+
+
+def test_a_script_leaves_a_name_to_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "people.csv").write_text("height,weight\n1.8,80\n1.6,60\n")
+    script = tmp_path / "summary.po"
+    script.write_text("print(sum h in people.height (h))\nprint(len(xs))\n")
+    options = ["--set", f"people=@{tmp_path / 'people.csv'}", "--set", "xs=[1, 2, 3]"]
+    assert answered(capsys, "run", str(script), *options).split() == ["3.4", "3"]
+    assert "P0201" in answered(capsys, "run", str(script), status=1)
+
+
+def test_pictures_fits_and_derivatives(program: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    import numpy as np
+
+    target = str(tmp_path / "picture.npy")
+    answered(capsys, "render", program, "pixel", "--set", "c=2", "--size", "2x2", "-o", target)
+    assert np.allclose(np.sort(np.load(target).ravel()), [1, 2, 2, 3])  # 2*(x + y) at the quarters
+    assert "a = 4" in answered(capsys, "fit", program, "loss", "a=1", "--set", "c=4")
+    assert "interior  2*x*dx" in answered(capsys, "deriv", program, "shade", "--set", "shade=\\x . x^2")
+
+
+def test_what_is_wrong_with_a_value(program: str, capsys: pytest.CaptureFixture[str]) -> None:
+    said = answered(capsys, "eval", program, "shade(2)", "--set", "c=1 +", status=1)
+    assert "<c>:1:3" in said and "P0101" in said
+    said = answered(capsys, "eval", program, "shade(2)", "--set", "c=grey", status=1)
+    assert "scene.po:2:5" in said and "P0201" in said
+    # what follows stands in the lines where it was
+    said = answered(capsys, "eval", program, "loss(1)", "--set", "shade=\\x . x", "--set", "c=(1, 2)", status=1)
+    assert "scene.po:7:" in said
