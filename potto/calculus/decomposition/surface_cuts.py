@@ -17,7 +17,7 @@ from potto.calculus.algebra.ranges import positive
 from potto.calculus.solving.enclosable import slope_of
 from potto.calculus.solving.solve import Family, Sections, Unsolvable, sections
 from potto.core.simplify import normalized_surface
-from potto.core.terms import Const, Prim, Term, prim
+from potto.core.terms import ONE, Const, Prim, Term, prim
 
 RATIONAL = frozenset(("add", "neg", "mul", "div"))
 MOST_CENTERS = 6
@@ -136,7 +136,7 @@ def cut_along(surface: Term, variable: str) -> Cut:
 
 
 def _product(terms: tuple[Term, ...]) -> Term:
-    return prim("mul", *terms) if len(terms) > 1 else terms[0]
+    return prim("mul", *terms) if len(terms) > 1 else terms[0] if terms else ONE
 
 
 def factored(surface: Term, orientation: int) -> tuple[tuple[Face, ...], int]:

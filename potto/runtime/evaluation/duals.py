@@ -29,7 +29,8 @@ def call_derivative(
         machine.record.second = True
     if machine.directions or isinstance(primal, Paired):
         machine.record.second = machine.record.second or machine.directions > 0
-        return machine.call(dual_function(machine, primal), groups, None)
+        pairs = tuple(tuple(_with_tangent(arg, machine.directions) for arg in group) for group in groups)
+        return machine.call(dual_function(machine, primal), pairs, None)
     _, arities = uncurried(primal.lam, sizes_of(groups))
     carrying = machine.with_directions(1)
     dual_groups = tuple(
@@ -37,6 +38,14 @@ def call_derivative(
     )
     value = split(carrying.call(primal.padded(1), dual_groups, trace))
     return compared(machine, function.primal, groups, value) if isinstance(function.primal, Derivative) else value
+
+
+def _with_tangent(arg: Value, directions: int) -> Value:
+    """A plain number, or an array of them, as a dual with tangent 0; a dual as it is."""
+    if isinstance(arg, Cell | Rows):
+        motionless = (None,) * directions
+        return arg, map_cells(arg, lambda _: Cell(0.0, None, motionless, motionless))
+    return arg
 
 
 def merge(arg: Value) -> Value:
