@@ -22,7 +22,7 @@ def by_scale(s) snd(deriv(part)((s, 1), 3))
     [
         ("by_number", 0.3, 0.6, 2),  # c t^2/2: the argument that is a plain number has tangent 0
         ("by_array", 0.3, 0.375, 1.25),  # t^2/2 (1 + 1/4)
-        # with u = 2 - log(3/s) the area is 1 - u^2/2; along one variable the surface of its own is a quotient of constants
+        # with u = 2 - log(3/s) the area is 1 - u^2/2; z only scales its own surface
         ("by_scale", 1.0, -0.9013877113318903, -0.0986122886681097),
     ],
 )
