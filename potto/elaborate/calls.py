@@ -36,8 +36,9 @@ from potto.elaborate.context import Elaboration, rule
 from potto.elaborate.filling import Filling, Given, Packed, Spread, fill
 from potto.elaborate.lookups import image, interp
 from potto.elaborate.signatures import groups_of_term
+from potto.elaborate.slopes import slope
 from potto.elaborate.values import Builtin, Closure, Groups, Scope, Value, counted
-from potto.modules.builtins import VECTORS
+from potto.modules.builtins import DERIVATIVES, VECTORS
 from potto.source import Span
 from potto.syntax import nodes
 
@@ -50,6 +51,8 @@ def _apply(elaboration: Elaboration, node: nodes.Apply, scope: Scope) -> Value:
     if isinstance(only, nodes.Text) and elaboration.value(node.function, scope) == Builtin("load"):
         return loaded(elaboration, only.text)
     function = elaboration.value(node.function, scope)
+    if isinstance(function, Builtin) and function.name in DERIVATIVES and node.arguments:
+        return slope(elaboration, function.name, node, elaboration.value(node.arguments[0].value, scope))
     given = [Given(argument.name, elaboration.value(argument.value, scope)) for argument in node.arguments]
     return call(elaboration, function, given, node.span)
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from potto.primitives import PRIMITIVES
 
 CONSTANTS = ("pi", "inf")
-SPECIALS = ("deriv", "delta", "load")
+DERIVATIVES = ("D", "grad")
+SPECIALS = ("deriv", "delta", "load", *DERIVATIVES)
 PROJECTIONS = ("fst", "snd")
 LOOK_UPS = ("interp", "image")
 VECTORS = ("len", "dot", "norm", "cross", *LOOK_UPS)

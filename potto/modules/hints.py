@@ -81,6 +81,9 @@ def library_hint(module: str, names: Iterable[str] = ()) -> str:
     return ""
 
 
+MUCH_WORSE = 0.2  # a second name this much less alike is no help: `grad` for `raduis`, beside `radius`
+
+
 def near_names(name: str, candidates: Iterable[str], count: int = 2) -> tuple[str, ...]:
     """The names that `name` may have been meant to be, the likeliest first."""
     known = dict.fromkeys(candidate for candidate in candidates if candidate != name)
@@ -90,7 +93,9 @@ def near_names(name: str, candidates: Iterable[str], count: int = 2) -> tuple[st
     import difflib  # most programs name what there is
 
     cutoff = 0.6 if len(name) > 3 else 0.5
-    return tuple(difflib.get_close_matches(name, list(known), n=count, cutoff=cutoff))
+    close = difflib.get_close_matches(name, list(known), n=count, cutoff=cutoff)
+    scores = [difflib.SequenceMatcher(None, candidate, name).ratio() for candidate in close]
+    return tuple(candidate for candidate, score in zip(close, scores) if score > scores[0] - MUCH_WORSE)
 
 
 def did_you_mean(near: Iterable[str]) -> str:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from potto.diagnostics import Diagnostic, Suggestion, shortened
+from potto.modules.builtins import DERIVATIVES
 from potto.modules.hints import did_you_mean, instead, near_names
 from potto.primitives import PRIMITIVES
 from potto.source import Span
@@ -23,6 +24,7 @@ from potto.types.loading import loaded
 from potto.types.mismatches import between, comparison, describe, mismatch
 from potto.types.motionless import check_tangents, takes_duals
 from potto.types.scope import Builtin
+from potto.types.slopes import slope
 from potto.types.types import (
     REAL,
     UNKNOWN,
@@ -54,6 +56,8 @@ def _apply(inference: Inference, node: nodes.Apply) -> Type:
             return of_vectors(inference, node)
         if form == "load":
             return loaded(inference, node)
+        if form in DERIVATIVES:
+            return slope(inference, node, form)
         return _deriv(inference, node) if form == "deriv" else _delta(inference, node)
     callee = resolve(inference.infer(node.function))
     types = [inference.infer(argument.value) for argument in node.arguments]

@@ -6,8 +6,11 @@ jumps, its tangent has deltas. What must be plain is the values alone: a tangent
 
 from __future__ import annotations
 
-from potto.types.algebra import flat, inputs_of, merge, ports_in
+from potto.types.algebra import flat, inputs_of, merge, ports_in, symbolic
+from potto.types.apply import call
+from potto.types.types import ArrayOf, Parameter, TupleOf, Type, groups_of, resolve, result_of
 from potto.types.values import (
+    HAZY,
     Abstract,
     Choice,
     Closure,
@@ -37,6 +40,35 @@ def dual(value: Value) -> Value:
             return _dual_of_input(value)
         case Choice(options):
             return Choice(tuple(dual(option) for option in options))
+        case _:
+            return value
+
+
+def slope_value(value: Value, type: Type) -> Value:
+    """What `D` and `grad` make of a function: the tangent of its answer, in the shape of the result of `type`."""
+    groups = groups_of(type)
+    return _slope_group(dual(value), groups, result_of(type)) if groups else HAZY
+
+
+def _slope_group(function: Value, groups: tuple[tuple[Parameter, ...], ...], result: Type) -> Value:
+    if not groups:
+        tangent = function.items[1] if isinstance(function, TupleValue) and len(function.items) == 2 else function
+        return _shaped(tangent, result) if isinstance(tangent, Scalar) else tangent
+    inputs = tuple(
+        symbolic(p.type, lambda p=p: Source("input", p.name or "x"), lambda p=p: Port(p.name or "x"))  # type: ignore[misc]
+        for p in groups[0]
+    )
+    answer, effects = call(function, tuple(map(_doubled, inputs)))
+    return Closure(inputs, _slope_group(answer, groups[1:], result), tuple(effects))
+
+
+def _shaped(value: Scalar, type: Type) -> Value:
+    """The same for every number of a type."""
+    match resolve(type):
+        case TupleOf(items):
+            return TupleValue(tuple([_shaped(value, item) for item in items]))
+        case ArrayOf(_, item):
+            return ListValue(_shaped(value, item))
         case _:
             return value
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from potto.modules.builtins import LOOK_UPS, VECTORS
+from potto.modules.builtins import DERIVATIVES, LOOK_UPS, VECTORS
 from potto.primitives import PRIMITIVES
 from potto.syntax import nodes
 from potto.syntax.printer import print_expression
@@ -12,7 +12,7 @@ from potto.types.algebra import flat, jumps_of, merge, still
 from potto.types.apply import call
 from potto.types.calls import callee_name
 from potto.types.context import Plan
-from potto.types.dualize import dual
+from potto.types.dualize import dual, slope_value
 from potto.types.flow import Walk, walks
 from potto.types.flow_arrays import element
 from potto.types.infer import strip
@@ -43,6 +43,10 @@ def _apply(walk: Walk, node: nodes.Apply) -> Value:
         return _delta(walk, node)
     if name == "load":
         return still(walk.inference.types[id(node)])
+    if name in DERIVATIVES and not node.arguments:
+        return HAZY
+    if name in DERIVATIVES:
+        return slope_value(walk.value(node.arguments[0].value), walk.inference.types[id(node)])
     arguments = [walk.value(argument.value) for argument in node.arguments]
     if name == "deriv":
         return dual(arguments[0]) if len(arguments) == 1 else HAZY

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from functools import cache
 
 from potto.diagnostics import Diagnostic
-from potto.modules.builtins import SPECIALS
+from potto.modules.builtins import DERIVATIVES, SPECIALS
 from potto.primitives import PRIMITIVES
 from potto.syntax import nodes
 from potto.types import kinds
@@ -137,6 +137,8 @@ def _builtin(inference: Inference, node: nodes.Name | nodes.Member, name: str) -
 
 _APPLIED = {
     "deriv": "a function, `deriv(f)`",
+    "D": "a function, `D(f)(0.3)`, and the name of a parameter, `D(f, c)`",
+    "grad": "a function, `grad(f)(0.3, 2)`, and names of parameters, `grad(f, a, b)`",
     "delta": "a diffeomorphism's result, `delta(x - t)`",
     "load": 'the name of a file, `load("heights.csv")`',
 }
@@ -338,7 +340,8 @@ def special(inference: Inference, expr: nodes.Expr) -> str | None:
 
 
 def deriv_argument(inference: Inference, node: nodes.Apply) -> nodes.Expr | None:
-    """The function that is derived, if this is `deriv(f)`."""
-    if special(inference, node.function) != "deriv" or len(node.arguments) != 1:
-        return None
-    return node.arguments[0].value
+    """The function that is derived, if this is `deriv(f)`, `D(f, …)` or `grad(f, …)`."""
+    form = special(inference, node.function)
+    if form in DERIVATIVES and node.arguments:
+        return node.arguments[0].value
+    return node.arguments[0].value if form == "deriv" and len(node.arguments) == 1 else None

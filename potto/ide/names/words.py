@@ -90,6 +90,12 @@ _SPECIALS = (
     Special("deriv", "(A -> B) -> D A -> D B", "The derivative of a function: it takes duals `(value, tangent)` under "
             "the names of the parameters with a `d` in front and gives the dual of the result. A plain number stands "
             "for one with tangent 0.", "", "deriv(f)(dc=(0.5, 1))", ("f",)),
+    Special("D", "(A -> B) -> A -> B", "The derivative of a function by its first parameter, `D(f)(0.3)`, or by the "
+            "one that is named, `D(f, c)(0.3, 2)`. It takes what the function takes.", "", "D(\\t . t^2)(3)",
+            ("f", "parameter")),
+    Special("grad", "(A -> Real) -> A -> A", "The derivatives of a function by all its parameters, or by those that "
+            "are named, `grad(f, a, b)`: a tuple in their order. Of a tuple, an array or a record they have its shape.",
+            "", "grad(\\(a, b) . a*b)(2, 3)", ("f", "parameters")),
     Special("delta", "Real -> Dist", "The Dirac delta of a diffeomorphism's first coordinate. It has a meaning under "
             "an integral over the variables that it varies with.", "", "integral [0, 1] x*delta(x - 0.5) d(x)"),
     Special("fst", "(a, b) -> a", "The first part of a tuple.", "d fst(p) = fst(dp)", "fst((1, 2))", ("p",)),
