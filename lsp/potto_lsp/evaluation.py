@@ -1,7 +1,7 @@
 """The server's side of the evaluation process: started when first needed, asked one task at a time.
 
-Owns `Evaluator` and `Task`. A task has a time limit and can be cancelled: the process is interrupted, and ended if it
-does not heed that. One that dies is started again for the next task.
+Owns `Evaluator` and `Task`. A task has limits of time and memory and can be cancelled: the process is interrupted, and
+ended if it does not heed that. One that dies is started again for the next task.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 LIMIT, LOADING, GRACE = 10.0, 60.0, 0.5  # seconds: for a task, for the start, to heed an interrupt
+MEMORY = 4096.0  # megabytes for a task
 PATIENCE = 0.3  # seconds that a task may run on while a more urgent one waits
 COMMAND, LIVE, POINTS = 0, 1, 2  # how urgent a task is: what a user asked for comes first
 
@@ -40,6 +41,7 @@ class Task(Struct, eq=False):
     texts: Mapping[str, str] = {}
     roots: tuple[str, ...] = ()
     limit: float = LIMIT
+    memory: float = MEMORY
     urgency: int = COMMAND
 
 
@@ -68,13 +70,18 @@ class Evaluator:
         analysis = self._analysis
         task.texts = {key: document.text.text for key, document in analysis.documents.items()}
         task.roots = analysis.files.roots
-        limit = analysis.settings.get("evaluation.timeLimit")
-        task.limit = float(limit) if isinstance(limit, int | float) and limit > 0 else LIMIT
+        task.limit = self._setting("evaluation.timeLimit", LIMIT)
+        task.memory = self._setting("evaluation.memoryLimit", MEMORY)
         if self._thread is None:
             self._thread = Thread(target=self._work, name="potto-evaluation", daemon=True)
             self._thread.start()
         self._add(task)
         return task
+
+    def _setting(self, name: str, default: float) -> float:
+        """A limit that the user has set, if it is a number above 0."""
+        value = self._analysis.settings.get(name)
+        return float(value) if isinstance(value, int | float) and value > 0 else default
 
     def _add(self, task: Task) -> None:
         self._tasks.put((task.urgency, next(self._order), task))
@@ -123,7 +130,8 @@ class Evaluator:
         closed = {key: None for key in self._sent if key not in task.texts}
         texts = {key: text for key, text in task.texts.items() if self._sent.get(key) != text}
         self._sent = dict(task.texts)
-        message = {"id": id, "do": task.do, "file": task.file, "text": task.text, "roots": task.roots, **task.more}
+        message = {"id": id, "do": task.do, "file": task.file, "text": task.text, "roots": task.roots}
+        message |= {"memory": task.memory, **task.more}
         assert process.stdin is not None
         try:
             process.stdin.write(json.dumps({**message, "texts": {**texts, **closed}}) + "\n")

@@ -54,7 +54,7 @@ class Interrupts:
 
 
 def main() -> int:
-    """Do tasks until standard input ends."""
+    """Do tasks until standard input ends, or memory does: what a task has left behind would fail the next ones."""
     from potto_lsp.main import take_streams
 
     reader, writer = take_streams()
@@ -66,12 +66,34 @@ def main() -> int:
     for line in tasks:
         task = json.loads(line)
         try:
-            with interrupts.allowed():
+            with interrupts.allowed(), _within(task["memory"]):
                 answer = _answer(world, task)
         except KeyboardInterrupt:
             answer = {"error": "interrupted"}
+        except MemoryError:
+            _say(answers, {"id": task["id"], "error": f"stopped at {task['memory']:g} MB of memory"})
+            return 0
         _say(answers, {"id": task["id"], **answer})
     return 0
+
+
+@contextmanager
+def _within(megabytes: float) -> Iterator[None]:
+    """Let the task have so much memory, where the system can hold a process to that (Linux: what it has to itself,
+    so that neither libraries nor mapped files count)."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        yield
+        return
+    before, most = resource.getrlimit(resource.RLIMIT_DATA)
+    wanted = int(megabytes * 2**20)
+    wanted = wanted if most == resource.RLIM_INFINITY else min(wanted, most)
+    resource.setrlimit(resource.RLIMIT_DATA, (wanted, most))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_DATA, (before, most))
 
 
 def _loaded() -> World:
@@ -111,6 +133,8 @@ def _answer(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
         return {"error": _rendered(error), "brief": "; ".join(d.message for d in error.diagnostics)}
     except Unanswerable as error:
         return {"error": str(error)}
+    except MemoryError:
+        raise
     except Exception as error:  # a bug of ours: told, and the process lives on
         import traceback
 

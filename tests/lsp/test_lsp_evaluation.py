@@ -6,6 +6,7 @@ import base64
 import re
 import signal
 import stat
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -26,6 +27,7 @@ TEXT = "def f(t)\n    integral [0, 1] [x < t] * x d(x)\n#> f(0.5)\n#= 0.125\n#> 
 PUSHED = "textDocument/publishDiagnostics"
 # A sum that takes minutes.
 HEAVY = "sum i in 1..50000 (integral ([0,1],[0,1],[0,1]) [x*y + z*i < 1/i] * sin(x*y*z*i) d(x,y,z))"
+LARGE = "[i*1.5 for i in 0..9999999][9999999]"  # ten million numbers of 8 bytes, more than once
 REFRESHES = {"workspace": {"inlayHint": {"refreshSupport": True}}}
 
 
@@ -333,6 +335,20 @@ def test_an_evaluation_that_hangs_is_ended(deaf: bool) -> None:
         evaluator._process.send_signal(signal.SIGSTOP)
     assert "stopped after 0.5 seconds" in ask(evaluator, HEAVY)["error"]
     assert ask(evaluator, "2 + 3") == {"text": "5"}
+    evaluator.close()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux holds a process to what it may allocate")
+def test_an_evaluation_that_takes_too_much_memory_is_stopped() -> None:
+    """It is told so, and what is asked next is answered."""
+    evaluator = Evaluator(Analysis("utf-16"))
+    assert ask(evaluator, "1 + 1") == {"text": "2"}
+    evaluator._analysis.settings = {"evaluation.memoryLimit": 300}
+    for _ in range(2):
+        assert "stopped at 300 MB of memory" in ask(evaluator, LARGE)["error"]
+        assert ask(evaluator, "2 + 3") == {"text": "5"}
+    evaluator._analysis.settings = {}
+    assert ask(evaluator, LARGE)["text"].startswith("14999998.5")
     evaluator.close()
 
 

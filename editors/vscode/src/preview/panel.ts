@@ -213,7 +213,11 @@ class Preview {
 
 /** What stopped for want of time can be given more. */
 const advised = (message: string): string =>
-  message.startsWith("stopped after ") ? `${message}; the setting potto.evaluation.timeLimit gives it more` : message;
+  message.startsWith("stopped after ")
+    ? `${message}; the setting potto.evaluation.timeLimit gives it more`
+    : message.startsWith("stopped at ")
+      ? `${message}; the setting potto.evaluation.memoryLimit gives it more`
+      : message;
 
 const title = (uri: vscode.Uri): string => `Preview ${posix.basename(uri.path)}`;
 
