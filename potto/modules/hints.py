@@ -58,6 +58,8 @@ _CALLED = {
 }  # fmt: skip
 """What can be written in the place of a name of elsewhere as it stands."""
 
+MARKS = ("potto.toml", ".git", "pyproject.toml")  # of the folder of a project
+
 _LIBRARIES = frozenset({"math", "cmath", "numpy", "np", "scipy", "sympy", "jax", "jnp", "torch", "random", "maths"})
 
 
@@ -150,6 +152,19 @@ def looked_in(db: Database, file: str, dotted: str) -> tuple[str, ...]:
 
 
 def elsewhere(db: Database, file: str, name: str) -> str | None:
-    """A module of the workspace that defines a name, as it would be written in `file`."""
-    found = (module_name(db, file, other) for other in definers(db, name) if other != file)
+    """A module that defines a name, as it would be written in `file`: one of the same project, if both are in one."""
+    own = _project(file if os.path.isabs(file) else os.path.join(*folders(db, file)[:1], file))
+    inside = (other for other in definers(db, name) if other != file and _project(other) == own)
+    found = (module_name(db, file, other) for other in inside)
     return next((module for module in found if module is not None), None)
+
+
+def _project(file: str) -> str | None:
+    """The folder of the project that a file is in: the nearest with a mark of one; None where there is none above."""
+    folder = os.path.dirname(file)
+    while not any(os.path.exists(os.path.join(folder, mark)) for mark in MARKS):
+        above = os.path.dirname(folder)
+        if above == folder or not folder:
+            return None
+        folder = above
+    return folder

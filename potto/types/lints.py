@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from potto.diagnostics import Diagnostic
+from potto.modules.builtins import is_builtin
+from potto.source import Span
 from potto.syntax import nodes
 from potto.syntax.nodes import Node
+from potto.syntax.walk import walk as every
 from potto.types import kinds
 from potto.types.context import Inference
 from potto.types.flow import Walk
@@ -19,7 +22,7 @@ def lints(inference: Inference, walk: Walk, item: Node) -> Iterator[Diagnostic]:
     yield from _unused(inference)
     yield from _constant_conditions(inference)
     if isinstance(item, nodes.Definition) and (item.groups or isinstance(item.body, nodes.Lambda)):
-        yield from _still_surfaces(walk)
+        yield from _still_surfaces(inference, walk, item)
 
 
 def _unused(inference: Inference) -> Iterator[Diagnostic]:
@@ -61,8 +64,9 @@ def _literal(expr: nodes.Expr) -> bool:
     return isinstance(expr, nodes.Number)
 
 
-def _still_surfaces(walk: Walk) -> Iterator[Diagnostic]:
-    """Surfaces over variables of integration alone. What is wrong or comes from elsewhere is left alone."""
+def _still_surfaces(inference: Inference, walk: Walk, item: Node) -> Iterator[Diagnostic]:
+    """Surfaces that a definition without parameters places: it looks as if it could move them, and cannot. Those of
+    numbers alone, `[x < 0.5]`, are meant to stand still. What is wrong or comes from elsewhere is left alone."""
     seen = set()
     for surface in walk.surfaces:
         kinds_of = {source.kind for source in surface.sources}
@@ -71,9 +75,29 @@ def _still_surfaces(walk: Walk) -> Iterator[Diagnostic]:
         if any(source.origin is not None for source in surface.sources):
             continue
         seen.add(surface.span)
-        yield kinds.STILL_SURFACE(
-            surface.span,
-            "no parameter moves this surface",
-            label="has no boundary term",
-            notes=("it depends on variables of integration only, so it contributes nothing to a derivative",),
-        )
+        name = _constant_in(inference, item, surface.span)
+        if name:
+            yield kinds.STILL_SURFACE(
+                surface.span,
+                f"no parameter moves this surface: `{name}` is a constant",
+                label="has no boundary term",
+                notes=("it depends on variables of integration only, so it contributes nothing to a derivative",),
+                help=f"make `{name}` a parameter, if derivatives are to be taken by it",
+            )
+
+
+def _constant_in(inference: Inference, item: Node, place: Span) -> str:
+    """The first name in a place that means a value of the file or of an import; nothing if there is none."""
+    local = {found.name for found in inference.locals}
+    called: set[Span] = set()
+    for node in every(item):
+        match node:
+            case nodes.Apply():
+                called.add(node.function.span)
+            case nodes.Name():
+                inside = place.start <= node.span.start and node.span.end <= place.end
+                if inside and node.span not in called and node.id not in local and not is_builtin(node.id):
+                    return node.id
+            case _:
+                pass
+    return ""

@@ -334,7 +334,10 @@ def test_lints() -> None:
         def h(x) integral [0, x] x^2 d(x)
         #                              ^ warning[P0612]: `x` hides the parameter
         def i(t) integral [0, 1] t*[x < 0.5] d(x)
-        #                          ^^^^^^^^^ hint[P0613]: no parameter moves this surface
+        edge = 0.5
+        def k(t) integral [0, 1] t*[x < 2*edge] d(x)
+        #                          ^^^^^^^^^^^^ hint[P0613]: no parameter moves this surface: `edge` is a constant
+        def l(t) integral [0, 1] (let u = 2*x in t*[sin(u) < pi/4]) d(x)
         def j(x) if 1 < 2 then x else 0
         #           ^^^^^ warning[P0614]: this condition never changes
         area = integral ([0, 1], [0, 1]) [x^2 + y^2 < 1] d(x, y)
