@@ -84,6 +84,7 @@ class Session:
         self.number = 0
         self.loaded: list[str] = []
         self._answers = 0
+        self._kept = ""  # the entry that has given the last answer
         self._see(())
 
     # Entries
@@ -159,8 +160,12 @@ class Session:
         return Valued(shown.text, shown.estimates, format_type(inferred.type), self._keep(entry, source, shown))
 
     def _keep(self, entry: str, source: SourceText, shown: Shown) -> tuple[str, ...]:
-        """Let `_` and `_3` be the answer to entry 3 in later entries: its value, or the expression of a function."""
+        """Let `_` and `_3` be the answer to entry 3 in later entries: its value, or the expression of a function. Of
+        several values in one entry, as in a paste, each has a number of its own."""
         self._answers += 1
+        if self._kept == entry:
+            self.number += 1
+        self._kept = entry
         number, text = f"_{self.number}", source.text[shown.span.start : shown.span.end]
         before = self.prelude
         answer, last = f"<Out {self._answers}>", f"<Last {self._answers}>"

@@ -125,7 +125,7 @@ class _Lexer:
             if word == "return" and self._returns(end):
                 nesting.report(no_return(self.text, Span(start, end)))
                 return end
-            if word == "d" and nesting.words and _D.match(self.text, end) and nesting.close_integral():
+            if word == "d" and nesting.words and _D.match(self.text, end) and nesting.close_integral(start):
                 kind = "D"
             elif self.clauses and self._starts_clause(start):
                 kind = word.upper()
@@ -363,8 +363,9 @@ def lex(text: str, diffeo: bool = False, alone: bool = False) -> Lexed:
     text = normalized(text)
     lexer = _read(text, diffeo, alone, frozenset())
     never_closed = frozenset(lexer.nesting.never_closed)
-    if never_closed and "\n" in text and not lexer.too_deep:
-        # Read again, knowing which brackets have no end: they end where the indentation says that they must have.
+    if never_closed and not lexer.too_deep:
+        # Read again, knowing which brackets have no end: they end where the indentation, or the `d(x)` of an integral
+        # that they opened in, says that they must have.
         lexer = _read(text, diffeo, alone, never_closed)
     return Lexed(lexer.tokens, lexer.comments, lexer.nesting.diagnostics, lexer.too_deep, never_closed)
 

@@ -23,6 +23,8 @@ _CHARACTER = {"LPAR": "(", "RPAR": ")", "LSQB": "[", "RSQB": "]"}
 _DIFFERENTIAL = re.compile(rf"\bd ?({FIRST_NAME.pattern})\Z")
 """`dx` or `d x`, as mathematics writes it."""
 
+_DIFFERENTIATES = re.compile(r"\s*d\s*\(")
+
 
 @dataclass(slots=True)
 class _Open:
@@ -58,8 +60,10 @@ class Nesting:
         """A `let`, `sum` or `integral` begins."""
         self.words.append(_Open(kind, start, len(self.brackets)))
 
-    def close_integral(self) -> bool:
-        """Close the innermost integral that is open at this depth of brackets, if there is one."""
+    def close_integral(self, at: int) -> bool:
+        """Close the innermost integral that is open at this depth of brackets, if there is one. Brackets around the
+        `d` at `at` that the text never closes, and that opened in the integral, must have ended before it."""
+        self._close_integrand(at)
         depth = len(self.brackets)
         for index in range(len(self.words) - 1, max(-1, len(self.words) - MAX_NESTING), -1):
             word = self.words[index]
@@ -69,6 +73,15 @@ class Nesting:
                 del self.words[index:]
                 return True
         return False
+
+    def _close_integrand(self, at: int) -> None:
+        depth = -1
+        for word in self.words[-MAX_NESTING:]:
+            depth = word.depth if word.kind == "INTEGRAL" else depth
+        if depth < 0 or any(bracket.start not in self.unclosed for bracket in self.brackets[depth:]):
+            return
+        while len(self.brackets) > depth:
+            self.close_unclosed(at)
 
     def close_in(self) -> bool:
         """`in` belongs to the innermost `let` or `sum` at this depth; whether it is that of a `let`."""
@@ -178,7 +191,9 @@ class Nesting:
 
     def _closings(self, start: int, last: int, closer: str) -> tuple[Suggestion, ...]:
         """Where a closing bracket may be meant: at the end of the line of the opening one, where it is missed, at the
-        very end."""
+        very end. Ahead of the `d(x)` of an integral only there."""
+        if _DIFFERENTIATES.match(self.text, last):
+            return (insert(last, closer),)
         line = self.text.find("\n", start)
         ends = (len(self.text[: line if line >= 0 else None].rstrip()), last, len(self.text.rstrip()))
         return tuple(insert(end, closer) for end in dict.fromkeys(ends))

@@ -18,6 +18,7 @@ from potto.source import SourceText
 
 Kind = Literal["answer", "output", "note", "tail", "error", "help", "diagnostic", "picture"]
 _GOES_ON = re.compile(r"(?!\w+ : )[\w`(\"'\[$]")  # how a line begins that may belong to the paragraph above
+NARROWEST = 36  # columns, from which on a number and its error go on one line
 COMPLAINTS: frozenset[Kind] = frozenset(("error", "help", "diagnostic"))
 
 
@@ -26,7 +27,8 @@ class Part(Struct, frozen=True):
 
     answer: what was asked for. output: what a program printed. note: what is good to know. tail: what it cost; shown
     to people only. error, help: a command that could not be carried out, and what to do. diagnostic: about a program.
-    picture: an image, as pixels in `data`. `prose`: its lines may be broken where a screen is narrow.
+    picture: an image, as pixels in `data`. `prose`: its lines may be broken where a screen is narrow; `numbers`: between
+    numbers, each with its error.
     """
 
     kind: Kind
@@ -35,6 +37,7 @@ class Part(Struct, frozen=True):
     located: Located | None = None
     sources: Mapping[str, SourceText] = {}
     prose: bool = False
+    numbers: bool = False
 
     @property
     def is_error(self) -> bool:
@@ -61,6 +64,8 @@ class Part(Struct, frozen=True):
         if self.kind == "help":
             said = broken(f"  = help: {self.text}", columns, 4)
             return said.replace("help", palette.paint(palette.bold, "help"), 1)
+        if self.numbers and columns is not None:
+            return "\n".join(_between_numbers(line, columns) for line in self.text.split("\n"))
         if self.prose or self.kind in ("note", "tail"):
             return self.text if columns is None else _broken_lines(self.text, columns)
         return self.text
@@ -119,6 +124,28 @@ def _broken_lines(text: str, columns: int) -> str:
             lines.append(line)
     return "\n".join(broken(line, columns, indent) if (indent := len(line) - len(line.lstrip())) < 4 else line
                      for line in lines)  # fmt: skip
+
+
+def _between_numbers(line: str, columns: int) -> str:
+    """A line with numbers, broken only between them: first where three blanks set something off. A number, what it is
+    called and its error stay together where there is room."""
+    if len(line) < columns:
+        return line
+    indent = len(line) - len(line.lstrip()) + 4
+    lines = [""]
+    for part in re.split(r"(?<=\S) {3,}(?=[a-z])", line):
+        joined = f"{lines[-1]}   {part}" if lines[-1] else part
+        if lines[-1] and len(joined) >= columns:
+            lines.append(" " * indent + part)
+        else:
+            lines[-1] = joined
+    if columns > NARROWEST:
+        lines = [re.sub(r" (±) |\b(interior|boundary|gives) ", _glued, part) for part in lines]
+    return "\n".join(broken(part, columns, indent).replace("\1", " ") for part in lines)
+
+
+def _glued(found: re.Match[str]) -> str:
+    return found[0].replace(" ", "\1")
 
 
 def answer(text: str, **data: Any) -> Part:

@@ -19,6 +19,9 @@ from potto_repl.session import Conversation
 
 _QUESTION = re.compile(r"\s*([^\W\d][\w.']*|:\w+)\s*(\?{1,2})\s*")
 
+# What other prompts are left and asked with; names that are defined go first.
+_WORDS = {"?": "help", "help": "help", "help()": "help"} | dict.fromkeys(("quit", "exit", "quit()", "exit()"), "quit")
+
 
 def respond(session: Conversation, text: str) -> Reply:
     """The whole answer to an entry or a command."""
@@ -87,8 +90,8 @@ def _answered(session: Conversation, text: str) -> Iterator[Part]:
     elif stripped.startswith(":"):
         word, argument = command_words(stripped)
         yield from parts(find(word).run(session, argument))
-    elif stripped in ("?", "help", "quit", "exit") and session.target(stripped) is None:
-        yield from parts(find({"exit": "quit", "?": "help"}.get(stripped, stripped)).run(session, ""))
+    elif stripped in _WORDS and session.target(stripped.removesuffix("()")) is None:
+        yield from parts(find(_WORDS[stripped]).run(session, ""))
     elif stripped:
         from potto_repl.answers import entry_parts
 
@@ -97,7 +100,7 @@ def _answered(session: Conversation, text: str) -> Iterator[Part]:
 
 def command_words(text: str) -> tuple[str, str]:
     """The word of a command and its argument: `:type f(x)`, `:t f(x)`, `:?`."""
-    found = re.match(r":\s*(\w+|\?)?\s*(.*)", text, re.DOTALL)
+    found = re.match(r":\s*(\w+|\?|!)?\s*(.*)", text, re.DOTALL)
     assert found is not None
     return ("help" if found[1] in (None, "?") else found[1]), found[2].strip()
 

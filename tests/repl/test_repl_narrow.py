@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from potto_repl.paint import Look, painted
 from potto_repl.registry import COMMANDS
@@ -85,3 +87,14 @@ def test_pictures_fit(talk, columns):
         assert len(rows) > 4 and max(map(width, rows)) == columns
     coloured = lines(talk(":image x + y 128"), columns, color=True)
     assert {row.count("▀") for row in coloured[:-1]} == {columns}
+
+
+@pytest.mark.parametrize("columns", [40, 50, 60, 80])
+def test_numbers_stay_whole(talk, columns):
+    talk("def f(a, t) integral ([0, 1], [0, 1]) a*[x + y < t]*exp(x) d(x, y)")
+    for text in (":check f(2.5, 0.7)", ":grad f(2.5, 0.7)", "deriv(f)((2.5, 0), (0.7, 1))", "f(1/3, 0.7)"):
+        reply = talk(text)
+        shown = lines(reply, columns)
+        assert all(width(line) <= columns for line in shown), shown
+        numbers = re.findall(r"[\d.]*\d(?:e-?\d+)?(?: ± [\d.]+(?:e-?\d+)?)?", reply.parts[0].plain())
+        assert all(any(number in line for line in shown) for number in numbers)

@@ -82,7 +82,7 @@ def _compared(session: Conversation, called: Called, slope: Slope) -> Iterator[P
             rows.append("  the sum misses the boundary term")
     if not agree:
         rows.append("  the value may have a corner here, so that the derivatives on its two sides differ")
-    yield Part("answer", "\n".join(rows), {"check": data})
+    yield Part("answer", "\n".join(rows), {"check": data}, numbers=True)
 
 
 # Finite differences

@@ -17,6 +17,7 @@ from potto.reports.render import Located, ProgramError
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.printing import (
     format_bars,
+    format_digits,
     format_error,
     format_numbers,
     format_seconds,
@@ -35,6 +36,7 @@ from potto_repl.values import is_dual, parts_of, tail, value_parts
 
 TOLERANCES = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 SAMPLES = (1_000, 10_000, 100_000)
+ROUND, ROUNDS, MOST_TIMES = 0.1, 7, 10_000  # seconds of a round of `:timeit`, how many, of how many evaluations at most
 BRIEF = 3.0  # seconds: what took no longer may be done twice
 
 
@@ -73,7 +75,7 @@ def gradient(session: Conversation, text: str) -> Iterator[Part]:
         lines.append(line)
         data[slope.name] = dual.tangent
         cost = tail(dual, session.settings)
-    yield Part("answer", "\n".join(lines), {"gradient": data})
+    yield Part("answer", "\n".join(lines), {"gradient": data}, numbers=True)
     if cost:
         yield Part("tail", cost)
 
@@ -115,6 +117,32 @@ def show_time(session: Conversation, text: str) -> Iterator[Part]:
         cost += f", {counts.native_points - by_machine:,} points by machine code"
     rows += [f"{'total':<9} {format_seconds(total):>9}", cost]
     yield Part("answer", "\n".join(rows), {"seconds": phases, "kernels": kernels, "evaluations": estimate.evals})
+
+
+@command("timeit", argument="EXPR", completes="expression")
+def time_often(session: Conversation, text: str) -> Part:
+    """Show what an evaluation takes when it is done again and again: `:timeit f(0.3)`.
+
+    What is made once, plans and kernels, does not count. The least of several rounds is what the machine can do, the
+    median what it did.
+    """
+    asked = checked(session, text, ":timeit EXPR")
+
+    def seconds(times: int) -> float:
+        start = time.perf_counter()
+        for _ in range(times):
+            session.evaluate(asked.text, session.settings)
+        return (time.perf_counter() - start) / times
+
+    seconds(1)
+    once = seconds(1)
+    times = max(1, min(MOST_TIMES, round(ROUND / max(once, 1e-9))))
+    rounds = sorted(seconds(times) for _ in range(ROUNDS if once < BRIEF else 1))
+    least, median = rounds[0], rounds[len(rounds) // 2]
+    told = f"{len(rounds)} rounds of {times:,}" if len(rounds) > 1 else "one round"
+    shown = [f"{format_digits(1e3 * found, 3)} ms" for found in (least, median)]
+    return Part("answer", f"{shown[0]} at least, {shown[1]} in the median of {told}",
+                {"least": least, "median": median, "rounds": len(rounds), "times": times})  # fmt: skip
 
 
 def _lap(phases: dict[str, float], name: str, start: float) -> float:

@@ -1,0 +1,31 @@
+"""Brackets that an integrand never closes end before the `d(x)` of its integral; that is all there is to say of them."""
+
+from __future__ import annotations
+
+import pytest
+
+from potto.syntax import parse_expression
+
+
+@pytest.mark.parametrize(
+    ("text", "mended"),
+    [
+        ("integral [0, 1] [x < t d(x)", "integral [0, 1] [x < t] d(x)"),
+        ("integral ([0, 1], [0, 1]) [x^2 + y^2 < r^2 d(x, y)", "integral ([0, 1], [0, 1]) [x^2 + y^2 < r^2] d(x, y)"),
+        ("integral [0, 1] (2*x d(x)", "integral [0, 1] (2*x) d(x)"),
+        ("1 + (integral [0, 1] [x < t d(x))", "1 + (integral [0, 1] [x < t] d(x))"),
+        ("integral [0, 1] integral [0, 1] [x < y d(x) d(y)", "integral [0, 1] integral [0, 1] [x < y] d(x) d(y)"),
+    ],
+)
+def test_one_bracket_is_missing(text: str, mended: str) -> None:
+    (said,) = parse_expression(text).diagnostics
+    assert said.code == "P0102" and "never closed" in said.message
+    (suggestion,) = said.suggestions
+    (edit,) = suggestion.edits
+    assert text[: edit.span.start] + edit.text + text[edit.span.end :] == mended
+    assert not parse_expression(mended).diagnostics
+
+
+def test_several_are_missing() -> None:
+    found = parse_expression("integral [0, 1] (x*(1 + [x < 1 d(x)").diagnostics
+    assert [said.code for said in found] == ["P0102"] * 3
