@@ -27,8 +27,8 @@ class Part(Struct, frozen=True):
 
     answer: what was asked for. output: what a program printed. note: what is good to know. tail: what it cost; shown
     to people only. error, help: a command that could not be carried out, and what to do. diagnostic: about a program.
-    picture: an image, as pixels in `data`. `prose`: its lines may be broken where a screen is narrow; `numbers`: between
-    numbers, each with its error.
+    picture: an image, as pixels in `data`. `prose`: its lines may be broken where a screen is narrow; `numbers`:
+    between numbers, each with its error.
     """
 
     kind: Kind

@@ -1,4 +1,4 @@
-"""Brackets that an integrand never closes end before the `d(x)` of its integral; that is all there is to say of them."""
+"""Brackets that an integrand never closes end before the `d(x)` of its integral; nothing else is said of them."""
 
 from __future__ import annotations
 
