@@ -64,9 +64,7 @@ def field(elaboration: Elaboration, whole: Term, name: str) -> Term:
     place = place_in(elaboration.shapes.of(whole), name)
     if place is None:
         return hole(f"there is no part `{name}`")
-    if isinstance(whole, App) and elaboration.shapes.makes_record(whole.function):
-        return whole.args[place]
-    return proj(whole, place)
+    return _part(elaboration, whole, place)
 
 
 def shaped(elaboration: Elaboration, shape: TupleOf, parts: Sequence[Term]) -> Term:
@@ -76,6 +74,25 @@ def shaped(elaboration: Elaboration, shape: TupleOf, parts: Sequence[Term]) -> T
         return tuple_(parts)
     elaboration.shapes.meets_records = True
     return app(global_(record.file, record.name), tuple(parts))
+
+
+def standing(elaboration: Elaboration, whole: Term) -> Term:
+    """The tangent of a value that stands still: a value like it, of zeros."""
+    shape = elaboration.shapes.of(whole)
+    if isinstance(shape, TupleOf):
+        parts = [_part(elaboration, whole, place) for place in range(len(shape.items))]
+        return shaped(elaboration, shape, [standing(elaboration, part) for part in parts])
+    if isinstance(shape, ArrayOf):
+        place = elaboration.fresh("k")
+        elaboration.numbers.add(place)
+        return array(place, length(whole), standing(elaboration, index(whole, var(place))))
+    return ZERO
+
+
+def _part(elaboration: Elaboration, whole: Term, place: int) -> Term:
+    if isinstance(whole, App) and elaboration.shapes.makes_record(whole.function):
+        return whole.args[place]
+    return proj(whole, place)
 
 
 @rule(nodes.Text)

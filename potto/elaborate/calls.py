@@ -31,7 +31,7 @@ from potto.core.terms import (
     tuple_,
 )
 from potto.elaborate import builtins
-from potto.elaborate.arrays import loaded, of_vectors
+from potto.elaborate.arrays import loaded, of_vectors, standing
 from potto.elaborate.context import Elaboration, rule
 from potto.elaborate.filling import Filling, Given, Packed, Spread, fill
 from potto.elaborate.lookups import image, interp
@@ -41,6 +41,8 @@ from potto.elaborate.values import Builtin, Closure, Groups, Scope, Value, count
 from potto.modules.builtins import DERIVATIVES, VECTORS
 from potto.source import Span
 from potto.syntax import nodes
+from potto.types import interface
+from potto.types.still import lacks_tangents
 
 Arguments = Sequence[Given[Value]]
 
@@ -105,9 +107,28 @@ def _call_known(elaboration: Elaboration, function: Term, groups: Groups, given:
         return hole(filled)
     for group, filling in zip(groups, filled):
         args = tuple(map(elaboration.as_term, _values(elaboration, len(group), filling)))
+        if not isinstance(filling, Spread | Packed):
+            args = _with_tangents(elaboration, function, args)
         elaboration.shapes.meets_records |= elaboration.shapes.makes_record(function)
         function = elaboration.note(app(function, args), span)
     return function
+
+
+def _with_tangents(elaboration: Elaboration, function: Term, args: tuple[Term, ...]) -> tuple[Term, ...]:
+    """The arguments of a derivative; tuples and records that are given without tangents with those that are 0."""
+    head = function
+    while isinstance(head, App):
+        head = head.function
+    if isinstance(head, Global):
+        if not interface(elaboration.db, head.module, head.name).derivative:
+            return args
+    elif not (isinstance(head, Deriv) and isinstance(head.function, Global)):
+        return args
+    expected = elaboration.shapes.parameters(function)
+    return tuple(
+        tuple_((arg, standing(elaboration, arg))) if lacks_tangents(elaboration.shapes.of(arg), wanted) else arg
+        for arg, wanted in zip(args, expected)
+    ) if len(expected) == len(args) else args
 
 
 def _values(elaboration: Elaboration, count: int, filling: Filling[Value]) -> tuple[Value, ...]:

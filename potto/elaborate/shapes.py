@@ -84,6 +84,11 @@ class Shapes:
             case _:
                 return REAL
 
+    def parameters(self, function: Term) -> tuple[Type, ...]:
+        """The types of what a function takes next; none where that is not known."""
+        found = resolve(self._called(function))
+        return tuple(p.type for p in found.parameters) if isinstance(found, Function) else ()
+
     def makes_record(self, function: Term) -> bool:
         """Whether a function is the definition of a record."""
         found = signature(self.db, function.module, function.name) if isinstance(function, Global) else None

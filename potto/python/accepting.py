@@ -1,8 +1,9 @@
 """What Python has for numbers, arrays and tuples, as the few kinds that arguments are made of.
 
-Owns `accepted`, and `as_given`, the way back. Decimals and tensors become floats and arrays; a list where a number is
-wanted is a batch of numbers; a list, or an array whose last axis has its length, where a tuple is wanted, is that
-tuple. What it cannot place it hands on unchanged: the check of arguments says what is wrong with it.
+Owns `accepted`, `with_tangents` for derivatives, and `as_given`, the way back. Decimals and tensors become floats and
+arrays; a list where a number is wanted is a batch of numbers; a list, or an array whose last axis has its length, where
+a tuple is wanted, is that tuple. What it cannot place it hands on unchanged: the check of arguments says what is wrong
+with it.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ import numpy as np
 
 from potto.kernels.cells import Rows
 from potto.runtime.answers.estimate import Estimate
-from potto.types.types import Dist, Real, RecordName, TupleOf, Type, resolve
+from potto.types.still import values_of
+from potto.types.types import ArrayOf, Dist, Real, RecordName, TupleOf, Type, resolve
 
 PLAIN = (numbers.Real, np.ndarray, np.bool_, Estimate, Rows, str, bytes, tuple, list, Mapping)
 
@@ -33,6 +35,36 @@ def accepted(argument: Any, type: Type | None) -> Any:
     if isinstance(found, TupleOf):
         return _tuple(argument, found)
     return argument
+
+
+def with_tangents(argument: Any, type: Type | None) -> Any:
+    """An argument of a derivative; a tuple or a record that is given alone together with its tangents, which are 0."""
+    values = None if type is None else values_of(type)
+    if values is None or not _is_like(argument, values):
+        return argument
+    return argument, _zeros(argument, values)
+
+
+def _is_like(argument: Any, type: Type) -> bool:
+    """Whether an argument is made as a type of numbers is."""
+    found = resolve(type)
+    if not isinstance(found, TupleOf):
+        return not isinstance(argument, tuple | Mapping)
+    parts = _parts(argument, found)
+    return parts is not None and all(map(_is_like, parts, found.items))
+
+
+def _parts(argument: Any, type: TupleOf) -> tuple[Any, ...] | None:
+    if isinstance(argument, Mapping) and type.record is not None and argument.keys() == set(type.record.fields):
+        return tuple(argument[name] for name in type.record.fields)
+    return argument if isinstance(argument, tuple) and len(argument) == len(type.items) else None
+
+
+def _zeros(argument: Any, type: Type) -> Any:
+    found = resolve(type)
+    if isinstance(found, TupleOf):
+        return tuple(map(_zeros, _parts(argument, found) or (), found.items))
+    return np.zeros(np.shape(argument)) if isinstance(found, ArrayOf) else 0.0
 
 
 def _standard(argument: Any) -> Any:

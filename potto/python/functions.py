@@ -19,7 +19,7 @@ from potto.diagnostics import PottoError
 from potto.evaluating.world import World
 from potto.kernels.cells import Rows, Value
 from potto.kernels.errors import wrong_call
-from potto.python.accepting import accepted
+from potto.python.accepting import accepted, with_tangents
 from potto.python.arguments import Batch, batch_of, misfit, moving, value_of
 from potto.python.arrays import has_arrays, with_arrays
 from potto.python.calls import Call, Form
@@ -112,6 +112,8 @@ class Function(Travelling):
 
         def taken(label: str, argument: Any, type: Type | None) -> Any:
             argument = accepted(argument, type)
+            if isinstance(argument, tuple | Mapping) and self._is_derivative():
+                argument = with_tangents(argument, type)
             return with_arrays(label, argument, type, sizes) if arrays and type is not None else argument
 
         found = iter([taken(*each) for each in labelled(given, groups)])

@@ -134,6 +134,7 @@ def _infer(inference: Inference, item: Written, skeleton: Type) -> None:
     groups = (item.variables, *item.groups) if isinstance(item, nodes.DiffeoDefinition) else item.groups
     for group, expected in zip(groups, groups_of(skeleton)):
         found = inference.bind_group(group, lambda a: written_type(inference, a))
+        inference.heads.update(map(id, found))
         for local, parameter in zip(found, expected):
             unify(local.type, parameter.type)
     bindings(inference, item.bindings)

@@ -14,6 +14,7 @@ from potto.diagnostics import Diagnostic, Suggestion, shortened
 from potto.modules.builtins import DERIVATIVES
 from potto.modules.hints import did_you_mean, instead, near_names
 from potto.primitives import PRIMITIVES
+from potto.quick import replace
 from potto.source import Span
 from potto.syntax import nodes
 from potto.syntax.printer import print_expression
@@ -25,6 +26,7 @@ from potto.types.mismatches import between, comparison, describe, mismatch
 from potto.types.motionless import check_tangents, takes_duals
 from potto.types.scope import Builtin
 from potto.types.slopes import slope
+from potto.types.still import lacks_tangents, stands_still
 from potto.types.types import (
     REAL,
     UNKNOWN,
@@ -338,10 +340,16 @@ class _Filling:
 
     def _give(self, place: int, expected: Type, name: str | None) -> None:
         """Check that an argument fits what is expected of it, by the parameter of this name if it has one."""
+        expr = self.node.arguments[place].value
+        if not self.spread and stands_still(self.inference, self.node, expr, expected):
+            self.inference.still.add(id(expr))
+            return
         if not self.inference.fits(self.types[place], expected):
             what = f"`{name}`" if name else "the argument"
-            expr = self.node.arguments[place].value
-            self.inference.report(mismatch(self.types[place], expected, expr, f"{what} of {callee_name(self.node)}"))
+            said = mismatch(self.types[place], expected, expr, f"{what} of {callee_name(self.node)}")
+            if lacks_tangents(self.types[place], expected):
+                said = replace(said, help="give its tangents as well: `(value, tangents)`")
+            self.inference.report(said)
 
 
 # Special forms

@@ -123,6 +123,8 @@ class Inference:
         self.owners: dict[int, Meaning] = {}  # of members of no module, `u.x`: what `u` is
         self.fields: dict[int, list[int]] = {}  # of `u.x`, and of `c with x = 1`: where in the tuple it is
         self.parts: list[Part] = []
+        self.heads: set[int] = set()  # the parameters of the definition itself
+        self.still: set[int] = set()  # arguments of derivatives that are given without their tangents
         self.sizes: dict[str, Type] = {}  # the names of sizes in annotations
         self.mixed: set[int] = set()  # the `and`, `or`, `not` of conditions, where brackets may stand
         self.integrals = 0  # how many integrals are around the place that is looked at

@@ -47,7 +47,7 @@ def _apply(walk: Walk, node: nodes.Apply) -> Value:
         return HAZY
     if name in DERIVATIVES:
         return slope_value(walk.value(node.arguments[0].value), walk.inference.types[id(node)])
-    arguments = [walk.value(argument.value) for argument in node.arguments]
+    arguments = [_given(walk, argument.value) for argument in node.arguments]
     if name == "deriv":
         return dual(arguments[0]) if len(arguments) == 1 else HAZY
     if name in VECTORS:
@@ -60,6 +60,12 @@ def _apply(walk: Walk, node: nodes.Apply) -> Value:
     function = walk.value(node.function)
     groups = groups_of(walk.inference.types[id(node.function)])
     return _Calling(walk, node, plan, groups, arguments).result(function)
+
+
+def _given(walk: Walk, argument: nodes.Expr) -> Value:
+    """The value of an argument; with tangents that are 0 where a derivative is given none."""
+    value = walk.value(argument)
+    return TupleValue((value, STILL)) if id(argument) in walk.inference.still else value
 
 
 def _builtin(walk: Walk, node: nodes.Apply, name: str, arguments: Sequence[Value]) -> Value:

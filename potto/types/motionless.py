@@ -85,6 +85,11 @@ def _derives(inference: Inference, node: nodes.Apply) -> bool:
     return isinstance(meaning, Builtin) and meaning.name == "deriv"
 
 
+def head_of(inference: Inference, call: nodes.Apply) -> nodes.Expr:
+    """What a call, maybe one of several groups of arguments, is of."""
+    return _calls(inference, call)[1]
+
+
 def _calls(inference: Inference, node: nodes.Apply) -> tuple[list[nodes.Apply], nodes.Expr]:
     """The calls of a curried function, the last one first, and what is called."""
     calls: list[nodes.Apply] = []
@@ -103,6 +108,8 @@ def _carries(inference: Inference, call: nodes.Apply, plan: Plan) -> bool:
     if any(slots is not None and any(len(slot) > 1 for slot in slots) for slots in plan.groups):
         return True  # several make up one parameter: the value and its tangent
     for argument in call.arguments:
+        if id(argument.value) in inference.still:
+            continue
         found = resolve(inference.types[id(argument.value)])
         if plan.spread and isinstance(found, TupleOf):
             if not all(_is_plain(item) for item in found.items):
@@ -126,7 +133,8 @@ def _motionless(
     if plan.spread and isinstance(first, nodes.Tuple):
         first = first.items[0]
     several = sum(len(call.arguments) for call in calls) > 1 or plan.spread
-    moved = _moving(first, inference.types[id(head)])
+    stand = any(id(argument.value) in inference.still for call in calls for argument in call.arguments)
+    moved = None if stand else _moving(first, inference.types[id(head)])
     text = "" if moved is None else _written(calls, head, first, moved)
     if not text or len(text) > LONGEST or "\n" in text:
         help = GENERAL

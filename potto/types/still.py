@@ -1,0 +1,110 @@
+"""Tuples and records without tangents where a derivative takes them with some: they stand still, as a number does.
+
+Owns `lacks_tangents`, which types and elaboration both ask, and `stands_still`, whether a call may leave them out. A
+pair of numbers could be a number with its tangent: what is expected decides. So the derivative has to be one of a
+definition, whose type is known; and a term has to show what an argument is, since elaboration sees nothing else.
+"""
+
+from __future__ import annotations
+
+from potto.syntax import nodes
+from potto.types.context import Inference
+from potto.types.infer import strip
+from potto.types.motionless import head_of
+from potto.types.scope import Builtin, Global, Local, Meaning
+from potto.types.types import UNKNOWN, ArrayOf, Dist, Meta, Real, TupleOf, Type, resolve
+from potto.types.unify import unify
+
+
+def lacks_tangents(actual: Type, expected: Type) -> bool:
+    """Whether a tuple or a record is given for itself and its tangents."""
+    values = values_of(expected)
+    return values is not None and _alike(actual, values)
+
+
+def values_of(expected: Type) -> TupleOf | None:
+    """The tuple or record that is expected together with its tangents; None for anything else."""
+    wanted = resolve(expected)
+    if not isinstance(wanted, TupleOf) or len(wanted.items) != 2:
+        return None
+    values, tangents = map(resolve, wanted.items)
+    return values if isinstance(values, TupleOf) and _alike(values, tangents) else None
+
+
+def _alike(a: Type, b: Type, guess: bool = False) -> bool:
+    """Whether two types are known, and made of numbers in the same way, whatever their sizes. guess: what is not known
+    of the first may be anything."""
+    a, b = resolve(a), resolve(b)
+    match a:
+        case Meta():
+            return guess
+        case Real() | Dist():
+            return isinstance(b, Real | Dist)
+        case TupleOf(items):
+            if not isinstance(b, TupleOf) or a.record != b.record or len(items) != len(b.items):
+                return False
+            return all(_alike(item, other, guess) for item, other in zip(items, b.items))
+        case ArrayOf(item=item):
+            return isinstance(b, ArrayOf) and _alike(item, b.item, guess)
+        case _:
+            return False
+
+
+def stands_still(inference: Inference, call: nodes.Apply, argument: nodes.Expr, expected: Type) -> bool:
+    """Whether an argument of a derivative is given without tangents, and that can be seen wherever it is looked at."""
+    values, found = values_of(expected), inference.types[id(argument)]
+    if values is None or not _alike(found, values, guess=True) or _alike(found, expected, guess=True):
+        return False
+    known = _evident(inference, argument) and _of_a_definition(inference, head_of(inference, call))
+    return known and unify(found, values)
+
+
+def _of_a_definition(inference: Inference, head: nodes.Expr) -> bool:
+    """Whether a function is `deriv(f)` or another name of it, where f is a definition."""
+    head = strip(head)
+    if isinstance(head, nodes.Apply):
+        inner = strip(head.arguments[0].value) if len(head.arguments) == 1 else head
+        meaning = _meaning(inference, head.function)
+        derives = isinstance(meaning, Builtin) and meaning.name == "deriv"
+        return derives and isinstance(_meaning(inference, inner), Global)
+    meaning = _meaning(inference, head)
+    if isinstance(meaning, Local):
+        return meaning.kind == "local" and meaning.value is not None and _of_a_definition(inference, meaning.value)
+    return isinstance(meaning, Global) and meaning.interface.derivative
+
+
+def _meaning(inference: Inference, expr: nodes.Expr) -> Meaning | None:
+    return inference.meanings.get(id(strip(expr)))
+
+
+def _is_bound(inference: Inference, local: Local) -> bool:
+    """Whether a local name stands for the whole of an expression that shows what it is made of."""
+    if local.kind != "local" or local.value is None:
+        return False
+    whole = inference.types.get(id(local.value), UNKNOWN)
+    return _alike(whole, local.type) and _evident(inference, local.value)
+
+
+def _evident(inference: Inference, expr: nodes.Expr) -> bool:
+    """Whether the term of an expression shows what it is made of: the types of lambdas' parameters and of what loops go
+    through are known to inference alone."""
+    expr = strip(expr)
+    if isinstance(resolve(inference.types.get(id(expr), UNKNOWN)), Real | Dist):
+        return True
+    match expr:
+        case nodes.Tuple(items=items):
+            return all(_evident(inference, item) for item in items)
+        case nodes.Name():
+            meaning = _meaning(inference, expr)
+            if isinstance(meaning, Local):
+                return id(meaning) in inference.heads or _is_bound(inference, meaning)
+            return isinstance(meaning, Global)
+        case nodes.Member():
+            owner = inference.owners.get(id(expr), _meaning(inference, expr))
+            return isinstance(owner, Global) or (isinstance(owner, Local) and id(owner) in inference.heads)
+        case nodes.Apply(function=function):
+            return isinstance(_meaning(inference, function), Global)
+        case nodes.Field(value=inner) | nodes.With(record=inner) | nodes.Index(array=inner):
+            return _evident(inference, inner)
+        case _:
+            return False

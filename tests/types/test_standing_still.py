@@ -1,0 +1,91 @@
+"""Tuples and records given to derivatives without tangents: they stand still, as numbers do."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from marks import check
+
+import potto
+from potto.evaluating.world import World
+
+PROGRAM = """
+record P(x: Real, y: Real)
+record M(xs: [n] Real, p: P)
+def f(u: (Real, Real), t) u.x*t^2 + u.y
+def h(p: P, t) p.x*t
+def nested(u: (Real, (Real, Real)), t) u.0*t + u.1.y
+def mesh(s: M, t) s.xs[1]*t + s.p.y*t
+def swapped(t)(u: (Real, Real)) u.x*t^2
+def inside(u: (Real, Real), t) integral [0, 1] [x < u.x*t]*u.y d(x)
+df = deriv(f)
+pair = (1, 2)
+def make(a) P(a, 2*a)
+def within(u: (Real, Real), t) snd(df(u, (t, 1)))
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "value", "tangent"),
+    [
+        ("deriv(f)((1, 2), (3, 1))", 11, 6),
+        ("deriv(f)(((1, 2), (0, 0)), (3, 1))", 11, 6),  # the same, with tangents
+        ("deriv(f)(((1, 1), (2, 0)), (3, 1))", 10, 2 * 9 + 6),
+        ("deriv(f)(dt=(3, 1), du=pair)", 11, 6),
+        ("df((1, 2), (3, 1))", 11, 6),
+        ("let q = (1, 2) in df(q, (3, 1))", 11, 6),
+        ("deriv(h)(P(1, 2), (3, 1))", 3, 1),
+        ("deriv(h)(make(2), (3, 1))", 6, 2),
+        ("deriv(h)(make(2) with x = 5, (3, 1))", 15, 5),
+        ("deriv(nested)((1, (2, 3)), (3, 1))", 6, 1),
+        ("deriv(mesh)(M([1, 2], P(3, 4)), (5, 1))", 30, 6),
+        ("deriv(swapped)((3, 1))((1, 2))", 9, 6),
+        ("deriv(inside)((0.5, 2), (0.5, 1))", 0.5, 1),  # the surface x = u.x t moves by u.x, the jump is u.y
+        ("(1, within((1, 2), 3))", 1, 6),
+    ],
+)
+def test_what_stands_still(text: str, value: float, tangent: float) -> None:
+    world = World()
+    key = world.put("<text>", PROGRAM)
+    found = world.evaluate(key, text).estimate
+    whole = found.value if found.tangent is None else (found.value, found.tangent)
+    assert whole == pytest.approx((value, tangent), rel=1e-12)
+
+
+def test_from_python() -> None:
+    m = potto.compile(PROGRAM)
+    for u in ((1.0, 2.0), ((1.0, 2.0), (0.0, 0.0))):
+        found = potto.deriv(m.f)(u, (3.0, 1.0))
+        assert (found.value, found.tangent) == pytest.approx((11, 6))
+    for p in ({"x": 1.0, "y": 2.0}, (1.0, 2.0)):
+        assert potto.deriv(m.h)(p, (3.0, 1.0)).tangent == pytest.approx(1)
+    scene = {"xs": np.array([1.0, 2.0]), "p": (3.0, 4.0)}
+    assert potto.deriv(m.mesh)(scene, (5.0, 1.0)).tangent == pytest.approx(6)
+
+
+def test_where_nobody_can_tell() -> None:
+    check("""
+        def f(u: (Real, Real), t) u.x*t + u.y
+        def g(us: [n] (Real, Real), t) sum u in us (snd(deriv(f)(u, (t, 1))))
+        #                                                        ^ error[P0306]: `du` of `deriv` must be
+        def by_hand(a: ((Real, Real), (Real, Real))) a.0.x + a.1.y
+        h = by_hand((1, 2))
+        #           ^^^^^^ error[P0306]: must be `((Real, Real), (Real, Real))`
+    """)
+
+
+def test_what_varies_in_what_stands_still_counts() -> None:
+    check("""
+        def plain(u: (Real*, Real), t) if u.y > 0 then u.x*t else t
+        def f(t) integral [0, 1] snd(deriv(plain)((t, x), (t, 1))) d(x)
+        #                                         ^^^^^^ error[P0301]: depends on the variable of integration
+        def g(t) integral [0, 1] snd(deriv(plain)((x, t), (t, 1))) d(x)
+    """)
+
+
+def test_nothing_moves() -> None:
+    check("""
+        def f(u: (Real, Real), t) u.x*t + u.y
+        k = deriv(f)((1, 2), 3)
+        #            ^^^^^^ warning[P0615]: no argument of this derivative has a tangent
+    """)
