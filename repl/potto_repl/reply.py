@@ -167,8 +167,12 @@ def diagnostic(located: Located, sources: Sources) -> Part:
 def _for_a_prompt(located: Located) -> Located:
     """With options of the command line as they are set here: `--max-evals` is `:set max_evals`."""
     found = located.diagnostic
-    help = re.sub(r"`--([a-z-]+)`", lambda option: f"`:set {option[1].replace('-', '_')}`", found.help)
+    help = re.sub(r"`--([a-z-]+)( [^`]+)?`", _setting, found.help)
     return located if help == found.help else replace(located, diagnostic=replace(found, help=help))
+
+
+def _setting(option: re.Match[str]) -> str:
+    return f"`:set {option[1].replace('-', '_')}{option[2] or ''}`"
 
 
 def diagnostics(found: Iterable[Located], sources: Sources) -> list[Part]:

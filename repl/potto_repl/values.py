@@ -18,8 +18,8 @@ from potto.elaborate import elaborate_expression
 from potto.evaluating.world import World
 from potto.projects.settings import Settings
 from potto.runtime.answers.estimate import Estimate
-from potto.runtime.answers.printing import format_seconds, with_error
-from potto.runtime.answers.shown import MISSED, as_dual, estimate_json, format_estimate, gives_dual, interval
+from potto.runtime.answers.printing import format_seconds, led, with_error
+from potto.runtime.answers.shown import as_dual, estimate_json, format_estimate, gives_dual, interval
 from potto.runtime.evaluate import Clock, report
 from potto.syntax import nodes
 from potto_repl.reply import Part
@@ -139,7 +139,7 @@ def value_parts(
             rows += [("  interior", parts.interior, parts.interior_error),
                      ("  boundary", parts.boundary, parts.boundary_error)]  # fmt: skip
             data["interior"], data["boundary"] = _plain(parts.interior), _plain(parts.boundary)
-        lines = [f"{head}{text}{'' if estimate.converged else MISSED}{f' : {type}' if type else ''}"]
+        lines = [f"{head}{led(text, estimate.converged)}{f' : {type}' if type else ''}"]
         lines += [f"  {label:<11} {with_error(value, error)}" for label, value, error in rows]
         yield Part("answer", "\n".join(lines), {**data, "text": text}, numbers=True)
     cost = tail(estimate, settings)

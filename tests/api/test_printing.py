@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 import potto
 from potto.runtime.answers.printing import (
+    MISSED,
     concisely,
     format_bounds,
     format_digits,
@@ -24,7 +25,7 @@ from potto.runtime.answers.printing import (
     with_error,
     written_tolerance,
 )
-from potto.runtime.answers.shown import MISSED, format_answer, interval
+from potto.runtime.answers.shown import format_answer, interval
 
 
 @pytest.mark.parametrize(
@@ -240,11 +241,11 @@ def test_what_missed_its_tolerance_says_so_on_the_same_line() -> None:
     bad = potto.Estimate(0.027, 0.0051, converged=False)
     dual = potto.Estimate(0.5, 0.0, 0.027, 0.0051, converged=False)
     assert format_answer(good) == "0.03" and interval(good) == "0.0270 ± 0.0051"
-    assert format_answer(bad) == interval(bad) == f"0.0270 ± 0.0051{MISSED}"
-    assert format_answer(dual) == f"(0.5, 0.0270) ± (0, 0.0051){MISSED}"
-    assert repr(bad).startswith(f"0.0270(51){MISSED}  ") and MISSED not in repr(good)
+    assert format_answer(bad) == interval(bad) == f"{MISSED}0.0270 ± 0.0051"
+    assert format_answer(dual) == f"{MISSED}(0.5, 0.0270) ± (0, 0.0051)"
+    assert repr(bad).startswith(f"{MISSED}0.0270(51)  ") and MISSED not in repr(good)
     unknown = potto.Estimate(0.5, math.inf, converged=False)
-    assert format_answer(unknown) == f"0.5 (error unknown){MISSED}"
+    assert format_answer(unknown) == f"{MISSED}0.5 (error unknown)"
 
 
 @pytest.mark.parametrize("method", ["quadrature", "mc", "qmc"])
@@ -258,7 +259,7 @@ def test_as_many_printed_intervals_hold_as_computed_ones(method: str) -> None:
             r = f(t)
         truth = Fraction(t) ** 3
         computed += abs(Fraction(r.value) - truth) <= Fraction(r.error)
-        value, bar = (Fraction(part) for part in read(interval(r).removesuffix(MISSED)))
+        value, bar = (Fraction(part) for part in read(interval(r).removeprefix(MISSED)))
         printed += abs(value - truth) <= bar
     assert printed >= computed
 
@@ -268,3 +269,26 @@ def test_a_summary_shows_every_field_and_note() -> None:
     lines = answer.summary().split("\n")
     assert lines[:2] == ["value: 0.0", "error: 0.0"] and "converged: True" in lines
     assert lines[-1].startswith("note: the surface") and "0 backward, 1 forward" in lines[-1]
+
+
+# Ten thousand numbers
+
+
+def test_ten_thousand_printed_intervals_contain_their_values() -> None:
+    """Values and errors of all sizes and of any ratio: what a person reads contains the value and the whole interval
+    around it, in every form in which a number is printed."""
+    random = np.random.default_rng(17)
+    values = random.choice([-1.0, 1.0], 10_000) * 10 ** random.uniform(-25, 25, 10_000)
+    values[::7] = np.round(random.uniform(-1000, 1000, len(values[::7])), 2)
+    values[::50] = 0.0
+    errors = np.where(values == 0, 1.0, np.abs(values)) * 10 ** random.uniform(-17, 1.5, 10_000)
+    for value, error in zip(values.tolist(), errors.tolist(), strict=True):
+        low, high = Fraction(value) - Fraction(error), Fraction(value) + Fraction(error)
+        estimate = potto.Estimate(value, error)
+        for text in (interval(estimate), str(estimate), repr(estimate).split("  ")[0], f"{estimate}"):
+            middle, bar = (Fraction(part) for part in read(text))
+            slack = max(abs(low), abs(high)) / 10**15 if text == interval(estimate) else 0
+            assert middle - bar <= Fraction(value) <= middle + bar, (value, error, text)
+            assert middle - bar - slack - bar / 10**10 <= low and high <= middle + bar + slack + bar / 10**10, text
+        alone = Fraction(format_number(value, error))
+        assert abs(alone - Fraction(value)) <= 10 * Fraction(error) + abs(Fraction(value)) / 10**15, (value, error)

@@ -52,8 +52,8 @@ def test_formats() -> None:
     bar = Estimate(0.349858807576, 4.05e-12, evals=5, seconds=1e-4)
     assert repr(bar) == "0.3498588075760(41)  5 evaluations  0.1 ms"
     assert str(bar) == f"{bar}" == "0.3498588075760(41)"
-    assert repr(Estimate(0.5, 0.1, converged=False)).startswith("0.50(10) (not converged)")
-    assert str(Estimate(0.5, 0.1, converged=False)) == "0.50(10) (not converged)"
+    assert repr(Estimate(0.5, 0.1, converged=False)).startswith("not converged: 0.50(10)  ")
+    assert str(Estimate(0.5, 0.1, converged=False)) == "not converged: 0.50(10)"
 
 
 def test_errors_of_sums_and_products() -> None:

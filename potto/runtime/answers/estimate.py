@@ -19,12 +19,15 @@ from msgspec.structs import replace
 from potto.integrate.events import Shortfall
 from potto.runtime.answers.arithmetic import Operators, Pair, applied, operand, reduced
 from potto.runtime.answers.printing import (
+    MISSED,
+    attainable,
     concisely,
     format_fields,
     format_list,
     format_number,
     format_seconds,
     format_tuple,
+    led,
 )
 from potto.runtime.answers.rich import as_html, as_latex
 
@@ -115,8 +118,10 @@ class Estimate(Operators, Struct, frozen=True, eq=False):
 
     @property
     def advice(self) -> str:
-        """What helps against the reasons, each advice once."""
-        return "; ".join(dict.fromkeys(why.advice for why in self.shortfalls))
+        """What helps against the reasons, each advice once; with the accuracy that can be had, where that is known."""
+        told = "; ".join(dict.fromkeys(why.advice for why in self.shortfalls))
+        reached = attainable(*self._shown) if told and self.value is not None else None
+        return told if reached is None else told.replace("(`--rtol`)", f"(`--rtol {reached:.0e}`)").replace("e-0", "e-")
 
     def reasons_of(self, index: Any) -> tuple[str, ...]:
         """Why one member of a batch is not as accurate as was asked: none, if it is."""
@@ -271,11 +276,10 @@ class Estimate(Operators, Struct, frozen=True, eq=False):
             text = concisely(self.value, self.error)
             if self.tangent is not None:
                 text = format_tuple([text, concisely(self.tangent, self.tangent_error)])
-        missed = "" if self.converged or self.text is not None else " (not converged)"
-        return f"{text}{missed}  {self._cost}"
+        return f"{led(text, self.converged or self.text is not None)}  {self._cost}"
 
     def _repr_html_(self) -> str:
-        return as_html(*self._shown, "" if self.converged else "not converged", self._cost)
+        return as_html(*self._shown, "" if self.converged else MISSED.strip(), self._cost)
 
     def _repr_latex_(self) -> str | None:
         return None if self.value is None else as_latex(*self._shown)

@@ -18,6 +18,10 @@ from typing import Any
 from msgspec import Struct
 
 ROUNDING = 8 * 2.0**-52  # a few rounding errors: what remains of an error estimate of zero
+MISSED = "not converged: "  # stands in front of an answer that missed its tolerance
+# The roughest accuracy that is proposed, and how much worse it is than what was reached: asked for less, integration
+# takes another way to it, which may reach less.
+MOST_ASKED, SPARE = 0.05, 5.0
 MOST_ITEMS = 12  # of an array that are shown
 DOUBLE = 18  # significant digits: one more than tell all doubles apart, so that rounding to them loses nothing
 SMALLEST = -5  # the power of ten from which on numbers are written without an exponent
@@ -259,6 +263,11 @@ def _bar(value: float, error: float) -> tuple[str, str]:
     return found.value, found.bound
 
 
+def led(text: str, converged: bool) -> str:
+    """An answer as text; one that missed its tolerance says so first, what is not a number that it is none."""
+    return text if converged else MISSED + text if text != "nan" else "nan (not converged)"
+
+
 def format_bounds(error: Any) -> str:
     """Error estimates to two digits, in the form of the value."""
     if isinstance(error, tuple | list):
@@ -279,6 +288,29 @@ def largest(error: Any) -> float:
     if isinstance(error, dict):
         return largest(tuple(error.values()))
     return float(error) if error is not None and error == error else math.inf
+
+
+def attainable(value: Any, error: Any) -> float | None:
+    """The relative accuracy, rounded up to a digit, that all numbers of an answer have with something to spare; None
+    where that is none to speak of."""
+    worst = _relative(value, error)
+    if not 0 < worst <= MOST_ASKED:  # nan as well
+        return None
+    place = _exponent(_decimal(SPARE * worst))
+    return float(math.ceil(_decimal(SPARE * worst) / _power(place)) * _power(place))
+
+
+def _relative(value: Any, error: Any) -> float:
+    """The largest error of the numbers of an answer beside their size; infinite where that is not known."""
+    if isinstance(value, dict):
+        return _relative(list(value.values()), [error[name] for name in value])
+    if isinstance(value, tuple | list):
+        each = [_relative(v, e) for v, e in zip(value, error, strict=True)]
+    elif hasattr(value, "ravel"):
+        each = [_relative(v, e) for v, e in zip(value.ravel().tolist(), error.ravel().tolist(), strict=True)]
+    else:
+        return 0.0 if error == 0 else float(error) / abs(value) if value else math.inf
+    return math.inf if any(part != part for part in each) else max(each, default=0.0)
 
 
 def format_list(parts: Sequence[str], size: int) -> str:

@@ -22,13 +22,13 @@ from potto.runtime.answers.printing import (
     format_list,
     format_numbers,
     format_tuple,
+    led,
     with_error,
 )
 from potto.runtime.evaluation.functions import Derivative
 from potto.runtime.evaluation.machine import Linker
 
 NOTHING: Mapping[str, Value] = MappingProxyType({})
-MISSED = " (not converged)"  # what is said behind an answer that missed its tolerance
 
 
 def format_value(value: Value) -> str:
@@ -52,15 +52,15 @@ def format_answer(estimate: Estimate) -> str:
 
 
 def answer_text(value: Any, error: Any, converged: bool) -> str:
-    """The digits of an answer that hold; of one that missed its tolerance all digits beside the error, and that."""
-    return format_numbers(value, error) if converged else with_error(value, error) + MISSED
+    """The digits of an answer that hold; of one that missed its tolerance that, and all digits beside the error."""
+    return format_numbers(value, error) if converged else led(with_error(value, error), False)
 
 
 def interval(estimate: Estimate) -> str:
     """The answer with its error bars; what missed its tolerance says so."""
     if estimate.text is not None:
         return estimate.text
-    return with_error(*pair(estimate)) + ("" if estimate.converged else MISSED)
+    return led(with_error(*pair(estimate)), estimate.converged)
 
 
 def bounds(estimate: Estimate) -> str:

@@ -22,9 +22,10 @@ from potto.runtime.answers.printing import (
     format_numbers,
     format_seconds,
     largest,
+    led,
     with_error,
 )
-from potto.runtime.answers.shown import MISSED, as_dual
+from potto.runtime.answers.shown import as_dual
 from potto.syntax import parse_expression
 from potto.types import infer_expression
 from potto_repl.expressions import call_of, checked
@@ -64,10 +65,10 @@ def gradient(session: Conversation, text: str) -> Iterator[Part]:
     for slope in slopes(session, called):
         dual = slope.dual
         if not lines:
-            lines.append(f"{text.strip()} = {with_error(dual.value, dual.error)}{_missed(dual)}")
+            lines.append(f"{text.strip()} = {led(with_error(dual.value, dual.error), dual.converged)}")
             data["value"] = dual.value
         sign = "∂/∂" if session.options.unicode else "d/d"
-        line = f"  {sign}{slope.name} = {with_error(dual.tangent, dual.tangent_error)}{_missed(dual)}"
+        line = f"  {sign}{slope.name} = {led(with_error(dual.tangent, dual.tangent_error), dual.converged)}"
         if slope.parts is not None:
             interior = format_numbers(slope.parts.interior, slope.parts.interior_error)
             boundary = format_numbers(slope.parts.boundary, slope.parts.boundary_error)
@@ -78,10 +79,6 @@ def gradient(session: Conversation, text: str) -> Iterator[Part]:
     yield Part("answer", "\n".join(lines), {"gradient": data}, numbers=True)
     if cost:
         yield Part("tail", cost)
-
-
-def _missed(estimate: Estimate) -> str:
-    return "" if estimate.converged else MISSED
 
 
 @command("time", argument="EXPR", completes="expression")

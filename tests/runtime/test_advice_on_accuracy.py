@@ -1,0 +1,48 @@
+"""What helps where an answer missed its tolerance: followed, it does."""
+
+from __future__ import annotations
+
+import re
+
+import mpmath
+import pytest
+
+import potto
+from potto.runtime.answers.printing import attainable
+
+# Programs that a small budget is too little for, and their values by mathematics.
+HARD = {
+    "integral [0, 1] sin(1/x) d(x)": lambda: mpmath.sin(1) - mpmath.ci(1),
+    "integral [0, 1] abs(x - 1/3)^0.3*cos(300*x) d(x)": lambda: sum(
+        mpmath.re(mpmath.quad(lambda x: abs(x - mpmath.mpf(1) / 3) ** mpmath.mpf("0.3") * mpmath.cos(300 * x), piece))
+        for piece in ([k / mpmath.mpf(120) for k in range(41)], [k / mpmath.mpf(120) for k in range(40, 121)])
+    ),
+    "integral ([0, 1], [0, 1]) sqrt(abs(x - y)) d(x, y)": lambda: mpmath.mpf(8) / 15,
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("text", HARD)
+@pytest.mark.parametrize("budget", [200, 2_000])
+def test_the_accuracy_that_is_proposed_can_be_had(text: str, budget: int) -> None:
+    module = potto.compile("")
+    with potto.settings(max_evals=budget):
+        answer = module.eval(text)
+    if answer.converged:
+        return
+    assert str(answer).startswith("not converged: ")
+    proposed = re.search(r"`--rtol ([\d.e-]+)`", answer.advice)
+    if proposed is None:
+        assert not answer.error <= 0.05 * abs(answer.value)  # there is nothing to propose
+        return
+    with potto.settings(max_evals=budget, rtol=float(proposed[1])):
+        again = module.eval(text)
+    assert again.converged and "not converged" not in repr(again)
+    assert abs(again.value - float(HARD[text]())) <= float(proposed[1]) * abs(again.value)
+
+
+def test_what_is_proposed() -> None:
+    assert attainable(2.0, 1e-5) == 3e-5  # five times 5e-6, rounded up
+    assert attainable((2.0, 4.0), (1e-5, 1e-4)) == 2e-4 and attainable((2.0, 4.0), (0.0, 1e-4)) == 2e-4
+    assert attainable(0.0, 1e-5) is None and attainable(1.0, 0.5) is None and attainable(1.0, float("nan")) is None
+    assert attainable(2.0, 0.0) is None and attainable((2.0, 0.0), (1e-5, 1e-5)) is None
