@@ -148,6 +148,8 @@ class Lines:
         if op in COMPARISONS:
             a, b = args
             return self.plain(self.let(f"{a.v} {COMPARISONS[op]} {b.v}", "m"))
+        if op in ("and", "or", "min", "max") and len(args) > 2:
+            return reduce(lambda result, arg: self.apply(op, (result, arg)), args)
         if op in ("and", "or", "not"):
             f = self.ufunc("logical_" + op)
             return self.plain(self.let(f"{f}({', '.join(a.v for a in args)})", "m"))
@@ -155,8 +157,6 @@ class Lines:
             return self.add(args)
         if op == "mul":
             return self.mul(args)
-        if op in ("min", "max") and len(args) > 2:
-            return reduce(lambda result, arg: self.apply(op, (result, arg)), args)
         return self.chain(op, args, self.value(op, args))
 
     def value(self, op: str, args: Sequence[Scalar]) -> str:

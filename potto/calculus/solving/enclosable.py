@@ -6,6 +6,7 @@ does to batches.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 
 from potto.calculus.algebra.degree import value_parts
@@ -18,6 +19,7 @@ from potto.core.terms import (
     Const,
     Data,
     Fold,
+    Global,
     If,
     Index,
     Length,
@@ -45,8 +47,19 @@ def enclosable(term: Term, jumps: bool = False) -> bool:
         or (isinstance(node, Proj) and isinstance(node.term, Proj | Var | Index | Fold))
         or (isinstance(node, Prim) and (node.op in ARITHMETIC or RANGES.knows(node.op)))
         or (jumps and isinstance(node, Branch))
-        for node in postorder_by(term, value_parts)
+        for node in postorder_by(term, _parts)
     )
+
+
+def _parts(node: Term) -> Sequence[Term]:
+    """What is asked for an enclosure; an array that has a definition of its own is read beside the integral."""
+    match node:
+        case Index(array=Global(), index=place):
+            return (place,)
+        case Length(array=Global()):
+            return ()
+        case _:
+            return value_parts(node)
 
 
 @lru_cache(maxsize=4096)
