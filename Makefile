@@ -5,9 +5,10 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.stamp
 VSCODE := editors/vscode
 
+TORCH ?= torch==2.13.0
 TESTS := $(BIN)/python -m pytest -n auto --maxprocesses 8 --dist worksteal --durations 20
 
-.PHONY: demo test quick fuzz check format clean native vsix e2e
+.PHONY: demo test quick fuzz check format clean native test-bridges vsix e2e
 
 demo: $(STAMP)  ## the paper's programs, evaluated and differentiated
 	@PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python examples/demo.py
@@ -20,6 +21,11 @@ quick: $(STAMP)  ## the tests that take no time
 
 fuzz: $(STAMP)  ## every law, with examples that nobody has seen
 	$(TESTS) --hypothesis-profile=explore tests/properties tests/primitives
+
+test-bridges: $(STAMP)  ## JAX, PyTorch and scipy: installed into .venv (PyTorch for the CPU), their own gradient checks run
+	$(BIN)/python -m pip install -qq --disable-pip-version-check 'jax>=0.4.36' optax
+	$(BIN)/python -c 'import torch' 2>/dev/null || $(BIN)/python -m pip install -qq --disable-pip-version-check $(TORCH)
+	$(BIN)/python -m pytest -rs tests/bridges tests/docs/test_readme.py
 
 check: $(STAMP)  ## lints, types, floors
 	$(BIN)/ruff check .

@@ -13,6 +13,9 @@ from potto.projects.settings import settings
 if TYPE_CHECKING:
     from potto.applications.fitting import fit
     from potto.applications.hessian import hessian, hvp
+    from potto.bridges.to_jax import to_jax
+    from potto.bridges.to_scipy import to_scipy
+    from potto.bridges.to_torch import to_torch
     from potto.integrate.costs import counting
     from potto.python.api import Module, ProgramWarning, Workspace, compile, load
     from potto.python.functions import Function, deriv
@@ -41,6 +44,9 @@ __all__ = [
     "jvp",
     "load",
     "settings",
+    "to_jax",
+    "to_scipy",
+    "to_torch",
     "value_and_grad",
     "vjp",
 ]
@@ -57,6 +63,9 @@ _HOMES = {
     "hvp": "potto.applications.hessian",
     "jacobian": "potto.python.gradients",
     "jvp": "potto.python.gradients",
+    "to_jax": "potto.bridges.to_jax",
+    "to_scipy": "potto.bridges.to_scipy",
+    "to_torch": "potto.bridges.to_torch",
     "value_and_grad": "potto.python.gradients",
     "vjp": "potto.python.gradients",
 }

@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parent.parent
 # From the top floor down. Packages on one floor may import each other unless they are listed as strangers.
 FLOORS: tuple[tuple[str, ...], ...] = (
     ("potto_lsp", "potto_repl", "potto.__main__", "potto.cli"),
-    ("potto.ide", "potto.evaluating", "potto.python", "potto.applications", "potto.bench"),
+    ("potto.ide", "potto.evaluating", "potto.python", "potto.applications", "potto.bench", "potto.bridges"),
     ("potto.runtime",),
     ("potto.kernels", "potto.integrate"),
     ("potto.checking", "potto.crew"),
@@ -38,10 +38,11 @@ OUTSIDERS: dict[str, tuple[str, ...]] = {
     "lark": ("potto.syntax",),
     "numpy": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.python.accepting", "potto.python.arguments",
               "potto.python.arrays", "potto.python.forms", "potto.python.gradients", "potto.applications",
-              "potto.bench", "potto.data", "potto_lsp.preview", "potto_lsp.sampling"),
+              "potto.bench", "potto.bridges", "potto.data", "potto_lsp.preview", "potto_lsp.sampling"),
     "PIL": ("potto.data",),
     "scipy": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.applications.fitting", "potto.bench"),
-    "jax": ("potto.bench.peers",),
+    "jax": ("potto.bench.peers", "potto.bridges.to_jax"),
+    "torch": ("potto.bridges.to_torch",),
     "vegas": ("potto.bench.peers",),
     "matplotlib": ("potto.bench.plotting",),
     "mpmath": ("potto.core.reference",),

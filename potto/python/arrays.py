@@ -1,8 +1,9 @@
 """Arrays of Python as arrays of Potto: what a parameter's type says which axes of numpy's are.
 
-Owns `with_arrays`, `over_batch` and `batch_shapes`. A parameter `[n] Real` takes a numpy array, a column of a table or
-a list as one array, and the axes before those of the array are a batch; a parameter `Real` takes a numpy array as a
-batch. Until all batches are known, the parts of such an array have its axes first and then those of its own batch.
+Owns `with_arrays`, `axes_of`, `over_batch` and `batch_shapes`. A parameter `[n] Real` takes a numpy array, a column of
+a table or a list as one array, and the axes before those of the array are a batch; a parameter `Real` takes a numpy
+array as a batch. Until all batches are known, the parts of such an array have its axes first and then those of its
+own batch.
 """
 
 from __future__ import annotations
@@ -64,7 +65,7 @@ def _array(name: str, argument: Any, type: ArrayOf, sizes: Sizes) -> Any:
         argument = argument.to_numpy()
     if isinstance(argument, list) and _of_numbers(type):
         with contextlib.suppress(TypeError, ValueError):  # of answers, or not of one shape
-            axes = _axes(type) or 0
+            axes = axes_of(type) or 0
             numbers = np.array(argument, dtype=float) if argument else np.zeros((0,) * axes)
             argument = numbers if numbers.ndim <= axes else argument  # else of elements that are batches
     if isinstance(argument, np.ndarray):
@@ -99,7 +100,7 @@ def _of_numbers(type: Type) -> bool:
 def _numpy(name: str, argument: np.ndarray[Any, Any], type: ArrayOf, sizes: Sizes) -> Value:
     if argument.dtype.kind not in "fiu":
         raise wrong_call(f"`{name}` is {format_type(type)}: an array must hold real numbers, not {argument.dtype}")
-    axes = _axes(type)
+    axes = axes_of(type)
     if axes is None:
         raise wrong_call(f"`{name}` is {format_type(type)}: give it as a list")
     if argument.ndim < axes:
@@ -111,15 +112,15 @@ def _numpy(name: str, argument: np.ndarray[Any, Any], type: ArrayOf, sizes: Size
     return _made(name, numbers, type, sizes)
 
 
-def _axes(type: Type) -> int | None:
+def axes_of(type: Type) -> int | None:
     """How many axes of numpy a type has; None for a tuple whose items differ in that."""
     found = resolve(type)
     if isinstance(found, ArrayOf):
-        inner = _axes(found.item)
+        inner = axes_of(found.item)
         return None if inner is None else 1 + inner
     if not isinstance(found, TupleOf):
         return 0
-    each = {_axes(item) for item in found.items}
+    each = {axes_of(item) for item in found.items}
     only = each.pop() if len(each) == 1 else None
     return None if only is None else 1 + only
 

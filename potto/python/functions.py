@@ -252,6 +252,22 @@ def bound(function: Function, args: tuple[Any, ...], kwargs: dict[str, Any]) -> 
     return [(label, argument) for label, argument, _ in found]
 
 
+def component(function: Function, place: int) -> Function:
+    """The function of one number of a tuple that a function gives; it takes what is left to be given."""
+    names = [[parameter.name or "" for parameter in group] for group in function._parameter_groups]
+    body: nodes.Expr = function._expr
+    for group in names:
+        given = tuple(nodes.Argument(NOWHERE, None, None, nodes.Name(NOWHERE, name)) for name in group)
+        body = nodes.Apply(NOWHERE, body, given, True)
+    groups = tuple(tuple(nodes.Parameter(NOWHERE, name) for name in group) for group in names)
+    expr = nodes.Lambda(NOWHERE, groups, nodes.Field(NOWHERE, body, str(place), NOWHERE))
+    type: Type = infer_expression(function._world.db, function._file, expr).type
+    for _ in function._given:
+        assert isinstance(type, FunctionType)
+        type = type.result
+    return Function(function._world, function._file, expr, type, function._given)
+
+
 def _call_of(name: str, argument: nodes.Expr) -> nodes.Expr:
     """`name(argument)` as a tree."""
     given = (nodes.Argument(NOWHERE, None, None, argument),)

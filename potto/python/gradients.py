@@ -91,9 +91,15 @@ def jacobian(function: Function, wrt: Names = None) -> Callable[..., Estimate]:
     `value` and `error` have the shape (*batch, answers, parameters): batch is what arrays broadcast to, and an axis is
     left out where the answer is one number, and where one parameter is named that is one number. Raises as `grad` does.
     """
+    pair = value_and_jacobian(function, wrt)
+    return lambda *args, **kwargs: pair(*args, **kwargs)[1]
+
+
+def value_and_jacobian(function: Function, wrt: Names = None) -> Callable[..., tuple[Estimate, Estimate]]:
+    """The value and what `jacobian` has of it, in one run. Raises as that does."""
     names = parameters_to_vary(function, wrt)
 
-    def matrix(*args: Any, **kwargs: Any) -> Estimate:
+    def pair(*args: Any, **kwargs: Any) -> tuple[Estimate, Estimate]:
         run = _Run(*function.prepared(args, kwargs, {}), {})
         value = run.along_each(names)
         tangents, bounds = (
@@ -104,9 +110,10 @@ def jacobian(function: Function, wrt: Names = None) -> Callable[..., Estimate]:
         single = isinstance(value, Cell), len(names) == 1 and isinstance(run.given[names[0]], Cell)
         count = sum(_size(name, run.given[name]) for name in names)
         slopes, errors = (as_matrix(part, count, run.batch, *single) for part in (found.tangent, found.tangent_error))
-        return replace(found, value=slopes, error=errors, tangent=None, tangent_error=None)
+        plain = replace(found, tangent=None, tangent_error=None)
+        return plain, replace(plain, value=slopes, error=errors)
 
-    return matrix
+    return pair
 
 
 def vjp(function: Function, cotangent: Any, wrt: Names = None) -> Callable[..., Gradient]:
