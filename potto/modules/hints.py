@@ -37,7 +37,6 @@ _ELSEWHERE = {
     "false": "a comparison in brackets is 1 or 0; write `0`",
     "None": "every expression has a value; leave it out",
     "null": "every expression has a value; leave it out",
-    "len": "a list has no length here; `for v in list: …` goes through it",
     "range": "write a range, `0..n-1`, as in `[i^2 for i in 0..n-1]` and `sum i in 0..n-1 (…)`",
     "integrate": "write `integral [lo, hi] body d(x)`",
     "quad": "write `integral [lo, hi] body d(x)`",

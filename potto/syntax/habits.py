@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 _STATEMENTS = {
     "while": "there are no loops but `for` over a list in a script; `sum i in 1..n (…)` adds, recursion repeats",
-    "class": "values are numbers, tuples, lists and functions",
-    "struct": "values are numbers, tuples, lists and functions",
+    "class": "values with names for their parts are records: `record Camera(eye: Real, focal: Real)`",
+    "struct": "values with names for their parts are records: `record Camera(eye: Real, focal: Real)`",
     "function": "write `def f(x) …`",
     "func": "write `def f(x) …`",
     "fn": "write `def f(x) …`",
