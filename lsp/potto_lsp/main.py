@@ -10,9 +10,11 @@ import logging
 import os
 import socket
 import sys
+from itertools import chain
 from typing import BinaryIO
 
-from potto_lsp.server import Server
+from potto_lsp.greeting import greet
+from potto_lsp.wire import Outbox, messages
 
 logger = logging.getLogger(__name__)
 SWITCH = 0.0002  # seconds: with Python's 5 ms a question beside a busy thread takes as long
@@ -36,8 +38,21 @@ def _log_to(path: str | None) -> None:
 
 def _serve_streams() -> int:
     reader, writer = take_streams()
-    status = Server(reader, writer).run()
-    return _leave(status)
+    return _leave(_talk(reader, writer))
+
+
+def _talk(reader: BinaryIO, writer: BinaryIO) -> int:
+    """Serve the client at a pair of streams; the exit status. It is greeted before the server is loaded."""
+    received, outbox = messages(reader), Outbox(writer)
+    first = next(received, None)
+    if first is None:
+        outbox.close()
+        return 1
+    greeted = greet(first, outbox)
+
+    from potto_lsp.server import Server
+
+    return Server(chain([first], received), outbox, greeted).run()
 
 
 def take_streams() -> tuple[BinaryIO, BinaryIO]:
@@ -59,7 +74,7 @@ def _serve_socket(address: tuple[str, int]) -> int:
         connection, _ = listener.accept()
     with connection:
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        status = Server(connection.makefile("rb"), connection.makefile("wb")).run()
+        status = _talk(connection.makefile("rb"), connection.makefile("wb"))
     return _leave(status)
 
 

@@ -1,7 +1,7 @@
 """Messages on a stream: `Content-Length` and JSON, as the base protocol has it.
 
-Owns `messages`, which reads them, and `Outbox`, which writes them from any thread without making it wait: a client that
-does not read for a while must not keep the server from reading, or both would wait for ever.
+Owns `messages`, which reads them, `framed`, their bytes, and `Outbox`, which writes them from any thread without making
+it wait: a client that does not read for a while must not keep the server from reading, or both would wait for ever.
 """
 
 from __future__ import annotations
@@ -70,6 +70,13 @@ def _length(value: bytes) -> int | None:
     return length
 
 
+def framed(message: dict[str, Any]) -> bytes:
+    """A message as it is sent."""
+    # Escaped to ASCII: half of a surrogate pair, which JSON may carry, would not go into UTF-8.
+    body = json.dumps(message, separators=(",", ":")).encode("ascii")
+    return b"Content-Length: %d\r\n\r\n%b" % (len(body), body)
+
+
 class Outbox:
     """Writes messages in the order in which they are put.
 
@@ -87,9 +94,11 @@ class Outbox:
 
     def put(self, message: dict[str, Any]) -> None:
         """Send a message now or some time soon."""
-        # Escaped to ASCII: half of a surrogate pair, which JSON may carry, would not go into UTF-8.
-        body = json.dumps(message, separators=(",", ":")).encode("ascii")
-        left = b"Content-Length: %d\r\n\r\n%b" % (len(body), body)
+        self.write(framed(message))
+
+    def write(self, data: bytes) -> None:
+        """Send a framed message now or some time soon."""
+        left = data
         with self._lock:
             if not self._left and self._pipe is not None:
                 left = self._pipe.write(left)

@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 from potto_lsp import server
 from potto_lsp.features import Feature
+from potto_lsp.wire import Outbox, messages
 
 from potto.checking import check
 
@@ -27,7 +28,7 @@ class Pipe:
     def __init__(self) -> None:
         (inner, outer), (answers, writer) = os.pipe(), os.pipe()
         self.out, self.answers = os.fdopen(outer, "wb", buffering=0), os.fdopen(answers, "rb")
-        self.server = server.Server(os.fdopen(inner, "rb"), os.fdopen(writer, "wb"))
+        self.server = server.Server(messages(os.fdopen(inner, "rb")), Outbox(os.fdopen(writer, "wb")))
         self.thread = threading.Thread(target=self.server.run)
         self.thread.start()
         self.notes: list[dict[str, Any]] = []

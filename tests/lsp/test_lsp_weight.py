@@ -19,7 +19,7 @@ from potto_lsp.progress import Progress
 
 Server = Callable[..., Client]
 Uri = Callable[[str], str]
-HEAVY = ("numpy", "scipy", "llvmlite", "mpmath", "matplotlib", "prompt_toolkit", "pygls", "lsprotocol")
+HEAVY = ("numpy", "scipy", "llvmlite", "mpmath", "matplotlib", "prompt_toolkit")
 TEXT = "def f(t)\n    integral [0, 1] [x < t] * x d(x)\n#> f(0.5)\ny = f(0.25)\n"
 # Says on standard error, when it is asked, which heavy modules the server has and how many texts of open files.
 SPY = f"""

@@ -1,0 +1,209 @@
+"""pygls, where it is strict enough, and what is done here in its place. Owns `Protocol` and `Carrier`.
+
+Taken from pygls: the server and its table of handlers, the way from a message to its handler, answers as futures and
+their cancellation, requests and notifications to the client, the codes of errors. Of pygls 2.1.1 does not hold:
+
+- `io_.run` knows `Content-Length: n` in exactly that form, answers nothing to what is no JSON and takes a body that
+  ends early for a message: `Carrier.carry` is given what `wire.messages` reads.
+- `structure_message` is called for every object inside of a message, and makes classes that are taken apart again:
+  messages stay plain JSON here.
+- `handle_message` raises for what is no message of JSON-RPC, and its sender waits for ever; a request before
+  `initialize` is served, one after `shutdown` is not answered.
+- Requests of both sides share a table by id, so that a client that counts as the server does gets wrong answers.
+- What a synchronous handler returns is its answer at once, so that it cannot be cancelled: a handler may return a
+  future here. `set_result` on a future that was cancelled meanwhile raises: see `settle`.
+- A handler's failure is sent with a traceback, and one of the protocol without its data.
+- `_send_data` waits for a client that does not read, writes every message into the log, sends `params: null`, takes
+  results apart object by object, and keeps what it cannot send to itself: `wire.Outbox` writes.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import Future, InvalidStateError
+from contextlib import suppress
+from typing import Any, cast
+
+from potto_lsp import errors, lazy_types
+from potto_lsp.errors import RequestError
+from potto_lsp.wire import BadMessage, framed
+
+lazy_types.load()
+
+import cattrs  # noqa: E402  # what follows imports lsprotocol's types, which must be there already
+from lsprotocol.types import ResponseError  # noqa: E402
+from pygls.exceptions import JsonRpcException  # noqa: E402
+from pygls.protocol import JsonRPCProtocol  # noqa: E402
+from pygls.server import JsonRPCServer  # noqa: E402
+
+logger = logging.getLogger(__name__)
+Id = int | str
+_LATER = object()  # what stands for the result of a handler that has returned a future
+
+
+def settle(future: Future[Any], result: Any = None, error: RequestError | None = None) -> None:
+    """Answer a request, unless it was answered or cancelled."""
+    with suppress(InvalidStateError):
+        if error is None:
+            future.set_result(result)
+        else:
+            future.set_exception(error)
+
+
+class Protocol(JsonRPCProtocol):
+    """JSON-RPC to the letter. `_server` says what a message means at this stage of the session."""
+
+    _server: Carrier
+
+    def __init__(self, server: JsonRPCServer, converter: cattrs.Converter) -> None:
+        super().__init__(server, converter)
+        self._asked: dict[Id, Future[Any]] = {}  # what the client waits for
+
+    # Receiving
+
+    def structure_message(self, data: dict[str, Any]) -> Any:
+        return data
+
+    def handle_message(self, message: Any) -> None:
+        if isinstance(message, BadMessage):
+            logger.error("a message that is no JSON: %s", message)
+            self.fail(None, errors.PARSE_ERROR, "this is no JSON")
+        elif not isinstance(message, dict):
+            logger.error("a message that is no object")
+            self.fail(None, errors.INVALID_REQUEST, "a message is an object")
+        elif not isinstance(method := message.get("method"), str):
+            self._handle_response(cast(Id, message.get("id")), message.get("result"), message.get("error"))
+        elif "id" not in message:
+            self._handle_notification(method, message.get("params"))
+        elif isinstance(id := message["id"], int | str) and not isinstance(id, bool):
+            self._handle_request(id, method, message.get("params"))
+        else:
+            self.fail(None, errors.INVALID_REQUEST, "the id of a request is a number or a string")
+
+    def _handle_request(self, msg_id: Id, method_name: str, params: Any) -> None:
+        refused = self._server.refused(method_name)
+        if refused is not None:
+            self.fail(msg_id, refused.code, refused.message)
+        elif method_name not in self.fm.features:
+            self.fail(msg_id, errors.METHOD_NOT_FOUND, f"there is no method `{method_name}`")
+        else:
+            super()._handle_request(msg_id, method_name, params)
+
+    def _handle_notification(self, method_name: str, params: Any) -> None:
+        if not self._server.listens(method_name):
+            logger.info("a notification out of time: %s", method_name)
+        elif method_name == "$/cancelRequest":
+            self._handle_cancel_notification(params.get("id") if isinstance(params, Mapping) else None)
+        elif method_name in self.fm.features:
+            super()._handle_notification(method_name, params)
+        elif not method_name.startswith("$/"):
+            logger.info("a notification that is not known: %s", method_name)
+
+    def _handle_response(self, msg_id: Id, result: Any = None, error: Any = None) -> None:
+        future = self._request_futures.pop(msg_id, None) if isinstance(msg_id, int | str) else None
+        if future is None:
+            logger.info("a response to what was not asked: %r", msg_id)
+        elif error is None:
+            settle(future, result)
+        else:
+            said = error if isinstance(error, Mapping) else {}
+            code = said.get("code", errors.INTERNAL_ERROR)
+            settle(future, error=RequestError(code, str(said.get("message", "")), said.get("data")))
+
+    def _handle_cancel_notification(self, msg_id: Any) -> None:
+        future = self._asked.get(msg_id) if isinstance(msg_id, int | str) else None
+        if future is not None:
+            future.cancel()
+
+    # Answering
+
+    def _execute_handler(
+        self,
+        msg_id: Id,
+        handler: Callable[..., Any],
+        callback: Callable[[Future[Any]], None],
+        args: tuple[Any, ...] | None = None,
+        kwargs: dict[str, Any] | None = None,
+    ) -> None:
+        def called(*args: Any, **kwargs: Any) -> Any:
+            returned = handler(*args, **kwargs)
+            if not isinstance(returned, Future):
+                return returned
+            self._asked[msg_id] = returned
+            returned.add_done_callback(callback)
+            return _LATER
+
+        def unless_later(future: Future[Any]) -> None:
+            if future.exception() is not None or future.result() is not _LATER:
+                callback(future)
+
+        super()._execute_handler(msg_id, called, unless_later, args, kwargs)
+
+    def _send_handler_result(self, future: Future[Any], *, msg_id: Id) -> None:
+        if self._asked.get(msg_id) is future:
+            del self._asked[msg_id]
+        if future.cancelled():
+            self.fail(msg_id, errors.REQUEST_CANCELLED, "the request was cancelled")
+            return
+        match future.exception():
+            case None:
+                self._send_response(msg_id, future.result())
+            case RequestError() as error:
+                self.fail(msg_id, error.code, error.message, error.data)
+            case error:
+                logger.error("a request failed", exc_info=error)
+                self.fail(msg_id, errors.INTERNAL_ERROR, f"internal error: {type(error).__name__}: {error}")
+
+    # Sending
+
+    def fail(self, id: Id | None, code: int, message: str, data: Any = None) -> None:
+        """Answer with an error; `id` is None for what has none that could be read."""
+        self._send_response(cast(Id, id), error=JsonRpcException(message, code, data).to_response_error())
+
+    def _send_response(self, msg_id: Id, result: Any = None, error: ResponseError | None = None) -> None:
+        if error is None:
+            self._send_data({"id": msg_id, "result": result})
+            return
+        said = {"code": error.code, "message": error.message}
+        self._send_data({"id": msg_id, "error": said if error.data is None else {**said, "data": error.data}})
+
+    def _send_data(self, data: Any) -> None:
+        if not isinstance(data, dict):  # pygls' own requests and notifications
+            told = {name: getattr(data, name, None) for name in ("id", "method", "params")}
+            data = {name: value for name, value in told.items() if value is not None}
+        if self.writer is not None:
+            self.writer.write(framed({"jsonrpc": self.VERSION, **data}))
+
+
+class Carrier(JsonRPCServer):
+    """A server of pygls that reads one stream on the thread that runs it, and knows when a session may ask what."""
+
+    protocol: Protocol
+
+    def __init__(self) -> None:
+        super().__init__(Protocol, cattrs.Converter)
+
+    def carry(self, messages: Iterable[Any]) -> int:
+        """Handle messages until `exit` or their end; the exit status."""
+        for message in messages:
+            if isinstance(message, dict) and message.get("method") == "exit" and "id" not in message:
+                return self.status()
+            self.protocol.handle_message(message)
+        return 1
+
+    def refused(self, method: str) -> RequestError | None:
+        """Why a request is out of time, if it is."""
+        raise NotImplementedError
+
+    def listens(self, method: str) -> bool:
+        """Whether a notification counts."""
+        raise NotImplementedError
+
+    def status(self) -> int:
+        """The exit status, when the client says `exit`."""
+        raise NotImplementedError
+
+    def report_server_error(self, error: Exception, source: Any) -> None:
+        """For the log: a user cannot do anything about it."""
+        logger.error("%s", error)

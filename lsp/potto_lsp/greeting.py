@@ -1,0 +1,34 @@
+"""The answer to `initialize`, which waits for nothing that it does not need. Owns `answer` and `greet`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from potto import __version__
+from potto_lsp import errors
+from potto_lsp.client import Client
+from potto_lsp.errors import RequestError
+from potto_lsp.features import capabilities
+from potto_lsp.wire import Outbox
+
+
+def answer(params: Any) -> dict[str, Any]:
+    """What the server is able to do, for a client. Raises `RequestError` for what is no greeting."""
+    if not isinstance(params, Mapping) or not isinstance(params.get("capabilities", {}), Mapping):
+        raise RequestError(errors.INVALID_PARAMS, "the client's capabilities are missing")
+    info = {"name": "potto", "version": __version__}
+    return {"capabilities": capabilities(Client(params).encoding), "serverInfo": info}
+
+
+def greet(message: Any, outbox: Outbox) -> bool:
+    """Answer a first message at once if it is a greeting in order; whether it was. Else the server says what it is."""
+    match message:
+        case {"id": int() | str() as id, "method": "initialize"} if not isinstance(id, bool):
+            try:
+                result = answer(message.get("params"))
+            except RequestError:
+                return False
+            outbox.put({"jsonrpc": "2.0", "id": id, "result": result})
+            return True
+    return False
