@@ -40,7 +40,7 @@ OUTSIDERS: dict[str, tuple[str, ...]] = {
               "potto.python.arrays", "potto.python.forms", "potto.python.gradients", "potto.applications",
               "potto.bench", "potto.bridges", "potto.data", "potto_lsp.preview", "potto_lsp.sampling"),
     "PIL": ("potto.data",),
-    "scipy": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.applications.fitting", "potto.bench"),
+    "scipy": ("potto.kernels", "potto.integrate", "potto.runtime", "potto.applications.minimizing", "potto.bench"),
     "jax": ("potto.bench.peers", "potto.bridges.to_jax"),
     "torch": ("potto.bridges.to_torch",),
     "vegas": ("potto.bench.peers",),

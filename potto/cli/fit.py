@@ -15,7 +15,7 @@ from potto.cli.console import Console
 from potto.cli.numbers import accounts, add_options, settings_of, show_stats
 
 if TYPE_CHECKING:
-    from potto.applications.fitting import Fit, Step
+    from potto.applications.minimizing import Fit, Step
     from potto.evaluating.world import World
     from potto.runtime.answers.estimate import Estimate
 
@@ -37,6 +37,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
                         "column); then the mean squared distance is made least")  # fmt: skip
     parser.add_argument("--data", metavar="FILE.csv", help="parameters as columns of a table with a line of names")
     parser.add_argument("--steps", type=int, default=200, help="the most steps (default 200)")
+    parser.add_argument("--optimizer", dest="way", choices=("lbfgs", "gauss-newton", "adam"), default="lbfgs",
+                        help="how it goes down: lbfgs; gauss-newton for a target; adam for what is noisy")  # fmt: skip
+    parser.add_argument("--checkpoint", metavar="FILE", help="write the best place to FILE after every step, and go on "
+                        "from there if it exists")  # fmt: skip
     parser.add_argument("--trace", metavar="FILE", help="write every step to a .csv or .json file")
     add_set(parser)
     add_options(parser)
@@ -131,7 +135,8 @@ def _fitted(
                          "name the column of what is measured with --target")  # fmt: skip
     bounds = dict(options.bound)
     return fit(function, start, given={**given, **columns}, bounds=bounds, target=target, steps=options.steps,
-               progress=_Progress(tuple(start), console), watch=answers.append)  # fmt: skip
+               progress=_Progress(tuple(start), console), watch=answers.append, method=options.way,
+               checkpoint=options.checkpoint)  # fmt: skip
 
 
 class _Progress:

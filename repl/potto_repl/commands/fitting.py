@@ -12,8 +12,8 @@ from collections.abc import Iterator, Sequence
 
 from msgspec.structs import asdict
 
-from potto.applications.fitting import Step
 from potto.applications.fitting import fit as fitted
+from potto.applications.minimizing import Step
 from potto.projects.settings import settings
 from potto.python.functions import Function
 from potto.runtime.answers.printing import format_digits, format_error, format_number, format_seconds, with_error
