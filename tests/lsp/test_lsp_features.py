@@ -193,6 +193,28 @@ def test_lenses(client: Client, uri: Uri) -> None:
     assert any("reference" in lens["command"]["title"] for lens in done)
 
 
+@pytest.mark.parametrize(
+    ("kind", "gone"),
+    [("evaluate", "evaluate"), ("differentiate", "differentiate"), ("derivative", "show derivative"),
+     ("preview", "preview"), ("references", "reference"), ("live", "evaluate")],
+)  # fmt: skip
+def test_a_kind_of_lens_can_be_turned_off(server: Server, uri: Uri, kind: str, gone: str) -> None:
+    """And only that kind."""
+    text = "def f(t)\n    t^2\n" if kind != "live" else "#> 1 + 1\n"
+
+    def titles(settings: dict[str, Any]) -> list[str]:
+        client = server(main=text)
+        client.tell("workspace/didChangeConfiguration", {"settings": {"potto": settings}})
+        client.open(uri("main"), text)
+        found = client.ask("textDocument/codeLens", {"textDocument": {"uri": uri("main")}})
+        done = [lens if "command" in lens else client.ask("codeLens/resolve", lens) for lens in found]
+        return sorted(lens["command"]["title"] for lens in done)
+
+    every, fewer = titles({}), titles({"lenses": {kind: False}})
+    assert any(gone in title for title in every)
+    assert fewer == [title for title in every if gone not in title]
+
+
 def test_hints(client: Client, uri: Uri) -> None:
     found = client.ask("textDocument/inlayHint", whole(uri("main")))
     assert any("Real" in hint["label"] for hint in found)
@@ -213,9 +235,7 @@ def test_semantic_tokens_whole_in_range_and_by_difference(client: Client, uri: U
     assert first["data"] and len(first["data"]) % 5 == 0
     assert client.ask("textDocument/semanticTokens/range", whole(uri("main")))["data"] == first["data"]
     client.change(uri("main"), 2, {"text": TEXT.replace("x < width", "x < k")})
-    delta = client.ask(
-        "textDocument/semanticTokens/full/delta", {**document, "previousResultId": first["resultId"]}
-    )
+    delta = client.ask("textDocument/semanticTokens/full/delta", {**document, "previousResultId": first["resultId"]})
     data = first["data"]
     for edit in delta["edits"]:
         data[edit["start"] : edit["start"] + edit["deleteCount"]] = edit["data"]

@@ -15,15 +15,25 @@ COMMANDS = {
     "evaluate": "potto.evaluate", "run": "potto.evaluate", "differentiate": "potto.differentiate",
     "showDerivative": "potto.differentiate", "preview": "potto.preview",
 }  # fmt: skip
+SETTINGS = {
+    "evaluate": "lenses.evaluate", "run": "lenses.run", "differentiate": "lenses.differentiate",
+    "showDerivative": "lenses.derivative", "showReferences": "lenses.references",
+}  # fmt: skip
 REFERENCES = "potto.showReferences"  # of the client; only one that says that it has it is given it
 
 
 def code_lenses(ask: Ask) -> list[protocol.CodeLens]:
+    """The lenses of a file, but for the kinds that are turned off."""
     found: list[protocol.CodeLens] = []
-    scenes = {scene.name: scene for scene in ide.scenes(ask.db, ask.file)}
+    settings = ask.analysis.settings
+    previews = settings.get("lenses.preview") is not False
+    scenes = {scene.name: scene for scene in ide.scenes(ask.db, ask.file)} if previews else {}
+    off = {kind for kind, setting in SETTINGS.items() if settings.get(setting) is False}
     for lens in ide.code_lenses(ask.db, ask.file):
         if lens.command == "showDerivative":
             found += _previews(ask, lens, scenes.get(lens.arguments[1]))
+        if lens.command in off or (_is_live(ask, lens) and settings.get("lenses.live") is False):
+            continue
         made: protocol.CodeLens = {"range": ask.range(lens.span)}
         if lens.title:
             made["command"] = _command(ask, lens)
@@ -31,6 +41,11 @@ def code_lenses(ask: Ask) -> list[protocol.CodeLens]:
             made["data"] = [lens.command, *lens.arguments]
         found.append(made)
     return found
+
+
+def _is_live(ask: Ask, lens: ide.CodeLens) -> bool:
+    """Whether it stands above a live expression."""
+    return ask.analysis.text(ask.file).text.startswith("#", lens.span.start)
 
 
 def _previews(ask: Ask, lens: ide.CodeLens, scene: ide.Scene | None) -> list[protocol.CodeLens]:
