@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import reduce
+from operator import getitem
 from typing import Any
 
 import numpy as np
@@ -21,6 +23,9 @@ from potto.kernels.errors import wrong_call
 from potto.python.functions import Function
 from potto.python.gradients import grad
 from potto.runtime.answers.estimate import Estimate
+
+Path = tuple[str, ...]
+"""The name of a parameter and, where that is a record, those of fields."""
 
 
 def fit(
@@ -36,7 +41,8 @@ def fit(
     method: str = METHODS[0],
     checkpoint: str | None = None,
 ) -> Fit:
-    """Make a function least over the parameters named in `start`, from there on: numbers, or arrays.
+    """Make a function least over the parameters named in `start`, from there on: numbers, arrays, or records as
+    dicts.
 
     given: the other parameters; arrays among them make the function an array. bounds: what a parameter, or each
     element of one, may be.
@@ -61,18 +67,19 @@ def fit(
             hint = f"did you mean `{near[0]}`?" if near else ""
             raise wrong_call(f"a bound is given for `{name}`, which is not fitted", hint)
     gradient = grad(function, names)
-    begun = {name: _begun(name, value) for name, value in start.items()}
+    begun = {path: _begun(".".join(path), value) for path, value in _leaves(start)}
 
     def objective(x: Array) -> Seen:
         answer = gradient(**_named(begun, x), **given)
         if watch is not None:
             watch(answer)
-        return _seen(answer, [np.ndim(value) for value in begun.values()], target)
+        return _seen(answer, names, {path: np.ndim(value) for path, value in begun.items()}, target)
 
-    limits = [(bounds or {}).get(name, (-math.inf, math.inf)) for name, value in begun.items() for _ in _labels(value)]
+    free = (-math.inf, math.inf)
+    limits = [(bounds or {}).get(path[0], free) for path, value in begun.items() for _ in _labels(value)]
     numbers = {
-        f"{name}{label}": float(number)
-        for name, value in begun.items()
+        f"{'.'.join(path)}{label}": float(number)
+        for path, value in begun.items()
         for label, number in zip(_labels(value), np.ravel(value), strict=True)
     }
     if not numbers:
@@ -81,6 +88,15 @@ def fit(
         numbers, progress = kept(checkpoint, numbers), keeping(checkpoint, tuple(numbers), progress)
     found = minimized(objective, numbers, limits, steps, progress, method)
     return replace(found, parameters=_named(begun, np.array(list(found.numbers.values()))))
+
+
+def _leaves(start: Mapping[str, Any], path: Path = ()) -> Iterator[tuple[Path, Any]]:
+    """What parameters start at, with the names that lead there: of a record, field by field."""
+    for name, value in start.items():
+        if isinstance(value, Mapping):
+            yield from _leaves(value, (*path, name))
+        else:
+            yield (*path, name), value
 
 
 def _begun(name: str, value: Any) -> Any:
@@ -96,25 +112,30 @@ def _labels(value: Any) -> list[str]:
     return [f"[{', '.join(map(str, place))}]" if place else "" for place in np.ndindex(np.shape(value))]
 
 
-def _named(begun: Mapping[str, Any], x: Array) -> dict[str, Any]:
+def _named(begun: Mapping[Path, Any], x: Array) -> dict[str, Any]:
     """Numbers in a row as parameters, in the form in which they began."""
-    found, at = {}, 0
-    for name, value in begun.items():
-        size = np.size(value)
-        found[name] = x[at : at + size].reshape(np.shape(value)) if np.ndim(value) else float(x[at])
+    found: dict[str, Any] = {}
+    at = 0
+    for path, value in begun.items():
+        size, inner = np.size(value), found
+        for name in path[:-1]:
+            inner = inner.setdefault(name, {})
+        inner[path[-1]] = x[at : at + size].reshape(np.shape(value)) if np.ndim(value) else float(x[at])
         at += size
     return found
 
 
-def _seen(found: Any, axes: Sequence[int], target: Any) -> Seen:
+def _seen(found: Any, names: Sequence[str], axes: Mapping[Path, int], target: Any) -> Seen:
     """What is to be least: the function itself, or the mean of its squared distances to the target.
 
-    axes: how many each parameter has.
+    axes: how many each part of the parameters has.
     """
-    sides = (
-        [_by_numbers(part, found, n) for part, n in zip(side if len(axes) > 1 else (side,), axes, strict=True)]
-        for side in (found.tangent, found.tangent_error)
-    )
+
+    def rows(side: Any) -> list[Array]:
+        whole = dict(zip(names, side if len(names) > 1 else (side,), strict=True))
+        return [_by_numbers(reduce(getitem, path, whole), found, count) for path, count in axes.items()]
+
+    sides = (rows(side) for side in (found.tangent, found.tangent_error))
     tangents, errors = (np.concatenate(parts) for parts in sides)
     value, bound = _flat(found.value), _flat(found.error)
     tangents = np.broadcast_to(tangents, (len(tangents), value.size))

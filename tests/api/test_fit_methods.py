@@ -29,6 +29,20 @@ def spread(xs: [n] Real)
 m = potto.compile(SOURCE)
 
 
+def test_records_and_tuples_are_fitted_in_their_form() -> None:
+    program = potto.compile("""
+record Lens(at: (Real, Real), width: Real)
+def off(lens: Lens, k) (lens.at.0 - 1)^2 + (lens.at.1 - 2*k)^2 + (lens.width - 3)^2 + (k - 1)^2
+def pair(p: (Real, Real)) (p.0 - 1)^2 + (p.1 - 2)^2
+""")
+    start = {"lens": {"at": (0.0, 0.0), "width": 1.0}, "k": 0.5}
+    found = potto.fit(program.off, start)
+    assert found.converged and list(found["lens"]["at"]) == pytest.approx([1, 2], abs=1e-6)
+    assert (found["lens"]["width"], found["k"]) == pytest.approx((3, 1), abs=1e-6)
+    assert list(found.numbers) == ["lens.at[0]", "lens.at[1]", "lens.width", "k"]
+    assert list(potto.fit(program.pair, {"p": (0.0, 0.0)})["p"]) == pytest.approx([1, 2], abs=1e-6)
+
+
 def test_gauss_newton_takes_few_steps_to_a_target() -> None:
     y = np.linspace(-2, 3, 15)
     target = np.array([0.5 * math.erfc((v - 0.7) / 1.3 / math.sqrt(2)) for v in y])
