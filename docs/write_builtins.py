@@ -72,9 +72,9 @@ def grammars() -> dict[Path, str]:
         ),
         "emacs/potto-mode.el": (
             r"(?<=defconst potto--builtins\n)[^)]*\)",
-            lines([f'"{name}"' for name in (*names, "fst", "snd", "print", "deriv", "delta")], "    ").replace(
-                "    ", "  '(", 1
-            )
+            lines(
+                [f'"{name}"' for name in (*names, "fst", "snd", "print", "deriv", "delta", "grad", "D")], "    "
+            ).replace("    ", "  '(", 1)
             + ")",
         ),
         "vscode/syntaxes/potto.tmLanguage.json": (r"(?<=\(\?:)fst\|snd\|[\w|]*", "|".join(["fst", "snd", *names])),

@@ -44,7 +44,7 @@
   '("abs" "acos" "asin" "atan" "atan2" "besselj0" "besselj1" "ceil" "clamp" "cos" "cosh" "cross" "digamma" "dot" "erf"
     "erfc" "erfinv" "exp" "expm1" "floor" "gamma" "hypot" "image" "interp" "len" "lgamma" "load" "log" "log1p" "max"
     "min" "norm" "pow" "sech" "sign" "sin" "sinc" "sinh" "sqrt" "tan" "tanh" "trigamma" "fst" "snd" "print" "deriv"
-    "delta"))
+    "delta" "grad" "D"))
 
 (defconst potto-font-lock-keywords
   `(("^\\s-*#>" 0 font-lock-doc-face t)

@@ -28,7 +28,7 @@ syntax match pottoDefine "^\s\+\zs\(inverse\|where\)\>"
 syntax match pottoFunction "\K\k*" contained
 syntax match pottoFunction "^\K\k*\ze\s*=\s*\(\\\|λ\|deriv\>\)"
 syntax keyword pottoConstant pi inf
-syntax keyword pottoCalculus deriv delta
+syntax keyword pottoCalculus deriv delta grad D
 syntax keyword pottoBuiltin abs acos asin atan atan2 besselj0 besselj1 ceil clamp cos cosh cross digamma dot erf erfc
 syntax keyword pottoBuiltin erfinv exp expm1 floor gamma hypot image interp len lgamma load log log1p max min norm pow
 syntax keyword pottoBuiltin sech sign sin sinc sinh sqrt tan tanh trigamma fst snd print
