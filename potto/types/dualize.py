@@ -54,12 +54,14 @@ def _slope_group(function: Value, groups: tuple[tuple[Parameter, ...], ...], res
     if not groups:
         tangent = function.items[1] if isinstance(function, TupleValue) and len(function.items) == 2 else function
         return _shaped(tangent, result) if isinstance(tangent, Scalar) else tangent
-    inputs = tuple(
-        symbolic(p.type, lambda p=p: Source("input", p.name or "x"), lambda p=p: Port(p.name or "x"))  # type: ignore[misc]
-        for p in groups[0]
-    )
+    inputs = tuple(map(_symbol, groups[0]))
     answer, effects = call(function, tuple(map(_doubled, inputs)))
     return Closure(inputs, _slope_group(answer, groups[1:], result), tuple(effects))
+
+
+def _symbol(parameter: Parameter) -> Value:
+    name = parameter.name or "x"
+    return symbolic(parameter.type, lambda: Source("input", name), lambda: Port(name))
 
 
 def _shaped(value: Scalar, type: Type) -> Value:
