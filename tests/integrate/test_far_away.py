@@ -6,9 +6,11 @@ for the doubles that the program has.
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import Any
 
 import mpmath as mp
+import numpy as np
 import pytest
 
 import potto
@@ -91,3 +93,29 @@ def test_a_wave_over_infinite_ranges(first: str, order: str) -> None:
         return mp.fsum(cdf(2 * mp.pi * (k + 1) + a) - cdf(2 * mp.pi * k + mp.pi - a) for k in range(-8, 8))
 
     covered(answer, share(mp.mpf(0.25)), mp.diff(share, mp.mpf(0.25)))
+
+
+def test_corners_that_rounding_misplaces_are_in_the_bound() -> None:
+    """A triangle of an array, 100,000 from the origin: where its edges meet is found by differences of numbers of 1e10,
+    so that the section bends 1e-5 beside its cut. Held to the triangle clipped in fractions."""
+    corners = np.array([[0.54672171, 0.86204095], [0.66097723, 0.88411966], [0.66509467, 0.97001584]]) + 1e5
+    x, y, h = 1e5 + 42 / 64, 1e5 + 62 / 64, 1 / 64
+    module = potto.compile("""
+def edge(a: (Real*, Real*), b: (Real*, Real*), x, y) (b.x - a.x)*(y - a.y) - (b.y - a.y)*(x - a.x)
+def covered(ts: [n] ((Real, Real), (Real, Real), (Real, Real)), px, py, h) integral ([px, px + h], [py, py + h])
+    [edge(ts[0].0, ts[0].1, x, y) >= 0 and edge(ts[0].1, ts[0].2, x, y) >= 0 and edge(ts[0].2, ts[0].0, x, y) >= 0]
+    d(x, y)
+""")
+    polygon = [(Fraction(a), Fraction(b)) for a, b in corners.tolist()]
+    for axis, end, sign in ((0, x, 1), (0, x + h, -1), (1, y, 1), (1, y + h, -1)):
+        kept = []
+        for p, q in zip(polygon, polygon[1:] + polygon[:1], strict=True):
+            u, v = sign * (p[axis] - Fraction(end)), sign * (q[axis] - Fraction(end))
+            if u >= 0:
+                kept.append(p)
+            if u * v < 0:
+                kept.append((p[0] + u / (u - v) * (q[0] - p[0]), p[1] + u / (u - v) * (q[1] - p[1])))
+        polygon = kept
+    area = sum(p[0] * q[1] - q[0] * p[1] for p, q in zip(polygon, polygon[1:] + polygon[:1], strict=True)) / 2
+    answer = module.covered(corners[None], x, y, h)
+    assert abs(Fraction(answer.value) - area) <= Fraction(answer.error) < Fraction(1, 10**7)

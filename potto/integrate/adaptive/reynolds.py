@@ -126,6 +126,18 @@ def cut_rounding(work: PanelBatch, ends: Ends) -> tuple[Array, Array]:
     return total(seg.ea, seg.eb), np.stack(speeds, axis=1) if speeds else np.zeros((work.width, 0, work.batch))
 
 
+def bent_elsewhere(work: PanelBatch, at_ends: Array) -> Array:
+    """What is lost as an integrand bends beside the place where rounding puts its cut, (m, B): the square of how far
+    off that is, times the slopes on both sides."""
+    seg, steep = work.seg, at_ends[1]
+    with np.errstate(invalid="ignore", over="ignore"):
+        reach = seg.b - seg.a
+        low, high = np.minimum(seg.ea, reach) ** 2, np.minimum(seg.eb, reach) ** 2
+        cost = steep[:, 0] * low + steep[:, 1] * high
+    cost = np.where(np.isfinite(cost), cost, 0.0)
+    return np.stack([np.bincount(seg.owner, row, minlength=work.batch) for row in cost])
+
+
 def added_up(work: PanelBatch, found: Totals) -> Array:
     """What is added up for each of the batch, without regard to sign, here and further in: (2, B)."""
     size = np.where(np.isfinite(found.size), found.size, 0.0).max(axis=0)
@@ -152,6 +164,8 @@ def sums(work: PanelBatch, found: Totals, ends: Ends | None) -> Sums:
     if ends is not None:
         places, common = cut_rounding(work, ends)
         e, et = e + places, et + common
+    if not work.last and work.at_ends is not None:
+        e = e + bent_elsewhere(work, work.at_ends)
     if work.endless is not None:
         t, et = np.where(work.endless == 0, t, work.endless), np.where(work.endless == 0, et, np.inf)
     return Sums(v, e, t, et, gross=added_up(work, found), common=common)

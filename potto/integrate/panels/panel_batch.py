@@ -23,6 +23,7 @@ from potto.kernels.cells import Array, Cell, Ints, Mask, Number, Value, pad
 
 CHUNK = 1 << 15  # points per kernel call: a few buffers of this length fit the second-level cache
 MOST_SLACK = 1e6  # how many times the error of a node may be larger that hardly counts
+UNSURE = 1e-9  # how far off cuts may be, in parts of a segment, until it matters that integrands bend beside them
 BESIDE = 1e-9  # how far from the ends of a segment, in parts of it, it is looked at just inside
 
 
@@ -59,6 +60,9 @@ class PanelBatch(Struct, dict=True):
         # Without forced sides there are no values on a surface: only the moving form does without them.
         self.both = self.moving and not self.parent.plan.hides
         self.inner = self.machine.with_directions(self.k + 1) if self.moving else self.machine
+        with np.errstate(divide="ignore", invalid="ignore"):
+            off = np.maximum(self.seg.ea, self.seg.eb) / (self.seg.b - self.seg.a)
+        self.bends = not self.last and bool((off > UNSURE).any())  # beside cuts, by more than nothing
 
     # Channels: per component the value, then per direction the moving form, then (if both) the fixed form
 
@@ -127,7 +131,7 @@ class PanelBatch(Struct, dict=True):
         p.floor = 4 * EPS * p.size + (size @ rule.slopes) * shake
         if self.ends is not None and self.last and not self.parent.tracked:
             p.floor += noise(self.ends, self.width, p, seg)
-        if self.both:
+        if self.both or self.bends:
             if self.at_ends is None:
                 self.at_ends = np.zeros((2, self.width, 2, self.seg.a.size))
             note_ends(self.at_ends, p, seg, coefficients[:: height.shape[0] // self.width], rule)
