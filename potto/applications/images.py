@@ -1,6 +1,6 @@
-"""Images of functions: values over a grid of pixels, and how numbers become colours.
+"""Images of functions: values over a grid of pixels.
 
-Owns `Grid`, `sampled` and the colours. The pixels of a band are one array call; where the program has no value, the
+Owns `Grid` and `sampled`. The pixels of a band are one array call; where the program has no value, the
 image has a hole, and the pixels around it are found by halving the band.
 """
 
@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from msgspec import Struct
 
-from potto.applications.png import encode
 from potto.diagnostics import PottoError
 from potto.kernels.cells import Array
 from potto.kernels.errors import WRONG_CALL
@@ -22,8 +21,6 @@ from potto.runtime.answers.estimate import Estimate
 from potto.runtime.evaluation.record import Gauge, watching
 
 BAND = 1 << 18  # pixels of one array call, which is evaluated in blocks
-HOLE = (128, 128, 128)
-DECADES = 16  # of an error map: from black, 1e-16, to white, 1
 
 
 class Grid(Struct, frozen=True):
@@ -122,84 +119,18 @@ def _fill(call: Call, places: Sequence[Array], start: int, stop: int, found: Sam
     found.answers.append(answer)
 
 
-def flat(value: Any) -> list[Any]:
-    """The numbers of an answer, tuples and lists taken apart."""
+def flat(value: Any, axes: int = 0) -> list[Any]:
+    """The numbers of an answer over a batch of so many axes: tuples and lists taken apart, and arrays by their own
+    axes, which come behind those of the batch."""
     if isinstance(value, tuple | list):
-        return [number for item in value for number in flat(item)]
-    return [value]
-
-
-# Colours: arrays of parts (k, n) to bytes (n, 3)
-
-
-def limits(parts: Array, *, even: bool = False) -> tuple[float, float]:
-    """The least and the largest finite number; `even`: as far below zero as above."""
-    finite = parts[np.isfinite(parts)]
-    if not finite.size:
-        return (-1.0, 1.0) if even else (0.0, 1.0)
-    low, high = float(finite.min()), float(finite.max())
-    if even:
-        most = max(-low, high) or 1.0
-        return -most, most
-    return low, high
-
-
-def shades(parts: Array, low: float, high: float) -> Any:
-    """One part in greys from black (`low`) to white, three and more as red, green and blue."""
-    level = np.clip((parts - low) / ((high - low) or 1.0), 0.0, 1.0)
-    return _bytes(level[:3] if len(parts) >= 3 else np.repeat(level[:1], 3, axis=0))
-
-
-def signed(parts: Array, low: float, high: float) -> Any:
-    """Zero white, what is above it red, what is below it blue; `high` = -`low` is the deepest.
-
-    Of three parts and more each is a channel, and zero is gray.
-    """
-    if len(parts) >= 3:
-        return shades(parts, low, high)
-    share = np.clip(parts[0] / (high or 1.0), -1.0, 1.0)
-    up, down = np.maximum(share, 0.0), np.maximum(-share, 0.0)
-    return _bytes(np.stack([1 - 0.95 * down, 1 - 0.85 * (up + down), 1 - 0.95 * up]))
-
-
-def coloured(
-    components: Sequence[Sequence[float]], signed_values: bool
-) -> tuple[list[tuple[int, int, int]], float, float]:
-    """The colours of pixels given by plain numbers, part by part, and the least and the largest number."""
-    parts = np.asarray(components, dtype=float)
-    low, high = limits(parts, even=signed_values)
-    if len(parts) >= 3 and not signed_values and low >= 0 and high <= 1:
-        low, high = 0.0, 1.0  # colours as they are meant
-    rgb = (signed if signed_values else shades)(parts, low, high)
-    return [(r, g, b) for r, g, b in rgb.tolist()], *limits(parts)
-
-
-def decades(parts: Array) -> Any:
-    """The largest of the parts by its power of ten: black for 1e-16 and less, white for 1 and more."""
-    with np.errstate(divide="ignore"):
-        level = 1 + np.log10(np.max(np.abs(parts), axis=0)) / DECADES
-    return _bytes(np.repeat(np.clip(level, 0.0, 1.0)[None], 3, axis=0))
-
-
-def _bytes(levels: Array) -> Any:
-    holes = np.isnan(levels).any(axis=0)
-    rgb = np.round(255 * np.where(holes, 0.0, levels)).astype(np.uint8).T
-    rgb[holes] = HOLE
-    return rgb
+        return [number for item in value for number in flat(item, axes)]
+    own = np.ndim(value) - axes
+    if own <= 0:
+        return [value]
+    return list(np.moveaxis(np.reshape(value, (*np.shape(value)[:axes], -1)), -1, 0))
 
 
 def largest(parts: Array) -> float:
     """The largest finite number; nan if there is none."""
     finite = parts[np.isfinite(parts)]
     return float(finite.max()) if finite.size else float("nan")
-
-
-def save_array(path: str, parts: Array, grid: Grid) -> None:
-    """Write numbers as a .npy file: (height, width), with a last axis for several parts. Raises OSError."""
-    shaped = parts.reshape(len(parts), grid.height, grid.width)
-    np.save(path, shaped[0] if len(shaped) == 1 else np.moveaxis(shaped, 0, -1))
-
-
-def png(rgb: Any, grid: Grid) -> bytes:
-    """The bytes of colours as a PNG file."""
-    return encode(np.ascontiguousarray(rgb).tobytes(), grid.width, grid.height)

@@ -89,18 +89,10 @@ def accounts(options: argparse.Namespace) -> AbstractContextManager[None]:
 
 
 def totals(estimates: Sequence[Estimate]) -> dict[str, Any]:
-    """What evaluations cost, all together: the numbers added up, each surface once."""
-    found: dict[str, Any] = {}
-    surfaces: dict[str, dict[str, Any]] = {}
-    for estimate in estimates:
-        for name, value in estimate.stats.items():
-            if name == "surfaces":
-                for entry in value:
-                    if not surfaces.get(entry["surface"], entry)["kept"] or entry["surface"] not in surfaces:
-                        surfaces[entry["surface"]] = entry
-            else:
-                found[name] = found.get(name, 0) + value
-    return {**found, "surfaces": list(surfaces.values())}
+    """What evaluations cost, all together, with the surfaces that they met."""
+    from potto.runtime.answers.batches import stats_of
+
+    return {"surfaces": [], **stats_of(estimates)}
 
 
 def show_stats(estimates: Sequence[Estimate], console: Console) -> None:

@@ -1,55 +1,123 @@
-"""`potto render`: an image of a function, and of its derivatives."""
+"""`potto render`: an image of a function, and of its derivatives; an animation over a parameter."""
 
 from __future__ import annotations
 
 import argparse
 import os
 import time
-from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from msgspec import Struct
-
-from potto.cli.calling import add_set, arguments_in, assignment, function_in
+from potto.cli.calling import add_set, assignment
 from potto.cli.console import Console
 from potto.cli.numbers import accounts, add_options, add_workers, settings_of, show_stats
 
 if TYPE_CHECKING:
-    from potto.applications.images import Grid, Sampled
-    from potto.evaluating.world import World
+    from potto.applications.images import Grid
+    from potto.cli.rendering import Drawn, Layer
     from potto.projects.settings import Settings
-    from potto.python.functions import Function
-    from potto.runtime.answers.estimate import Estimate
 
 SUMMARY = "draw a function of two numbers as an image, and its derivatives"
-EXAMPLE = "  potto render examples/worked/picture.po pixel r=0.7 --wrt r --size 512x512 -o disc.png"
+EXAMPLE = """  potto render examples/worked/picture.po pixel r=0.7 --wrt r --size 512x512 -o disc.png
+  potto render examples/worked/picture.po pixel --over r=0.1..1.2 --frames 60 -o disc.gif"""
 MOST_PIXELS = 1 << 26
+MOST_FRAMES, MOST_IN_FRAMES = 10_000, 1 << 27  # all of them are in memory at once
+FRAMES = 60  # if nobody says
+SIDE = 256  # pixels, if nobody says
+PAUSE = 0.2  # seconds between two looks at the files
+MAPS, DIVERGING = ("gray", "viridis", "magma"), ("red-blue", "brick-navy", "purple-orange")
+TONES = ("linear", "srgb", "log")
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", help="the program; `-` reads it from standard input")
     parser.add_argument("name", metavar="NAME", help="the function: a name, or an expression that is a function")
     parser.add_argument("given", metavar="NAME=EXPR", nargs="*", type=assignment, help="what parameters are given")
-    parser.add_argument("-o", "--output", metavar="FILE", help="the image, .png or .npy (default: NAME.png)")
-    parser.add_argument("--size", metavar="WxH", type=_size, default=(256, 256), help="pixels (default 256x256)")
-    parser.add_argument("--box", metavar="X0,X1,Y0,Y1", type=_box, default=(0.0, 1.0, 0.0, 1.0),
-                        help="what of the plane is seen (default 0,1,0,1)")  # fmt: skip
-    parser.add_argument("--axes", metavar="X,Y", help="the parameters that are the axes (default: the two not given)")
-    parser.add_argument("--wrt", metavar="NAME", action="append", default=[], help="draw also the derivative by this")
-    parser.add_argument("--range", metavar="LO,HI", type=_range, help="what is black and what is white")
-    parser.add_argument("--error", action="store_true", help="draw also the estimated error, by powers of ten")
+    parser.add_argument("-o", "--output", metavar="FILE", help="the image: .png, .jpg, or the numbers themselves: "
+                        ".npy, .exr (default: NAME.png); of an animation .gif, .mp4, .npy")  # fmt: skip
+    _add_what_is_seen(parser)
+    _add_colours(parser)
+    moving = parser.add_argument_group("animation")
+    moving.add_argument("--over", metavar="NAME=FROM..TO", type=_over, help="let a parameter move from frame to frame")
+    moving.add_argument("--frames", metavar="N", type=_frames, help="how many (default 60)")
+    moving.add_argument("--fps", metavar="N", type=_positive, help="frames a second (default 20)")
+    parser.add_argument("--watch", action="store_true", help="draw again whenever a file of the program changes")
     add_workers(parser)
     add_set(parser)
     add_options(parser)
+
+
+def _add_what_is_seen(parser: argparse.ArgumentParser) -> None:
+    seen = parser.add_argument_group("what is seen")
+    seen.add_argument("--size", metavar="WxH", type=_size, help="pixels (default 256x256)")
+    seen.add_argument("--width", metavar="N", type=_side, help="pixels across; the height follows, so that pixels are "
+                      "square")  # fmt: skip
+    seen.add_argument("--height", metavar="N", type=_side, help="pixels down; the width follows")
+    seen.add_argument("--box", "--viewport", metavar="X0,X1,Y0,Y1", type=_box, default=(0.0, 1.0, 0.0, 1.0),
+                      help="what of the plane is seen (default 0,1,0,1)")  # fmt: skip
+    seen.add_argument("--axes", metavar="X,Y", help="the parameters that are the axes (default: the two not given)")
+    seen.add_argument("--wrt", metavar="NAME,…", action="append", default=[], type=_names,
+                      help="draw also the derivatives by these")  # fmt: skip
+    seen.add_argument("--error", action="store_true", help="draw also the estimated error, by powers of ten")
+
+
+def _add_colours(parser: argparse.ArgumentParser) -> None:
+    colours = parser.add_argument_group("colours")
+    colours.add_argument("--range", metavar="LO,HI", type=_range, help="the numbers at both ends of the map")
+    colours.add_argument("--map", choices=MAPS, default="gray", help="colours of a value (default gray)")
+    colours.add_argument("--diverging", choices=DIVERGING, default="red-blue", help="colours of a derivative, around "
+                         "zero (default red-blue)")  # fmt: skip
+    colours.add_argument("--tone", choices=TONES, default="linear", help="srgb: the numbers are light; log: what is "
+                         "weak can be seen (default linear)")  # fmt: skip
+
+
+def _pixels(width: int, height: int, text: str) -> tuple[int, int]:
+    if width * height > MOST_PIXELS:
+        raise argparse.ArgumentTypeError(f"{text} is more than {MOST_PIXELS:,} pixels")
+    return width, height
 
 
 def _size(text: str) -> tuple[int, int]:
     width, _, height = text.partition("x")
     if not (width.isdecimal() and (height or width).isdecimal()) or int(width) * int(height or width) == 0:
         raise argparse.ArgumentTypeError(f"{text!r} is no size; write `256x256`")
-    if int(width) * int(height or width) > MOST_PIXELS:
-        raise argparse.ArgumentTypeError(f"{text!r} is more than {MOST_PIXELS:,} pixels")
-    return int(width), int(height or width)
+    return _pixels(int(width), int(height or width), repr(text))
+
+
+def _side(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text) <= MOST_PIXELS:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of pixels; write `512`")
+    return int(text)
+
+
+def _frames(text: str) -> int:
+    if not text.isdecimal() or not 2 <= int(text) <= MOST_FRAMES:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of frames, from 2 to {MOST_FRAMES:,}")
+    return int(text)
+
+
+def _positive(text: str) -> float:
+    try:
+        found = float(text)
+    except ValueError:
+        found = 0.0
+    if not 0 < found <= 1000:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of frames a second; write `20`")
+    return found
+
+
+def _names(text: str) -> list[str]:
+    names = [name.strip() for name in text.split(",")]
+    if not all(name.isidentifier() for name in names):
+        raise argparse.ArgumentTypeError(f"{text!r} does not name parameters; write `c` or `c,d`")
+    return names
+
+
+def _over(text: str) -> tuple[str, str, str]:
+    name, _, way = text.partition("=")
+    low, dots, high = way.partition("..")
+    if not name.strip().isidentifier() or not dots or not low.strip() or not high.strip():
+        raise argparse.ArgumentTypeError(f"{text!r} does not say what moves from where to where; write `c=-2..0`")
+    return name.strip(), low.strip(), high.strip()
 
 
 def _numbers(text: str, count: int, form: str) -> tuple[float, ...]:
@@ -75,181 +143,174 @@ def prepare(arguments: list[str]) -> list[str]:
     """Let a box begin with a minus: `--box -1,1,-1,1` as `--box=-1,1,-1,1`."""
     joined: list[str] = []
     for word in arguments:
-        if joined and joined[-1] in ("--box", "--range"):
+        if joined and joined[-1] in ("--box", "--viewport", "--range"):
             joined[-1] += f"={word}"
         else:
             joined.append(word)
     return joined
 
 
-class Picture(Struct):
-    """What was drawn: the numbers of the value, of each derivative and of the errors, and the files."""
-
-    function: Function
-    given: dict[str, Any]
-    axes: tuple[str, ...]
-    wrt: tuple[str, ...]
-    width: int = 0  # parts of the value
-    files: list[dict[str, Any]] = []
-
-    def call(self, *places: Any) -> tuple[Sequence[Any], Estimate]:
-        """The value, the derivatives and the errors at places, as parts one after the other."""
-        from potto.applications.images import flat
-        from potto.python.gradients import grad
-        from potto.python.tiles import Interrupted
-
-        here = {**self.given, **dict(zip(self.axes, places, strict=True))}
-        try:
-            answer = (grad(self.function, self.wrt) if self.wrt else self.function)(**here)
-        except Interrupted as stop:
-            answer = stop.estimate
-        value, error = flat(answer.value), flat(answer.error)
-        self.width = len(value)
-        tangents, errors = (answer.tangent, answer.tangent_error) if self.wrt else ((), ())
-        return [*value, *flat(tangents), *error, *flat(errors)], answer
-
-
 def run(options: argparse.Namespace, console: Console) -> int:
-    from potto.cli.opening import fail, opened, report_others
-
     settings = settings_of(options, console)
     if settings is None:
         return 2
+    stem = options.name if options.name.isidentifier() else "image"
+    target = options.output or stem + (".gif" if options.over else ".png")
+    wrong = _complaint(options, target)
+    if wrong is not None:
+        console.complain(f"potto render: {wrong}")
+        return 2
+    options.frames = options.frames or FRAMES
+    status = _once(options, target, settings, console)
+    while options.watch and status != 130:
+        console.out.flush()
+        _wait(options)
+        console.complain(f"-- {time.strftime('%H:%M:%S')}")
+        status = _once(options, target, settings, console)
+    return status
+
+
+def _complaint(options: argparse.Namespace, target: str) -> str | None:
+    """What is wrong with the options, before anything is computed."""
+    from potto.applications import animations
+    from potto.applications.picture_files import NEEDS, complaint, ending_of
+
+    if options.size is not None and (options.width or options.height):
+        return "--size says what --width and --height say: give one or the others"
+    if options.over is None and (options.frames or options.fps):
+        return "--frames and --fps are for an animation: say what moves, `--over c=-2..0`"
+    if options.watch and options.file == "-":
+        return "standard input is read once, and cannot be watched"
+    moving = ending_of(target) in animations.NEEDS
+    if options.over is None and moving and ending_of(target) not in NEEDS:
+        return f"`{target}` is an animation: say what moves, `--over c=-2..0`"
+    if options.over is not None and ending_of(target) in NEEDS and not moving:
+        return f"`{target}` is a picture, and an animation ends with {', '.join(animations.NEEDS)}"
+    width, height = _shape(options)
+    if width * height > MOST_PIXELS:
+        return f"{width:,} x {height:,} are more than {MOST_PIXELS:,} pixels"
+    frames = (options.frames or FRAMES) if options.over is not None else 1
+    if width * height * frames > MOST_IN_FRAMES:
+        return f"{frames:,} frames of {width:,} x {height:,} are more than {MOST_IN_FRAMES:,} pixels"
+    return complaint(target) if options.over is None else animations.complaint(target)
+
+
+def _shape(options: argparse.Namespace) -> tuple[int, int]:
+    """Pixels across and down; where one is given, the other so that pixels are square."""
+    if options.size is not None:
+        width, height = options.size
+        return width, height
+    x0, x1, y0, y1 = options.box
+    ratio = (y1 - y0) / (x1 - x0)
+    width, height = options.width, options.height
+    if width is None and height is None:
+        return SIDE, SIDE
+    if width is None:
+        return max(1, round(min(height / ratio, MOST_PIXELS))), height
+    return width, height or max(1, round(min(width * ratio, MOST_PIXELS)))
+
+
+def _wait(options: argparse.Namespace) -> None:
+    """Come back when a file of the program has changed."""
+    from potto.checking.library import Library
+    from potto.cli.opening import opened
+    from potto.diagnostics import PottoError
+
+    library = Library(["."])
+    try:
+        library.diagnostics(opened(library, options.file))
+    except PottoError:  # it is gone: until it is there again
+        while not os.path.exists(options.file):
+            time.sleep(PAUSE)
+        return
+    while not library.refresh():
+        time.sleep(PAUSE)
+
+
+def _once(options: argparse.Namespace, target: str, settings: Settings, console: Console) -> int:
     from potto.applications.images import Grid
+    from potto.applications.picture_files import NUMBERS, ending_of
+    from potto.cli.opening import fail, opened, report_others
+    from potto.cli.rendering import drawn, layers, picture_of
     from potto.diagnostics import PottoError
     from potto.evaluating.world import World
 
     world = World(["."])
-    grid = Grid(options.size[0], options.size[1], options.box)
-    start = time.perf_counter()
+    grid = Grid(*_shape(options), options.box)
     try:
         file = opened(world, options.file, options.set)
-        picture = _picture(world, file, options)
+        picture = picture_of(world, file, options, ending_of(target) not in NUMBERS)
         with accounts(options):
-            found = _sampled(picture, grid, settings, options.workers, console)
+            found = drawn(picture, grid, settings, options, console)
     except PottoError as error:
         console.progress("")
         return fail(error, options, console)
+    files = layers(picture, found, options, target)
     try:
-        _write(picture, found, grid, options)
+        for layer in files:
+            _write(layer, grid, options)
     except OSError as error:
         console.complain(f"potto render: {error}")
         return 1
-    _tell(picture, found, grid, time.perf_counter() - start, options, console)
-    if found.interrupted:
-        return 130
-    return report_others(world, file, options, console)
+    _tell(files, found, grid, options, console)
+    return 130 if found.interrupted else report_others(world, file, options, console)
 
 
-def _picture(world: World, file: str, options: argparse.Namespace) -> Picture:
-    """What the command line asks for. Raises PottoError."""
-    from potto.kernels.errors import wrong_call
+def _write(layer: Layer, grid: Grid, options: argparse.Namespace) -> None:
+    """Raises OSError."""
+    from potto.applications.animations import save_frames
+    from potto.applications.picture_files import NUMBERS, ending_of, save
 
-    function = function_in(world, file, options.name)
-    given = arguments_in(world, file, options.given)
-    names = tuple(n for n in function.parameters if n not in given)
-    axes = names if options.axes is None else tuple(n.strip() for n in options.axes.split(","))
-    if len(axes) != 2 or not all(axes):
-        many = len(names) > 2
-        what = "give the others a value, `c=0.5`, until two are left" if many else "name a function of two numbers"
-        left = ", ".join(f"`{n}`" for n in names) or "none"
-        raise wrong_call(
-            f"an image has two axes, and the parameters of `{options.name}` that are given nothing are: {left}",
-            what,
-        )
-    known = dict.fromkeys(options.wrt)
-    return Picture(function, given, axes, tuple(known))
-
-
-def _sampled(picture: Picture, grid: Grid, chosen: Settings, workers: int | None, console: Console) -> Sampled:
-    """All pixels, with progress for a person who waits."""
-    from msgspec.structs import asdict
-
-    from potto.applications.images import sampled
-    from potto.projects.settings import settings
-    from potto.python.workers import Workers
-    from potto.runtime.answers.printing import format_seconds
-
-    total, start = grid.width * grid.height, time.perf_counter()
-
-    def progress(done: int) -> None:
-        left = (time.perf_counter() - start) * (total - done) / max(done, 1)
-        rest = f", {format_seconds(left)} left" if 0 < done < total and left >= 1 else ""
-        console.progress(f"{100 * done // total} % of {total:,} pixels{rest}")
-
-    with Workers(workers) as pool, settings(**asdict(chosen), executor=pool):
-        found = sampled(picture.call, grid.middles(), progress)
-    console.progress("")
-    return found
-
-
-def _write(picture: Picture, found: Sampled, grid: Grid, options: argparse.Namespace) -> None:
-    """The files: value, derivatives, errors. Raises OSError."""
-    from potto.applications.images import decades, limits, shades, signed
-
-    target = options.output or f"{options.name if options.name.isidentifier() else 'image'}.png"
-    stem, ending = os.path.splitext(target)
-    parts, width, count = found.numbers, picture.width, len(found.numbers) // 2
-    low, high = options.range or (limits(parts[:width]) if width < 3 else _color_limits(parts[:width]))
-    _save(picture, target, "value", parts[:width], grid, low, high, shades)
-    for number, name in enumerate(picture.wrt):
-        here = parts[width * (1 + number) : width * (2 + number)]
-        least, most = limits(here, even=True)
-        _save(picture, f"{stem}-d{name}{ending}", f"derivative by {name}", here, grid, least, most, signed)
-    if options.error:
-        errors = parts[count:]
-        _save(picture, f"{stem}-error{ending}", "error", errors, grid, 0.0, float(limits(errors)[1]),
-              lambda rows, low, high: decades(rows))  # fmt: skip
-
-
-def _color_limits(parts: Any) -> tuple[float, float]:
-    """Colours between 0 and 1 are meant as they are."""
-    from potto.applications.images import limits
-
-    low, high = limits(parts)
-    return (0.0, 1.0) if low >= 0 and high <= 1 else (low, high)
-
-
-def _save(
-    picture: Picture, path: str, what: str, parts: Any, grid: Grid, low: float, high: float,
-    paint: Callable[[Any, float, float], Any],
-) -> None:  # fmt: skip
-    from potto.applications.images import png, save_array
-
-    if path.endswith(".npy"):
-        save_array(path, parts, grid)
+    if options.over is not None:
+        save_frames(layer.path, layer.frames, layer.colours, grid, options.fps or 20)
     else:
-        with open(path, "wb") as stream:
-            stream.write(png(paint(parts, low, high), grid))
-    picture.files.append({"file": path, "shows": what, "low": low, "high": high})
+        plain = ending_of(layer.path) in NUMBERS
+        save(layer.path, layer.frames[0], None if plain else layer.colours(), grid)
 
 
 def _tell(
-    picture: Picture, found: Sampled, grid: Grid, seconds: float, options: argparse.Namespace, console: Console
+    files: list[Layer], found: Drawn, grid: Grid, options: argparse.Namespace, console: Console
 ) -> None:  # fmt: skip
-    from potto.applications.images import largest
-
-    pixels = grid.width * grid.height
-    most = largest(found.numbers[len(found.numbers) // 2 :])  # errors come after as many values and derivatives
     if options.json:
-        from potto.runtime.answers.shown import json_number
-
-        console.answer_json({
-            "files": picture.files, "width": grid.width, "height": grid.height, "evals": found.evaluations,
-            "seconds": seconds, "largest_error": json_number(most), "holes": found.holes,
-            "converged": not found.reasons and not found.holes,
-        })  # fmt: skip
+        console.answer_json(_answer(files, found, grid))
     else:
         from potto.runtime.answers.printing import format_error, format_range
 
-        for entry in picture.files:
-            console.answer(f"{entry['file']}: {entry['shows']}, {format_range(entry['low'], entry['high'])}")
-        cost = f"{found.evaluations / pixels:.1f} evaluations a pixel, largest error {format_error(most)}"
-        console.answer(f"{grid.width} x {grid.height} pixels in {seconds:.2f} s, {cost}")
+        pixels = grid.width * grid.height * len(found.frames)
+        for layer in files:
+            console.answer(f"{layer.path}: {layer.shows}, {format_range(layer.low, layer.high)}")
+        cost = f"{found.evaluations / pixels:.1f} evaluations a pixel, largest error {format_error(found.largest)}"
+        frames = f"{len(found.frames)} frames of " if options.over is not None else ""
+        console.answer(f"{frames}{grid.width} x {grid.height} pixels in {found.seconds:.2f} s, {cost}")
     if options.stats:
         show_stats(found.answers, console)
-    if found.holes and found.trouble is not None:
-        message = found.trouble.diagnostics[0].message
-        console.complain(f"warning: {found.holes:,} pixels have no value and are gray: {message}")
+        console.complain(_crossed(found, grid))
+    trouble = next((part.trouble for part in found.found if part.trouble is not None), None)
+    if found.holes and trouble is not None:
+        console.complain(
+            f"warning: {found.holes:,} pixels have no value and are gray: {trouble.diagnostics[0].message}"
+        )
     for reason in found.reasons:
         console.complain(f"warning: not as accurate everywhere as was asked: {reason}")
+
+
+def _crossed(found: Drawn, grid: Grid) -> str:
+    """How many pixels a surface crosses, as far as one looked."""
+    if found.crossed is None:
+        return "pixels crossed by a surface: not known"
+    some, all = found.crossed
+    what = "pixels" if all == grid.width * grid.height * len(found.frames) else "integrals"
+    return f"{what} crossed by a surface: {some:,} of {all:,} ({100 * some / all:.1f} %)"
+
+
+def _answer(files: list[Layer], found: Drawn, grid: Grid) -> dict[str, Any]:
+    """All of it for machines."""
+    from potto.runtime.answers.shown import json_number
+
+    answer = {
+        "files": [{"file": f.path, "shows": f.shows, "low": f.low, "high": f.high} for f in files],
+        "width": grid.width, "height": grid.height, "frames": len(found.frames), "evals": found.evaluations,
+        "seconds": found.seconds, "largest_error": json_number(found.largest), "holes": found.holes,
+        "converged": not found.reasons and not found.holes,
+    }  # fmt: skip
+    return answer if found.crossed is None else {**answer, "crossed": found.crossed[0], "looked_at": found.crossed[1]}

@@ -31,9 +31,14 @@ def counting() -> Iterator[None]:
         _wanted.reset(token)
 
 
+def wanted() -> bool:
+    """Whether anyone asked."""
+    return _wanted.get()
+
+
 def books() -> Costs | None:
     """Record to write in, if anyone asked for them."""
-    return Costs() if _wanted.get() else None
+    return Costs() if wanted() else None
 
 
 class Surface(Struct):
@@ -62,7 +67,7 @@ class Costs(Struct):
     interior: evaluations of integrands at nodes. boundary: at places that move, where boundary terms are read off.
     checks: at ends that stand still, for peaks and jumps that lie there. cells: stretches of the innermost variable
     that were integrated; empty: those left out, since the integrand vanishes there. whole: members of a batch that no
-    surface crosses.
+    surface crosses; looked: those that were looked at for that.
     """
 
     interior: int = 0
@@ -71,6 +76,7 @@ class Costs(Struct):
     cells: int = 0
     empty: int = 0
     whole: int = 0
+    looked: int = 0
     surfaces: dict[Term, Surface] = {}
     _apart: int | None = None
 
@@ -136,6 +142,7 @@ class Costs(Struct):
             "cells": self.cells,
             "empty cells left out": self.empty,
             "members that no surface crosses": self.whole,
+            "members looked at": self.looked,
             "surfaces": surfaces,
         }
 

@@ -14,12 +14,14 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
+from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
 
 from msgspec import Struct, field
 from msgspec.structs import asdict, replace
 
 from potto.diagnostics import PottoError
+from potto.integrate.costs import counting, wanted
 from potto.kernels.cells import Value, all_arrays, map_arrays
 from potto.projects.settings import Settings, current, executor, settings
 from potto.python.arguments import Batch, cut, flattened
@@ -54,17 +56,18 @@ class Interrupted(KeyboardInterrupt):
 
 class Task(Struct, frozen=True):
     """Blocks of a batch as they travel: the function, its arguments in one row of members for each block, what it is
-    differentiated by, and how numbers are asked for."""
+    differentiated by, how numbers are asked for, and whether books are kept of what they cost."""
 
     function: Function
     blocks: tuple[Any, ...]
     wrt: tuple[str, ...]
     settings: Settings
+    counted: bool = False
 
     def answers(self) -> list[Estimate] | None:
         """The answers, block by block; None if there is an error, which is then met again by who asks."""
         found = []
-        with settings(**asdict(self.settings), executor=None):
+        with settings(**asdict(self.settings), executor=None), counting() if self.counted else nullcontext():
             try:
                 for given in self.blocks:
                     arguments, batch = self.function._arguments(given)
@@ -102,7 +105,7 @@ def in_tiles(
     bare = type(function)(function._world, function._file, function._expr, function._whole)
 
     def task(parts: list[Part]) -> Task:
-        return Task(bare, tuple(cut(flat, slice(*part)) for part in parts), wrt, chosen)
+        return Task(bare, tuple(cut(flat, slice(*part)) for part in parts), wrt, chosen, wanted())
 
     key = (function._call(given).elaborated, wrt, chosen)
     return batch.shaped(_Tiles(count, here, task, key).run(None if function._world._held else executor()))

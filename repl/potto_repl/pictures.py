@@ -199,7 +199,7 @@ def image_of(components: Sequence[Sequence[float]], columns: int, *, signed: boo
 
     signed: of a derivative; zero is white, what is above it red, what is below it blue.
     """
-    from potto.applications.images import coloured
+    from potto.applications.colours import coloured
 
     colours, low, high = coloured(components, signed)
     rows = (colours[i : i + columns] for i in range(0, len(colours), columns))

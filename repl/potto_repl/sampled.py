@@ -175,7 +175,7 @@ def _sampled(session: Conversation, axes: Axes, places: list[Any]) -> list[list[
 
     def parts(*here: Any) -> tuple[list[Any], Estimate]:
         found = _call(axes, list(here))
-        return _components(found, axes), found
+        return _components(found, axes, getattr(here[0], "ndim", 0)), found
 
     with settings(**_coarse(session.settings)):
         rows: list[list[float]] = sampled(parts, places).numbers.tolist()
@@ -195,9 +195,9 @@ def _call(axes: Axes, places: list[Any]) -> Estimate:
     return found
 
 
-def _components(estimate: Estimate, axes: Axes) -> list[Any]:
-    """The values of all components, then their errors."""
+def _components(estimate: Estimate, axes: Axes, batch: int) -> list[Any]:
+    """The values of all components, then their errors; of a batch of so many axes."""
     drawn, doubt = (estimate.tangent, estimate.tangent_error) if axes.dual else (estimate.value, estimate.error)
     if drawn is None:
         raise Refusal(f"`{axes.label}` gives a function, which cannot be drawn")
-    return [*flat(drawn), *flat(doubt)]
+    return [*flat(drawn, batch), *flat(doubt, batch)]

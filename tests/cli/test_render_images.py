@@ -103,7 +103,7 @@ def test_for_machines(potto: Potto) -> None:
     (["pixel", "c=1", "--box", "1,0,0,1"], "not X0,X1,Y0,Y1", 2),
     (["pixel", "c=1", "--axes", "px"], "two axes", 1),
     (["pixel", "c"], "which parameter is what", 2),
-    (["pixel", "c=1", "-o", "no/such/folder.png"], "No such file", 1),
+    (["pixel", "c=1", "-o", "no/such/folder.png"], "there is no folder `no/such`", 2),
     (["3"], "is no function", 1),
 ])  # fmt: skip
 def test_mistakes(potto: Potto, words, said, status) -> None:

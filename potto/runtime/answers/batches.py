@@ -33,7 +33,7 @@ def joined(parts: Sequence[Estimate]) -> Estimate:
         converged=all(part.converged for part in parts), evals=sum(part.evals for part in parts),
         seconds=sum(part.seconds for part in parts), compile_seconds=sum(part.compile_seconds for part in parts),
         method="+".join(sorted({m for part in parts for m in part.method.split("+")} - {"exact"})) or "exact",
-        notes=_notes(parts, sizes), stats=_stats(parts), shortfalls=missed,
+        notes=_notes(parts, sizes), stats=stats_of(parts), shortfalls=missed,
         member_converged=converged_members(missed, (sum(sizes),)),
     )  # fmt: skip
 
@@ -88,10 +88,16 @@ def _notes(parts: Sequence[Estimate], sizes: Sequence[int]) -> tuple[OneSided, .
     return tuple(out)
 
 
-def _stats(parts: Sequence[Estimate]) -> dict[str, Any]:
-    """Counts added up; of what was found out about surfaces what the first part says."""
+def stats_of(parts: Sequence[Estimate]) -> dict[str, Any]:
+    """What evaluations cost, all together: counts added up, each surface once; it is kept if it is for any."""
     found: dict[str, Any] = {}
+    surfaces: dict[str, dict[str, Any]] = {}
     for part in parts:
         for name, value in part.stats.items():
-            found[name] = found.get(name, 0) + value if isinstance(value, int | float) else found.get(name, value)
-    return found
+            if name == "surfaces":
+                for entry in value:
+                    if not surfaces.get(entry["surface"], entry)["kept"] or entry["surface"] not in surfaces:
+                        surfaces[entry["surface"]] = entry
+            else:
+                found[name] = found.get(name, 0) + value if isinstance(value, int | float) else found.get(name, value)
+    return {**found, "surfaces": list(surfaces.values())} if surfaces else found

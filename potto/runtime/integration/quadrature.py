@@ -85,6 +85,7 @@ def _uncut(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> t
     found = uncut(plan.box, machine, env, batch)
     if found is not None and machine.costs is not None:
         machine.costs.whole += int(found[0].sum())
+        machine.costs.looked += batch
     return found
 
 
