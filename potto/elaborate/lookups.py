@@ -2,7 +2,7 @@
 
 `interp` begins with the first value and adds, segment by segment, the slope times how far into the segment it goes:
 beyond the ends it is what it is there. `image` weighs pixels by how near their centres are. The kinks are those of
-`clamp`, `max` and `abs`, which the integrator knows.
+`clamp` and `tent`, which the integrator knows.
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ from potto.core.terms import (
     index,
     length,
     mul,
-    neg,
     proj,
     sub,
     sum_,
@@ -54,11 +53,11 @@ def image(elaboration: Elaboration, photo: Term, u: Term, v: Term) -> Term:
     """Bilinear between the centres of pixels: `u` along the rows, `v` down the columns, from 0 to 1."""
     row, column = _number(elaboration), _number(elaboration)
     rows, columns = length(photo), length(index(photo, ZERO))
-    near = mul(_near(v, rows, row), _near(u, columns, column))
+    across, down = _near(u, columns, column), _near(v, rows, row)
 
     def at(read: Read) -> Term:
-        along = sum_(_name(column), ZERO, sub(columns, ONE), mul(near, read(index(index(photo, row), column))))
-        return sum_(_name(row), ZERO, sub(rows, ONE), along)
+        along = sum_(_name(column), ZERO, sub(columns, ONE), mul(across, read(index(index(photo, row), column))))
+        return sum_(_name(row), ZERO, sub(rows, ONE), mul(down, along))
 
     first = index(index(photo, ZERO), ZERO)
     return _by_numbers(elaboration, elaboration.shapes.of(first), first, at, _itself)
@@ -67,7 +66,7 @@ def image(elaboration: Elaboration, photo: Term, u: Term, v: Term) -> Term:
 def _near(where: Term, count: Term, place: Term) -> Term:
     """How near to the centre of a pixel: 1 there, 0 from the centre of the next one on."""
     at = apply("clamp", sub(mul(where, count), HALF), ZERO, sub(count, ONE))
-    return apply("max", ZERO, sub(ONE, apply("abs", add(at, neg(place)))))
+    return apply("tent", sub(at, place))
 
 
 def _number(elaboration: Elaboration) -> Term:

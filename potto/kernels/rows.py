@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from potto.kernels.cells import Ints, Rows, Value, parts_of
-from potto.kernels.tape import Node, Untaped
+from potto.kernels.tape import Node
 
 
 def gathered(rows: Rows, places: Ints) -> Value:
@@ -41,6 +41,6 @@ def _taken(part: Any, places: Ints, inner: int) -> Any:
         wide = np.broadcast_to(part.reshape(*own, part.shape[inner], *pad, *batch), (*own, part.shape[inner], *shape))
         at = np.broadcast_to(places, shape).reshape((1,) * inner + (1, *shape))
         return np.take_along_axis(wide, np.broadcast_to(at, (*own, 1, *shape)), axis=inner).reshape(*own, *shape)
-    if inner:
-        raise Untaped
-    return part[(places, *np.indices(batch, sparse=True))]
+    inside, behind = range(1, 1 + inner), range(-inner, 0)
+    turned: Any = np.moveaxis(part, inside, behind)  # type: ignore[type-var]
+    return np.moveaxis(turned[(places, *np.indices(batch, sparse=True))], behind, range(inner))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from itertools import combinations
 
-from potto.core.terms import ONE, ZERO, Term, branch, const, neg, prim, sub
+from potto.core.terms import ONE, ZERO, Term, add, branch, const, neg, prim, sub
 from potto.primitives.bounds import ends, extreme
 from potto.primitives.registry import Primitive, Terms, register
 
@@ -56,11 +56,12 @@ def _clamped(x: Term, lo: Term, hi: Term) -> tuple[Term, Term, Term]:
 
 
 def _clamp_partials(x: Term, lo: Term, hi: Term) -> Terms:
-    """clamp is min(max(x, lo), hi), also where lo > hi."""
+    """clamp is min(max(x, lo), hi), also where lo > hi. At lo it moves with x, at hi no more, so that of clamps that
+    follow upon each other only one moves where they meet."""
 
     def choose(of_x: Term, of_lo: Term, of_hi: Term) -> Term:
         def below(limit: Term, inside: Term) -> Term:
-            return inside if inside is of_hi else branch((limit,), False, inside, of_hi)
+            return inside if inside is of_hi else branch((limit,), True, inside, of_hi)
 
         return branch((sub(x, lo),), False, below(sub(hi, x), of_x), below(sub(hi, lo), of_lo))
 
@@ -125,6 +126,30 @@ maximum = register(
         domain=((-1e6, 1e6),),
         kinks=_differences,
         example="max(3, 1, 2)",
+    )
+)
+
+def _tent_slope(x: Term) -> Terms:
+    """The slope to the right: of tents that overlap one falls from where another rises."""
+    falling = branch((sub(x, ONE),), False, ZERO, neg(ONE))
+    return (branch((x,), False, falling, branch((add(x, ONE),), False, ONE, ZERO)),)
+
+
+tent = register(
+    Primitive(
+        "tent",
+        arity=1,
+        surface=False,
+        lacks=frozenset({"discs"}),
+        formula=lambda x: prim("max", ZERO, sub(ONE, prim("abs", x))),
+        doc="1 - |x| where that is positive, else 0: how near a place is to one of a lattice.",
+        turns=(0.0,),
+        image=(0.0, 1.0),
+        parity=1,
+        partials=_tent_slope,
+        kinks=lambda x: (add(x, ONE), x, sub(ONE, x)),
+        domain=((-3.0, 3.0),),
+        example="image([[0, 1]], 0.5, 0.5)",
     )
 )
 

@@ -1,6 +1,7 @@
 """`sum i in lo..hi (e)`: the terms as one more axis of the batch.
 
-Owns `total`. Where no side is forced in the terms, all of them are evaluated in one go, in chunks.
+Owns `total`. Where no side is forced in the terms, all of them are evaluated in one go, in chunks; of those that are in
+proportion to a tent only the few that are not 0.
 """
 
 from __future__ import annotations
@@ -10,10 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from potto.calculus.inlining.lattices import REACH, middle
 from potto.core.terms import Sum, lam
 from potto.diagnostics import PottoError
 from potto.kernels import errors
-from potto.kernels.cells import Cell, Number, Rows, Trace, Value, all_arrays, combined, listed, map_arrays
+from potto.kernels.cells import Cell, Number, Rows, Trace, Value, all_arrays, combined, listed, map_arrays, map_cells
 from potto.kernels.whole import UNIT_ROUNDOFF
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.selection import Pick, apart
@@ -34,12 +36,16 @@ def total(machine: Machine, term: Sum, lo: Value, hi: Value, env: dict[str, Valu
     body = lam(params, term.body)
     if trace:
         return _one_by_one(machine, term, body, int(first), int(last), env, trace)
+    shape = np.broadcast_shapes(*(a.shape for v in env.values() for a in all_arrays(v)))
+    wide = {n: map_arrays(v, lambda a: a[..., None]) for n, v in env.items()}
+    if last - first >= REACH and (place := middle(term)) is not None:
+        here = {n: map_cells(wide[n], lambda cell: Cell(cell.v)) for n in place.free}
+        wide[term.variable] = _around(machine, machine.with_directions(0).term(place, here), int(first), int(last))
+        return _reduce(machine.run(body, [wide[p] for p in params], None), shape, REACH)
     if machine.linker.inexact(term.body):  # it integrates
         found = machine.linker.semantics.culled(machine, term, int(first), int(last), env)
         if found is not None:
             return found
-    shape = np.broadcast_shapes(*(a.shape for v in env.values() for a in all_arrays(v)))
-    wide = {n: map_arrays(v, lambda a: a[..., None]) for n, v in env.items()}
     step = max(1, CHUNK // max(1, int(np.prod(shape))))
     machine = machine if shape else machine.changed(summed=True)
     result: Value | None = None
@@ -51,6 +57,14 @@ def total(machine: Machine, term: Sum, lo: Value, hi: Value, env: dict[str, Valu
         result = part if result is None else _plus(result, part)
     assert result is not None
     return result
+
+
+def _around(machine: Machine, place: Value, first: int, last: int) -> Cell:
+    """The places from `first` to `last` nearest to one, along a new last axis."""
+    if not isinstance(place, Cell):
+        raise errors.not_a_number(place)
+    lowest = np.clip(np.floor(np.nan_to_num(place.v)) - 1, first, last - REACH + 1)
+    return Cell(lowest + np.arange(REACH, dtype=float), None, (None,) * machine.directions)
 
 
 def bounds(value: Value, which: str) -> Number:

@@ -10,6 +10,7 @@ from functools import lru_cache
 import numpy as np
 
 from potto.calculus.inlining.arrays import MOST_STEPS, Access, TooMany, hoisted, inlined, loops, summands, unrolled
+from potto.calculus.inlining.lattices import by_cells
 from potto.core.terms import Index, Integral, Term, function_of, substitute, tuple_, var
 from potto.diagnostics import PottoError, declare
 from potto.kernels import errors
@@ -62,7 +63,8 @@ def without_arrays(machine: Machine, term: Integral, env: Env) -> tuple[Term, En
 
 @lru_cache(maxsize=4096)
 def _outside(term: Integral, arrays: frozenset[str], reach: Reach) -> Term:
-    return summands(inlined(term, lambda name: Index in reach.kinds(name), reach.resolve, arrays))
+    found = by_cells(inlined(term, lambda name: Index in reach.kinds(name), reach.resolve, arrays))
+    return summands(found) if isinstance(found, Integral) else found
 
 
 def _whole(machine: Machine, end: Term, env: Env) -> float:

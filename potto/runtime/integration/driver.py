@@ -31,6 +31,7 @@ from potto.runtime.integration.preparation import filled, held, placed, prepared
 from potto.runtime.integration.problem import Mixed, Problem, linked
 from potto.runtime.integration.rims import note_rims
 from potto.runtime.integration.solving import solve
+from potto.runtime.integration.taken_apart import summed
 
 
 def integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
@@ -44,7 +45,7 @@ def integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
         except Differ as differ:
             return _by_length(machine, term, env, differ.ends)
         if not isinstance(ready, Integral):
-            return machine.evaluate(function_of(ready), env, None)
+            return summed(machine, ready, env)
         term = ready
     return locally(machine, env, lambda own, here: _of_numbers(own, term, here))
 

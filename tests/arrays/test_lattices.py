@@ -1,0 +1,155 @@
+"""Look-ups between the places of lattices: their slopes at places, and what integrals make of them."""
+
+from __future__ import annotations
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+import potto
+
+PROGRAMS = """
+def line(x) interp([0, 1, 2], [0, 1, 3], x)
+def picked(photo: [h, w] Real, u, v) image(photo, u, v)
+def lit(photo: [h, w] Real, a, b, s) integral ([a, a + s], [b, b + s]) image(photo, u, v)^2*(u + 2*v) d(u, v)
+def above(photo: [h, w] Real, a, b, s, t) integral ([a, a + s], [b, b + s]) [image(photo, u, v) > t] d(u, v)
+def across(photo: [h, w] Real, c, t) integral [0, 1] [image(photo, c*x, x) > t] d(x)
+"""
+
+
+@pytest.fixture(scope="module")
+def programs() -> potto.Module:
+    return potto.compile(PROGRAMS)
+
+
+def bilinear(photo: np.ndarray, u: mp.mpf, v: mp.mpf) -> mp.mpf:
+    h, w = photo.shape
+    x, y = (min(max(at * n - mp.mpf(0.5), 0), n - 1) for at, n in ((u, w), (v, h)))
+    i, j = int(mp.floor(x)), int(mp.floor(y))
+    right, below, f, g = min(i + 1, w - 1), min(j + 1, h - 1), x - i, y - j
+    upper = (1 - f) * mp.mpf(photo[j, i]) + f * mp.mpf(photo[j, right])
+    lower = (1 - f) * mp.mpf(photo[below, i]) + f * mp.mpf(photo[below, right])
+    return (1 - g) * upper + g * lower
+
+
+def borders(low: float, high: float, count: int) -> list[mp.mpf]:
+    middles = [(mp.mpf(k) + 0.5) / count for k in range(count)]
+    inside = [m for m in middles if min(low, high) < m < max(low, high)]
+    return [mp.mpf(low), *(inside if low < high else inside[::-1]), mp.mpf(high)]
+
+
+def squared(photo: np.ndarray, a: float, b: float, s: float) -> mp.mpf:
+    h, w = photo.shape
+
+    def row(v: mp.mpf) -> mp.mpf:
+        return mp.quad(lambda u: bilinear(photo, u, v) ** 2 * (u + 2 * v), borders(a, a + s, w), maxdegree=3)
+
+    return mp.quad(row, borders(b, b + s, h), maxdegree=3)
+
+
+# Slopes at places
+
+
+def test_at_a_place_the_slope_is_that_to_the_right(programs: potto.Module) -> None:
+    found = potto.grad(programs.line)(np.array([0.0, 0.5, 1.0, 1.5, 2.0]))
+    assert found.value.tolist() == [0, 0.5, 1, 2, 3]
+    assert found.tangent.tolist() == [1, 1, 2, 2, 0]
+
+
+def test_at_the_middle_of_a_pixel_too(programs: potto.Module) -> None:
+    photo = np.array([[0.0, 1.0, 5.0], [3.0, 0.0, 7.0]])
+    u, v = np.array([1 / 6, 1 / 2, 1 / 2]), np.array([1 / 4, 1 / 4, 3 / 4])
+    found = potto.grad(programs.picked, ("u", "v"))(photo, u, v)
+    assert found.value == pytest.approx([0, 1, 0], abs=1e-15)
+    assert found.tangent[0] == pytest.approx([3, 12, 21], abs=1e-13)  # differences of neighbours, times 3 columns
+    assert found.tangent[1] == pytest.approx([6, -2, 0], abs=1e-13)  # times 2 rows; below the last all is as there
+
+
+def test_by_all_pixels_for_many_points_at_once(programs: potto.Module) -> None:
+    """A look-up is linear in the pixels: the derivative by one is the look-up in a picture of that pixel alone."""
+    random = np.random.default_rng(3)
+    photo, (u, v) = random.random((9, 7)), random.random((2, 6))
+    slopes = np.asarray(potto.grad(programs.picked, "photo")(photo, u, v).tangent)
+    assert slopes.shape == (6, 9, 7)
+    for row, column in ((0, 0), (4, 3), (8, 6), (5, 1)):
+        alone = np.zeros((9, 7))
+        alone[row, column] = 1
+        assert slopes[:, row, column] == pytest.approx(programs.picked(alone, u, v).value, abs=1e-15)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 4), (2, 3), (4, 4), (5, 2), (40, 60)])
+def test_points_in_pictures_of_all_sizes(programs: potto.Module, size: tuple[int, int]) -> None:
+    random = np.random.default_rng(size[0])
+    photo, (u, v) = random.random(size), 1.4 * random.random((2, 50)) - 0.2
+    found = programs.picked(photo, u, v)
+    wanted = [float(bilinear(photo, mp.mpf(x), mp.mpf(y))) for x, y in zip(u, v, strict=True)]
+    assert (np.abs(found.value - wanted) <= found.error + 1e-16).all()
+
+
+# Under integrals
+
+
+@pytest.mark.parametrize(
+    ("size", "a", "b", "s"),
+    [
+        ((2, 2), 0.0, 0.0, 1.0),
+        ((3, 2), 0.25, 1 / 6, 0.5),  # begins on the middles of pixels
+        ((2, 3), -0.5, -0.25, 2.0),  # goes beyond on all sides
+        ((3, 3), 0.9, 0.8, -0.6),  # backwards
+        ((4, 3), 0.3, 0.4, 0.01),  # within a cell
+        ((1, 2), 0.1, 0.2, 0.7),
+        ((2, 2), 0.4, 0.3, 0.0),
+    ],
+)
+def test_the_square_of_a_look_up(
+    programs: potto.Module, size: tuple[int, int], a: float, b: float, s: float
+) -> None:
+    photo = np.random.default_rng(7).random(size)
+    found = potto.grad(programs.lit, ("a", "b", "s"))(photo, a, b, s)
+    assert abs(found.value - squared(photo, a, b, s)) <= found.error + 1e-16 < 1e-12
+    with mp.workdps(20):
+        step = mp.mpf(10) ** -6  # 1e-8 by central differences of a function whose third derivatives jump
+        for place, slope in enumerate(found.tangent):
+            ends = [squared(photo, *(mp.mpf(x) + sign * step * (i == place) for i, x in enumerate((a, b, s))))
+                    for sign in (1, -1)]  # fmt: skip
+            assert slope == pytest.approx(float((ends[0] - ends[1]) / (2 * step)), abs=1e-4)
+
+
+def test_a_condition_on_a_look_up(programs: potto.Module) -> None:
+    """Between four pixels 0, 0, 0, 1 it is x*y over a unit cell: above t that is 1 - t + t*log(t) of it."""
+    photo, t = np.array([[0.0, 0.0], [0.0, 1.0]]), 0.3
+    found = potto.grad(programs.above, "t")(photo, 0.25, 0.25, 0.5, t)
+    assert abs(found.value - (1 - t + t * np.log(t)) / 4) <= found.error + 1e-17 < 1e-13
+    assert abs(found.tangent - np.log(t) / 4) <= found.tangent_error + 1e-16 < 1e-12
+
+
+def test_a_condition_on_a_picture_of_many_pixels(programs: potto.Module) -> None:
+    """A picture that rises with u alone: above t is what lies to the right of one line."""
+    photo = np.tile((np.arange(32) + 0.5) / 32, (24, 1))
+    found = potto.grad(programs.above, "t")(photo, 0, 0, 1, 0.4)
+    assert abs(found.value - 0.6) <= found.error + 1e-16 < 1e-12
+    assert abs(found.tangent + 1) <= found.tangent_error + 1e-16 < 1e-11
+
+
+def test_a_look_up_along_one_variable_in_both_directions(programs: potto.Module) -> None:
+    """On the diagonal of x*y: x^2 > t from sqrt(t) on, where coordinates are taken from the middles of four pixels."""
+    photo, t = np.array([[0.0, 0.0], [0.0, 1.0]]), 0.36
+    found = potto.grad(programs.across, "t")(photo, 1, t)  # (2x - 1/2)^2 > t, from (sqrt(t) + 1/2)/2 on
+    assert abs(found.value - (1 - (0.6 + 0.5) / 2)) <= found.error + 1e-16 < 1e-13
+    assert abs(found.tangent + 1 / (4 * 0.6)) <= found.tangent_error + 1e-15 < 1e-12
+
+
+def test_a_surface_on_the_border_of_two_cells() -> None:
+    """At t = 1/2, the middle of a pixel, one cell ends and the next begins: the whole has one derivative there, at 0
+    and 1 two."""
+    program = """
+photo = [[0, 1, 0.5], [0.25, 0.75, 1]]
+def passed(t) integral ([0, 1], [0, 1]) image(photo, u, v)^2*[u < t] d(u, v)
+"""
+    function = potto.compile(program).passed
+    found = potto.grad(function, "t")(0.5)
+    column = 1 / 4 + (1 + 0.75 + 0.75**2) / 3 / 2 + 0.75**2 / 4
+    assert found.tangent == pytest.approx(column, abs=1e-14) and not found.notes and found.converged
+    assert potto.grad(function, "t")(1.0).notes
+    several = potto.grad(function, "t")(np.array([0.5, 0.6, 1.0]))
+    assert several.tangent[0] == pytest.approx(column, abs=1e-14) and len(several.notes) == 1
