@@ -8,7 +8,7 @@ VSCODE := editors/vscode
 TORCH ?= torch==2.13.0
 TESTS := $(BIN)/python -m pytest -n auto --maxprocesses 8 --dist worksteal --durations 20
 
-.PHONY: demo test quick fuzz check format clean native test-bridges vsix e2e
+.PHONY: demo test quick fuzz check format clean native pictures test-bridges vsix e2e
 
 demo: $(STAMP)  ## the paper's programs, evaluated and differentiated
 	@PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python examples/demo.py
@@ -41,6 +41,9 @@ vsix: $(VSCODE)/node_modules/.stamp  ## the extension for Visual Studio Code, ch
 
 e2e: $(STAMP)  ## the editors: the packaged extension in a real Visual Studio Code, and Neovim, Emacs, Vim (INSTALL=1 gets what is missing)
 	INSTALL=$(INSTALL) sh editors/e2e.sh
+
+pictures: $(STAMP)  ## the figures of the pages, light and dark
+	$(BIN)/python docs/write_pictures.py
 
 format: $(STAMP)  ## what ruff can put right by itself
 	$(BIN)/ruff check --fix .

@@ -46,7 +46,7 @@ OUTSIDERS: dict[str, tuple[str, ...]] = {
     "jax": ("potto.bench.peers", "potto.bridges.to_jax"),
     "torch": ("potto.bridges.to_torch",),
     "vegas": ("potto.bench.peers",),
-    "matplotlib": ("potto.bench.plotting",),
+    "matplotlib": ("potto.bench.plotting", "potto.applications.figures"),
     "mpmath": ("potto.core.reference",),
     "pygls": ("potto_lsp",),
     "lsprotocol": ("potto_lsp",),

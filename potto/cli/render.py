@@ -66,6 +66,8 @@ def _add_colours(parser: argparse.ArgumentParser) -> None:
     colours.add_argument("--map", choices=MAPS, default="gray", help="colours of a value (default gray)")
     colours.add_argument("--diverging", choices=DIVERGING, default="red-blue", help="colours of a derivative, around "
                          "zero (default red-blue)")  # fmt: skip
+    colours.add_argument("--scale", action="store_true", help="one figure with axes, colour bars and a caption: value "
+                         "and derivatives beside each other (.png, .jpg, .pdf, .svg)")  # fmt: skip
     colours.add_argument("--tone", choices=TONES, default="linear", help="srgb: the numbers are light; log: what is "
                          "weak can be seen (default linear)")  # fmt: skip
 
@@ -192,7 +194,13 @@ def _complaint(options: argparse.Namespace, target: str) -> str | None:
     frames = (options.frames or FRAMES) if options.over is not None else 1
     if width * height * frames > MOST_IN_FRAMES:
         return f"{frames:,} frames of {width:,} x {height:,} are more than {MOST_IN_FRAMES:,} pixels"
-    return complaint(target) if options.over is None else animations.complaint(target)
+    if options.over is not None:
+        return "--scale is for pictures that stand still" if options.scale else animations.complaint(target)
+    if options.scale:
+        from potto.applications import figures
+
+        return figures.complaint(target)
+    return complaint(target)
 
 
 def _shape(options: argparse.Namespace) -> tuple[int, int]:
@@ -208,6 +216,13 @@ def _shape(options: argparse.Namespace) -> tuple[int, int]:
     if width is None:
         return max(1, round(min(height / ratio, MOST_PIXELS))), height
     return width, height or max(1, round(min(width * ratio, MOST_PIXELS)))
+
+
+def grid_of(options: argparse.Namespace) -> Grid:
+    """The pixels that are asked for."""
+    from potto.applications.images import Grid
+
+    return Grid(*_shape(options), options.box)
 
 
 def _wait(options: argparse.Namespace) -> None:
@@ -228,15 +243,14 @@ def _wait(options: argparse.Namespace) -> None:
 
 
 def _once(options: argparse.Namespace, target: str, settings: Settings, console: Console) -> int:
-    from potto.applications.images import Grid
     from potto.applications.picture_files import NUMBERS, ending_of
     from potto.cli.opening import fail, opened, report_others
-    from potto.cli.rendering import drawn, layers, picture_of
+    from potto.cli.rendering import drawn, layers, picture_of, save_figure
     from potto.diagnostics import PottoError
     from potto.evaluating.world import World
 
     world = World(["."])
-    grid = Grid(*_shape(options), options.box)
+    grid = grid_of(options)
     try:
         file = opened(world, options.file, options.set)
         picture = picture_of(world, file, options, ending_of(target) not in NUMBERS)
@@ -247,7 +261,9 @@ def _once(options: argparse.Namespace, target: str, settings: Settings, console:
         return fail(error, options, console)
     files = layers(picture, found, options, target)
     try:
-        for layer in files:
+        if options.scale:
+            save_figure(target, files, picture, grid, _cost(found, grid, options))
+        for layer in () if options.scale else files:
             _write(layer, grid, options)
     except OSError as error:
         console.complain(f"potto render: {error}")
@@ -274,14 +290,11 @@ def _tell(
     if options.json:
         console.answer_json(_answer(files, found, grid))
     else:
-        from potto.runtime.answers.printing import format_error, format_range
+        from potto.runtime.answers.printing import format_range
 
-        pixels = grid.width * grid.height * len(found.frames)
         for layer in files:
             console.answer(f"{layer.path}: {layer.shows}, {format_range(layer.low, layer.high)}")
-        cost = f"{found.evaluations / pixels:.1f} evaluations a pixel, largest error {format_error(found.largest)}"
-        frames = f"{len(found.frames)} frames of " if options.over is not None else ""
-        console.answer(f"{frames}{grid.width} x {grid.height} pixels in {found.seconds:.2f} s, {cost}")
+        console.answer(_cost(found, grid, options))
     if options.stats:
         show_stats(found.answers, console)
         console.complain(_crossed(found, grid))
@@ -292,6 +305,15 @@ def _tell(
         )
     for reason in found.reasons:
         console.complain(f"warning: not as accurate everywhere as was asked: {reason}")
+
+
+def _cost(found: Drawn, grid: Grid, options: argparse.Namespace) -> str:
+    from potto.runtime.answers.printing import format_error
+
+    pixels = grid.width * grid.height * len(found.frames)
+    cost = f"{found.evaluations / pixels:.1f} evaluations a pixel, largest error {format_error(found.largest)}"
+    frames = f"{len(found.frames)} frames of " if options.over is not None else ""
+    return f"{frames}{grid.width} x {grid.height} pixels in {found.seconds:.2f} s, {cost}"
 
 
 def _crossed(found: Drawn, grid: Grid) -> str:

@@ -17,6 +17,7 @@ from potto.cli.numbers import totals
 if TYPE_CHECKING:
     from potto.applications.colours import Paint
     from potto.applications.images import Grid, Sampled
+    from potto.applications.pictures import Image
     from potto.evaluating.world import World
     from potto.projects.settings import Settings
     from potto.python.functions import Function
@@ -261,3 +262,35 @@ def layers(picture: Picture, found: Drawn, options: argparse.Namespace, target: 
         most = max(limits(errors)[1] for errors in found.errors)
         layers.append(Layer(f"{stem}-error{ending}", "error", found.errors, None, 0.0, most))
     return layers
+
+
+def save_figure(path: str, files: list[Layer], picture: Picture, grid: Grid, caption: str) -> None:
+    """One figure of all layers, each with its axes and its scale. Raises OSError."""
+    from potto.applications import figures
+
+    figures.save(path, images(files, picture, grid, caption), caption=caption)
+    for layer in files:
+        layer.path = path
+
+
+def images(files: list[Layer], picture: Picture, grid: Grid, caption: str) -> list[Image]:
+    """Layers as what figures are made of."""
+    return [_image(layer, picture, grid, caption) for layer in files]
+
+
+def _image(layer: Layer, picture: Picture, grid: Grid, caption: str) -> Image:
+    from potto.applications.picture_files import pixels
+    from potto.applications.pictures import Image
+
+    first, second = picture.axes
+    name = picture.function.written
+    what, by, parameter = layer.shows.partition(" by ")
+    label = name if what == "value" else f"{what} of {name}{by}{parameter}"
+    paint = layer.paint
+    rows = tuple(tuple(map(tuple, row)) for row in pixels(layer.colours(), grid).tolist())
+    bare = paint is None or picture.width >= 3
+    return Image(
+        rows, layer.low, layer.high, paint is not None and paint.even and not bare, label, (first, second), grid.box,
+        "" if bare or paint is None else paint.map, "linear" if paint is None else paint.tone, (layer.low, layer.high),
+        caption,
+    )  # fmt: skip

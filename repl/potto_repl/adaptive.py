@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from msgspec import Struct
 
-from potto_repl.pictures import Curve
+from potto.applications.pictures import Curve
 
 FIRST = 65  # points at equal distances to begin with
 FINE = 12  # how often the first distances may be halved

@@ -13,8 +13,8 @@ from typing import Literal
 
 from msgspec.structs import replace
 
+from potto.applications.pictures import Color, Curve, Image, Plot, line
 from potto.runtime.answers.printing import format_digits
-from potto_repl.pictures import Color, Curve, Image, Plot, line
 
 Protocol = Literal["kitty", "iterm", "sixel", "blocks"]
 _DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))

@@ -11,9 +11,9 @@ from ipykernel.kernelapp import IPKernelApp
 from ipykernel.kernelbase import Kernel
 
 from potto import __version__
+from potto.applications.pictures import Image
 from potto_repl.complete import candidates
 from potto_repl.editing import indentation, is_over
-from potto_repl.pictures import Image
 from potto_repl.reply import Part
 from potto_repl.respond import respond, stream
 from potto_repl.script import entries

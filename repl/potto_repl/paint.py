@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from msgspec import Struct
 
+from potto.applications.pictures import Image, Plot
 from potto.reports.render import COLORS, PLAIN, Palette
 from potto_repl.drawing import Protocol, braille, half_blocks, inline, room_for_curves, shrunk
-from potto_repl.pictures import Image, Plot
 from potto_repl.reply import Part
 from potto_repl.symbols import ascii_only
 

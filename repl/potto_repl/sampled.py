@@ -14,19 +14,20 @@ from typing import Any
 from msgspec import Struct
 from msgspec.structs import asdict, replace
 
-from potto.applications.images import flat, sampled
+from potto.applications.images import Sampled, flat, largest, sampled
+from potto.applications.pictures import Curve
 from potto.modules.builtins import is_builtin
 from potto.modules.free import free_references
 from potto.projects.settings import Settings, settings
 from potto.python.arguments import evenly
 from potto.python.functions import Function
 from potto.runtime.answers.estimate import Estimate
+from potto.runtime.answers.printing import format_error
 from potto.syntax import nodes, parse_expression
 from potto.types.types import Diffeo, Real, TupleOf, resolve
 from potto.types.types import Function as FunctionType
 from potto_repl.adaptive import Point, followed
 from potto_repl.expressions import Asked, checked, without_parens
-from potto_repl.pictures import Curve
 from potto_repl.reply import Refusal
 from potto_repl.session import Conversation
 
@@ -111,7 +112,24 @@ def free_names(session: Conversation, text: str) -> list[str]:
     return [name for name in found if name not in known and not is_builtin(name) and not name.startswith("_")]
 
 
-def curves(session: Conversation, axes: Axes, lo: float, hi: float) -> list[Curve]:
+class Spent(Struct):
+    """What a picture has cost so far, and the largest error in it."""
+
+    evaluations: int = 0
+    error: float = 0.0
+
+    def take(self, found: Sampled) -> None:
+        worst = largest(found.numbers[len(found.numbers) // 2 :])
+        self.evaluations, self.error = self.evaluations + found.evaluations, worst if worst > self.error else self.error
+
+    @property
+    def told(self) -> str:
+        """For a caption: `error at most 2.1e-15, 130 evaluations`."""
+        count = f"{self.evaluations:,} evaluation{'' if self.evaluations == 1 else 's'}"
+        return f"{f'error at most {format_error(self.error)}' if self.error else 'exact'}, {count}"
+
+
+def curves(session: Conversation, axes: Axes, lo: float, hi: float, spent: Spent) -> list[Curve]:
     """The components of a function of one number, each as a curve with its errors and jumps."""
     asked = 0
 
@@ -123,10 +141,10 @@ def curves(session: Conversation, axes: Axes, lo: float, hi: float) -> list[Curv
             if session.progress is not None:
                 done = before + start
                 session.progress(f"{axes.label}: {done} of {asked} points", done / asked, open=True)
-            found += zip(*_sampled(session, axes, [_array(places[start:stop])]), strict=True)
+            found += zip(*_sampled(session, axes, [_array(places[start:stop])], spent), strict=True)
         return found
 
-    return followed(evaluate, lo, hi)
+    return [replace(curve, slope=axes.dual) for curve in followed(evaluate, lo, hi)]
 
 
 def _portions(count: int, watched: bool) -> Iterator[tuple[int, int]]:
@@ -141,7 +159,7 @@ def _portions(count: int, watched: bool) -> Iterator[tuple[int, int]]:
 
 
 def grid(
-    session: Conversation, axes: Axes, box: tuple[float, float, float, float], columns: int, rows: int
+    session: Conversation, axes: Axes, box: tuple[float, float, float, float], columns: int, rows: int, spent: Spent
 ) -> list[list[float]]:
     """The components of a function of two numbers at the middles of pixels, row by row from the top."""
     x0, x1, y0, y1 = box
@@ -155,7 +173,7 @@ def grid(
         session.progress(f"{axes.label}: {rows * columns} pixels")
     for start in range(0, rows * columns, size):
         stop = min(start + size, rows * columns)
-        parts = _sampled(session, axes, [_array(place[start:stop]) for place in points])
+        parts = _sampled(session, axes, [_array(place[start:stop]) for place in points], spent)
         found = found or [[] for _ in parts]
         for pixels, part in zip(found, parts, strict=True):
             pixels += [value for value, _ in part]
@@ -170,7 +188,7 @@ def _array(numbers: Sequence[float]) -> Any:
     return found
 
 
-def _sampled(session: Conversation, axes: Axes, places: list[Any]) -> list[list[Pair]]:
+def _sampled(session: Conversation, axes: Axes, places: list[Any], spent: Spent) -> list[list[Pair]]:
     """Per component the values with their errors; nan where there is none."""
 
     def parts(*here: Any) -> tuple[list[Any], Estimate]:
@@ -178,7 +196,9 @@ def _sampled(session: Conversation, axes: Axes, places: list[Any]) -> list[list[
         return _components(found, axes, getattr(here[0], "ndim", 0)), found
 
     with settings(**_coarse(session.settings)):
-        rows: list[list[float]] = sampled(parts, places).numbers.tolist()
+        found = sampled(parts, places)
+    spent.take(found)
+    rows: list[list[float]] = found.numbers.tolist()
     count = len(rows) // 2
     return [list(zip(*pair, strict=True)) for pair in zip(rows[:count], rows[count:], strict=True)]
 

@@ -79,3 +79,16 @@ def test_columns_that_mean_nothing(potto: Potto, tmp_path) -> None:
     (tmp_path / "t.csv").write_text(TABLE)
     ran = potto("fit", "p.po", "box", "b=0.7", "--with", "a=1", "--data", "t.csv", p=PROGRAM)
     assert ran.status == 2 and "--target" in ran.err
+
+
+def test_the_way_there_is_drawn(potto: Potto, tmp_path) -> None:
+    """(a - 2)^2 + 1 from a = 0: an SVG by ourselves, a PNG by matplotlib; what cannot be drawn is said at once."""
+    program = "def loss(a) (a - 2)^2 + 1\n"
+    assert potto("fit", "s.po", "loss", "a=0", "--plot", "way.svg", s=program).status == 0
+    svg = (tmp_path / "way.svg").read_text()
+    assert ">step<" in svg and ">loss<" in svg and "evaluations" in svg
+    ran = potto("fit", "s.po", "loss", "a=0", "--plot", "way.bmp")
+    assert ran.status == 2 and "`.bmp` is no picture" in ran.err and ran.out == ""
+    pytest.importorskip("matplotlib")
+    assert potto("fit", "s.po", "loss", "a=0", "--plot", "way.png").status == 0
+    assert (tmp_path / "way.png").read_bytes().startswith(b"\x89PNG")

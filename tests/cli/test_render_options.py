@@ -276,3 +276,38 @@ def test_interrupted_frames_are_kept(tmp_path: Path) -> None:
     frames = np.load(tmp_path / "e.npy")
     assert frames.shape[1:] == (256, 256) and 1 <= len(frames) < 2000
     assert f"{len(frames)} frames" in out
+
+
+# Figures
+
+
+def test_a_figure_has_value_and_derivative_beside_each_other(potto: Potto, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    image = pytest.importorskip("PIL.Image")
+    words = ["edge", "c=0.53", "--wrt", "c", "--size", "16", "--scale"]
+    ran = potto("render", "s.po", *words, "-o", "both.png", s=SCENE)
+    assert ran.status == 0 and sorted(p.name for p in tmp_path.glob("*.png")) == ["both.png"]
+    assert ran.out.startswith("both.png: value, 0 to 1\nboth.png: derivative by c, -16 to 16\n")
+    potto("render", "s.po", "edge", "c=0.53", "--size", "16", "--scale", "-o", "one.png")
+    with image.open(tmp_path / "both.png") as both, image.open(tmp_path / "one.png") as one:
+        assert both.size[0] == pytest.approx(2 * one.size[0], abs=2)
+    potto("render", "s.po", *words, "-o", "both.pdf")
+    assert (tmp_path / "both.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_a_figure_without_matplotlib(potto: Potto, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An SVG needs nothing: both images, their axes, their scales, what they cost."""
+    monkeypatch.setattr("potto.applications.picture_files.find_spec", lambda name: None)
+    words = ["triple", "t=1/2", "--axes", "x,y", "--wrt", "x", "--size", "4", "--scale"]
+    assert potto("render", "s.po", *words, "-o", "f.svg", s=SCENE).status == 0
+    svg = (tmp_path / "f.svg").read_text()
+    assert svg.count("<image") == 2 and ">triple<" in svg and ">derivative of triple by x<" in svg
+    assert potto("render", "s.po", "edge", "c=0.4", "--wrt", "c", "--size", "4", "--scale", "-o", "e.svg").status == 0
+    assert all(f">{number}<" in (tmp_path / "e.svg").read_text() for number in ("-16", "-8", "8", "16", "0.25", "0.75"))
+    ran = potto("render", "s.po", *words, "-o", "f.png")
+    assert ran.status == 2 and "pip install 'potto[plots]'" in ran.err and ".svg does without" in ran.err
+
+
+def test_animations_have_no_scale(potto: Potto) -> None:
+    ran = potto("render", "s.po", "edge", "--over", "c=0..1", "--scale", "-o", "x.gif", s=SCENE)
+    assert ran.status == 2 and "stand still" in ran.err

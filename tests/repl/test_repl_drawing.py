@@ -11,7 +11,8 @@ import zlib
 import pytest
 from potto_repl.drawing import braille, half_blocks, inline, protocol, sixel
 from potto_repl.paint import Look, painted
-from potto_repl.pictures import Curve, Image, Plot, image_of
+
+from potto.applications.pictures import Curve, Image, Plot, image_of
 
 CHECKERS = Image((((0, 0, 0), (255, 255, 255)), ((255, 0, 0), (0, 0, 255))), 0.0, 1.0)
 

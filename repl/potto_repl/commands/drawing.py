@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 import re
 
+from msgspec.structs import replace
+
+from potto.applications.pictures import Curve, Plot, image_of
 from potto.runtime.answers.printing import format_digits, format_error, format_range
 from potto_repl.drawing import braille, half_blocks, room_for_curves
 from potto_repl.expressions import split_items
-from potto_repl.pictures import Curve, Plot, image_of
 from potto_repl.registry import command
 from potto_repl.reply import Part, Refusal
-from potto_repl.sampled import axes_of, curves, derivative_of, grid
+from potto_repl.sampled import Spent, axes_of, curves, derivative_of, grid
 from potto_repl.session import Conversation, plain_names
 
 MOST_JUMPS = 6  # that a caption names
@@ -33,15 +35,15 @@ def plot(session: Conversation, text: str) -> Part:
         raise Refusal("there is nothing to draw", "write `:plot f 0 1` or `:plot f, deriv f`")
     labels: list[str] = []
     drawn: list[Curve] = []
-    axis = "x"
+    axis, spent = "x", Spent()
     for item in split_items(what):
         axes = axes_of(session, item, 1, ":plot f 0 1")
         axis = axes.names[0]
-        parts = curves(session, axes, lo, hi)
+        parts = curves(session, axes, lo, hi, spent)
         for number, part in enumerate(parts):
             labels.append(item if len(parts) == 1 else f"{item} [{number + 1}]")
             drawn.append(part)
-    picture = Plot(tuple(labels), tuple(drawn), lo, hi, axis)
+    picture = Plot(tuple(labels), tuple(drawn), lo, hi, axis, spent.told)
     session.last_picture = picture
     width = room_for_curves(session.width())
     low, high = picture.span
@@ -119,7 +121,10 @@ def image(session: Conversation, text: str) -> Part:
     else:
         axes = derivative_of(session, named[1], 2, named[2], ":image f by NAME")
     count = int(pixels)
-    picture = image_of(grid(session, axes, (x0, x1, y0, y1), count, count), count, signed=axes.dual)
+    box, spent = (x0, x1, y0, y1), Spent()
+    picture = image_of(grid(session, axes, box, count, count, spent), count, signed=axes.dual)
+    first, second = axes.names
+    picture = replace(picture, label=axes.label, names=(first, second), box=box, caption=spent.told)
     session.last_picture = picture
     shown = half_blocks(picture, unicode=session.options.unicode, color=False)
     dark, light = ("blue below 0", "red above") if picture.signed else ("dark", "light")

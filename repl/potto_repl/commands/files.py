@@ -12,6 +12,8 @@ from potto_repl.replay import prompted
 from potto_repl.reply import Part, Refusal, answer, note
 from potto_repl.session import Conversation
 
+PICTURES = (".svg", ".png", ".pdf", ".jpg")
+
 
 @command("load", "l", argument="FILE", completes="file")
 def load(session: Conversation, text: str) -> list[Part]:
@@ -102,7 +104,7 @@ def editor() -> list[str]:
 
 @command("save", argument="FILE", completes="file")
 def save(session: Conversation, text: str) -> list[Part]:
-    """Write the session as a program (`:save session.po`), or the last picture (`:save plot.svg`, `.png`).
+    """Write the session as a program (`:save session.po`), or the last picture (`:save plot.svg`, `.png`, `.pdf`).
 
     Values become live expressions, `#> e` with `#= v`, which `potto test session.po` runs again.
     """
@@ -110,7 +112,7 @@ def save(session: Conversation, text: str) -> list[Part]:
     if not path:
         raise Refusal("a file is missing", "write `:save session.po` or `:save plot.svg`")
     suffix = os.path.splitext(path)[1].lower()
-    if suffix in (".svg", ".png"):
+    if suffix in PICTURES:
         return _save_picture(session, path, suffix)
     if suffix != ".po":
         raise Refusal(f"`{path}` is neither a program nor a picture", "end it with .po, .svg or .png")
@@ -126,12 +128,23 @@ def save(session: Conversation, text: str) -> list[Part]:
 
 
 def _save_picture(session: Conversation, path: str, suffix: str) -> list[Part]:
+    from potto.applications.figures import figure, has_matplotlib
+
     picture = session.last_picture
     if picture is None:
         raise Refusal("there is no picture yet", "`:plot f 0 1` or `:image f` makes one")
-    data = picture.svg().encode() if suffix == ".svg" else picture.png()
+    if suffix != ".svg" and has_matplotlib():
+        data = figure(picture, suffix)
+    elif suffix in (".svg", ".png"):
+        data = picture.svg().encode() if suffix == ".svg" else picture.png()
+    else:
+        help = "a picture that ends with .svg does without"
+        raise Refusal(f"`{suffix}` needs matplotlib: pip install 'potto[plots]'", help)
     _write(path, data)
-    return [answer(f"{path}: {len(data):,} bytes", saved=path, bytes=len(data))]
+    said = [answer(f"{path}: {len(data):,} bytes", saved=path, bytes=len(data))]
+    if suffix == ".png" and not has_matplotlib():
+        said.append(note("axes and labels need matplotlib, `pip install 'potto[plots]'`; a .svg has them without"))
+    return said
 
 
 def _write(path: str, data: bytes) -> None:

@@ -5,7 +5,6 @@ Owns how a fit is asked for and told at the prompt; the fitting itself is `potto
 
 from __future__ import annotations
 
-import math
 import re
 import time
 from collections.abc import Iterator, Sequence
@@ -14,18 +13,17 @@ from msgspec.structs import asdict
 
 from potto.applications.fitting import fit as fitted
 from potto.applications.minimizing import Step
+from potto.applications.pictures import course
 from potto.projects.settings import settings
 from potto.python.functions import Function
 from potto.runtime.answers.printing import format_digits, format_error, format_number, format_seconds, with_error
 from potto_repl.drawing import braille, room_for_curves
 from potto_repl.expressions import checked, split_items
-from potto_repl.pictures import Curve, Plot
 from potto_repl.registry import command
 from potto_repl.reply import Part, Refusal
 from potto_repl.sampled import free_names
 from potto_repl.session import Conversation, plain_names
 
-ROUNDING = 1e-16  # of the largest value: what lies below says nothing
 FEWEST = 3  # steps that are worth a picture
 HEIGHT = 6  # of that picture in lines
 PATIENCE = 0.5  # seconds before progress is shown
@@ -72,11 +70,8 @@ def fit(session: Conversation, text: str) -> Iterator[Part]:
 
 def _course(session: Conversation, name: str, values: Sequence[float]) -> Part:
     """The value from step to step as a picture; its logarithm where it falls far."""
-    least, most = min(values), max(values)
-    logarithm = least > 0 and most > 100 * least
-    heights = [math.log10(max(value, ROUNDING * most)) for value in values] if logarithm else list(values)
-    label = f"log10 {name}" if logarithm else name
-    picture = Plot((label,), (Curve.even(heights, 0, len(values) - 1),), 0, len(values) - 1, "step")
+    picture = course(name, values)
+    (label,) = picture.labels
     session.last_picture = picture
     said = f"{label} from step to step"
     shown = braille(picture, room_for_curves(session.width()), HEIGHT, unicode=session.options.unicode)

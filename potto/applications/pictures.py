@@ -18,12 +18,15 @@ from potto.runtime.answers.printing import format_digits
 Color = tuple[int, int, int]
 COLORS: tuple[Color, ...] = ((31, 119, 180), (214, 39, 40), (44, 160, 44), (148, 103, 189), (255, 127, 14))
 WHITE: Color = (255, 255, 255)
+FAR = 100.0  # times the least: a course that is drawn by its logarithm
+ROUNDING = 1e-16  # of the largest value of a course: what lies below says nothing
 
 
 class Curve(Struct, frozen=True):
     """Values and their errors over places in order, nan where there is none.
 
     breaks: numbers of the points after which the curve jumps. height: what is to be seen of it; beyond it go poles.
+    slope: whether it is a derivative, which figures show beside the values.
     """
 
     xs: tuple[float, ...]
@@ -31,6 +34,7 @@ class Curve(Struct, frozen=True):
     errors: tuple[float, ...] = ()
     breaks: tuple[int, ...] = ()
     height: tuple[float, float] | None = None
+    slope: bool = False
 
     @classmethod
     def even(cls, values: Sequence[float], lo: float, hi: float) -> Curve:
@@ -65,13 +69,15 @@ class Curve(Struct, frozen=True):
 
 
 class Plot(Struct, frozen=True):
-    """Curves over one stretch."""
+    """Curves over one stretch. caption: how far they may be off, and what they cost. marks: a mark at every point."""
 
     labels: tuple[str, ...]
     curves: tuple[Curve, ...]
     lo: float
     hi: float
     axis: str = "x"
+    caption: str = ""
+    marks: bool = False
 
     @property
     def span(self) -> tuple[float, float]:
@@ -102,7 +108,7 @@ class Plot(Struct, frozen=True):
         return (x - self.lo) / (self.hi - self.lo)
 
     def svg(self, width: int = 640, height: int = 400) -> str:
-        left, top, right, bottom = 70, 20, 20, 40
+        left, top, right, bottom = 70, 24, 20, 44
         inner_w, inner_h = width - left - right, height - top - bottom
         frame = (left, top, inner_w, inner_h)
         low, high = self.span
@@ -112,12 +118,18 @@ class Plot(Struct, frozen=True):
             f'<rect width="{width}" height="{height}" fill="white"/>',
             f'<rect x="{left}" y="{top}" width="{inner_w}" height="{inner_h}" fill="none" stroke="#999"/>',
         ]
-        for share, label in ((0.0, low), (0.5, (low + high) / 2), (1.0, high)):
-            y = top + (1 - share) * inner_h
-            out.append(f'<text x="{left - 6}" y="{y + 4:.1f}" text-anchor="end">{self.label(label)}</text>')
-        for share, label in ((0.0, self.lo), (0.5, (self.lo + self.hi) / 2), (1.0, self.hi)):
-            x = left + share * inner_w
-            out.append(f'<text x="{x:.1f}" y="{height - 20}" text-anchor="middle">{format_digits(label, 4)}</text>')
+        for at in ticks(low, high):
+            y = top + (high - at) / (high - low) * inner_h
+            out.append(f'<path d="M{left} {y:.1f}h{inner_w}" stroke="#ddd"/>')
+            out.append(f'<text x="{left - 6}" y="{y + 4:.1f}" text-anchor="end">{self.label(at)}</text>')
+        for label in ticks(self.lo, self.hi):
+            x = left + self.share(label) * inner_w
+            out.append(f'<path d="M{x:.1f} {top}v{inner_h}" stroke="#ddd"/>')
+            out.append(f'<text x="{x:.1f}" y="{height - 26}" text-anchor="middle">{format_digits(label, 4)}</text>')
+        out.append(f'<text x="{left + inner_w / 2}" y="{height - 6}" text-anchor="middle" font-style="italic">'
+                   f"{html.escape(self.axis)}</text>")  # fmt: skip
+        if self.caption:
+            out.append(f'<text x="{left}" y="{top - 6}" font-size="11" fill="#555">{html.escape(self.caption)}</text>')
         for number, curve in enumerate(self.curves):
             color = "rgb({},{},{})".format(*COLORS[number % len(COLORS)])
             for band in self._bands(curve):
@@ -142,8 +154,13 @@ class Plot(Struct, frozen=True):
         low, high = self.span
         if not curve.error > (high - low) / 1000:
             return []
-        above, below = self.runs(curve, 1.0), self.runs(curve, -1.0)
-        return [up + down[::-1] for up, down in zip(above, below, strict=False)] if len(above) == len(below) else []
+        found = []
+        for piece in curve.pieces():
+            xs, ys, off = ([row[i] for i in piece] for row in (curve.xs, curve.ys, curve.errors))
+            above, below = ([(self.share(x), min(max((y + sign * _finite(e) - low) / (high - low), 0.0), 1.0))
+                             for x, y, e in zip(xs, ys, off, strict=True)] for sign in (1, -1))  # fmt: skip
+            found.append(above + below[::-1])
+        return found
 
     def _steps(self, curve: Curve) -> list[tuple[float, float, float]]:
         """Jumps as places and heights in the unit square; of poles none."""
@@ -167,12 +184,23 @@ class Plot(Struct, frozen=True):
 
 
 class Image(Struct, frozen=True):
-    """Pixels row by row from the top, the least and the largest value; whether zero is white between two colours."""
+    """Pixels row by row from the top, the least and the largest value; whether zero is white between two colours.
+
+    label: what is drawn. names, box: the axes and what is seen of them. map, tone: how numbers became colours, as
+    `colours.Paint` says; no map where the pixels are colours themselves. ends: the numbers at both ends of the map.
+    """
 
     pixels: tuple[tuple[Color, ...], ...]
     low: float
     high: float
     signed: bool = False
+    label: str = ""
+    names: tuple[str, str] = ("x", "y")
+    box: tuple[float, float, float, float] = (0.0, 1.0, 0.0, 1.0)
+    map: str = ""
+    tone: str = "linear"
+    ends: tuple[float, float] = (0.0, 1.0)
+    caption: str = ""
 
     @property
     def size(self) -> tuple[int, int]:
@@ -182,16 +210,10 @@ class Image(Struct, frozen=True):
         return png(self.pixels)
 
     def svg(self) -> str:
-        """The image as an image inside of an SVG."""
-        import base64
+        """The image with its axes, its scale and its caption, as an SVG."""
+        from potto.applications.svg import images_svg
 
-        width, height = self.size
-        data = base64.b64encode(self.png()).decode()
-        return (
-            f'<svg xmlns="http://www.w3.org/2000/svg" width="{width * 4}" height="{height * 4}" '
-            f'viewBox="0 0 {width} {height}"><image width="{width}" height="{height}" '
-            f'style="image-rendering:pixelated" href="data:image/png;base64,{data}"/></svg>\n'
-        )
+        return images_svg([self])
 
 
 def image_of(components: Sequence[Sequence[float]], columns: int, *, signed: bool = False) -> Image:
@@ -203,7 +225,29 @@ def image_of(components: Sequence[Sequence[float]], columns: int, *, signed: boo
 
     colours, low, high = coloured(components, signed)
     rows = (colours[i : i + columns] for i in range(0, len(colours), columns))
-    return Image(tuple(map(tuple, rows)), low, high, signed and len(components) < 3)
+    plain = len(components) < 3
+    most = max(-low, high) or 1.0
+    colouring = ("red-blue" if signed else "gray") if plain else ""
+    ends = (-most, most) if signed else (low, high)
+    return Image(tuple(map(tuple, rows)), low, high, signed and plain, map=colouring, ends=ends)
+
+
+def ticks(low: float, high: float, most: int = 6) -> list[float]:
+    """Round numbers from low to high, so many at the most: steps of 1, 2 or 5 times a power of ten."""
+    rough = (high - low) / most
+    power = 10.0 ** math.floor(math.log10(rough))
+    step = power * next(m for m in (1, 2, 5, 10) if m * power >= rough * (1 - 1e-9))
+    first = math.ceil(low / step - 1e-9)
+    return [n * step for n in range(first, math.floor(high / step + 1e-9) + 1)]
+
+
+def course(name: str, values: Sequence[float], caption: str = "") -> Plot:
+    """A value from step to step; its logarithm where it falls far."""
+    least, most = min(values), max(values)
+    logarithm = least > 0 and most > FAR * least
+    heights = [math.log10(max(value, ROUNDING * most)) for value in values] if logarithm else list(values)
+    label, last = f"log10 {name}" if logarithm else name, len(values) - 1
+    return Plot((label,), (Curve.even(heights, 0, last),), 0, last, "step", caption, True)
 
 
 def _finite(error: float) -> float:
