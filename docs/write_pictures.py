@@ -46,7 +46,8 @@ def rendered(*words: str) -> list[Plot | Image]:
     grid = render.grid_of(options)
     picture = rendering.picture_of(world, opened(world, options.file), options, True)
     found = rendering.drawn(picture, grid, DEFAULTS, options, Console(sys.stdout, sys.stderr))
-    return list(rendering.images(rendering.layers(picture, found, options, "x.png"), picture, grid, ""))
+    caption = f"{grid.width} x {grid.height} pixels, {found.cost(grid)}"
+    return list(rendering.images(rendering.layers(picture, found, options, "x.png"), picture, grid, caption))
 
 
 G = "def g(t) (integral [0, 1] [x < t]*t^2 d(x)) * (if t < 0.6 then 1 else 0.4)"

@@ -24,8 +24,8 @@ NEEDS: dict[str, tuple[str, str, str] | None] = {
 }  # fmt: skip
 COLORS = ("#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e")
 DARK_COLORS = ("#6fb1e8", "#ff7b72", "#7ee787", "#d2a8ff", "#ffa657")  # the same on a dark ground
-PAPER, INK, FAINT = "#ffffff", "#1a1a1a", "#b0b0b0"
-DARK_PAPER, DARK_INK, DARK_FAINT = "#0d1117", "#e6edf3", "#6e7681"
+PAPER, INK, FAINT, NOTE = "#ffffff", "#1a1a1a", "#b0b0b0", "#555555"
+DARK_PAPER, DARK_INK, DARK_FAINT, DARK_NOTE = "#0d1117", "#e6edf3", "#6e7681", "#9da7b3"
 WIDTH, HEIGHT = 4.6, 3.7  # of one panel, in inches
 SEEN = 1e-3  # of the height: the smallest error whose band can be seen
 
@@ -71,7 +71,7 @@ def _written(target: Any, pictures: Sequence[Plot | Image], caption: str, dark: 
                 _draw_image(figure, axes, panel)
         said = caption or next((p.caption for p in pictures if p.caption), "")
         if said:
-            figure.supxlabel(said, fontsize=9, color=DARK_FAINT if dark else "#555555", x=0.01, ha="left")
+            figure.supxlabel(said, fontsize=9, color=DARK_NOTE if dark else NOTE, x=0.01, ha="left")
         figure.savefig(target, format=kind)
 
 

@@ -308,10 +308,7 @@ def _tell(
 
 
 def _cost(found: Drawn, grid: Grid, options: argparse.Namespace) -> str:
-    from potto.runtime.answers.printing import format_error
-
-    pixels = grid.width * grid.height * len(found.frames)
-    cost = f"{found.evaluations / pixels:.1f} evaluations a pixel, largest error {format_error(found.largest)}"
+    cost = found.cost(grid)
     frames = f"{len(found.frames)} frames of " if options.over is not None else ""
     return f"{frames}{grid.width} x {grid.height} pixels in {found.seconds:.2f} s, {cost}"
 

@@ -156,6 +156,13 @@ class Drawn(Struct):
         looked = stats.get("members looked at", 0)
         return (looked - stats["members that no surface crosses"], looked) if looked else None
 
+    def cost(self, grid: Grid) -> str:
+        """What the pixels took, and how far they may be off."""
+        from potto.runtime.answers.printing import format_error
+
+        each = self.evaluations / (grid.width * grid.height * len(self.frames))
+        return f"{each:.1f} evaluations a pixel, largest error {format_error(self.largest)}"
+
     def take(self, found: Sampled, keep_errors: bool) -> None:
         from potto.applications.images import largest
 

@@ -64,13 +64,14 @@ def fit(session: Conversation, text: str) -> Iterator[Part]:
     yield Part("answer", "\n".join(said), data)
     count = len(found.steps) - 1
     if count >= FEWEST:
-        yield _course(session, name, [step.value for step in found.steps])
+        ends = f"{name} = {with_error(found.value, found.error)} after {count} steps, {found.evaluations} evaluations"
+        yield _course(session, name, [step.value for step in found.steps], ends)
     yield Part("tail", f"{count} steps, {found.evaluations} evaluations, {format_seconds(time.perf_counter() - begun)}")
 
 
-def _course(session: Conversation, name: str, values: Sequence[float]) -> Part:
+def _course(session: Conversation, name: str, values: Sequence[float], ends: str) -> Part:
     """The value from step to step as a picture; its logarithm where it falls far."""
-    picture = course(name, values)
+    picture = course(name, values, ends)
     (label,) = picture.labels
     session.last_picture = picture
     said = f"{label} from step to step"
