@@ -8,10 +8,13 @@ VSCODE := editors/vscode
 TORCH ?= torch==2.13.0
 TESTS := $(BIN)/python -m pytest -n auto --maxprocesses 8 --dist worksteal --durations 20
 
-.PHONY: demo test quick fuzz check format clean native pictures test-bridges vsix e2e
+.PHONY: demo gallery test quick fuzz check format clean native pictures test-bridges vsix e2e
 
 demo: $(STAMP)  ## the paper's programs, evaluated and differentiated
 	@PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python examples/demo.py
+
+gallery: $(STAMP)  ## docs/gallery: pictures of the examples with times and errors, in a few minutes
+	$(BIN)/python examples/gallery
 
 test: $(STAMP)  ## every test
 	$(TESTS)

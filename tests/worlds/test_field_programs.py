@@ -216,3 +216,21 @@ def test_a_polygon_by_all_corners() -> None:
             exact = reference(lambda t, w=which, a=axis: shoelace(moved(ARROW, w, a, t)), 0.0)
             assert abs(float(np.asarray(slopes)[which, axis]) - exact[1]) < 1e-12
     assert abs(float(POLYGON.area(ARROW)) - exact[0]) < 1e-13
+
+
+@pytest.mark.parametrize("apart", [1.4125, 1.6])
+def test_metaballs_that_are_two(apart: float) -> None:
+    """Between them nothing is above the level; the first refined sections of the derivative met nothing but that."""
+
+    def g(x: Any) -> Any:
+        return mp.exp(-((x + apart) ** 2)) + mp.exp(-((x - apart) ** 2))
+
+    def rate(x: Any) -> Any:
+        return 2 * ((x - apart) * mp.exp(-((x - apart) ** 2)) - (x + apart) * mp.exp(-((x + apart) ** 2))) / g(x)
+
+    with mp.workdps(40):
+        ends = [mp.findroot(lambda x: g(x) - 0.5, apart + d * mp.sqrt(mp.log(2))) for d in (-1, 1)]
+        places = [ends[0], apart, ends[1]]
+        value = 4 * mp.quad(lambda x: mp.sqrt(abs(mp.log(2 * g(x)))), places)
+        slope = 2 * mp.quad(lambda x: rate(x) / mp.sqrt(abs(mp.log(2 * g(x)))), places)
+    agrees(dual(BALLS, r"\a . area(a, 1, 0.5)", apart), (float(value), float(slope)), 1e-9)

@@ -197,7 +197,7 @@ class PanelBatch(Struct, dict=True):
         masks = {g: m[index[flat]] if isinstance(m, np.ndarray) else m for g, m in self.sides.items()}
         root = self.below(owner[flat])
         less = self.spared(owner, n, None if weight is None else np.broadcast_to(np.abs(weight), x.shape))
-        sums = self.parent.run(self.number + 1, env, x.size, masks, self.inner, root, less)
+        sums = self.parent.run(self.number + 1, env, x.size, masks, self.inner, root, less).widened(self.width)
         if sums.gross is not None:
             self.count_cancelling(sums, sums.gross, owner[flat])
         numbers, errors = (part.reshape(*part.shape[:2], *x.shape) for part in sums.channels())

@@ -1,0 +1,55 @@
+"""The gallery: pictures of the examples with their times and errors, made in one run.
+
+`python examples/gallery [--quick] [--out FOLDER] [FOLDER…]`. What is shown stands in a table beside the programs,
+`examples/*/gallery.toml`; `tables` says how one is written.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+from made import Made, make
+from pages import contact_sheet, index
+from tables import TableError, chapters
+
+HERE = Path(__file__).resolve().parent
+TARGET = HERE.parents[1] / "docs" / "gallery"
+
+
+def main(arguments: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(prog="gallery", description="pictures of the examples, with times and errors")
+    parser.add_argument("folders", nargs="*", metavar="FOLDER", help="which of examples/ (default: all with a table)")
+    parser.add_argument("--out", type=Path, default=TARGET, help="where the pages go (default: docs/gallery)")
+    parser.add_argument("--quick", action="store_true", help="small pictures and few points, to see that all runs")
+    parser.add_argument("--root", type=Path, default=HERE.parent, help=argparse.SUPPRESS)
+    options = parser.parse_args(arguments)
+    try:
+        found = chapters(options.root, options.folders)
+    except TableError as error:
+        print(f"gallery: {error}", file=sys.stderr)
+        return 2
+    options.out.mkdir(parents=True, exist_ok=True)
+    start = time.perf_counter()
+    made: list[tuple[str, str, list[Made]]] = []
+    for chapter in found:
+        entries = []
+        for entry in chapter.entries:
+            print(f"{chapter.name}: {entry.title}", flush=True)
+            entries.append(make(entry, chapter, options.out, options.quick))
+        made.append((chapter.title, chapter.about, entries))
+    seconds = time.perf_counter() - start
+    (options.out / "index.html").write_text(index(made, seconds), encoding="utf-8")
+    (options.out / "contact.svg").write_text(contact_sheet(made, options.out), encoding="utf-8")
+    failures = [e for _, _, entries in made for e in entries if e.failure]
+    for failed in failures:
+        print(f"gallery: {failed.title}: {failed.failure}", file=sys.stderr)
+    count = sum(len(entry.files) for _, _, entries in made for entry in entries)
+    print(f"{count} pictures in {seconds:.0f} s: {options.out / 'index.html'}")
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
