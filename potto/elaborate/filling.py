@@ -13,6 +13,7 @@ from typing import Generic, TypeVar
 from msgspec import Struct
 
 from potto.elaborate.values import Groups
+from potto.types.types import dual_name
 
 V = TypeVar("V")
 
@@ -62,6 +63,7 @@ def _placed(groups: Groups, given: Sequence[Given[V]]) -> list[Filling[V]] | str
         if argument.name is None:
             continue
         places = [place for place, name in enumerate(parameters) if name == argument.name]
+        places = places or [place for place, name in enumerate(parameters) if name == dual_name(argument.name)]
         if not places:
             return f"there is no parameter `{argument.name}`"
         if places[-1] in taken:

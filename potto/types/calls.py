@@ -43,6 +43,7 @@ from potto.types.types import (
     function,
     groups_of,
     resolve,
+    without_d,
 )
 from potto.types.unify import settle, unify
 from potto.types.vectors import vector_form
@@ -201,15 +202,16 @@ class _Filling:
 
     def _keywords(self) -> bool:
         names = {parameter.name: place for place, parameter in enumerate(self.parameters) if parameter.name}
+        numbers = {**without_d(self.parameters), **names}
         fine = True
         for place, argument in enumerate(self.node.arguments):
             if argument.name is None:
                 continue
-            if argument.name not in names:
+            if argument.name not in numbers:
                 self.inference.report(self._unknown_keyword(argument, tuple(names)))
                 fine = False
             else:  # the parser has seen to it that none is given twice
-                self.slots[names[argument.name]] = (place,)
+                self.slots[numbers[argument.name]] = (place,)
         return fine
 
     def _unknown_keyword(self, argument: nodes.Argument, names: tuple[str, ...]) -> Diagnostic:

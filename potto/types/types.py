@@ -7,7 +7,7 @@ leaves it. What flows from which parameter to where is not in the type but in `v
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import assert_never
 
@@ -212,6 +212,16 @@ def result_of(type: Type) -> Type:
 def dual_name(name: str) -> str:
     """The name that `deriv` gives to a parameter."""
     return "d" + name
+
+
+def without_d(parameters: Sequence[Parameter]) -> dict[str, int]:
+    """The parameters of a derivative by the names of those that they are the duals of: `deriv(f)(x=(2, 1))`."""
+    found: dict[str, int] = {}
+    for place, parameter in enumerate(parameters):
+        type = resolve(parameter.type)
+        if parameter.name is not None and parameter.name[:1] == "d" and isinstance(type, TupleOf) and type.dual:
+            found[parameter.name[1:]] = place
+    return found
 
 
 def derivative_type(type: Type) -> Type:

@@ -55,6 +55,14 @@ def test_products_and_extremes() -> None:
     assert (M.least(XS).value, M.greatest(XS).value) == (-1.25, 2.0)
 
 
+@pytest.mark.parametrize("given", ["(xs, dxs)", "xs=(xs, dxs)", "dxs=(xs, dxs)"])
+def test_derivatives_by_the_names_of_parameters(given: str) -> None:
+    """The derivative of the sum of squares of 1, 2 and 6 along (1, 0, 2) is 2 + 24."""
+    program = "def squares(xs: [n] Real) sum x in xs (x^2)\nxs = [1, 2, 6]\ndxs = [1, 0, 2]\n"
+    found = potto.compile(program + f"slope = deriv(squares)({given})").slope
+    assert (found.value, found.tangent) == (41, 26)
+
+
 def test_folds() -> None:
     assert M.halves(0, 20).value == 2 - 2.0**-19
     x, v = 1.0, 0.0
