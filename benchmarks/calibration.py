@@ -1,9 +1,10 @@
 """The experiments behind the numbers that error estimates rest on: `python benchmarks/calibration.py [NAME]`.
 
-truncation, analytic: how often the two estimates of `potto.integrate.rules.gauss` are exceeded, by how much, and how
-much larger than the error they are. edge: how near a piece may come to the edge of a builtin's domain before the
-coefficients no longer tell (`EDGE` in `potto.integrate.fixed.alike`). Functions are drawn from families that are told
-in their names; the truth is a rule of 20 nodes on 800 graded panels.
+truncation, singular, analytic: how often the estimates of `potto.integrate.rules.gauss` are exceeded, by how much,
+and how much larger than the error they are; singular is `truncation` as it is for pieces at whose ends powers may be.
+edge: how near a piece may come to the edge of a builtin's domain before the coefficients no longer tell (`EDGE` in
+`potto.integrate.fixed.alike`). Functions are drawn from families that are told in their names; the truth is a rule of
+20 nodes on 800 graded panels.
 """
 
 from __future__ import annotations
@@ -22,6 +23,9 @@ Estimate = Callable[[Array], Array]
 DRAWN = 600
 NODES = (6, 8, 11, 12, 16, 20)
 POWERS = (-0.7, -0.5, -0.25, 0.25, 0.5, 0.75, 1.5, 2.5, 3.5, 5.5)
+ESTIMATES: dict[str, Estimate] = {
+    "truncation": truncation, "singular": lambda size: truncation(size, True), "analytic": analytic_truncation
+}  # fmt: skip
 # What a sum of n products may lose to rounding, and what the truth may, both as a part of what is added up.
 ROUNDING = 300 * EPS
 
@@ -71,7 +75,7 @@ def measured(functions: list[Function], exact: Array, n: int) -> Iterator[tuple[
     values = np.array([f(rule.nodes) for f in functions])
     sizes, floor = np.abs(values @ rule.transform), ROUNDING * (np.abs(values) @ rule.weights)
     error = np.maximum(np.abs(values @ rule.weights - exact) - floor, 0.0)
-    for name, estimate in (("truncation", truncation), ("analytic", analytic_truncation)):
+    for name, estimate in ESTIMATES.items():
         yield name, error, estimate(sizes) + floor
 
 
@@ -175,6 +179,7 @@ def elementary() -> None:
 
 EXPERIMENTS: dict[str, Callable[[], None]] = {
     "truncation": lambda: estimates("truncation"),
+    "singular": lambda: estimates("singular"),
     "analytic": lambda: estimates("analytic"),
     "edge": edge,
     "native": native,

@@ -118,7 +118,10 @@ class PanelBatch(Struct, dict=True):
         size, height = np.abs(coefficients), np.abs(h)
         p.integral = coefficients[..., 0]
         exact = self.enough()
-        p.error = truncation(size) if exact is None or rule.nodes.size < exact else np.zeros(size.shape[:-1])
+        if exact is None or rule.nodes.size < exact:
+            p.error = truncation(size, (seg.kind != substitution.LINEAR) & ((p.u0 == 0) | (p.u1 == 1)))
+        else:
+            p.error = np.zeros(size.shape[:-1])
         p.coefficients, p.heights = coefficients, height
         p.size = height @ rule.weights
         if self.ends is not None:

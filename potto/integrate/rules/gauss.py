@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 from msgspec import Struct
 
-from potto.kernels.cells import Array, Ints
+from potto.kernels.cells import Array, Bools, Ints
 
 EPS = 2.0**-52
 AHEAD = 0.7
@@ -46,14 +46,15 @@ def gauss(n: int) -> Rule:
     return Rule((x + 1) / 2, w / 2, transform, ends, k * (k + 1.0), derivative)
 
 
-def truncation(size: Array) -> Array:
-    """A bound of how far the rule's integral is off, from the decay of its Legendre coefficients (their sizes).
+def truncation(size: Array, singular: Bools | bool = False) -> Array:
+    """A bound of how far the rule's integral is off, from the decay of its Legendre coefficients: their sizes (P, n).
 
     The integral errs by about the 2n-th coefficient. The decay is read off pairs of coefficients (functions even or
     odd on the piece have every other one zero), at the end and over the upper half, and the slower of the two is
     followed for fewer than n further steps: for analytic integrands, where the decay is geometric, that is safe by
-    orders of magnitude. Where the decay slows down as it does for x^a at an end of the piece, the coefficients are
-    taken to fall like a power of their number. A slow decay means that the integrand is not resolved: then the last
+    orders of magnitude. Where the decay slows down, and on the pieces that are `singular` (P,), at whose ends an
+    integrand may be no more than a power of the distance, the coefficients are taken to go on as those of a power: they
+    first fall as if geometrically. A slow decay means that the integrand is not resolved: then the last
     coefficients themselves. (`benchmarks/calibration.py truncation` counts by which functions the bound is exceeded: by
     peaks that fall between the nodes and, up to 20,000 times, by powers at an end beneath something that grows; where
     either may be, panels are looked at in other ways as well.)
@@ -67,11 +68,28 @@ def truncation(size: Array) -> Array:
     decay = np.fmin(np.fmax(np.fmax(last, mean), 0.0), 1.0)
     power = 4.5 if n >= 10 else 4.0 if n >= 8 else 2.0
     share = np.fmax(decay**power, np.fmin(1.0, (decay - 0.3) / 0.3))
-    slowing = last > 1.15 * mean
+    slowing = (last > 1.15 * mean) | singular
     if slowing.any():
-        algebraic = np.log(2.0) / np.log((n - 0.5) / (n - 2.5))
-        share = np.where(slowing, np.fmax(share, 1.5 * np.fmin(last, 1.0) ** algebraic), share)
+        share = np.where(slowing, np.fmax(share, decay_of_power(n, last)), share)
     return 8 * end * share  # type: ignore[no-any-return]
+
+
+def decay_of_power(n: int, last: Array) -> Array:
+    """By which factor the coefficients of a power of the distance to an end fall from the last one of n to the 2n-th,
+    if the last two are by `last` less than the two before them.
+
+    Those of x^p fall by (k - p)/(k + 2 + p) from the k-th to the next: that tells p, and all that follow.
+    """
+    ratios, falls = _falls(n)
+    return np.exp(np.interp(np.sqrt(np.fmin(last, 1.0)), ratios, falls))
+
+
+@lru_cache(maxsize=64)
+def _falls(n: int) -> tuple[Array, Array]:
+    """The ratio of neighbouring coefficients where the last pairs are, and the logarithm of what it leads to."""
+    ratios, k, later = np.linspace(0.0, 1.0, 257), n - 2.5, np.arange(n - 1, 2 * n)[:, None]
+    power = (k - ratios * (k + 2)) / (1 + ratios)
+    return ratios, np.log((later - power) / (later + 2 + power)).sum(axis=0)
 
 
 def analytic_truncation(size: Array) -> Array:
