@@ -44,10 +44,12 @@ def rendered(*words: str) -> list[Plot | Image]:
     options = parser.parse_args(render.prepare(list(words)))
     world = World([HERE])
     grid = render.grid_of(options)
-    picture = rendering.picture_of(world, opened(world, options.file), options, True)
+    file = opened(world, options.file)
+    picture = rendering.picture_of(world, file, options, True)
     found = rendering.drawn(picture, grid, DEFAULTS, options, Console(sys.stdout, sys.stderr))
     caption = f"{grid.width} x {grid.height} pixels, {found.cost(grid)}"
-    return list(rendering.images(rendering.layers(picture, found, options, "x.png"), picture, grid, caption))
+    lines = rendering.outlines(world, file, picture, grid) if options.surfaces else ()
+    return list(rendering.images(rendering.layers(picture, found, options, "x.png"), picture, grid, caption, lines))
 
 
 G = "def g(t) (integral [0, 1] [x < t]*t^2 d(x)) * (if t < 0.6 then 1 else 0.4)"
@@ -57,6 +59,9 @@ FIGURES: dict[str, Callable[[], list[Plot | Image]]] = {
     "figure-plot": lambda: session(G, ":plot g, deriv g 0 0.9"),
     "figure-noise": lambda: session(NOISY, ":set method mc", ":set samples 1000", ":plot h, deriv h 0.05 1.9"),
     "figure-render": lambda: rendered(str(WORKED / "picture.po"), "pixel", "r=0.7", "--wrt", "r", "--size", "192"),
+    "figure-surfaces": lambda: rendered(
+        str(WORKED / "painted.po"), "pixel", "t=0.5", "--wrt", "t", "--size", "192", "--surfaces",
+    ),
     "figure-fit": lambda: session(
         "def cover(r) integral ([0, 1], [0, 1]) [u^2 + v^2 < r^2] d(u, v)",
         "def loss(r) (cover(r) - 1/2)^2", ":fit loss r=0.5",

@@ -15,7 +15,7 @@ from typing import Any
 from potto.applications.picture_files import complaint as plain_complaint
 from potto.applications.picture_files import ending_of
 from potto.applications.pictures import Curve, Image, Plot
-from potto.applications.svg import images_svg
+from potto.applications.svg import OUTLINE, images_svg
 from potto.runtime.answers.printing import format_digits
 
 _LIBRARY = ("matplotlib", "matplotlib", "plots")
@@ -142,6 +142,10 @@ def _draw_image(figure: Any, axes: Any, image: Image) -> None:
     import numpy as np
 
     axes.imshow(np.array(image.pixels, dtype=np.uint8), extent=image.box, interpolation="nearest", aspect="equal")
+    if image.outlines:
+        from matplotlib.collections import LineCollection
+
+        axes.add_collection(LineCollection(image.outlines, colors=OUTLINE, linewidths=1.0), autolim=False)
     for side in ("top", "right"):
         axes.spines[side].set_visible(True)
     axes.set_title(image.label)

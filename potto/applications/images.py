@@ -30,11 +30,16 @@ class Grid(Struct, frozen=True):
     height: int
     box: tuple[float, float, float, float] = (0.0, 1.0, 0.0, 1.0)  # x0, x1, y0, y1
 
-    def middles(self) -> tuple[Array, Array]:
-        """The coordinates of the middles of all pixels, row by row: (height * width,) each."""
+    def sides(self) -> tuple[Array, Array]:
+        """The middles of the pixels across, and those down, from the top: (width,) and (height,)."""
         x0, x1, y0, y1 = self.box
         across = x0 + (x1 - x0) * (np.arange(self.width) + 0.5) / self.width
         down = y1 - (y1 - y0) * (np.arange(self.height) + 0.5) / self.height
+        return across, down
+
+    def middles(self) -> tuple[Array, Array]:
+        """The coordinates of the middles of all pixels, row by row: (height * width,) each."""
+        across, down = self.sides()
         return np.tile(across, self.height), np.repeat(down, self.width)
 
 

@@ -188,6 +188,7 @@ class Image(Struct, frozen=True):
 
     label: what is drawn. names, box: the axes and what is seen of them. map, tone: how numbers became colours, as
     `colours.Paint` says; no map where the pixels are colours themselves. ends: the numbers at both ends of the map.
+    outlines: straight lines over it, where surfaces are.
     """
 
     pixels: tuple[tuple[Color, ...], ...]
@@ -201,6 +202,7 @@ class Image(Struct, frozen=True):
     tone: str = "linear"
     ends: tuple[float, float] = (0.0, 1.0)
     caption: str = ""
+    outlines: tuple[tuple[tuple[float, float], tuple[float, float]], ...] = ()
 
     @property
     def size(self) -> tuple[int, int]:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 LEFT, TOP, BOTTOM, BAR, LABELS = 64, 30, 64, 16, 76
 SIDE = 320  # of the longer side of an image
+OUTLINE = "#2ca02c"  # of surfaces: neither a gray nor of a diverging map
 SHADES = 64  # of a colour bar
 
 
@@ -52,6 +53,11 @@ def _panel(image: Image) -> tuple[str, float, float]:
     for share in (0.0, 0.5, 1.0):
         out.append(_text(LEFT + share * wide, TOP + tall + 17, format_digits(x0 + share * (x1 - x0), 4), "middle"))
         out.append(_text(LEFT - 6, TOP + (1 - share) * tall + 4, format_digits(y0 + share * (y1 - y0), 4), "end"))
+    if image.outlines:
+        right, up = wide / (x1 - x0), tall / (y1 - y0)
+        lines = (f"M{LEFT + (a - x0) * right:.1f} {TOP + (y1 - b) * up:.1f}L{LEFT + (c - x0) * right:.1f} "
+                 f"{TOP + (y1 - d) * up:.1f}" for (a, b), (c, d) in image.outlines)  # fmt: skip
+        out.append(f'<path d="{"".join(lines)}" fill="none" stroke="{OUTLINE}" stroke-width="1"/>')
     if image.map:
         out += _bar(image, LEFT + wide + 16, tall)
     right = 20 + BAR + LABELS if image.map else 20

@@ -68,6 +68,7 @@ def _add_colours(parser: argparse.ArgumentParser) -> None:
                          "zero (default red-blue)")  # fmt: skip
     colours.add_argument("--scale", action="store_true", help="one figure with axes, colour bars and a caption: value "
                          "and derivatives beside each other (.png, .jpg, .pdf, .svg)")  # fmt: skip
+    colours.add_argument("--surfaces", action="store_true", help="draw in the figure of --scale where surfaces are")
     colours.add_argument("--tone", choices=TONES, default="linear", help="srgb: the numbers are light; log: what is "
                          "weak can be seen (default linear)")  # fmt: skip
 
@@ -181,6 +182,8 @@ def _complaint(options: argparse.Namespace, target: str) -> str | None:
         return "--size says what --width and --height say: give one or the others"
     if options.over is None and (options.frames or options.fps):
         return "--frames and --fps are for an animation: say what moves, `--over c=-2..0`"
+    if options.surfaces and not options.scale:
+        return "--surfaces are lines in a figure: add --scale"
     if options.watch and options.file == "-":
         return "standard input is read once, and cannot be watched"
     moving = ending_of(target) in animations.NEEDS
@@ -245,7 +248,7 @@ def _wait(options: argparse.Namespace) -> None:
 def _once(options: argparse.Namespace, target: str, settings: Settings, console: Console) -> int:
     from potto.applications.picture_files import NUMBERS, ending_of
     from potto.cli.opening import fail, opened, report_others
-    from potto.cli.rendering import drawn, layers, picture_of, save_figure
+    from potto.cli.rendering import drawn, layers, outlines, picture_of, save_figure
     from potto.diagnostics import PottoError
     from potto.evaluating.world import World
 
@@ -262,7 +265,12 @@ def _once(options: argparse.Namespace, target: str, settings: Settings, console:
     files = layers(picture, found, options, target)
     try:
         if options.scale:
-            save_figure(target, files, picture, grid, _cost(found, grid, options))
+            lines = outlines(world, file, picture, grid) if options.surfaces else ()
+            if options.surfaces and not lines:
+                console.complain(
+                    "note: no surface can be drawn: none is seen here, or where it is takes more than symbols"
+                )
+            save_figure(target, files, picture, grid, _cost(found, grid, options), lines)
         for layer in () if options.scale else files:
             _write(layer, grid, options)
     except OSError as error:

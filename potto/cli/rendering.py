@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from msgspec import Struct, field
+from msgspec.structs import replace
 
 from potto.cli.calling import argument_in, arguments_in, function_in
 from potto.cli.console import Console
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from potto.python.functions import Function
     from potto.runtime.answers.estimate import Estimate
 
+OUTLINED = 256  # places across and down at which surfaces are looked for
 COLOURS = ("r", "g", "b")  # the fields of a record that is a colour, whatever their order
 
 
@@ -271,18 +273,50 @@ def layers(picture: Picture, found: Drawn, options: argparse.Namespace, target: 
     return layers
 
 
-def save_figure(path: str, files: list[Layer], picture: Picture, grid: Grid, caption: str) -> None:
+Lines = tuple[tuple[tuple[float, float], tuple[float, float]], ...]
+
+
+def save_figure(path: str, files: list[Layer], picture: Picture, grid: Grid, caption: str, lines: Lines = ()) -> None:
     """One figure of all layers, each with its axes and its scale. Raises OSError."""
     from potto.applications import figures
 
-    figures.save(path, images(files, picture, grid, caption), caption=caption)
+    figures.save(path, images(files, picture, grid, caption, lines), caption=caption)
     for layer in files:
         layer.path = path
 
 
-def images(files: list[Layer], picture: Picture, grid: Grid, caption: str) -> list[Image]:
+def outlines(world: World, file: str, picture: Picture, grid: Grid) -> Lines:
+    """Where the surfaces of the function are seen in its image, as far as that can be told by symbols."""
+    from potto.applications.contours import zero_lines
+    from potto.applications.images import Grid, flat, sampled
+    from potto.checking.outlines import outlines as functions
+    from potto.cli.calling import function_in
+    from potto.diagnostics import PottoError
+
+    fine = Grid(OUTLINED, OUTLINED, grid.box)
+    xs, ys = fine.sides()
+    found: list[Any] = []
+    for text in functions(world.db, file, picture.function._expr, picture.axes):
+        try:
+            surface = function_in(world, file, text)
+
+            def call(*places: Any, surface: Function = surface) -> tuple[Sequence[Any], Estimate]:
+                here = {**picture.given, **dict(zip(picture.axes, places, strict=True))}
+                answer = surface(**{name: here[name] for name in surface.parameters})
+                return flat(answer.value, getattr(places[0], "ndim", 0)), answer
+
+            numbers = sampled(call, fine.middles()).numbers
+        except PottoError:  # it has no values here, or cannot be said again
+            continue
+        found += zero_lines(numbers[0].reshape(OUTLINED, OUTLINED), xs, ys).tolist()
+    return tuple(((a, b), (c, d)) for (a, b), (c, d) in found)
+
+
+def images(
+    files: list[Layer], picture: Picture, grid: Grid, caption: str, lines: Lines = ()
+) -> list[Image]:  # fmt: skip
     """Layers as what figures are made of."""
-    return [_image(layer, picture, grid, caption) for layer in files]
+    return [replace(_image(layer, picture, grid, caption), outlines=lines) for layer in files]
 
 
 def _image(layer: Layer, picture: Picture, grid: Grid, caption: str) -> Image:
