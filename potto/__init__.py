@@ -11,6 +11,9 @@ from potto.diagnostics import PottoError
 from potto.projects.settings import settings
 
 if TYPE_CHECKING:
+    from potto_repl.magics import load_ipython_extension
+    from potto_repl.sliders import sliders
+
     from potto.applications.fitting import fit
     from potto.applications.hessian import hessian, hvp
     from potto.bridges.to_jax import to_jax
@@ -43,7 +46,9 @@ __all__ = [
     "jacobian",
     "jvp",
     "load",
+    "load_ipython_extension",
     "settings",
+    "sliders",
     "to_jax",
     "to_scipy",
     "to_torch",
@@ -63,6 +68,8 @@ _HOMES = {
     "hvp": "potto.applications.hessian",
     "jacobian": "potto.python.gradients",
     "jvp": "potto.python.gradients",
+    "load_ipython_extension": "potto_repl.magics",
+    "sliders": "potto_repl.sliders",
     "to_jax": "potto.bridges.to_jax",
     "to_scipy": "potto.bridges.to_scipy",
     "to_torch": "potto.bridges.to_torch",

@@ -52,6 +52,7 @@ OUTSIDERS: dict[str, tuple[str, ...]] = {
     "lsprotocol": ("potto_lsp",),
     "prompt_toolkit": ("potto_repl",),
     "llvmlite": ("potto.kernels",),
+    "ipywidgets": ("potto_repl.sliders",),
 }
 
 

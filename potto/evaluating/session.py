@@ -21,7 +21,7 @@ from potto.modules.kinds import HIDES_BUILTIN
 from potto.modules.lookup import bindings, preludes, scope
 from potto.modules.texts import import_starts
 from potto.projects.settings import Settings
-from potto.reports.render import Located, ProgramError
+from potto.reports.render import Located, ProgramError, display_name
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.script import Shown
 from potto.source import SourceText
@@ -82,6 +82,9 @@ class Session:
         self.world = world if world is not None else World(roots)
         self.db = self.world.db
         self.number = 0
+        self.cell: int | None = None  # in a notebook: the number of the cell that is run
+        self.entry = ""  # the pseudo file of the last entry
+        self._pieces: dict[int, int] = {}  # how many entries have a number
         self.loaded: list[str] = []
         self._answers = 0
         self._kept = ""  # the entry that has given the last answer
@@ -98,10 +101,12 @@ class Session:
 
         Interrupted in a statement, what the entry defines has joined all the same.
         """
-        self.number += 1
-        entry = f"<In {self.number}>"
+        first = not self._pieces
+        self.number, self.entry = self.coming()
+        self._pieces[self.number] = self._pieces.get(self.number, 0) + 1
+        entry = self.entry
         self._put(entry, text, self.prelude)
-        if self.number == 1:
+        if first:
             yield from map(Said, self.world.project_problems(entry))
         said = [Said(located) for located in self.world.diagnostics(entry) if not _goes_without_saying(located)]
         yield from said
@@ -115,6 +120,12 @@ class Session:
         for item in self._shown(entry, settings):
             if not (isinstance(item, Said) and item.located in told):
                 yield item
+
+    def coming(self) -> tuple[int, str]:
+        """The number of the next entry and its pseudo file. The entries of one cell share its number."""
+        number = self.number + 1 if self.cell is None else self.cell
+        before = self._pieces.get(number, 0)
+        return number, f"<In {number}>{f'#{before + 1}' if before else ''}"
 
     def _joined(self, entry: str) -> Iterator[Outcome]:
         """The imports and definitions of an entry, in the order of the text."""
@@ -131,7 +142,8 @@ class Session:
         if isinstance(before, DefinitionTarget) and _ANSWER.fullmatch(before.name):
             shadows = f"the answer `{name}`" if name != "_" else "the last answer, until there is another"
         elif isinstance(before, DefinitionTarget):
-            shadows = f"`{name}` of {before.file if before.file.startswith('<') else os.path.basename(before.file)}"
+            file = display_name(before.file) if before.file.startswith("<") else os.path.basename(before.file)
+            shadows = f"`{name}` of {file}"
         elif before is not None:
             shadows = f"the module `{name}`"
         elif is_builtin(name):
@@ -161,9 +173,9 @@ class Session:
 
     def _keep(self, entry: str, source: SourceText, shown: Shown) -> tuple[str, ...]:
         """Let `_` and `_3` be the answer to entry 3 in later entries: its value, or the expression of a function. Of
-        several values in one entry, as in a paste, each has a number of its own."""
+        several values in one entry, as in a paste, each has a number of its own; in a cell the last one keeps it."""
         self._answers += 1
-        if self._kept == entry:
+        if self._kept == entry and self.cell is None:
             self.number += 1
         self._kept = entry
         number, text = f"_{self.number}", source.text[shown.span.start : shown.span.end]

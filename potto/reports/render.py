@@ -52,9 +52,9 @@ COLORS = Palette("\x1b[1;31m", "\x1b[1;33m", "\x1b[1;36m", "\x1b[1m", "\x1b[1;34
 
 
 def display_name(file: str) -> str:
-    """A file as people call it: relative to the working folder when it lies there."""
+    """A file as people call it: relative to the working folder when it lies there; of a part of a cell, the cell."""
     if not os.path.isabs(file):
-        return file
+        return file.partition("#")[0] if file.startswith("<") else file
     try:
         relative = os.path.relpath(file)
     except (OSError, ValueError):

@@ -43,7 +43,7 @@ def entry_parts(session: Conversation, text: str) -> Iterator[Part]:
             found = outcome.located.diagnostic
             otherwise |= outcome.is_error and (found.code != NOT_DEFINED or _is_elsewhere(session, outcome.located))
             session.last_code = found.code
-            if found.code == NOT_DEFINED and outcome.located.file == f"<In {session.number}>":
+            if found.code == NOT_DEFINED and outcome.located.file == session.entry:
                 name = plain_names(session.entries[-1].text)[found.span.start : found.span.end]
                 if ANSWER.fullmatch(name):
                     outcome = Said(_no_answer(session, outcome.located, name))
@@ -162,7 +162,7 @@ def _advice(session: Conversation, missing: list[str]) -> str:
     expression = session.entries[-1].text.strip()
     if not missing or "\n" in expression or not all(name.isidentifier() for name in missing):
         return ""
-    written = statements(session.db, f"<In {session.number}>")
+    written = statements(session.db, session.entry)
     if not any(isinstance(reference.statement, nodes.ExpressionStatement) for reference in written):
         return ""
     named = " and ".join(f"`{name}`" for name in missing)

@@ -12,11 +12,11 @@ from ipykernel.kernelbase import Kernel
 
 from potto import __version__
 from potto.applications.pictures import Image
+from potto_repl.cells import placed, result
 from potto_repl.complete import candidates
 from potto_repl.editing import indentation, is_over
 from potto_repl.reply import Part
 from potto_repl.respond import respond, stream
-from potto_repl.script import entries
 from potto_repl.session import Conversation
 from potto_repl.symbols import expanded, named, readable, typed
 
@@ -38,8 +38,9 @@ class PottoKernel(Kernel):
         allow_stdin: bool = False, **more: Any,
     ) -> dict[str, Any]:  # fmt: skip
         """Answer the entries of a cell; the first error ends it."""
+        self.conversation.cell = self.execution_count
         try:
-            for text in entries(code.splitlines()):
+            for text in placed(code):
                 wrong = [part for part in self._answered(text, silent) if part.is_error]
                 if wrong:
                     return self._failed("PottoError", wrong[0].plain())
@@ -68,6 +69,11 @@ class PottoKernel(Kernel):
             else:
                 data["image/svg+xml"] = picture.svg()
             self.send_response(self.iopub_socket, "display_data", {"data": data, "metadata": {}})
+            return
+        found = result(part)
+        if found is not None:
+            content = {"data": found, "metadata": {}, "execution_count": self.execution_count}
+            self.send_response(self.iopub_socket, "execute_result", content)
             return
         stream_name = "stderr" if part.is_complaint else "stdout"
         self.send_response(self.iopub_socket, "stream", {"name": stream_name, "text": part.plain() + "\n"})

@@ -31,6 +31,7 @@ class Entry(Struct):
 
     number: int
     text: str
+    file: str
     outcomes: list[Outcome] = []
 
 
@@ -69,12 +70,13 @@ class Conversation(Session):
 
     def enter(self, text: str) -> Iterator[Outcome]:
         """Run an entry step by step and remember it."""
-        self.remember(f"entry {self.number + 1}: {text.strip().partition(chr(10))[0]}")
-        entry = Entry(self.number + 1, text)
+        number, file = self.coming()
+        self.remember(f"entry {number}: {text.strip().partition(chr(10))[0]}")
+        entry = Entry(number, text, file)
         self.entries.append(entry)
         rewritten = plain_names(text)
         if rewritten != text:
-            self.written[f"<In {entry.number}>"] = SourceText(f"<In {entry.number}>", text)
+            self.written[file] = SourceText(file, text)
         try:
             for outcome in self.steps(rewritten, self.settings):
                 entry.outcomes.append(outcome)

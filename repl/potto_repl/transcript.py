@@ -61,9 +61,9 @@ class _Writer:
         self.used = self._used_answers()
         self.last_of = self._last_definitions()
 
-    def _last_definitions(self) -> dict[str, int]:
+    def _last_definitions(self) -> dict[str, str]:
         """The entry that defines each name last: there it keeps its name."""
-        return {o.name: e.number for e in self.session.entries for o in e.outcomes if isinstance(o, Defined)}
+        return {o.name: e.file for e in self.session.entries for o in e.outcomes if isinstance(o, Defined)}
 
     def _used_answers(self) -> set[int]:
         """The entries whose answers later ones use, as `_` or by number."""
@@ -80,14 +80,14 @@ class _Writer:
 
     def entry(self, entry: Entry) -> Iterator[str]:
         values = iter([o for o in entry.outcomes if isinstance(o, Valued)])
-        asked = {ref.start: ref.statement for ref in statements(self.session.db, f"<In {entry.number}>")}
+        asked = {ref.start: ref.statement for ref in statements(self.session.db, entry.file)}
         defined = [o.name for o in entry.outcomes if isinstance(o, Defined)]
         before = dict(self.current)
         for name in defined:
-            fresh = name if self.last_of[name] == entry.number else self._fresh(name)
+            fresh = name if self.last_of[name] == entry.file else self._fresh(name)
             self.current[name] = fresh
             self.taken.add(fresh)
-        for chunk in chunks(self.session.db, f"<In {entry.number}>"):
+        for chunk in chunks(self.session.db, entry.file):
             statement = asked.get(chunk.start)
             scope = self.current if defined else before
             if statement is None:

@@ -131,7 +131,8 @@ def value_parts(
     data = {**estimate_json(estimate, type), **({"name": name} if name else {})}
     if estimate.tangent is None:
         text = interval(estimate)
-        yield Part("answer", f"{head}{text}{f' : {type}' if type else ''}", {**data, "text": text}, numbers=True)
+        data |= {"text": text, "_rows": [("", estimate.value, estimate.error)]}
+        yield Part("answer", f"{head}{text}{f' : {type}' if type else ''}", data, numbers=True)
     else:
         text = format_estimate(estimate)
         rows = [("value", estimate.value, estimate.error), ("tangent", estimate.tangent, estimate.tangent_error)]
@@ -141,7 +142,7 @@ def value_parts(
             data["interior"], data["boundary"] = _plain(parts.interior), _plain(parts.boundary)
         lines = [f"{head}{led(text, estimate.converged)}{f' : {type}' if type else ''}"]
         lines += [f"  {label:<11} {with_error(value, error)}" for label, value, error in rows]
-        yield Part("answer", "\n".join(lines), {**data, "text": text}, numbers=True)
+        yield Part("answer", "\n".join(lines), {**data, "text": text, "_rows": rows}, numbers=True)
     cost = tail(estimate, settings)
     if cost:
         yield Part("tail", cost)
