@@ -12,6 +12,8 @@ from potto.core.terms import (
     ZERO,
     App,
     Array,
+    Const,
+    Index,
     Term,
     add,
     app,
@@ -23,10 +25,13 @@ from potto.core.terms import (
     fold,
     global_,
     hole,
+    if_,
     index,
     length,
     mul,
     neg,
+    postorder,
+    prim,
     proj,
     sub,
     substitute,
@@ -171,11 +176,31 @@ def _extreme(op: str) -> Callable[[Elaboration], Binder]:
         def bind(name: str, lo: Term, hi: Term, body: Term) -> Term:
             state = elaboration.fresh("m")
             first = substitute(body, {name: lo})
+            if not _reads_element(body, name, hi):
+                first = _unless_empty(elaboration, lo, hi, first)
             return fold(name, add(lo, ONE), hi, state, first, apply(op, var(state), body))
 
         return bind
 
     return binder
+
+
+def _reads_element(body: Term, name: str, hi: Term) -> bool:
+    """Whether a body reads an array whose elements a name counts: the first one of an empty array is refused anyway."""
+    return any(
+        isinstance(node, Index) and node.index is var(name) and sub(length(node.array), ONE) is hi
+        for node in postorder(body)
+    )
+
+
+def _unless_empty(elaboration: Elaboration, lo: Term, hi: Term, first: Term) -> Term:
+    """What a least or a greatest begins with. Over a range that turns out to be empty that is an element that is not
+    there, as over an empty array."""
+    if isinstance(lo, Const) and isinstance(hi, Const):
+        return first  # whether it is empty has been checked
+    place = elaboration.fresh("i")
+    elaboration.numbers.add(place)
+    return if_(prim("lt", hi, lo), index(array(place, ZERO, var(place)), ZERO), first)
 
 
 _FOLDED: dict[str, Callable[[Elaboration], Binder]] = {

@@ -18,6 +18,11 @@ def matrix(a: [n, m] Real, x: [m] Real) [sum j in 0..m-1 (a[i, j]*x[j]) for i in
 def product_of(xs: [n] Real) product x in xs (x)
 def least(xs: [n] Real) min x in xs (x)
 def greatest(xs: [n] Real) max i in 0..n-1 (xs[i])
+def highest(n, t) max i in 1..n (t*(3 - i))
+def lowest(n, t) min i in 1..n, j in i..n (t*(i + j))
+def highest_under(n, t) integral [0, 1] max i in 1..n (i*[x < t]) d(x)
+def highest_of(n, t) max i in 1..n (integral [0, 1] i*[x < t] d(x))
+def noted(xs: [n] Real) max x in xs (3)
 def halves(x0, n) fold x = x0 for i in 1..n (x/2 + 1)
 def spring(k, n)
     (x, v) = fold (x, v) = (1, 0) for i in 1..n (let w = v - k*x*0.01 in (x + w*0.01, w))
@@ -124,6 +129,12 @@ def test_an_element_that_varies() -> None:
     [
         (lambda: M.guarded([5, 7], 3), "P0511", "the index 2 is out of range: the array has 2 elements"),
         (lambda: M.guarded([5, 7], 0.5), "P0512", "the index -0.5 is no whole number"),
+        (lambda: M.highest(0, 1.0), "P0511", "this array or range is empty"),
+        (lambda: M.lowest(-2, 1.0), "P0511", "this array or range is empty"),
+        (lambda: M.highest_under(0, 0.5), "P0511", "this array or range is empty"),
+        (lambda: M.highest_of(0, 0.5), "P0511", "this array or range is empty"),
+        (lambda: M.noted([]), "P0511", "this array or range is empty"),
+        (lambda: potto.deriv(M.highest)((0, 0), (1.0, 1)), "P0511", "this array or range is empty"),
         (lambda: M.chosen(1, 2, 2), "P0511", "the index 2 is out of range"),
         (lambda: M.matrix([[1, 2], [3, 4]], [1, 2, 3]), "P0509", "`x` has 2 elements, as `a` says, and is given 3"),
         (lambda: M.mean(3), "P0509", "an array is needed"),
@@ -201,3 +212,10 @@ def test_an_array_without_tangents_stands_still() -> None:
     assert (module.k.value, module.k.tangent) == (28, 14)
     found = potto.deriv(module.f)((2.0, 1.0), np.array([1.0, 2.0]))
     assert (found.value, found.tangent) == (10, 5)
+
+
+def test_the_least_and_the_greatest_over_a_range_that_a_number_ends() -> None:
+    assert (M.highest(1, 1.0).value, M.highest(4, -1.0).value) == (2.0, 1.0)  # the ends of t*(3 - i)
+    assert M.lowest(3, 2.0).value == 4.0
+    moved = potto.deriv(M.highest_under)((3, 0), (0.3, 1))  # 3*[x < t] is the greatest: 3*t
+    assert (moved.value, moved.tangent) == (pytest.approx(0.9), pytest.approx(3.0))

@@ -131,8 +131,8 @@ def _places(place: Number, size: int) -> Any:
         last = f"indices go from 0 to {size - 1}"
         message = f"the index {first} is out of range: the array has {size} element{'s' if size > 1 else ''}"
         if not size:
-            message = f"this array is empty: it has no element {first}"
-            last = "nothing is the least or the greatest of an empty array either, as in `min x in xs (x)`"
+            message = f"this array or range is empty: it has no element {first}"
+            last = "nothing is the least or the greatest of an empty array or range, as in `min x in xs (x)`"
         raise PottoError([OUT_OF_RANGE(errors.NOWHERE, message, notes=(last,))])
     return at.astype(np.int64)
 
