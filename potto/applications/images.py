@@ -47,12 +47,14 @@ class Sampled(Struct):
     """Numbers at places: (parts, n), nan where there is none; how many have none, and what went wrong first.
 
     answers: the estimates that the numbers were taken from, one or more a band.
+    stopped: whether somebody did not want to wait between two of them.
     """
 
     numbers: Array
     holes: int = 0
     trouble: PottoError | None = None
     answers: list[Estimate] = []
+    stopped: bool = False
 
     @property
     def evaluations(self) -> int:
@@ -66,7 +68,7 @@ class Sampled(Struct):
     @property
     def interrupted(self) -> bool:
         """Whether somebody did not want to wait for the rest."""
-        return any(INTERRUPTED in answer.shortfalls for answer in self.answers)
+        return self.stopped or any(INTERRUPTED in answer.shortfalls for answer in self.answers)
 
 
 Call = Callable[..., tuple[Sequence[Any], Estimate]]  # places to the parts that are drawn, and where they are from
@@ -83,7 +85,12 @@ def sampled(call: Call, places: Sequence[Array], progress: Callable[[int], None]
     for start in range(0, count, BAND):
         stop = min(start + BAND, count)
         with nullcontext() if progress is None else watching(_gauge(progress, start, stop)):
-            _fill(call, places, start, stop, found)
+            try:
+                _fill(call, places, start, stop, found)
+            except KeyboardInterrupt:
+                if not found.answers:
+                    raise
+                found.stopped = True
         if found.interrupted:
             break
         if progress is not None:

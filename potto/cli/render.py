@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import time
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +12,7 @@ from potto.cli.numbers import accounts, add_options, add_workers, settings_of, s
 
 if TYPE_CHECKING:
     from potto.applications.images import Grid
+    from potto.checking.library import Library
     from potto.cli.rendering import Drawn, Layer
     from potto.projects.settings import Settings
 
@@ -164,13 +164,16 @@ def run(options: argparse.Namespace, console: Console) -> int:
         console.complain(f"potto render: {wrong}")
         return 2
     options.frames = options.frames or FRAMES
-    status = _once(options, target, settings, console)
-    while options.watch and status != 130:
-        console.out.flush()
-        _wait(options)
-        console.complain(f"-- {time.strftime('%H:%M:%S')}")
+    while True:
+        watched = _watched(options) if options.watch else None  # before: what changes meanwhile is drawn next
         status = _once(options, target, settings, console)
-    return status
+        if not options.watch or status == 130:
+            return status
+        console.out.flush()
+        while watched is None or not watched.refresh():
+            time.sleep(PAUSE)
+            watched = watched or _watched(options)
+        console.complain(f"-- {time.strftime('%H:%M:%S')}")
 
 
 def _complaint(options: argparse.Namespace, target: str) -> str | None:
@@ -228,8 +231,8 @@ def grid_of(options: argparse.Namespace) -> Grid:
     return Grid(*_shape(options), options.box)
 
 
-def _wait(options: argparse.Namespace) -> None:
-    """Come back when a file of the program has changed."""
+def _watched(options: argparse.Namespace) -> Library | None:
+    """The files of the program; None as long as it is not there."""
     from potto.checking.library import Library
     from potto.cli.opening import opened
     from potto.diagnostics import PottoError
@@ -237,12 +240,9 @@ def _wait(options: argparse.Namespace) -> None:
     library = Library(["."])
     try:
         library.diagnostics(opened(library, options.file))
-    except PottoError:  # it is gone: until it is there again
-        while not os.path.exists(options.file):
-            time.sleep(PAUSE)
-        return
-    while not library.refresh():
-        time.sleep(PAUSE)
+    except PottoError:
+        return None
+    return library
 
 
 def _once(options: argparse.Namespace, target: str, settings: Settings, console: Console) -> int:
@@ -311,6 +311,11 @@ def _tell(
         console.complain(
             f"warning: {found.holes:,} pixels have no value and are gray: {trouble.diagnostics[0].message}"
         )
+    if found.interrupted:
+        done = (
+            f"{len(found.frames)} of {options.frames} frames" if options.over else f"{found.unknown:,} pixels are gray"
+        )
+        console.complain(f"interrupted: {done}")
     for reason in found.reasons:
         console.complain(f"warning: not as accurate everywhere as was asked: {reason}")
 
@@ -338,6 +343,6 @@ def _answer(files: list[Layer], found: Drawn, grid: Grid) -> dict[str, Any]:
         "files": [{"file": f.path, "shows": f.shows, "low": f.low, "high": f.high} for f in files],
         "width": grid.width, "height": grid.height, "frames": len(found.frames), "evals": found.evaluations,
         "seconds": found.seconds, "largest_error": json_number(found.largest), "holes": found.holes,
-        "converged": not found.reasons and not found.holes,
+        "converged": not found.reasons and not found.holes and not found.interrupted,
     }  # fmt: skip
     return answer if found.crossed is None else {**answer, "crossed": found.crossed[0], "looked_at": found.crossed[1]}

@@ -149,7 +149,16 @@ class Drawn(Struct):
 
     @property
     def reasons(self) -> list[str]:
-        return list(dict.fromkeys(reason for found in self.found for reason in found.reasons))
+        """Why numbers are not as accurate as was asked; that somebody did not want to wait is none."""
+        from potto.runtime.answers.batches import INTERRUPTED
+
+        every = dict.fromkeys(reason for found in self.found for reason in found.reasons)
+        return [reason for reason in every if reason != INTERRUPTED.message]
+
+    @property
+    def unknown(self) -> int:
+        """How many pixels of the last frame have no value."""
+        return sum(1 for number in self.frames[-1][0].tolist() if number != number)
 
     @property
     def crossed(self) -> tuple[int, int] | None:

@@ -66,8 +66,7 @@ class PottoKernel(Kernel):
             data = {"text/plain": part.text}
             if isinstance(picture, Image):
                 data["image/png"] = base64.b64encode(picture.png()).decode()
-            else:
-                data["image/svg+xml"] = picture.svg()
+            data["image/svg+xml"] = picture.svg()  # with axes and a scale, which bare pixels have not
             self.send_response(self.iopub_socket, "display_data", {"data": data, "metadata": {}})
             return
         found = result(part)

@@ -228,6 +228,18 @@ def _started(folder: Path, *words: str) -> subprocess.Popen[str]:
                             stdout=subprocess.PIPE, stderr=subprocess.PIPE)  # fmt: skip
 
 
+def _interrupted(folder: Path, *words: str) -> tuple[int, str, str]:
+    """The end of a command that is interrupted once it has something to show: later on a machine that is busy."""
+    for seconds in (4.0, 12.0, 40.0):
+        process = _started(folder, *words)
+        time.sleep(seconds)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=120)
+        if (folder / "e.npy").exists():
+            break
+    return process.returncode, out, err
+
+
 def _until(condition: object, seconds: float = 60.0) -> bool:
     end = time.monotonic() + seconds
     while time.monotonic() < end:
@@ -251,10 +263,8 @@ def test_watching_draws_again(tmp_path: Path) -> None:
 
     try:
         assert _until(lambda: shows(0.25, 0.75))
-        time.sleep(1.0)
         (tmp_path / "other.po").write_text("k = 2\n")
         assert _until(lambda: shows(0.5, 1.5))
-        time.sleep(1.0)
         source.write_text("def f(x, y) x +\n")  # a mistake ends nothing
         time.sleep(2.0)
         source.write_text("def f(x, y) 4*x\n")
@@ -268,14 +278,24 @@ def test_watching_draws_again(tmp_path: Path) -> None:
 def test_interrupted_frames_are_kept(tmp_path: Path) -> None:
     """An animation that would take minutes: what was done until Ctrl-C is an animation."""
     (tmp_path / "s.po").write_text(SCENE)
-    process = _started(tmp_path, "s.po", "edge", "--over", "c=0..1", "--frames", "2000", "--size", "256", "-o", "e.npy")
-    time.sleep(6.0)
-    process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=60)
-    assert process.returncode == 130 and "Traceback" not in err
+    words = ["s.po", "edge", "--over", "c=0..1", "--frames", "2000", "--size", "256", "-o", "e.npy"]
+    status, out, err = _interrupted(tmp_path, *words)
+    assert status == 130 and "Traceback" not in err
     frames = np.load(tmp_path / "e.npy")
     assert frames.shape[1:] == (256, 256) and 1 <= len(frames) < 2000
     assert f"{len(frames)} frames" in out
+
+
+def test_an_interrupted_picture_is_gray_where_nothing_was_done(tmp_path: Path) -> None:
+    """Ctrl-C while blocks are evaluated: some pixels are there and right, the rest is gray, and how many is said."""
+    scene = "def slow(x, y, r) integral ([x, x + 1/64], [y, y + 1/64]) [sin(3*u) + v^2*exp(u) < r^2]*exp(u*v) d(u, v)\n"
+    (tmp_path / "s.po").write_text(scene)
+    words = ["s.po", "slow", "r=0.9", "--wrt", "r", "--size", "4096", "--workers", "1", "-o", "e.npy"]
+    status, _, err = _interrupted(tmp_path, *words)
+    gray = re.search(r"interrupted: ([\d,]+) pixels are gray", err)
+    assert status == 130 and "Traceback" not in err and gray is not None, err
+    value = np.load(tmp_path / "e.npy")
+    assert int(gray[1].replace(",", "")) == np.isnan(value).sum() and 0 < np.isnan(value).mean() < 1
 
 
 # Figures

@@ -107,6 +107,7 @@ def test_pictures_are_images(client):
     assert "<svg" in shown[0][1]["data"]["image/svg+xml"]
     _, shown = run(client, ":image x*y 4")
     assert shown[0][1]["data"]["image/png"].startswith("iVBOR")
+    assert shown[0][1]["data"]["image/svg+xml"].startswith("<svg")
 
 
 def test_an_interrupt_ends_a_cell_and_keeps_what_was_defined(client):
