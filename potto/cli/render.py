@@ -274,7 +274,8 @@ def _once(options: argparse.Namespace, target: str, settings: Settings, console:
         for layer in () if options.scale else files:
             _write(layer, grid, options)
     except OSError as error:
-        console.complain(f"potto render: {error}")
+        why = f"`{error.filename}` cannot be written: {error.strerror}" if error.filename else str(error)
+        console.complain(f"potto render: {why}")
         return 1
     _tell(files, found, grid, options, console)
     return 130 if found.interrupted else report_others(world, file, options, console)
@@ -301,7 +302,8 @@ def _tell(
         from potto.runtime.answers.printing import format_range
 
         for layer in files:
-            console.answer(f"{layer.path}: {layer.shows}, {format_range(layer.low, layer.high)}")
+            ends = "0 everywhere" if layer.vanishes else format_range(layer.low, layer.high)
+            console.answer(f"{layer.path}: {layer.shows}, {ends}")
         console.answer(_cost(found, grid, options))
     if options.stats:
         show_stats(found.answers, console)

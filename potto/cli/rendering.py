@@ -94,6 +94,11 @@ def picture_of(world: World, file: str, options: argparse.Namespace, drawable: b
     fixed = {*given, *([over[0]] if over is not None else [])}
     names = tuple(n for n in function.parameters if n not in fixed)
     axes = names if options.axes is None else tuple(n.strip() for n in options.axes.split(","))
+    for name in axes:
+        if name and name not in function.parameters:
+            raise wrong_call(f"`{options.name}` has no parameter `{name}` to be an axis", _listed(function))
+    if len(axes) == 2 and axes[0] == axes[1]:
+        raise wrong_call(f"both axes are `{axes[0]}`", "name two parameters, `--axes x,y`")
     if len(axes) != 2 or not all(axes):
         many = len(names) > 2
         what = "give the others a value, `c=0.5`, until two are left" if many else "name a function of two numbers"
@@ -104,6 +109,10 @@ def picture_of(world: World, file: str, options: argparse.Namespace, drawable: b
         )
     wrt = dict.fromkeys(name for names in options.wrt for name in names)
     return Picture(function, given, axes, tuple(wrt), over, drawable)
+
+
+def _listed(function: Function) -> str:
+    return f"its parameters are {', '.join(f'`{name}`' for name in function.parameters)}"
 
 
 def _frames(
@@ -117,8 +126,9 @@ def _frames(
         return None
     name, low, high = options.over
     if name not in function.parameters:
-        listed = ", ".join(f"`{n}`" for n in function.parameters)
-        raise wrong_call(f"`{options.name}` has no parameter `{name}` to move; it has {listed}")
+        raise wrong_call(f"`{options.name}` has no parameter `{name}` to move", _listed(function))
+    if any(name == known for known, _ in options.given):
+        raise wrong_call(f"`{name}` is given a value and moves, too", f"leave out `{name}=…` or `--over {name}=…`")
     ends = [argument_in(world, file, text) for text in (low, high)]
     if not all(isinstance(end, float) for end in ends):
         raise wrong_call(f"`{name}` moves from one number to another", "write `--over c=-2..0`")
@@ -246,6 +256,13 @@ class Layer(Struct):
     paint: Paint | None
     low: float
     high: float
+
+    @property
+    def vanishes(self) -> bool:
+        """Whether all that is known of it is 0."""
+        from potto.applications.colours import limits
+
+        return all(limits(parts) == (0.0, 0.0) for parts in self.frames)
 
     def colours(self, frame: int = 0) -> Any:
         """The bytes (n, 3) of a frame."""

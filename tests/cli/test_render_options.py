@@ -116,7 +116,10 @@ def test_what_cannot_be_is_said_before_anything_is_computed(potto: Potto, words:
     assert ran.status == 2 and said in ran.err and ran.out == ""
 
 
-@pytest.mark.parametrize(("over", "said"), [("q=0..1", "no parameter `q`"), ("a=0..nope", "not defined")])
+@pytest.mark.parametrize(("over", "said"), [
+    ("q=0..1", "no parameter `q`"), ("a=0..nope", "not defined"), ("b=0..1", "`b` is given a value and moves"),
+    ("a=0..sin", "from one number to another"),
+])  # fmt: skip
 def test_what_moves_must_be_there(potto: Potto, over: str, said: str) -> None:
     ran = potto("render", "s.po", "plane", "b=1", "--over", over, "--frames", "2", "--size", "2", s=SCENE)
     assert ran.status == 1 and said in ran.err
@@ -130,6 +133,25 @@ def test_a_library_that_is_missing_is_named_with_how_to_get_it(potto: Potto, mon
     monkeypatch.setattr(animations, "ffmpeg", lambda: None)
     ran = potto("render", "s.po", "plane", "b=1", "--over", "a=0..1", "-o", "x.mp4")
     assert ran.status == 2 and "needs the program ffmpeg" in ran.err
+
+
+@pytest.mark.parametrize(("axes", "said"), [
+    ("x,q", "no parameter `q` to be an axis"), ("x,x", "both axes are `x`"), ("x", "two axes"), ("x,", "two axes"),
+])  # fmt: skip
+def test_axes_must_be_two_parameters(potto: Potto, axes: str, said: str) -> None:
+    ran = potto("render", "s.po", "plane", "a=1", "b=1", "--axes", axes, "--size", "2", s=SCENE)
+    assert ran.status == 1 and said in ran.err and ran.out == ""
+
+
+def test_a_file_that_cannot_be_written(potto: Potto, tmp_path: Path) -> None:
+    (tmp_path / "there.png").mkdir()
+    ran = potto("render", "s.po", "plane", "a=1", "b=1", "--size", "2", "-o", "there.png", s=SCENE)
+    assert ran.status == 1 and ran.err.startswith("potto render: `there.png` cannot be written: ")
+
+
+def test_a_derivative_that_vanishes_says_so(potto: Potto) -> None:
+    ran = potto("render", "s.po", "\\(x, y, c) . x + 0*c", "c=1", "--wrt", "c", "--size", "2", s=SCENE)
+    assert "derivative by c, 0 everywhere" in ran.out
 
 
 # Colours
