@@ -38,6 +38,7 @@ _BOUNDS = re.compile(r"[ \t\n]*[\[(]")
 _RETURNED = re.compile(r"[ \t]+[^\s=]")
 _DEFINES = re.compile(rf"[ \t]+{FIRST_NAME.pattern}")
 _CONTINUES = re.compile(r"(?:then|else|in|and|or)\b|[*/^?:,)\].=<>≤≥≠+]|!=|->")
+_UNFINISHED = frozenset({"BINOP", "SIGN", "STAR", "QMARK", "NOT"})  # behind them an operand is still to come
 _CLAUSE = re.compile(r"(?:inverse|where)\b(?![ \t]*=(?!=))")
 _LINE = re.compile(r"([ \t\f\v]*)([^\n]?)")
 _FIELD = re.compile(rf"\.(?:{FIRST_NAME.pattern}|[0-9]+)")
@@ -335,10 +336,22 @@ class _Lexer:
         blocks.new_line()
         return True
 
+    def _ends_with_operator(self) -> bool:
+        """Whether the line above does; the `:` of `p ? a : b` is one, that of a loop or a type is not."""
+        last = self.tokens[-1].kind
+        if last != "COLON":
+            return last in _UNFINISHED
+        for token in reversed(self.tokens):
+            if token.kind in ("QMARK", "NEWLINE", "INDENT", "FOR"):
+                return token.kind == "QMARK"
+        return False
+
     def _continues(self, position: int) -> bool:
         """Whether a line that stands where a statement could start can only continue the one before."""
         if _CONTINUES.match(self.text, position):
             return True
+        if self.indent and self._ends_with_operator():  # its operand is still to come, and a binding is none
+            return _BINDING.match(self.text, position) is None and _CLAUSE.match(self.text, position) is None
         if self.tokens[-1].start == self.let_in:  # its body is still to come, and a binding is none
             return _BINDING.match(self.text, position) is None
         if self.clauses and _CLAUSE.match(self.text, position):

@@ -29,7 +29,7 @@ def folding_ranges(db: Database, file: str) -> tuple[Fold, ...]:
     kept: dict[int, Fold] = {}
     for fold in sorted(found, key=lambda f: (f.span.start, -f.span.end)):
         line = line_start(text, fold.span.start)
-        if "\n" in text[fold.span.start : fold.span.end] and line not in kept:
+        if line not in kept and text.find("\n", fold.span.start, fold.span.end) >= 0:
             kept[line] = fold
     return tuple(kept.values())
 

@@ -45,6 +45,12 @@ def laid_out(db: Database, text: str, diffeo: bool) -> str:
     return format_source(text, diffeo).rstrip("\r\n")
 
 
+@query(keep=4096)
+def chunk_edits(db: Database, text: str, diffeo: bool) -> tuple[Edit, ...]:
+    """The edits that lay out a chunk's text, relative to it."""
+    return minimal(text, laid_out(db, text, diffeo))
+
+
 def format_range(db: Database, file: str, span: Span) -> tuple[Edit, ...]:
     """The edits that lay out the definitions that a span touches."""
     edits: list[Edit] = []
@@ -55,7 +61,8 @@ def format_range(db: Database, file: str, span: Span) -> tuple[Edit, ...]:
 
 
 def _chunk(db: Database, chunk: ChunkAt) -> tuple[Edit, ...]:
-    return minimal(chunk.text, laid_out(db, chunk.text, chunk.diffeo), chunk.start)
+    found = chunk_edits(db, chunk.text, chunk.diffeo)
+    return tuple([Edit(chunk.absolute(edit.span), edit.text) for edit in found]) if found else ()
 
 
 def format_on_type(db: Database, file: str, offset: int, typed: str) -> tuple[Edit, ...]:

@@ -165,10 +165,13 @@ def word_at(text: str, offset: int) -> Span:
 
 def line_start(text: str, offset: int) -> int:
     """Where the line of an offset begins."""
-    return max(text.rfind("\n", 0, offset), text.rfind("\r", 0, offset)) + 1
+    start = text.rfind("\n", 0, offset) + 1
+    return text.rfind("\r", start, offset) + 1 or start
 
 
 def line_end(text: str, offset: int) -> int:
     """Where the line of an offset ends."""
-    ends = [at for at in (text.find("\n", offset), text.find("\r", offset)) if at >= 0]
-    return min(ends, default=len(text))
+    end = text.find("\n", offset)
+    end = len(text) if end < 0 else end
+    stop = text.find("\r", offset, end)
+    return end if stop < 0 else stop
