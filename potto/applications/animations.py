@@ -19,7 +19,8 @@ from potto.applications.picture_files import ending_of, pixels, shaped
 from potto.kernels.cells import Array
 
 NEEDS: dict[str, tuple[str, str, str] | None] = {".gif": ("Pillow", "PIL", "images"), ".mp4": None, ".npy": None}
-MOST_SEEN = 1 << 20  # pixels of all frames that the palette of a GIF is made for
+SHADES, KEPT = 256, 32  # colours of a GIF, and how many of them are the most frequent ones as they are
+CHUNK = 1 << 12  # colours that are compared with a palette at once
 QUALITY = "16"  # ffmpeg's constant rate factor: 0 loses nothing, 23 is usual
 
 
@@ -57,12 +58,36 @@ def _save_gif(path: str, frames: Sequence[Any], rate: float) -> None:
     """A GIF that goes round for ever. All frames share one palette, so that nothing flickers."""
     from PIL import Image
 
-    images = [Image.fromarray(frame) for frame in frames]
-    every = np.concatenate([frame.reshape(-1, 3) for frame in frames])
-    some = every[:: (len(every) // MOST_SEEN) | 1]
-    palette = Image.fromarray(some[None]).quantize(256)
-    shown = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+    packed = [frame.astype(np.int32) @ np.array([1 << 16, 1 << 8, 1], dtype=np.int32) for frame in frames]
+    known, counts = np.unique(np.concatenate([frame.ravel() for frame in packed]), return_counts=True)
+    palette = known if len(known) <= SHADES else _palette(known, counts)
+    nearest = np.concatenate([_nearest(known[i : i + CHUNK], palette) for i in range(0, len(known), CHUNK)])
+    shown = []
+    for frame in packed:
+        image = Image.fromarray(nearest[np.searchsorted(known, frame)])
+        image.putpalette(_channels(palette).astype(np.uint8).tobytes())
+        shown.append(image)
     shown[0].save(path, save_all=True, append_images=shown[1:], duration=round(1000 / rate), loop=0, optimize=False)
+
+
+def _palette(known: Any, counts: Any) -> Any:
+    """Colours for all that there are: the most frequent ones as they are, so that grounds stay; means of the others."""
+    from PIL import Image
+
+    often = known[np.argsort(-counts, kind="stable")[:KEPT]]
+    row = Image.fromarray(_channels(known)[None].astype(np.uint8))
+    means = np.array(row.quantize(SHADES - KEPT).getpalette(), dtype=np.int32).reshape(-1, 3)
+    return np.concatenate((often, means @ np.array([1 << 16, 1 << 8, 1], dtype=np.int32)))
+
+
+def _nearest(some: Any, palette: Any) -> Any:
+    """Which colour of a palette is the nearest to each."""
+    away = _channels(some)[:, None] - _channels(palette)
+    return np.argmin((away * away).sum(axis=-1), axis=1).astype(np.uint8)
+
+
+def _channels(packed: Any) -> Any:
+    return np.stack([packed >> 16, packed >> 8 & 255, packed & 255], axis=-1)
 
 
 def _save_mp4(path: str, frames: Any, grid: Grid, rate: float) -> None:

@@ -15,6 +15,7 @@ from command_runs import Potto
 
 from potto.applications import animations
 from potto.applications.colours import DIVERGING, MAPS, TONES, Paint
+from potto.applications.images import Grid
 from potto.cli import render
 
 SCENE = """
@@ -231,7 +232,20 @@ def test_a_gif_has_its_frames_and_one_scale(potto: Potto, tmp_path: Path) -> Non
         for number in range(5):
             found.seek(number)
             seen.append(int(np.asarray(found.convert("L"))[0, 1]))
-    assert seen[0] == 0 and seen[-1] == 255 and all(abs(s - 255 * i / 4) <= 2 for i, s in enumerate(seen))
+    assert seen == [round(255 * i / 4) for i in range(5)]
+
+
+def test_a_gif_of_many_colours_keeps_its_ground(tmp_path: Path) -> None:
+    """Thousands of colours on white: white stays white, and no other is far from what it is."""
+    image = pytest.importorskip("PIL.Image")
+    grid = Grid(64, 64)
+    rgb = np.full((grid.height * grid.width, 3), 255, dtype=np.uint8)
+    rgb[:1600] = np.random.default_rng(1).integers(0, 256, (1600, 3))
+    animations.save_frames(str(tmp_path / "c.gif"), [np.zeros((1, 1))] * 2, lambda i: np.roll(rgb, i, axis=0), grid, 10)
+    with image.open(tmp_path / "c.gif") as found:
+        shown = np.asarray(found.convert("RGB"), dtype=int).reshape(-1, 3)
+    assert (shown[1600:] == 255).all()
+    assert np.abs(shown[:1600] - rgb[:1600]).mean() < 16
 
 
 @pytest.mark.skipif(animations.ffmpeg() is None, reason="there is no ffmpeg")
