@@ -220,7 +220,7 @@ def _point(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
     for parameter, expression in task["slopes"]:
         try:
             dual = world.evaluate(task["file"], expression).estimate
-        except ProgramError:  # its derivative is no number: it jumps with this parameter
+        except ProgramError:  # its derivative is not a number: it jumps with this parameter
             continue
         if dual.tangent is not None:
             slope = tangent_of(dual)

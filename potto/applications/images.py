@@ -78,7 +78,7 @@ def sampled(call: Call, places: Sequence[Array], progress: Callable[[int], None]
     """The parts of a call at many places, band by band. `progress` is told how many are done. Of a call that was
     interrupted what it has done is kept, and no other follows.
 
-    Raises the PottoError of the first place if the call has no value at any, or if it is no call of the function.
+    Raises the PottoError of the first place if the call has no value at any, or if it is not a call of the function.
     """
     count = places[0].size
     found = Sampled(np.empty((0, count)))

@@ -297,5 +297,5 @@ def _reason(walk: Walk) -> str:
     if walk.trouble is not None:
         return f"it ends where the program has no value: {walk.trouble.diagnostics[0].message}"
     if walk.walls:
-        return "it ends beside places where the value is no number"
+        return "it ends beside places where the value is not a number"
     return STUCK

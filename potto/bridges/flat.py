@@ -73,7 +73,7 @@ class Flat:
         found = dict(zip(self.names, args))
         for name, argument in kwargs.items():
             if name in found or name not in self.names:
-                what = "is given twice" if name in found else "is no parameter that is left"
+                what = "is given twice" if name in found else "is not a parameter that is left"
                 raise wrong_call(f"`{name}` {what} of `{self.function.written}`")
             found[name] = argument
         missing = [f"`{name}`" for name in self.names if name not in found]
@@ -190,7 +190,7 @@ def _leaves(name: str, fields: tuple[str, ...], type: Type) -> Iterator[Leaf]:
     axes = axes_of(found) if isinstance(found, ArrayOf) else None
     if axes is None:
         shown = format_type(found)
-        raise wrong_call(f"`{name}` is {shown}, which is no array", f"give it at once: `given={{'{name}': …}}`")
+        raise wrong_call(f"`{name}` is {shown}, which is not an array", f"give it at once: `given={{'{name}': …}}`")
     yield Leaf(name, fields, axes)
 
 

@@ -129,7 +129,7 @@ def _fitted(
     for name, text in options.start:
         value = argument_in(world, file, text)
         if not isinstance(value, float):
-            raise wrong_call(f"`{name}` starts at something that is no number", "numbers are fitted, one by one")
+            raise wrong_call(f"`{name}` starts at something that is not a number", "numbers are fitted, one by one")
         start[name] = value
     given = arguments_in(world, file, options.given)
     target: Any = None

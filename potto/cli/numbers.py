@@ -40,7 +40,7 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
 
 def _some(text: str) -> int:
     if not text.isdecimal() or not 1 <= int(text) <= MOST_WORKERS:
-        raise argparse.ArgumentTypeError(f"{text!r} is no number of processes; write 1 for this one alone")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of processes; write 1 for this one alone")
     return int(text)
 
 

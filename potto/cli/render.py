@@ -88,13 +88,13 @@ def _size(text: str) -> tuple[int, int]:
 
 def _side(text: str) -> int:
     if not text.isdecimal() or not 1 <= int(text) <= MOST_PIXELS:
-        raise argparse.ArgumentTypeError(f"{text!r} is no number of pixels; write `512`")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of pixels; write `512`")
     return int(text)
 
 
 def _frames(text: str) -> int:
     if not text.isdecimal() or not 2 <= int(text) <= MOST_FRAMES:
-        raise argparse.ArgumentTypeError(f"{text!r} is no number of frames, from 2 to {MOST_FRAMES:,}")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of frames, from 2 to {MOST_FRAMES:,}")
     return int(text)
 
 
@@ -104,7 +104,7 @@ def _positive(text: str) -> float:
     except ValueError:
         found = 0.0
     if not 0 < found <= 1000:
-        raise argparse.ArgumentTypeError(f"{text!r} is no number of frames a second; write `20`")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of frames a second; write `20`")
     return found
 
 

@@ -85,7 +85,7 @@ def _entries(content: bytes, read: Callable[[ZipFile, ZipInfo], _T]) -> Iterator
         raise malformed("the file holds no arrays", hint=_SAVE_MANY)
     for entry in entries:
         if not entry.filename.endswith(".npy"):
-            raise malformed(f"{quoted(entry.filename)} within the file is no array", hint=_SAVE_MANY)
+            raise malformed(f"{quoted(entry.filename)} within the file is not an array", hint=_SAVE_MANY)
     names = [entry.filename.removesuffix(".npy") for entry in entries]
     for written, name, entry in zip(names, identifiers(names), entries):
         try:

@@ -86,7 +86,7 @@ def _ragged(text: str, level: Sequence[Any], dimensions: Sequence[int], path: Pa
 
 
 def _odd(text: str, level: Sequence[Any], dimensions: Sequence[int], path: Path) -> Refused:
-    """What is said of the first entry that is no number, or is a list among numbers or a number among lists."""
+    """What is said of the first entry that is not a number, or is a list among numbers or a number among lists."""
     lists = isinstance(level[0], list)
     at = next(at for at, entry in enumerate(level) if not isinstance(entry, list if lists else float))
     entry, place = level[at], (*path, *_index(at, dimensions))

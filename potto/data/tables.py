@@ -217,7 +217,7 @@ def _number(layout: _Layout, row: int, at: int, text: str) -> float:
     elif value is not None or _INFINITE.fullmatch(text):
         what, hint = f"{found} is not finite", "a number is at most 1.8e308; leave the row out of the file"
     elif _THOUSANDS.fullmatch(text):
-        what, hint = f"{found} is no number", "write numbers without separators of thousands, with a decimal point"
+        what, hint = f"{found} is not a number", "write numbers without separators of thousands, with a decimal point"
     else:
         what, hint = f"{found} is text, not a number", "only numbers can be read: take columns of text out of the file"
     raise bad_row(f"{where}: {what}", row, at + 1, text, "a number", hint)

@@ -111,7 +111,7 @@ def _with(elaboration: Elaboration, node: nodes.With, scope: Scope) -> Value:
     given = {argument.name: elaboration.term(argument.value, scope) for argument in node.arguments}
     shape = elaboration.shapes.of(whole)
     if not isinstance(shape, TupleOf) or shape.record is None or not given.keys() <= set(shape.record.fields):
-        return hole("this is no record with such fields")
+        return hole("this is not a record with such fields")
     parts = [given.get(name) or field(elaboration, whole, name) for name in shape.record.fields]
     return shaped(elaboration, shape, parts)
 

@@ -155,7 +155,7 @@ def listed(items: Sequence[Value]) -> Value:
 
 
 def _kind(value: Value) -> object:
-    """What elements must have in common to be one array; None for what is no number."""
+    """What elements must have in common to be one array; None for what is not a number."""
     if isinstance(value, Cell):
         return 0
     if isinstance(value, tuple):

@@ -33,7 +33,7 @@ class Domain(Generic[V]):
         raise NotImplementedError
 
     def other(self, node: Term, known: Mapping[Term, V]) -> V:
-        """Choices, and whatever else is no number, variable or builtin."""
+        """Choices, and whatever else is not a number, variable or builtin."""
         return self.unknown()
 
     def builtin(self, node: Prim, known: Mapping[Term, V]) -> V:

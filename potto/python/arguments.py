@@ -26,7 +26,7 @@ from potto.source import Span
 from potto.types import format_type
 from potto.types.types import ArrayOf, Diffeo, Dist, Function, Real, TupleOf, Type, resolve, result_of
 
-NO_KIND = declare("P0523", "a Python value that is no value of Potto")
+NO_KIND = declare("P0523", "a Python value that is not a value of Potto")
 
 ToFunction = Callable[[Any], Value | None]
 

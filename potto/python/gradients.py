@@ -61,7 +61,7 @@ def grad(function: Function | GradientFunction, wrt: Names = None) -> Any:
     It takes plain numbers. In the answer, `tangent` is the derivative by the one parameter, or a tuple of them in the
     order of `wrt`; `answer["c"]` is the one by `c`. The derivative by a tuple is a tuple, that by a record that is
     given as a dict a dict. Of `grad(f)` it is the second derivative: `value` is what `grad(f)` has as `tangent`.
-    Raises PottoError if the function has no such parameter, or one of them is no number.
+    Raises PottoError if the function has no such parameter, or one of them is not a number.
     """
     if isinstance(function, GradientFunction):
         from potto.applications.hessian import second_gradient  # which differentiates by what is here
@@ -138,8 +138,8 @@ def jvp(function: Function, along: Mapping[str, Any]) -> Callable[..., Estimate]
     """The product of the Jacobian with a vector: the derivative along a direction, over the parameters that it names.
 
     `potto.jvp(f, {"a": 1.0, "b": 2.0})(0.3, 0.6)` takes what `f` takes; the other parameters stand still. In the answer
-    `tangent` is the derivative. Raises PottoError if the function has no such parameter, one of them is no number, or a
-    tangent has not the form of its parameter.
+    `tangent` is the derivative. Raises PottoError if the function has no such parameter, one of them is not a
+    number, or a tangent does not have the form of its parameter.
     """
     names = parameters_to_vary(function, tuple(along))
 

@@ -122,7 +122,7 @@ class Script:
         env.update({target.name: part for target, part in zip(targets, parts, strict=True)})
 
     def value(self, expr: nodes.Expr, env: Environment) -> tuple[Value, Estimate | None]:
-        """The value of an expression, with what it cost; None for what is no number."""
+        """The value of an expression, with what it cost; None for what is not a number."""
         machine = self.program.machine(self.settings)
         place = expr.span
         try:

@@ -139,7 +139,7 @@ def plain(context: Context, written: Written) -> Expr:
     context.report(
         kinds.EQUALS(
             span,
-            f"`{target.id} = …` names an argument, but this is no call",
+            f"`{target.id} = …` names an argument, but this is not a call",
             help=f"to compare, write `{target.id} == …`",
             suggestions=(suggest(Span(target.span.end, written.value.span.start), " == ", "Write `==`"),),
         )
@@ -218,7 +218,7 @@ def _not_a_name(context: Context, written: Written, what: str) -> None:
         return
     span = written.value.span
     shown = context.text[span.start : span.end]
-    message = f"`{shown}` is no name: a {what} must be one" if len(shown) < 40 else f"a {what} must be a name"
+    message = f"`{shown}` is not a name: a {what} must be one" if len(shown) < 40 else f"a {what} must be a name"
     apart = isinstance(written.value, Apply) and all(isinstance(a.value, Name) for a in written.value.arguments)
     context.report(kinds.NOT_A_NAME(span, message, help="write `,` between the two" if apart else ""))
 

@@ -204,7 +204,7 @@ def _without_doubled(found: list[Diagnostic], stop: Stop) -> list[Diagnostic]:
 
 
 def _causes(found: list[Diagnostic], stops: list[Diagnostic]) -> list[Diagnostic]:
-    """A line that is no result because it was not understood has its message already; so has what is no name, or no
+    """A line that is no result because it was not understood has its message already; so has what is not a name, or no
     head of a definition."""
     codes = (kinds.LAST_LINE.code, kinds.NOT_A_NAME.code, kinds.DEFINITION_HEAD.code)
     places = [stop.span for stop in stops]

@@ -224,7 +224,7 @@ def product_of_deltas(expr: nodes.Expr) -> Diagnostic:
 def nonlinear(expr: nodes.Expr, what: str) -> Diagnostic:
     return kinds.DELTA_PRODUCT(
         expr.span,
-        f"a delta is no number: you cannot {what}",
+        f"a delta is not a number: you cannot {what}",
         label="a distribution",
         help="a delta may only be added, and multiplied with a number",
     )

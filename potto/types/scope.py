@@ -183,7 +183,7 @@ def undefined_member(outside: Outside, scope: Scope, node: nodes.Member) -> Diag
         return None
     if find_module(db, file, node.path) is not None and not local:
         return _no_module(node, f"the module `{node.path}` is not imported", f"add `import {node.path}`")
-    return _no_module(node, f"`{head}` is no module" if local else f"there is no module `{node.path}` here")
+    return _no_module(node, f"`{head}` is not a module" if local else f"there is no module `{node.path}` here")
 
 
 def _no_module(node: nodes.Member, what: str, help: str = "") -> Diagnostic:

@@ -96,7 +96,7 @@ def _disagree(left: Type, right: Type, operand: nodes.Operand, problem: tuple[Ty
 
 
 def fields(inference: Inference, type: Type, node: nodes.Member) -> Type:
-    """The type of `u.a.b`, where `u` is no module."""
+    """The type of `u.a.b`, where `u` is not a module."""
     head, *names = node.path.split(".")
     at = node.path_span.start + len(head) + 1
     for name in names:

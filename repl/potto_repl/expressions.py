@@ -67,7 +67,7 @@ def call_of(session: Conversation, text: str, usage: str) -> Called:
         groups.insert(0, expr.arguments)
         expr = without_parens(expr.function)
     if not groups:
-        what = "is a function: give it its arguments" if asked.groups else "is no call of a function"
+        what = "is a function: give it its arguments" if asked.groups else "is not a call of a function"
         raise Refusal(f"`{text.strip()}` {what}", f"write `{usage}`")
     head = checked(session, print_expression(expr), usage)
     parameters = head.groups

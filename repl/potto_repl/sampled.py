@@ -85,7 +85,7 @@ def derivative_of(session: Conversation, text: str, count: int, by: str, usage: 
             raise Refusal(f"`{by}` is neither an axis ({axes}) nor a number of the session", f"write `{usage}`")
         value = session.evaluate(by, session.settings).estimate.value
         if not isinstance(value, float):
-            raise Refusal(f"`{by}` is no number")
+            raise Refusal(f"`{by}` is not a number")
         names, fixed = [*names, by], (value,)
     asked = checked(session, f"deriv(\\({', '.join(names)}) . {inside})", usage)
     function = Function(session.world, session.file, asked.expr, asked.type)

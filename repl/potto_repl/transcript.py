@@ -144,7 +144,7 @@ class _Writer:
 
 
 def _expected(value: Valued) -> str | None:
-    """The digits that hold, as `#=` takes them; None for what is no number."""
+    """The digits that hold, as `#=` takes them; None for what is not a number."""
     if not value.estimates or "<" in value.text or "unknown" in value.text or "nan" in value.text:
         return None
     estimate = value.estimates[0]

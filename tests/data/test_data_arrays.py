@@ -163,4 +163,4 @@ def test_other_files_in_an_archive() -> None:
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w") as archive:
         archive.writestr("notes.txt", "hello")
-    assert mistake("a.npz", file.getvalue()).message == "`notes.txt` within the file is no array"
+    assert mistake("a.npz", file.getvalue()).message == "`notes.txt` within the file is not an array"

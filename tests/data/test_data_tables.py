@@ -124,7 +124,7 @@ def said(text: str, name: str = "t.csv") -> tuple[str, int | None, int | None, s
         ("x\n1_000", ("P0803", 2, 1, "1_000", "line 2, column `x`: `1_000` is text, not a number")),
         ("x\n٣", ("P0803", 2, 1, "٣", "line 2, column `x`: `٣` is text, not a number")),
         ("x;y\n1,5;2.5", ("P0803", 2, 1, "1,5", "line 2, column `x`: `1,5` is text, not a number")),
-        ("x;y\n1.234,5;2.5", ("P0803", 2, 1, "1.234,5", "line 2, column `x`: `1.234,5` is no number")),
+        ("x;y\n1.234,5;2.5", ("P0803", 2, 1, "1.234,5", "line 2, column `x`: `1.234,5` is not a number")),
         ('"a\nb",c\n1,2\n3,"x\ny"', ("P0803", 4, 2, "x\ny", "line 4, column `c`: `x y` is text, not a number")),
         ('x,y\n1,"2\n3,4', ("P0805", 2, None, "", "a quote on line 2 is not closed")),
         ('x,y\n1,"2"3\n', ("P0805", 2, None, "", "a quote on line 2 ends within a value")),

@@ -122,7 +122,7 @@ def test_files_that_move_take_their_imports_along():
     ("text", "new", "why"),
     [
         ("def f($0a) a\n", "if", "word of the language"),
-        ("def f($0a) a\n", "1a", "no name"),
+        ("def f($0a) a\n", "1a", "is not a name"),
         ("def f($0a, b) a*b\n", "b", "something else"),
         ("b = 1\ndef f($0a) a*b\n", "b", "something else"),
         ("def f($0a) a*sin(1)\n", "sin", "something else"),
@@ -147,8 +147,8 @@ def test_prepare_gives_the_word():
 
 
 def test_renaming_in_broken_text():
-    f, change = renamed("def f(a)\n    b = a +\n    $0b * (c\n", "d2")
-    assert f.after(change)["main.po"] == "def f(a)\n    d2 = a +\n    d2 * (c\n"
+    f, change = renamed("def f(a)\n    b = if a then\n    $0b * (c\n", "d2")
+    assert f.after(change)["main.po"] == "def f(a)\n    d2 = if a then\n    d2 * (c\n"
 
 
 def test_there_and_back_again():

@@ -134,7 +134,7 @@ def test_an_enclosure_holds_what_its_term_takes() -> None:
 
 
 def test_roots_between_infinite_bounds_where_terms_of_the_surface_have_no_sum() -> None:
-    """a^3 - a at infinity is no number; the cubic a^3 - a = c has its three roots all the same."""
+    """a^3 - a at infinity is not a number; the cubic a^3 - a = c has its three roots all the same."""
     a = var("a")
     surface = sub(prim("pow", a, const(3.0)), add(var("a"), var("c")))
     slope = slope_of(surface, "a")

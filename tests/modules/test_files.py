@@ -66,7 +66,7 @@ def test_what_is_no_file(files: Files, tmp_path: Path) -> None:
     assert codes(files, tmp_path / "gone.po" / "below.po") == ["P0208"]
     assert codes(files, tmp_path / "nul\0.po") == ["P0208"]
     (tmp_path / "main.po").write_text("import m\nprint(m.f(1))\n")
-    assert codes(files, tmp_path / "main.po") == ["P0202"], "a folder is no module"
+    assert codes(files, tmp_path / "main.po") == ["P0202"], "a folder is not a module"
 
 
 def test_a_file_without_permission(files: Files, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

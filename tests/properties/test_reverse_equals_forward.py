@@ -97,7 +97,7 @@ def hold(seed: int, monkeypatch: pytest.MonkeyPatch, wide: bool) -> None:
     for i, name in enumerate(NAMES):
         bars = np.asarray(forward.tangent_error[i]) + reverse.tangent_error[i]
         apart = np.abs(np.asarray(forward[name]) - reverse[name])
-        assert np.all(~(apart > bars + ULPS * size)), f"{name}\n{text}{given}"  # of what is no number nothing is told
+        assert np.all(~(apart > bars + ULPS * size)), f"{name}\n{text}{given}"  # nan tells nothing
     assert forward.converged <= reverse.converged, f"{reverse.reasons}\n{text}{given}"
 
 

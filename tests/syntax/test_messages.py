@@ -174,7 +174,7 @@ def test_equals() -> None:
         y = [x = 3]
         #      ^ error[P0108]: `=` names a value
         y = (x = 3)
-        #    ^^^^^ error[P0108]: names an argument, but this is no call
+        #    ^^^^^ error[P0108]: names an argument, but this is not a call
         y = x = 3
         #     ^ error[P0108]: `=` names a value
     """)
@@ -265,11 +265,11 @@ def test_records() -> None:
 def test_names() -> None:
     check_messages("""
         def f(3) x
-        #     ^ error[P0115]: `3` is no name: a parameter must be one
+        #     ^ error[P0115]: `3` is not a name: a parameter must be one
         def f(a=1) a
         #     ^^^ error[P0115]: a parameter can't have a default value
         x = integral [0, 1] x d(2*x)
-        #                       ^^^ error[P0115]: `2*x` is no name: a variable of integration must be one
+        #                       ^^^ error[P0115]: `2*x` is not a name: a variable of integration must be one
         x = a.
         #   ^^ error[P0115]: expected a name after `a.`
         x = let 3 = 4 in 5

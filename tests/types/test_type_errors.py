@@ -19,7 +19,7 @@ def test_names() -> None:
         def h(x) lip.soft(x)
         #        ^^^ error[P0201]: there is no module `lip` here
         k = \c . c.x
-        #        ^ error[P0201]: `c` is no module
+        #        ^ error[P0201]: `c` is not a module
         def l(x) lib + x
         #        ^^^ error[P0306]: `lib` is a module, not a value
         def m(x) print(x)

@@ -59,7 +59,7 @@ def _differentiate(ask: Ask, file: str, arguments: list[Any]) -> Any:
     if text not in names(ask.db, file):
         point = ide.point_of(ask.db, file, text)
         if point is None:
-            raise Refusal(f"there is no definition of `{text}` in this file, and it is no call of one")
+            raise Refusal(f"there is no definition of `{text}` in this file, and it is not a call of one")
         if not point.slopes:
             raise Refusal(f"`{text}` does not give numbers for numbers, so it has no slopes")
         deferred = task(ask, "point", file, point.text, {"slopes": point.slopes}, _slopes(point))

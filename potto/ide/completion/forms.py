@@ -1,4 +1,4 @@
-"""Signature help of what is no call: folds and sums, and the fields of a record behind `with`. Owns `form_help`."""
+"""Signature help of what is not a call: folds and sums, and the fields of a record behind `with`. Owns `form_help`."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ def split(db: Database, file: str, occurrence: Occurrence) -> tuple[Occurrence, 
 
 
 def begins_with_value(db: Database, file: str, path: str) -> bool:
-    """Whether what stands in front of a dot is no module but a definition, or part of one."""
+    """Whether what stands in front of a dot is not a module but a definition, or part of one."""
     return resolve_module(db, file, path) is None and defines(db, file, path.partition(".")[0]) is not None
 
 

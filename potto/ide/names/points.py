@@ -89,7 +89,7 @@ def _calls(node: nodes.Node) -> Iterator[nodes.Apply]:
 
 
 def point_of(db: Database, file: str, text: str) -> Point | None:
-    """A call in a file's scope as a point; None if it is no call of a definition with all its arguments."""
+    """A call in a file's scope as a point; None if it is not a call of a definition with all its arguments."""
     tree = parse_expression(text).expr
     while isinstance(tree, nodes.Paren):
         tree = tree.inner

@@ -68,7 +68,7 @@ def rename(db: Database, file: str, offset: int, new_name: str) -> Change | Refu
     if isinstance(prepared, Refused):
         return prepared
     if not _NAME.fullmatch(new_name):
-        return Refused(f"`{new_name}` is no name: a name is made of letters, digits and `_`, and begins with no digit")
+        return Refused(f"`{new_name}` is not a name: names are letters, digits and `_`, and do not begin with a digit")
     if new_name in RESERVED or new_name == "print":
         return Refused(f"`{new_name}` is a word of the language")
     if new_name == prepared.placeholder:

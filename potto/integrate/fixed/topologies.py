@@ -136,7 +136,7 @@ def _rows(values: tuple[Cell, ...], count: int) -> tuple[Array, Array]:
 
 def in_order(places: Array, off: Array, backend: str) -> tuple[Ints, Ints, Bools]:
     """Per member its rows in order, (R, M), how many of them lie between the bounds, these included, and for whom that
-    is sure. A row that is no number is a root that is not there.
+    is sure. A row that is not a number is a root that is not there.
     """
     near = CLEAR * off
     found = sorted_rows(places, near, backend)

@@ -214,7 +214,7 @@ def _div(node: Prim, args: list[Interval]) -> tuple[Any, Any] | tuple[Any, Any, 
 
 
 def _zero(a: Interval) -> Any:
-    """Where a divisor is 0 all over: the quotient is no number anywhere."""
+    """Where a divisor is 0 all over: the quotient is not a number anywhere."""
     return (np.asarray(a[0]) == 0) & (np.asarray(a[1]) == 0)
 
 

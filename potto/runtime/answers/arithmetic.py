@@ -134,7 +134,7 @@ class Operators:
     __slots__ = ()
 
     def _computed(self, ufunc: np.ufunc, *operands: Any, **options: Any) -> Any:
-        """What a ufunc makes of operands; NotImplemented where one of them is no number."""
+        """What a ufunc makes of operands; NotImplemented where one of them is not a number."""
         raise NotImplementedError
 
     def _compared(self, ufunc: np.ufunc, other: object) -> Any:

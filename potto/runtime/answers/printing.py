@@ -335,7 +335,7 @@ def format_fields(parts: dict[str, str]) -> str:
 def written_tolerance(text: str) -> float:
     """How far a value may be from the number that `text` writes: half a unit of its last digit.
 
-    A whole number without a decimal point is exact, and so is anything that is no number but an expression.
+    A whole number without a decimal point is exact, and so is anything that is not a number but an expression.
     """
     mantissa, _, exponent = text.strip().lstrip("+-").lower().partition("e")
     whole, point, fraction = mantissa.partition(".")

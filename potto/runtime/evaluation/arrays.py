@@ -19,7 +19,7 @@ from potto.runtime.evaluation.functions import Chosen, Closure
 from potto.runtime.evaluation.machine import Machine
 
 OUT_OF_RANGE = declare("P0511", "an index that is out of range")
-NO_PLACE = declare("P0512", "an index or a size that is no whole number")
+NO_PLACE = declare("P0512", "an index or a size that is not a whole number")
 RAGGED = declare("P0513", "sizes that do not agree")
 
 MOST_ELEMENTS = 100_000_000
@@ -123,7 +123,7 @@ def _places(place: Number, size: int) -> Any:
     with np.errstate(invalid="ignore"):
         bad = ~(np.isfinite(at) & (at == np.rint(at)))
         if np.any(bad):
-            message = f"the index {float(at[bad].ravel()[0])!r} is no whole number"
+            message = f"the index {float(at[bad].ravel()[0])!r} is not a whole number"
             raise PottoError([NO_PLACE(errors.NOWHERE, message, help="use `floor` or `ceil` to make it one")])
         out = (at < 0) | (at >= size)
     if np.any(out):

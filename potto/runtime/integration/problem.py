@@ -273,7 +273,7 @@ class Problem:
         return None if result is None else float(np.asarray(result).flat[0])
 
     def number(self, plain: Term, env: dict[str, Value]) -> Any:
-        """What a plain term comes to; None where it is no number."""
+        """What a plain term comes to; None where it is not a number."""
         try:
             value = self.machine.with_directions(0).term(plain, env)
         except PottoError:

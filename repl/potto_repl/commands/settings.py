@@ -54,7 +54,7 @@ def _number(session: Conversation, name: str, text: str) -> Part:
 
 
 def read_number(text: str) -> int | float | str:
-    """A number as people write it: `1e6` is whole, `1_000` too. What is no number stays text, for the complaint."""
+    """A number as people write it: `1e6` is whole, `1_000` too. What is not a number stays text, for the complaint."""
     try:
         value = float(text.replace(",", "").replace("_", ""))
     except ValueError:
