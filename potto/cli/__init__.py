@@ -7,8 +7,8 @@ Owns nothing but the list of commands. Each command is one module with `SUMMARY`
 from __future__ import annotations
 
 COMMANDS = (
-    "run", "eval", "check", "deriv", "fmt", "test", "render", "fit", "bench", "explain", "dump", "stubs", "cache",
-    "repl", "replay", "kernel", "lsp",
+    "run", "eval", "check", "deriv", "fmt", "test", "render", "view", "fit", "bench", "explain", "dump", "stubs",
+    "cache", "repl", "replay", "kernel", "lsp",
 )  # fmt: skip
 
 

@@ -1,0 +1,141 @@
+"""A function of a program as something whose integrals are looked at: parameters with values, and what is compiled.
+
+Owns `IntegralScene`, which the command, the page in a browser and editors share.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from msgspec import Struct
+
+from potto.applications.integral_pictures import integral_svg
+from potto.applications.integral_views import IntegralNumbers, IntegralView, Viewer, numbers
+from potto.checking.regions import Region, regions
+from potto.diagnostics import PottoError
+from potto.evaluating.world import World
+from potto.ide.display.scenes import Scene, scene
+from potto.kernels.errors import wrong_call
+from potto.modules import DefinitionTarget, resolve
+from potto.python.functions import Function
+from potto.types import groups_of, interface
+from potto.types.types import Function as FunctionType
+
+UNSAID = 0.5  # what a number is that nobody gives
+
+
+class Shot(Struct, frozen=True):
+    """One look: what is seen, and the numbers."""
+
+    view: IntegralView
+    numbers: IntegralNumbers
+    svg: str
+
+
+class IntegralScene:
+    """The integrals of one function. Raises PottoError if there is no such function, or it has no integral.
+
+    given: texts for parameters; the others start as a live expression gives them. `values` has the numbers by name, a
+    tuple's as `p_1`, `p_2`.
+    """
+
+    def __init__(self, world: World, file: str, name: str, given: Mapping[str, str]) -> None:
+        self.world, self.file, self.name = world, file, name
+        target = resolve(world.db, file, name)
+        if not isinstance(target, DefinitionTarget):
+            raise wrong_call(f"`{name}` is not defined here", "name a function of the program")
+        world.lookup(target.file, target.name)
+        found = scene(world.db, target.file, target.name)
+        if found is None:
+            raise wrong_call(f"`{name}` is no function of numbers", "name a function whose parameters are numbers, "
+                             "tuples of them, or functions of them")  # fmt: skip
+        unknown = sorted(given.keys() - {parameter.name for parameter in found.parameters})
+        if unknown:
+            raise wrong_call(f"`{name}` has no parameter `{unknown[0]}`",
+                             f"its parameters are {', '.join(p.name for p in found.parameters)}")  # fmt: skip
+        self.values: dict[str, float] = {}
+        arguments = self._arguments(found, given)
+        type = interface(world.db, target.file, target.name).type
+        call = name
+        for group in groups_of(type):
+            call += f"({', '.join(arguments.pop(0) for _ in group)})"
+        self.text = f"\\({', '.join(self.values)}) . {call}"
+        self._regions: dict[str, tuple[Region, ...]] = {}
+        self._viewers: dict[tuple[str, int], Viewer] = {}
+        self._functions: dict[str, Function] = {}
+
+    def _arguments(self, found: Scene, given: Mapping[str, str]) -> list[str]:
+        """What is written for each parameter; `values` is filled on the way."""
+        texts: list[str] = []
+        for parameter in found.parameters:
+            said = given.get(parameter.name)
+            if parameter.kind == "function":
+                text = said or next((text for text in parameter.fits if self._stands(text)), "")
+                if not text:
+                    raise wrong_call(f"`{parameter.name}` is a function, {parameter.type}", "give it one: "
+                                     f"`{parameter.name}=\\(x) . x`")  # fmt: skip
+                texts.append(f"({text})")
+                continue
+            numbers = self._given(said, parameter.size) if said else parameter.value or (UNSAID,) * parameter.size
+            single = parameter.kind == "number"
+            names = [parameter.name if single else f"{parameter.name}_{n + 1}" for n in range(parameter.size)]
+            self.values.update(zip(names, numbers, strict=True))
+            texts.append(names[0] if single else f"({', '.join(names)})")
+        return texts
+
+    def _stands(self, text: str) -> bool:
+        """Whether an expression means something in the file: an offer may need an import that is not there yet."""
+        try:
+            self.world.typed(self.file, text)
+        except PottoError:
+            return False
+        return True
+
+    def _given(self, text: str, size: int) -> tuple[float, ...]:
+        value = self.world.evaluate(self.file, text).estimate.value
+        found = tuple(map(float, value)) if isinstance(value, tuple) else (float(value),)
+        if len(found) != size:
+            raise wrong_call(f"`{text}` is {len(found)} numbers", f"{size} are needed here")
+        return found
+
+    def regions(self, wrt: str) -> tuple[Region, ...]:
+        """The integrals of the function, with what moves as `wrt` does."""
+        if wrt not in self.values:
+            raise wrong_call(f"`{self.name}` has no number `{wrt}` to differentiate by",
+                             f"its numbers are {', '.join(self.values)}")  # fmt: skip
+        if wrt not in self._regions:
+            tree, _ = self.world.typed(self.file, self.text)
+            found = regions(self.world.db, self.file, tree, wrt)
+            if not found:
+                raise wrong_call(f"`{self.name}` has no integral to look at", "name a function with an integral that "
+                                 "depends on nothing but its parameters")  # fmt: skip
+            self._regions[wrt] = found
+        return self._regions[wrt]
+
+    @property
+    def moving(self) -> str:
+        """The first number by which a surface or a bound moves, else the first one."""
+        for name in self.values:
+            for region in self.regions(name):
+                rates = [*(surface.rate for surface in region.surfaces), *(r for pair in region.rates for r in pair)]
+                if any(not rate.endswith(" . 0") for rate in rates):
+                    return name
+        return next(iter(self.values))
+
+    def look(self, values: Mapping[str, float], wrt: str, which: int = 0) -> Shot:
+        """The integral number `which`, from 0, with these values. Raises PottoError where it has none."""
+        known = self.regions(wrt)
+        if not 0 <= which < len(known):
+            raise wrong_call(f"`{self.name}` has {len(known)} integrals", f"choose one from 1 to {len(known)}")
+        viewer = self._viewers.setdefault((wrt, which), Viewer(known[which], self._compiled))
+        seen = viewer.look(values)
+        found = numbers(known[which], self._compiled, values, wrt)
+        title = f"{self.name}({', '.join(f'{name} = {value:.4g}' for name, value in values.items())})"
+        return Shot(seen, found, integral_svg(seen, found, title, wrt))
+
+    def _compiled(self, text: str) -> Function:
+        if text not in self._functions:
+            tree, type = self.world.typed(self.file, text)
+            assert isinstance(type, FunctionType)
+            self._functions[text] = Function(self.world, self.file, tree, type)
+        return self._functions[text]

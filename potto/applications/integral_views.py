@@ -1,0 +1,258 @@
+"""An integral as it can be seen: its domain, surfaces, cells, and what moves them, in numbers.
+
+Owns `IntegralView` and `Viewer`. A viewer belongs to one integral of one function; asking it again with other numbers
+compiles nothing. In one variable surfaces are points and the boundary term is their sum, in two they are lines and it
+is the integral along them; of more variables the first two are seen, the others stand in the middle of their ranges.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from msgspec import Struct
+
+from potto.applications.contours import zero_lines
+from potto.checking.regions import Region, RegionSurface
+from potto.kernels.cells import Array
+from potto.python.functions import Function
+from potto.python.gradients import grad
+
+PLACES = 257  # along a curve
+SIDE = 97  # along a side of a square
+REACH = 6.0  # how far an endless range is drawn
+ARROWS = 24  # of one surface, at most
+STEP = 1e-3  # of the parameter, or of 1 where that is more
+TINY = 1e-13
+CLOSER = 60  # halvings: the ends of a root are neighbours then
+
+Call = Callable[..., Any]
+Point = tuple[float, ...]
+
+
+class Arrow(Struct, frozen=True):
+    """A place of a surface or a bound, how fast it moves there, and what the integral gains by that.
+
+    weight: in one variable the gain itself; in two the gain for each unit of length along the surface.
+    """
+
+    at: Point
+    velocity: Point
+    weight: float
+
+
+class SurfaceView(Struct, frozen=True):
+    """A surface inside of the domain. lines: from and to, in one variable the same point twice."""
+
+    equation: str
+    lines: tuple[tuple[Point, Point], ...]
+    arrows: tuple[Arrow, ...]
+    gain: float  # what all of it adds to the derivative, as far as that is seen
+
+
+class IntegralView(Struct, frozen=True):
+    """What there is to see of an integral for one choice of its parameters.
+
+    box: from and to of each variable that is seen. cells: at the places of `integrand` the number of the cell, one for
+    each way that the surfaces can be on their sides; -1 outside of the domain. integrand: PLACES numbers, or rows of
+    SIDE from below. held: the variables that are not seen, and where they stand.
+    """
+
+    variables: tuple[str, ...]
+    box: tuple[tuple[float, float], ...]
+    integrand: tuple[tuple[float, ...], ...]
+    cells: tuple[tuple[int, ...], ...]
+    surfaces: tuple[SurfaceView, ...]
+    bounds: tuple[Arrow, ...]
+    held: tuple[tuple[str, float], ...] = ()
+    cut: bool = False  # whether a range goes on beyond what is drawn
+
+
+class IntegralNumbers(Struct, frozen=True):
+    """An integral and its derivative by the parameter that moves, each with its error. interior: what the derivative is
+    while surfaces and bounds stand still; boundary: the rest. difference: the central difference over `step` to both
+    sides, a ghost to hold the derivative against, and how far errors of values may move it."""
+
+    value: float
+    error: float
+    tangent: float
+    tangent_error: float
+    interior: float
+    interior_error: float
+    boundary: float
+    boundary_error: float
+    difference: float
+    difference_error: float
+    step: float
+    converged: bool
+    evals: int
+
+
+def numbers(region: Region, compile: Callable[[str], Function], given: Mapping[str, float], wrt: str
+            ) -> IntegralNumbers:  # fmt: skip
+    """The integral and its derivative by `wrt`. Raises PottoError where there is none."""
+    whole = compile(region.whole)
+    both = grad(whole, [wrt])(**given)
+    inner = compile(region.interior)(**given)
+    rest, error = both.tangent - inner.value, both.tangent_error + inner.error
+    if abs(rest) <= max(error, TINY * max(abs(both.tangent), abs(inner.value))):
+        rest, error = 0.0, error if rest else 0.0
+    step = STEP * max(1.0, abs(given[wrt]))
+    ahead, behind = (whole(**{**given, wrt: given[wrt] + way}) for way in (step, -step))
+    return IntegralNumbers(
+        float(both.value), float(both.error), float(both.tangent), float(both.tangent_error),
+        float(inner.value), float(inner.error), float(rest), float(error),
+        float(ahead.value - behind.value) / (2 * step), float(ahead.error + behind.error) / (2 * step), step,
+        bool(both.converged and inner.converged), both.evals + inner.evals + ahead.evals + behind.evals,
+    )  # fmt: skip
+
+
+class Viewer:
+    """Looks at one integral. compile: the function that a text of the region stands for, of numbers and arrays."""
+
+    def __init__(self, region: Region, compile: Callable[[str], Call]) -> None:
+        self.region = region
+        self._compile = compile
+        self._calls: dict[str, Call] = {}
+        self.seen = region.variables[:2]
+
+    def look(self, given: Mapping[str, float]) -> IntegralView:
+        """The view with these parameters. Raises PottoError where the integrand has no value."""
+        places: dict[str, Any] = {**given, **dict.fromkeys(self.region.variables, 0.0)}
+        box, held, cut = self._ranges(places)
+        grids = [np.linspace(low, high, PLACES if len(box) == 1 else SIDE) for low, high in box]
+        mesh = np.meshgrid(*grids)
+        at = {**places, **dict(zip(self.seen, mesh, strict=True))}
+        inside = self._inside(at)
+        values = self._numbers(self.region.integrand, at)
+        levels = [self._numbers(surface.level, at) for surface in self.region.surfaces]
+        code = np.zeros(values.shape, dtype=np.int64)
+        for place, level in enumerate(levels[:30]):
+            code += (level > 0).astype(np.int64) << place
+        _, cells = np.unique(code, return_inverse=True)
+        cells = np.where(inside, cells.reshape(values.shape), -1)
+        surfaces = tuple(
+            self._surface(surface, level, grids, places)
+            for surface, level in zip(self.region.surfaces, levels, strict=True)
+        )
+        return IntegralView(
+            self.seen, tuple(box), _rows(np.where(inside, values, np.nan)), _rows(cells), surfaces,
+            self._bounds(places, box), tuple(held), cut,
+        )  # fmt: skip
+
+    # Numbers
+
+    def _numbers(self, text: str, at: Mapping[str, Any]) -> Array:
+        if text not in self._calls:
+            self._calls[text] = self._compile(text)
+        arguments = np.broadcast_arrays(*(np.asarray(at[name], dtype=float) for name in self.region.names))
+        answer = self._calls[text](*(a if a.ndim else float(a) for a in arguments))
+        found: Array = np.broadcast_to(np.asarray(answer.value, dtype=float), arguments[0].shape)
+        return found
+
+    def _number(self, text: str, at: Mapping[str, Any]) -> float:
+        return float(self._numbers(text, at))
+
+    def _ranges(self, places: dict[str, Any]) -> tuple[list[tuple[float, float]], list[tuple[str, float]], bool]:
+        """The box of what is seen, and the middles of the others; `places` is given the middles of all."""
+        box: list[tuple[float, float]] = []
+        held: list[tuple[str, float]] = []
+        cut = False
+        for name, (low_text, high_text) in zip(self.region.variables, self.region.bounds, strict=True):
+            at = dict(places)
+            if box and name in self.seen:  # a bound that bends: all of what it reaches
+                first = self.seen[0]
+                at[first] = np.linspace(*box[0], SIDE)
+            lows, highs = self._numbers(low_text, at), self._numbers(high_text, at)
+            low, high = float(np.min(lows)), float(np.max(highs))
+            cut = cut or not np.isfinite([low, high]).all()
+            low, high = _drawn(low, high)
+            places[name] = (low + high) / 2
+            if name in self.seen:
+                box.append((low, high))
+            else:
+                held.append((name, places[name]))
+        return box, held, cut
+
+    def _inside(self, at: Mapping[str, Any]) -> Any:
+        found: Any = True
+        for name, (low, high) in zip(self.seen, self.region.bounds, strict=False):
+            found = found & (at[name] >= self._numbers(low, at)) & (at[name] <= self._numbers(high, at))
+        return found
+
+    # What moves
+
+    def _surface(
+        self, surface: RegionSurface, level: Array, grids: Sequence[Array], places: Mapping[str, Any]
+    ) -> SurfaceView:
+        ends = self._roots(surface, level, grids[0], places) if len(grids) == 1 else zero_lines(level, *grids)
+        if not len(ends):
+            return SurfaceView(surface.equation, (), (), 0.0)
+        middles = ends.mean(axis=1)
+        at = {**places, **dict(zip(self.seen, middles.T, strict=True))}
+        keep = self._inside(at)
+        slopes = np.stack([self._numbers(text, at) for text, _ in zip(surface.slopes, self.seen, strict=False)], axis=1)
+        steep = np.linalg.norm(slopes, axis=1)
+        rate, jump = self._numbers(surface.rate, at), self._numbers(surface.jump, at)
+        keep &= steep > 0
+        safe = np.where(steep > 0, steep, 1.0)
+        weights = np.where(keep, jump * rate / safe, 0.0)
+        velocities = -(rate / safe**2)[:, None] * slopes
+        lengths = np.ones(len(ends)) if len(grids) == 1 else np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        chosen = np.nonzero(keep)[0]
+        lines = tuple((tuple(a), tuple(b)) for a, b in ends[chosen].tolist())
+        around = middles[chosen] - middles[chosen].mean(axis=0) if len(chosen) else middles[chosen]
+        order = np.argsort(np.arctan2(around[:, -1], around[:, 0]), kind="stable")
+        shown = chosen[order][:: max(1, -(-len(chosen) // ARROWS))]
+        arrows = _arrows(middles[shown], velocities[shown], weights[shown])
+        return SurfaceView(surface.equation, lines, arrows, float(np.sum(weights * lengths)))
+
+    def _roots(self, surface: RegionSurface, level: Array, xs: Array, places: Mapping[str, Any]) -> Array:
+        """The points of a surface on a line: (n, 2, 1), each twice."""
+        positive = level > 0
+        at = np.nonzero(positive[1:] != positive[:-1])[0]
+        low, high, side = xs[at], xs[at + 1], positive[at]
+        for _ in range(CLOSER if len(at) else 0):
+            middle = (low + high) / 2
+            same = (self._numbers(surface.level, {**places, self.seen[0]: middle}) > 0) == side
+            low, high = np.where(same, middle, low), np.where(same, high, middle)
+        middle = (low + high) / 2
+        return np.stack([middle, middle], axis=1)[:, :, None]
+
+    def _bounds(self, places: Mapping[str, Any], box: Sequence[tuple[float, float]]) -> tuple[Arrow, ...]:
+        """What bounds that move gain: at the ends of the range, or along the sides of the box."""
+        found: list[Arrow] = []
+        for axis, name in enumerate(self.seen):
+            other = np.linspace(*box[1 - axis], 9)[1:-1] if len(box) == 2 else np.zeros(1)
+            for end, sign in ((0, -1.0), (1, 1.0)):
+                at = dict(places)
+                if len(box) == 2:
+                    at[self.seen[1 - axis]] = other
+                ends = np.broadcast_to(self._numbers(self.region.bounds[axis][end], at), other.shape)
+                rate = np.broadcast_to(self._numbers(self.region.rates[axis][end], at), other.shape)
+                if not rate.any() or not np.isfinite(ends).all():
+                    continue
+                at[name] = ends
+                gain = sign * rate * np.broadcast_to(self._numbers(self.region.integrand, at), other.shape)
+                points = np.stack([ends] if len(box) == 1 else [ends, other][:: 1 - 2 * axis], axis=1)
+                moves = np.zeros_like(points)
+                moves[:, axis] = rate
+                found += _arrows(points, moves, gain)
+        return tuple(found)
+
+
+def _drawn(low: float, high: float) -> tuple[float, float]:
+    """A range with both ends finite."""
+    if not np.isfinite(low):
+        low = high - 2 * REACH if np.isfinite(high) else -REACH
+    return low, high if np.isfinite(high) else low + 2 * REACH
+
+
+def _rows(values: Any) -> tuple[tuple[Any, ...], ...]:
+    return tuple(map(tuple, np.atleast_2d(values).tolist()))
+
+
+def _arrows(at: Array, velocities: Array, weights: Array) -> tuple[Arrow, ...]:
+    together = zip(at.tolist(), velocities.tolist(), weights.tolist(), strict=True)
+    return tuple(Arrow(tuple(a), tuple(v), w) for a, v, w in together)

@@ -1,0 +1,73 @@
+"""`potto view`: an integral with its domain, surfaces and boundary term, as a picture or as a page."""
+
+from __future__ import annotations
+
+import argparse
+
+from potto.cli.calling import add_set, assignment
+from potto.cli.console import Console
+from potto.cli.numbers import add_options, settings_of
+
+SUMMARY = "look at an integral: its domain, what jumps where, and what moves"
+EXAMPLE = """  potto view examples/worked/picture.po pixel x=0.7 y=0 r=0.7 --wrt r -o pixel.svg
+  potto view examples/worked/picture.po"""
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", metavar="FILE", help="the program")
+    parser.add_argument("name", metavar="NAME", help="the function whose integral is seen")
+    parser.add_argument("given", metavar="NAME=EXPR", nargs="*", type=assignment, help="what parameters are given; "
+                        "others start as a live expression of the file gives them, or as 0.5")  # fmt: skip
+    parser.add_argument("--wrt", metavar="NAME", help="the parameter that moves (default: the first on which the "
+                        "derivative depends)")  # fmt: skip
+    parser.add_argument("--integral", metavar="N", type=_count, default=1, help="which one of several (default 1)")
+    parser.add_argument("-o", "--output", metavar="FILE", help="the picture, .svg (default: NAME.svg)")
+    add_set(parser)
+    add_options(parser)
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or not int(text):
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of an integral; they count from 1")
+    return int(text)
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    from msgspec import to_builtins
+    from msgspec.structs import asdict
+
+    from potto.applications.integral_scenes import IntegralScene
+    from potto.cli.opening import fail, opened
+    from potto.diagnostics import PottoError
+    from potto.evaluating.world import World
+    from potto.projects.settings import settings
+
+    chosen = settings_of(options, console)
+    if chosen is None:
+        return 2
+    path = options.output or f"{options.name}.svg"
+    if not path.endswith(".svg"):
+        console.complain(f"potto view: {path} does not end with .svg, which is what a view is written as")
+        return 2
+    world = World(["."])
+    try:
+        file = opened(world, options.file, options.set)
+        with settings(**asdict(chosen)):
+            found = IntegralScene(world, file, options.name, dict(options.given))
+            wrt = options.wrt or found.moving
+            shot = found.look(found.values, wrt, options.integral - 1)
+    except PottoError as error:
+        return fail(error, options, console)
+    try:
+        with open(path, "w", encoding="utf-8") as out:
+            out.write(shot.svg)
+    except OSError as error:
+        console.complain(f"potto view: {path} cannot be written: {error.strerror}")
+        return 1
+    if options.json:
+        console.answer_json({"file": path, "wrt": wrt, "values": found.values, "numbers": to_builtins(shot.numbers),
+                             "view": to_builtins(shot.view)})  # fmt: skip
+    else:
+        count = len(shot.view.surfaces)
+        console.answer(f"{path}: {options.name} by {wrt}, {count} surface{'' if count == 1 else 's'}")
+    return 0

@@ -1,0 +1,29 @@
+"""`potto view`: an integral as a picture, and as numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from command_runs import Potto
+
+PROGRAM = "def f(t, k) integral [0, 1] k*[x < t] d(x)\n#> f(0.25, 2)\n"
+
+
+def test_a_picture_is_written(potto: Potto, tmp_path: Path) -> None:
+    ran = potto("view", "main.po", "f", "-o", "f.svg", main=PROGRAM)
+    assert (ran.status, ran.out) == (0, "f.svg: f by t, 1 surface\n")
+    assert "x = t" in (tmp_path / "f.svg").read_text(encoding="utf-8")
+
+
+def test_values_start_as_a_live_expression_gives_them(potto: Potto) -> None:
+    answer = potto("view", "main.po", "f", "--json", main=PROGRAM).json
+    assert answer["values"] == {"t": 0.25, "k": 2.0}
+    assert answer["numbers"]["boundary"] == pytest.approx(2.0)
+
+
+def test_what_is_wrong_is_said(potto: Potto) -> None:
+    assert potto("view", "main.po", "f", "q=1", main=PROGRAM).status == 1
+    assert "no parameter `q`" in potto("view", "main.po", "f", "q=1", main=PROGRAM).err
+    assert potto("view", "main.po", "f", "-o", "f.gif", main=PROGRAM).status == 2
+    assert potto("view", "main.po", "f", "-o", "none/f.svg", main=PROGRAM).status == 1

@@ -1,0 +1,137 @@
+"""What is seen of an integral, held against geometry by hand and closed forms."""
+
+from __future__ import annotations
+
+import math
+from xml.etree import ElementTree
+
+import pytest
+
+from potto.applications.integral_scenes import IntegralScene, Shot
+from potto.diagnostics import PottoError
+from potto.evaluating.world import World
+
+PROGRAM = r"""
+def step(t) integral [0, 1] [x < t]*(x + 1/2) d(x)
+def moving(t) integral [t^2, 2*t] x^2 d(x)
+def disc(r) integral ([-1, 1], [-1, 1]) [x^2 + y^2 < r^2] d(x, y)
+def corner(c) integral ([0, 1], [0, x]) [y < c] d(x, y)
+def tail(m) integral [-inf, inf] [x < m]*exp(-x^2) d(x)
+def ball(r) integral ([-1, 1], [-1, 1], [-1, 1]) [x^2 + y^2 + z^2 < r^2] d(x, y, z)
+def shaded(c, shader) integral ([0, 1], [0, 1]) [x + y + c >= 0]*shader(x, y) d(x, y)
+def both(a, b) integral [0, 1] a*[x < b] d(x)
+def pair(k, p: (Real, Real)) integral [0, fst(p)] snd(p)*x d(x)
+def two(t) (integral [0, 1] [x < t] d(x)) + (integral [0, 1] [x < t^2] d(x))
+def plain(t) t^2
+lost = 1 + nothing
+"""
+
+
+def looked(name: str, wrt: str, which: int = 0, shader: str = "", **values: float) -> Shot:
+    world = World()
+    file = world.put("program.po", PROGRAM)
+    scene = IntegralScene(world, file, name, {"shader": shader} if shader else {})
+    return scene.look({**scene.values, **values}, wrt, which)
+
+
+def test_a_step_is_a_point_that_gains_what_is_left_of_it() -> None:
+    shot = looked("step", "t", t=0.3)
+    (surface,) = shot.view.surfaces
+    (arrow,) = surface.arrows
+    assert surface.equation == "x = t"
+    assert arrow.at == pytest.approx((0.3,), abs=1e-15)
+    assert arrow.velocity == pytest.approx((1.0,))
+    assert arrow.weight == pytest.approx(0.8, abs=1e-15)  # x + 1/2 at x = t
+    assert shot.numbers.value == pytest.approx(0.3**2 / 2 + 0.15, abs=1e-15)
+    assert shot.numbers.boundary == pytest.approx(0.8, abs=1e-14)
+    assert shot.numbers.interior == 0
+    assert max(shot.view.cells[0]) == 1
+
+
+def test_bounds_that_move_gain_the_integrand_at_them() -> None:
+    shot = looked("moving", "t", t=0.5)
+    low, high = shot.view.bounds
+    assert (low.at, low.velocity, low.weight) == ((0.25,), (1.0,), -(0.25**2) * 1.0)
+    assert (high.at, high.velocity, high.weight) == ((1.0,), (2.0,), 2.0)
+    assert shot.numbers.tangent == pytest.approx(low.weight + high.weight, abs=1e-14)
+
+
+def test_a_circle_moves_outwards_everywhere_alike() -> None:
+    shot = looked("disc", "r", r=0.7)
+    (surface,) = shot.view.surfaces
+    for arrow in surface.arrows:
+        (x, y), (u, v) = arrow.at, arrow.velocity
+        assert math.hypot(x, y) == pytest.approx(0.7, abs=1e-3)
+        assert math.hypot(u, v) == pytest.approx(1.0, abs=1e-3)
+        assert u * x + v * y == pytest.approx(0.7, abs=1e-3)
+        assert arrow.weight == pytest.approx(1.0, abs=1e-3)
+    assert surface.gain == pytest.approx(2 * math.pi * 0.7, rel=1e-3)
+    assert shot.numbers.boundary == pytest.approx(2 * math.pi * 0.7, abs=1e-12)
+    assert shot.numbers.difference == pytest.approx(2 * math.pi * 0.7, abs=1e-9)  # of pi r^2, no error of its own
+
+
+def test_a_surface_ends_where_a_bound_that_bends_does() -> None:
+    shot = looked("corner", "c", c=0.25)
+    (surface,) = shot.view.surfaces
+    assert min(min(a[0], b[0]) for a, b in surface.lines) == pytest.approx(0.25, abs=0.02)
+    assert surface.gain == pytest.approx(0.75, abs=0.02)
+    assert shot.view.cells[-1][0] == -1
+    assert shot.view.cells[0][-1] >= 0
+
+
+def test_an_endless_range_is_cut_and_says_so() -> None:
+    shot = looked("tail", "m", m=0.2)
+    assert shot.view.cut
+    assert shot.view.surfaces[0].gain == pytest.approx(math.exp(-0.04), abs=1e-14)
+
+
+def test_of_three_variables_a_section_is_seen() -> None:
+    shot = looked("ball", "r", r=0.7)
+    assert shot.view.variables == ("x", "y")
+    assert shot.view.held == (("z", 0.0),)
+    assert shot.numbers.boundary == pytest.approx(4 * math.pi * 0.49, abs=1e-11)
+
+
+def test_a_parameter_that_is_a_function_is_written_in() -> None:
+    shot = looked("shaded", "c", shader=r"\(x, y) . x", c=-0.7)
+    (surface,) = shot.view.surfaces
+    # the edge y = 0.7 - x runs over x from 0 to 0.7: the integral of x dx along it
+    assert surface.gain == pytest.approx(0.245, abs=1e-3)
+    assert shot.numbers.boundary == pytest.approx(0.245, abs=1e-13)
+
+
+def test_interior_and_boundary_are_told_apart() -> None:
+    by_height = looked("both", "a", a=2, b=0.25).numbers
+    by_place = looked("both", "b", a=2, b=0.25).numbers
+    assert by_height.interior == pytest.approx(0.25)
+    assert by_height.boundary == 0
+    assert by_place.interior == 0
+    assert by_place.boundary == pytest.approx(2.0)
+
+
+def test_numbers_of_a_tuple_move_apart() -> None:
+    assert looked("pair", "p_1", k=0, p_1=0.5, p_2=3).numbers.tangent == pytest.approx(1.5)
+    assert looked("pair", "p_2", k=0, p_1=0.5, p_2=3).numbers.tangent == pytest.approx(0.125)
+
+
+def test_each_of_several_integrals_is_one_of_its_own() -> None:
+    assert looked("two", "t", 0, t=0.5).numbers.tangent == pytest.approx(1)
+    assert looked("two", "t", 1, t=0.5).numbers.tangent == pytest.approx(1)
+    assert looked("two", "t", 1, t=0.5).numbers.value == pytest.approx(0.25)
+
+
+def test_the_picture_is_xml_with_a_group_for_each_surface() -> None:
+    for shot in (looked("step", "t", t=0.3), looked("disc", "r", r=0.7), looked("moving", "t", t=0.5)):
+        root = ElementTree.fromstring(shot.svg)
+        groups = [g for g in root.iter("{http://www.w3.org/2000/svg}g") if g.get("class") == "surface"]
+        assert len(groups) == len(shot.view.surfaces)
+
+
+@pytest.mark.parametrize(
+    ("name", "wrt", "which", "says"),
+    [("plain", "t", 0, "no integral"), ("step", "u", 0, "no number `u`"), ("nobody", "t", 0, "not defined"),
+     ("lost", "t", 0, "nothing"), ("two", "t", 2, "2 integrals")],
+)  # fmt: skip
+def test_what_cannot_be_seen_says_why(name: str, wrt: str, which: int, says: str) -> None:
+    with pytest.raises(PottoError, match=says):
+        looked(name, wrt, which, t=0.5)
