@@ -162,7 +162,8 @@ def missed_peak(work: PanelBatch, p: Pieces, ends: Ends) -> Any:
     """Pieces at an end of their segment where the integrand is not what its values at the nodes lead to.
 
     Either it is far larger there than at any node, or it is off the interpolant through the nodes by far more
-    than the interpolant's last terms: something narrow sits at the end.
+    than the interpolant's last terms: something narrow sits at the end. Rounding there is none of it: beside a stretch
+    on which the integrand is 0 every bit of it would be.
     """
     seg = work.seg
     reach = seg.b - seg.a
@@ -170,12 +171,13 @@ def missed_peak(work: PanelBatch, p: Pieces, ends: Ends) -> Any:
     plain = (seg.kind[p.segment] == substitution.LINEAR) & (p.end == 0)
     bad = np.zeros(p.segment.size, dtype=bool)
     m = work.width
-    for f, touches, led in ((ends.low, p.u0 == 0, p.ends[:m]), (ends.high, p.u1 == 1, p.ends[m:])):
+    low, high = (ends.low, ends.low_error), (ends.high, ends.high_error)
+    for (f, rounded), touches, led in ((low, p.u0 == 0, p.ends[:m]), (high, p.u1 == 1, p.ends[m:])):
         for c in range(m):
-            at_end = f[c][p.segment] * width
+            at_end, slack = f[c][p.segment] * width, rounded[c][p.segment] * width
             known = touches & np.isfinite(at_end)
-            bad |= known & (np.abs(at_end) > PEAK * p.most[c])
-            off = np.abs(at_end - led[c])
+            bad |= known & (np.abs(at_end) - slack > PEAK * p.most[c])
+            off = np.abs(at_end - led[c]) - slack
             bad |= known & plain & (off > MISLED * p.tail[c] + 1e-8 * p.most[c])
     return bad
 
