@@ -212,10 +212,8 @@ def _number(value: float) -> _Text:
 
 
 def _projection(node: Proj, texts: _Texts) -> _Text:
-    inner = texts[node.term]
-    if node.index < 2:
-        return _Text(f"{('fst', 'snd')[node.index]}({inner.text})", _ATOM)
-    return _Text(f"{inner.at(_ATOM)}.{node.index}", _ATOM)
+    """`fst` and `snd` are of pairs alone."""
+    return _Text(f"{texts[node.term].at(_ATOM)}.{node.index}", _ATOM)
 
 
 def _builtin(node: Prim, texts: _Texts) -> _Text:

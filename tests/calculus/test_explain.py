@@ -27,7 +27,7 @@ RENDERER = """
 def test_equation_two_of_the_paper() -> None:
     found = explain(RENDERER, "renderer")
     (item,) = found.integrals
-    assert item.interior == "dshader(x, y)((c, dc))*[x + y + c >= 0]"
+    assert item.interior == "snd(dshader((x, 0), (y, 0))((c, dc)))*[x + y + c >= 0]"
     assert item.deltas == ("shader(x, y)(c)*delta(x + y + c)*dc",)
     assert found.alone and "# interior" in found.text and "# boundary" in found.text
 
@@ -73,7 +73,7 @@ def test_what_is_around_an_integral() -> None:
             (f(t) - a)^2
     """
     found = explain(text, "loss")
-    assert found.tangent == "2*(f(t) - a)*(df((t, dt)) - da)"
+    assert found.tangent == "2*(f(t) - a)*(snd(deriv(f)((t, dt))) - da)"
     assert found.integrals == ()
 
 
@@ -86,7 +86,7 @@ def test_a_boundary_found_by_numbers_says_so() -> None:
 
 def test_a_recursion_is_not_followed() -> None:
     found = explain("def fact(n)\n    if n > 0 then n*fact(n - 1) else 1", "fact")
-    assert "dfact" in found.tangent
+    assert "deriv(fact)" in found.tangent
 
 
 def test_a_derivative_is_explained_by_what_it_is_one_of() -> None:

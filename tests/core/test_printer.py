@@ -68,7 +68,7 @@ f = global_("/somewhere/m.po", "f")
         (prim("atan2", y, add(x, ONE)), "atan2(y, x + 1)"),
         (tuple_((x, y)), "(x, y)"),
         (list_of((x,)), "[x]"),
-        (proj(app(f, (x,)), 1), "snd(f(x))"),
+        (proj(app(f, (x,)), 1), "f(x).1"),
         (lam(("x", "y"), lam(("c",), add(x, y, c))), "\\(x, y) . \\c . x + y + c"),
         (app(lam(("x",), x), (y,)), "(\\x . x)(y)"),
         (deriv(f), "deriv(f)"),

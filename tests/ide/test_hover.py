@@ -33,7 +33,7 @@ def test_function_shows_its_types_its_comment_and_both_terms():
     assert "renderer : (c: Real, shader: (Real*, Real*) -> Real -> Real) -> Real" in text
     assert "drenderer : (dc: (Real, Real), " in text
     assert "Integrates a shader over the half plane." in text
-    assert "- interior: `dshader(x, y)((c, dc))*[x + y + c >= 0]`" in text
+    assert "- interior: `snd(dshader((x, 0), (y, 0))((c, dc)))*[x + y + c >= 0]`" in text
     assert "- boundary: `shader(x, y)(c)*delta(x + y + c)*dc`" in text
     assert "- `x + y + c = 0` moved by `c`; at `y = -x - c`" in text
 

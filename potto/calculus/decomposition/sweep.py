@@ -91,7 +91,6 @@ class _Pool(Struct):
                     self.put(factor.form, None, placed.turning, bool(placed.jumps) or placed.steps)
         return taken
 
-
     def take_points(self, variable: str) -> tuple[list[Term], tuple[Critical, ...]]:
         """The centers and critical places that depend on a variable."""
         here = [c for c in self.centers if variable in c.free]
@@ -189,5 +188,3 @@ def outer_findings(term: Integral, resolve: Resolve, decide: Decide) -> tuple[Fi
     )
     swept = sweep(term, (f for f in found if f.kind != "jump" or f.surface.free & inner), resolve, decide)
     return (*jumps, *swept.outer)
-
-

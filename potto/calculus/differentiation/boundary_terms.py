@@ -116,7 +116,17 @@ def _side(product: Term, factor: Term, variables: Iterable[str]) -> Term:
 def _same(root: Root, other: Root) -> bool:
     if root.variable != other.variable or (root.index is None) != (other.index is None):
         return False
-    return is_zero(sub(unguarded(root.at), unguarded(other.at)))
+    return is_zero(sub(unguarded(root.at), unguarded(other.at))) and not _apart(root.at, other.at)
+
+
+def _apart(first: Term, second: Term) -> bool:
+    """Whether one exists only where the other does not: each solves the equation of a root for one of its signs."""
+    known = {normalized_surface(surface) for surface in _guards(first)}
+    return any((canonical, -side) in known for canonical, side in map(normalized_surface, _guards(second)))
+
+
+def _guards(at: Term) -> list[Term]:
+    return [n.surface for n in postorder(at) if isinstance(n, Branch) and n.orelse is NAN]
 
 
 def _at_root(node: Integral, flips: Flips, root: Root, rate: Rate, sums: list[Loop]) -> Iterator[Term]:
@@ -213,8 +223,7 @@ def exists(at: Term, value: Term) -> Term:
     """`value` where `at` is a number, else 0: these conditions come first, and of roots of roots the inner ones, as a
     comparison with nan is nan.
     """
-    guards = [n.surface for n in postorder(at) if isinstance(n, Branch) and n.orelse is NAN]
-    for surface in guards:
+    for surface in _guards(at):
         value = branch((surface,), False, value, zero_like(value))
     for radicand in [n.args[0] for n in reversed(postorder(at)) if isinstance(n, Prim) and n.op in ("sqrt", "log")]:
         if not range_of(radicand).positive:

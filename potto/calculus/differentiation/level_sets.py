@@ -74,7 +74,6 @@ class LevelSet(Struct, frozen=True):
             return scaled(self.factor, div(ONE, size))
         return scaled(self.factor, div(size, _squared(slopes)))
 
-
     def standing(self, node: Integral, rate: Rate) -> list[Term]:
         """The derivative of the integral where the level set stands still."""
         moved = rate(self.factor)

@@ -1,9 +1,8 @@
 """The derivative of a definition, for a person to read: what `potto deriv` and hover show.
 
-Owns `explain_derivative`; how what it finds is laid out is in `explained`. First the derivative of each integrand with
+Owns `explain_derivative`; how what it finds is laid out is in `layout`. First the derivative of each integrand with
 its deltas, as in equation (2) of the paper, then what is left when the deltas are integrated out, then the surfaces and
-what moves each. Functions that are parameters stay symbols: `shader (x, y) c` and, for its tangent, `dshader (x, y)
-(c, dc)`.
+what moves each. Functions that are parameters stay symbols (`symbols`).
 """
 
 from __future__ import annotations
@@ -19,38 +18,30 @@ from potto.calculus.differentiation.derivative import NotSmooth
 from potto.calculus.differentiation.dual import Differentiator
 from potto.calculus.differentiation.higher_order import moving_deltas
 from potto.calculus.differentiation.level_sets import level_set
+from potto.calculus.explanation.fields import named_fields, parameter_types
 from potto.calculus.explanation.layout import DerivativeText, IntegralText, SurfaceText
+from potto.calculus.explanation.symbols import NoFormula, Rewrite, Words, over_functions
 from potto.calculus.inlining.expand import Resolve, heads_of
 from potto.calculus.solving.pivots import NoClosedForm, pivots
 from potto.calculus.solving.solve import factors
 from potto.calculus.surfaces.branch_assignment import branches_of
 from potto.calculus.surfaces.branch_cuts import opened
 from potto.calculus.surfaces.case_split import unnested
-from potto.calculus.surfaces.trace import spine
 from potto.core.printer import format_term
 from potto.core.simplify import normalized_surface, simplify
 from potto.core.terms import (
     ONE,
     ZERO,
-    App,
-    Branch,
     Deriv,
     Global,
     Integral,
     Lam,
-    Proj,
     Term,
-    Tuple,
-    Var,
     app,
     branch,
     children,
     integral,
     lam,
-    mul,
-    postorder,
-    rebuild,
-    tuple_,
     var,
 )
 from potto.diagnostics import PottoError
@@ -71,10 +62,18 @@ def explain_derivative(db: Database, file: str, name: str) -> DerivativeText:
     if original is not None:
         of, shown = original
         type = derivative_type(interface(db, of.module, of.name).type) if isinstance(of, Global) else found.type
-        text = describe(resolve(of) if isinstance(of, Global) else of, shown, format_type(type), resolve)
+        known = interface(db, of.module, of.name).type if isinstance(of, Global) else None
+        text = describe(
+            resolve(of) if isinstance(of, Global) else of, shown, format_type(type), resolve, _fields(db, known)
+        )
         return replace(text, by=name)
     given = _applied(term, found.type)
-    return describe(given, name, format_type(derivative_type(found.type)), resolve)
+    return describe(given, name, format_type(derivative_type(found.type)), resolve, _fields(db, found.type))
+
+
+def _fields(db: Database, type: Type | None) -> Rewrite:
+    known = parameter_types(type) if type is not None else {}
+    return lambda term: named_fields(db, term, known)
 
 
 def _original(term: Term, name: str, resolve: Resolve) -> tuple[Term, str] | None:
@@ -109,35 +108,47 @@ def _applied(term: Term, type: Type) -> Term:
     return body
 
 
-def describe(term: Term, name: str, type_text: str, resolve: Resolve) -> DerivativeText:
-    """The same for a term."""
+def describe(
+    term: Term, name: str, type_text: str, resolve: Resolve, fields: Rewrite = lambda term: term
+) -> DerivativeText:
+    """The same for a term; `fields` names those of records."""
     body, params = term, list[str]()
     while isinstance(body, Lam):
         params.extend(body.params)
         body = body.body
     body, conditions = unguarded(body)
-    functions = {p: f"d{p}" for p in params if p in heads_of(term)}
+    words = Words(
+        {p: f"d{p}" for p in params if p in heads_of(term)}, fields, frozenset(params) | {f"d{p}" for p in params}
+    )
     tangents: dict[str, Term] = {p: var(f"d{p}") for p in params}
     work = Differentiator(resolve, folding=True)
     problems: list[str] = []
     tangent = ""
     try:
-        tangent = _text(work.dual(opened(body), tangents)[1], functions)
+        tangent = words.text(_tangent(body, work, tangents))
     except NoClosedForm as problem:
         problems.append(f"a boundary is found by numbers: {problem}")
     except NotSmooth as problem:
         problems.append(f"the derivative has no closed form: {problem}")
+    except NoFormula as problem:
+        problems.append(str(problem))
     except PottoError as problem:
         problems.extend(d.message for d in problem.diagnostics)
     known = [work.carried_out(i) for i in _outermost(body)]
-    integrals = tuple(_integral(unnested(i), work, tangents, functions) for i in known if isinstance(i, Integral))
+    integrals = tuple(_integral(unnested(i), work, tangents, words) for i in known if isinstance(i, Integral))
     found = DerivativeText(name, type_text, tangent, isinstance(body, Integral), integrals, conditions)
     found = replace(found, problems=tuple(problems), smooth=tangent)
     if not integrals and not problems:
         plain = work.carried_out(body)
         found = replace(found, surfaces=_own_surfaces(plain, tangents))
-        return _with_deltas(found, plain, work, tangents, functions)
+        return _with_deltas(found, plain, work, tangents, words)
     return found
+
+
+def _tangent(body: Term, work: Differentiator, tangents: Mapping[str, Term]) -> Term:
+    """The whole derivative, deltas integrated out."""
+    found = work.dual(opened(body), tangents)[1]
+    return work.dual(opened(work.carried_out(body)), tangents)[1] if over_functions(found) else found
 
 
 def _outermost(term: Term) -> list[Integral]:
@@ -157,25 +168,23 @@ def _with_deltas(
     plain: Term,
     work: Differentiator,
     tangents: Mapping[str, Term],
-    functions: Mapping[str, str],
+    words: Words,
 ) -> DerivativeText:
     """A function that jumps over its parameters: its derivative is a distribution over what they are filled with."""
     try:
         over = jumps(opened(plain), tangents, lambda t: work.dual(t, tangents)[1])
-    except NotSmooth as problem:
+    except (NotSmooth, NoFormula) as problem:
         return replace(found, problems=(*found.problems, f"where it jumps has no closed form: {problem}"))
     if not over:
         return found
-    smooth = _text(work.dual(plain, tangents)[1], functions)  # calls carried out here too: else they count twice
-    deltas = tuple(_text(item.contribution, functions) for item in over if item.rate is not ZERO)
+    smooth = words.text(work.dual(plain, tangents)[1])  # calls carried out here too: else they count twice
+    deltas = tuple(words.text(item.contribution) for item in over if item.rate is not ZERO)
     first = f"({smooth})" if smooth.startswith("if ") else smooth  # an `else` would take in what is added
     parts = deltas if smooth == "0" and deltas else (first, *deltas)
     return replace(found, tangent=" + ".join(parts), smooth=smooth, deltas=deltas)
 
 
-def _integral(
-    node: Integral, work: Differentiator, tangents: Mapping[str, Term], functions: Mapping[str, str]
-) -> IntegralText:
+def _integral(node: Integral, work: Differentiator, tangents: Mapping[str, Term], words: Words) -> IntegralText:
     def rate(term: Term) -> Term:
         return work.dual(term, inside)[1]
 
@@ -185,20 +194,20 @@ def _integral(
     bounds: list[str] = []
     interior, reason = "", ""
     try:
-        interior = _text(rate(node.body), functions)
+        interior = words.text(rate(node.body), *node.variables)
         for item in jumps(opened(node.body), node.variables, rate):
-            deltas.append(_text(item.contribution, functions))
-        deltas += [_text(t, functions) for t in moving_deltas(node, rate)]
+            deltas.append(words.text(item.contribution, *node.variables))
+        deltas += [words.text(t, *node.variables) for t in moving_deltas(node, rate)]
         whole = opened(node)
         assert isinstance(whole, Integral)
         plain = without_deltas(whole, True)
         if isinstance(plain, Integral):
             reason = _why_searched(plain)
         if isinstance(plain, Integral) and level_set(plain) is None:
-            bounds = [_text(t, functions) for t in at_bounds(plain, rate)]
+            bounds = [words.text(t) for t in at_bounds(plain, rate)]
             swept = at_surfaces(plain, frozenset(inside), rate, True)
-            boundary = [_text(t, functions) for t in swept if not (isinstance(t, Integral) and level_set(t))]
-    except (NoClosedForm, NotSmooth) as problem:
+            boundary = [words.text(t) for t in swept if not (isinstance(t, Integral) and level_set(t))]
+    except (NoClosedForm, NotSmooth, NoFormula) as problem:
         reason = str(problem)
     except PottoError as problem:
         reason = problem.diagnostics[0].message
@@ -263,49 +272,3 @@ def _own_surfaces(body: Term, tangents: Mapping[str, Term]) -> tuple[SurfaceText
 def equation(surface: Term) -> str:
     """Where a surface is, as people write it: `x = t` for t - x."""
     return format_term(branch((surface,), False, ONE, ZERO))[1:-1].replace(">=", "=").replace("<=", "=")
-
-
-def _text(term: Term, functions: Mapping[str, str]) -> str:
-    """With brackets as factors, as people write them: what they guard against is not evaluated here."""
-    return format_term(simplify(_symbols(simplify(term), functions)))
-
-
-def _symbols(term: Term, functions: Mapping[str, str]) -> Term:
-    """Values and tangents of calls as symbols: `shader (x, y) c`, `dshader (x, y) (c, dc)`."""
-    originals = {dual: name for name, dual in functions.items()}
-    memo: dict[Term, Term] = {}
-    for node in postorder(term):
-        if isinstance(node, Proj) and isinstance(node.term, App):
-            head, groups = spine(node.term)
-            named = _named(head, originals)
-            if named is not None:
-                name, original = named
-                result: Term = original if node.index == 0 else name
-                for group in groups:
-                    args = [_symbols(a, functions) for a in group]
-                    result = app(result, tuple(_shown(a, node.index == 0, originals) for a in args))
-                memo[node] = result
-                continue
-        new = rebuild(node, tuple(memo[c] for c in children(node)))
-        if isinstance(new, Branch) and new.orelse is ZERO and not isinstance(new.then, Tuple) and new.then is not ONE:
-            new = mul(new.then, branch(new.coordinates, new.strict, ONE, ZERO))
-        memo[node] = new
-    return memo[term]
-
-
-def _named(head: Term, originals: Mapping[str, str]) -> tuple[Term, Term] | None:
-    """The symbol for the tangent of a call, and the function itself."""
-    if isinstance(head, Var) and head.name in originals:
-        return head, var(originals[head.name])
-    if isinstance(head, Deriv) and isinstance(head.function, Global):
-        return var(f"d{head.function.name}"), head.function
-    return None
-
-
-def _shown(arg: Term, primal: bool, originals: Mapping[str, str]) -> Term:
-    if isinstance(arg, Tuple) and len(arg.items) == 2:
-        value, tangent = arg.items
-        return value if primal or tangent is ZERO else tuple_((value, tangent))
-    if primal and isinstance(arg, Var) and arg.name in originals:
-        return var(originals[arg.name])
-    return arg.function if primal and isinstance(arg, Deriv) else arg

@@ -407,5 +407,3 @@ def _stem(node: Term) -> str:
             return "data"
         node = below[0]
     return node.name.split("@")[0]
-
-

@@ -98,9 +98,7 @@ class _Unrolling:
         whose steps jump as these."""
         if isinstance(node, App):
             return self.applied(node, depth)
-        if isinstance(node, Sum) and (
-            decides or any(isinstance(part, App | Branch) for part in postorder(node.body))
-        ):
+        if isinstance(node, Sum) and (decides or any(isinstance(part, App | Branch) for part in postorder(node.body))):
             return self.summed(node, depth)
         if isinstance(node, Fold) and any(isinstance(part, App | Branch) for part in postorder(node.body)):
             return self.stepped(node, depth)

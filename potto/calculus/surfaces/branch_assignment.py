@@ -71,14 +71,14 @@ class Loop(Struct, frozen=True):
 
 def loops_over(body: Term, branch_: Branch) -> list[Loop]:
     """The loops whose index a branch's surface uses, or the bounds of one of them, innermost first: it is one surface
-    for each value."""
-    found, names = list[Loop](), branch_.surface.free
+    for each value. Loops beside each other that name and count alike move what is in both at once: they are one."""
+    found, names = dict[Loop, None](), branch_.surface.free
     for node in postorder(body):
         if isinstance(node, Sum | Fold | Array) and node.variable in names:
             ends = (ZERO, sub(node.size, ONE)) if isinstance(node, Array) else (node.lo, node.hi)
-            found.append(Loop(node.variable, *ends))
+            found[Loop(node.variable, *ends)] = None
             names = names.union(*(end.free for end in ends))
-    return found
+    return list(found)
 
 
 class Flip(Struct, frozen=True):

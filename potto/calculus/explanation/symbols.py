@@ -1,0 +1,172 @@
+"""Calls in a derivative as a program writes them, with names that exist.
+
+Owns `Words`, `symbols` and `over_functions`. Derivatives take and give pairs: what moves `f(c)` is the second of one,
+`snd(deriv(f)((c, dc)))`, and of a parameter `shader`, whose derivative is given too, `snd(dshader((x, 0))((c, dc)))`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from msgspec import Struct
+
+from potto.calculus.algebra.radicals import NAN
+from potto.calculus.surfaces.trace import spine
+from potto.core.printer import format_term
+from potto.core.simplify import simplify
+from potto.core.terms import (
+    ONE,
+    ZERO,
+    App,
+    Array,
+    Branch,
+    Deriv,
+    Fold,
+    Global,
+    If,
+    Lam,
+    Prim,
+    Proj,
+    Sum,
+    Term,
+    Tuple,
+    Var,
+    app,
+    branch,
+    children,
+    mul,
+    postorder,
+    proj,
+    rebuild,
+    transform,
+    var,
+)
+
+_SECOND = var("snd")
+Rewrite = Callable[[Term], Term]
+
+
+class NoFormula(Exception):
+    """Internal: nothing that can be written, or that anybody would read. The text says which."""
+
+
+class Words(Struct, frozen=True):
+    """How the terms of one derivative are written: the names of its parameters' derivatives, the fields of records."""
+
+    functions: Mapping[str, str]
+    fields: Rewrite
+    names: frozenset[str]
+
+    def text(self, term: Term, *inside: str) -> str:
+        """A formula that is Potto, in the parameters, their tangents and the variables it is `inside` of. Raises
+        NoFormula."""
+        plain = symbols(without_guards(simplify(term)), self.functions)
+        known = self.names | {"snd", *inside}
+        strangers = {name for name in plain.free - known if name.rstrip("'") != "delta"}  # `delta'`: its derivative
+        if strangers:
+            raise NoFormula(f"where it jumps depends on `{min(strangers)}`, over which it is summed")
+        text = format_term(simplify(self.fields(plain)))
+        if "..." in text:
+            raise NoFormula("the formula is too long to be shown")
+        return text
+
+
+def symbols(term: Term, functions: Mapping[str, str]) -> Term:
+    """Values of calls as calls, tangents as those of derivatives; `functions`: the names of parameters' derivatives.
+
+    Brackets become factors, as people write them: what they guard against is not evaluated here.
+    """
+    originals = {dual: name for name, dual in functions.items()}
+    memo: dict[Term, Term] = {}
+    for node in postorder(term):
+        if isinstance(node, Proj):
+            memo[node] = _projection(node, functions, originals, memo)
+        else:
+            memo[node] = _factored(rebuild(node, tuple(memo[c] for c in children(node))))
+    return memo[term]
+
+
+def without_guards(term: Term) -> Term:
+    """Without what is decided for single values of numbers, and without `nan` where there is no root: brackets around
+    it say where it is."""
+    indices = {node.variable for node in postorder(term) if isinstance(node, Sum | Array | Fold)}
+
+    def change(_: Term, new: Term) -> Term:
+        match new:
+            case If(condition=Prim(op="eq", args=(left, right)), then=then, orelse=orelse) if (
+                then is ZERO and right is ZERO and not left.free <= indices
+            ):
+                return orelse
+            case Branch(then=then, orelse=orelse) if orelse is NAN:
+                return then
+            case _:
+                return new
+
+    return transform(term, change)
+
+
+def _factored(node: Term) -> Term:
+    """What is 0 elsewhere as a product with a bracket."""
+    if isinstance(node, Branch) and node.orelse is ZERO and node.then is not ONE and not isinstance(node.then, Tuple):
+        return mul(node.then, branch(node.coordinates, node.strict, ONE, ZERO))
+    return node
+
+
+def _projection(
+    node: Proj, functions: Mapping[str, str], originals: Mapping[str, str], memo: Mapping[Term, Term]
+) -> Term:
+    """A part of something: of a call of a derivative the value or the tangent."""
+    inner = memo[node.term]
+    if inner is ZERO:  # a part of a tangent of which nothing moves
+        return ZERO
+    if not isinstance(node.term, App):
+        return rebuild(node, (inner,))
+    head, groups = spine(node.term)
+    given = isinstance(head, Var) and head.name in originals
+    if not given and not (isinstance(head, Deriv) and isinstance(head.function, Global)):
+        return rebuild(node, (inner,))
+    shown = [tuple(symbols(a, functions) for a in group) for group in groups]
+    if node.index == 0:
+        assert isinstance(head, Var | Deriv)
+        original = var(originals[head.name]) if isinstance(head, Var) else head.function
+        return _call(original, [tuple(_value(a, originals) for a in group) for group in shown])
+    if given:
+        return app(_SECOND, (_call(head, shown),))
+    if not any(_moves(a) for group in shown for a in group):
+        return ZERO
+    return app(_SECOND, (_call(head, [tuple(_shortened(a) for a in group) for group in shown]),))
+
+
+def _call(head: Term, groups: list[tuple[Term, ...]]) -> Term:
+    for group in groups:
+        head = app(head, group)
+    return head
+
+
+def _value(arg: Term, originals: Mapping[str, str]) -> Term:
+    """The value of a dual."""
+    if isinstance(arg, Tuple) and len(arg.items) == 2:
+        return arg.items[0]
+    if isinstance(arg, Var) and arg.name in originals:
+        return var(originals[arg.name])
+    return arg.function if isinstance(arg, Deriv) else proj(arg, 0)
+
+
+def over_functions(term: Term) -> bool:
+    """Whether a derivative is given a function that is written out: its parameters are pairs, which nobody reads."""
+    heads = (spine(node) for node in postorder(term) if isinstance(node, App))
+    return any(isinstance(arg, Lam) for head, groups in heads if isinstance(head, Deriv) for g in groups for arg in g)
+
+
+def _moves(arg: Term) -> bool:
+    """Whether an argument of a derivative is one that can move what it is given to."""
+    return not (isinstance(arg, Tuple) and len(arg.items) == 2 and _zero(arg.items[1])) and not isinstance(arg, Deriv)
+
+
+def _shortened(arg: Term) -> Term:
+    """A plain number stands for a dual that does not move."""
+    return arg.items[0] if isinstance(arg, Tuple) and len(arg.items) == 2 and arg.items[1] is ZERO else arg
+
+
+def _zero(term: Term) -> bool:
+    return term is ZERO or (isinstance(term, Tuple) and all(map(_zero, term.items)))
