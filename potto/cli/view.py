@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from typing import TYPE_CHECKING
 
 from potto.cli.calling import add_set, assignment
 from potto.cli.console import Console
 from potto.cli.numbers import add_options, settings_of
+
+if TYPE_CHECKING:
+    from potto.evaluating.world import World
 
 SUMMARY = "look at an integral: its domain, what jumps where, and what moves"
 EXAMPLE = """  potto view examples/worked/picture.po pixel x=0.7 y=0 r=0.7 --wrt r -o pixel.svg
@@ -15,13 +19,14 @@ EXAMPLE = """  potto view examples/worked/picture.po pixel x=0.7 y=0 r=0.7 --wrt
 
 def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", help="the program")
-    parser.add_argument("name", metavar="NAME", help="the function whose integral is seen")
+    parser.add_argument("name", metavar="NAME", nargs="?", help="the function whose integral is seen")
     parser.add_argument("given", metavar="NAME=EXPR", nargs="*", type=assignment, help="what parameters are given; "
                         "others start as a live expression of the file gives them, or as 0.5")  # fmt: skip
     parser.add_argument("--wrt", metavar="NAME", help="the parameter that moves (default: the first on which the "
                         "derivative depends)")  # fmt: skip
     parser.add_argument("--integral", metavar="N", type=_count, default=1, help="which one of several (default 1)")
-    parser.add_argument("-o", "--output", metavar="FILE", help="the picture, .svg (default: NAME.svg)")
+    parser.add_argument("-o", "--output", metavar="FILE", help="write a picture, .svg (else: a page in the browser)")
+    parser.add_argument("--no-open", action="store_true", help="say the address of the page, open no browser")
     add_set(parser)
     add_options(parser)
 
@@ -45,24 +50,29 @@ def run(options: argparse.Namespace, console: Console) -> int:
     chosen = settings_of(options, console)
     if chosen is None:
         return 2
-    path = options.output or f"{options.name}.svg"
-    if not path.endswith(".svg"):
-        console.complain(f"potto view: {path} does not end with .svg, which is what a view is written as")
+    path = options.output
+    if path is not None and (options.name is None or not path.endswith(".svg")):
+        wrong = (
+            f"{path} does not end with .svg" if options.name else "say whose integral: `potto view FILE NAME -o FILE`"
+        )
+        console.complain(f"potto view: {wrong}")
         return 2
     world = World(["."])
     try:
         file = opened(world, options.file, options.set)
+        if path is None and not options.json:
+            with settings(**asdict(chosen)):
+                return _page(world, file, options, console)
+        if options.name is None:
+            console.complain("potto view: say whose integral: `potto view FILE NAME --json`")
+            return 2
         with settings(**asdict(chosen)):
             found = IntegralScene(world, file, options.name, dict(options.given))
             wrt = options.wrt or found.moving
             shot = found.look(found.values, wrt, options.integral - 1)
     except PottoError as error:
         return fail(error, options, console)
-    try:
-        with open(path, "w", encoding="utf-8") as out:
-            out.write(shot.svg)
-    except OSError as error:
-        console.complain(f"potto view: {path} cannot be written: {error.strerror}")
+    if path is not None and not _written(path, shot.svg, console):
         return 1
     if options.json:
         console.answer_json({"file": path, "wrt": wrt, "values": found.values, "numbers": to_builtins(shot.numbers),
@@ -70,4 +80,33 @@ def run(options: argparse.Namespace, console: Console) -> int:
     else:
         count = len(shot.view.surfaces)
         console.answer(f"{path}: {options.name} by {wrt}, {count} surface{'' if count == 1 else 's'}")
+    return 0
+
+
+def _written(path: str, text: str, console: Console) -> bool:
+    try:
+        with open(path, "w", encoding="utf-8") as out:
+            out.write(text)
+    except OSError as error:
+        console.complain(f"potto view: {path} cannot be written: {error.strerror}")
+        return False
+    return True
+
+
+def _page(world: World, file: str, options: argparse.Namespace, console: Console) -> int:
+    """Answer the page until Ctrl+C."""
+    import webbrowser
+    from contextlib import suppress
+
+    from potto.cli.view_page import Answers, serve
+
+    answers = Answers(world, file, options.name, dict(options.given), options.wrt)
+    server, address = serve(answers)
+    with server:
+        console.answer(f"{address}\nCtrl+C ends it")
+        if not options.no_open:
+            webbrowser.open(address)
+        with suppress(KeyboardInterrupt):
+            server.serve_forever()
+    answers.close()
     return 0

@@ -23,7 +23,7 @@ def test_values_start_as_a_live_expression_gives_them(potto: Potto) -> None:
 
 
 def test_what_is_wrong_is_said(potto: Potto) -> None:
-    assert potto("view", "main.po", "f", "q=1", main=PROGRAM).status == 1
-    assert "no parameter `q`" in potto("view", "main.po", "f", "q=1", main=PROGRAM).err
+    assert potto("view", "main.po", "f", "q=1", "-o", "f.svg", main=PROGRAM).status == 1
+    assert "no parameter `q`" in potto("view", "main.po", "f", "q=1", "-o", "f.svg", main=PROGRAM).err
     assert potto("view", "main.po", "f", "-o", "f.gif", main=PROGRAM).status == 2
     assert potto("view", "main.po", "f", "-o", "none/f.svg", main=PROGRAM).status == 1
