@@ -6,6 +6,7 @@ plane in conics: so the reference knows a closed form where Potto is told none.
 
 from __future__ import annotations
 
+import runpy
 import time
 from itertools import product
 from typing import Any
@@ -251,3 +252,15 @@ def test_no_pixel_takes_much_longer_than_the_others(kind: str) -> None:
             best.append(time.process_time() - start)
         times.append(min(best))
     assert max(times) < 20 * np.median(times)
+
+
+def test_what_moves_the_picture() -> None:
+    """By depth everything inside of the triangle; in two tones its edges by the corner, and the light moves no edge."""
+    lit: Any = runpy.run_path(str(EXAMPLES / "raytrace" / "sparsity.py"))["lit"]
+    given = {"q": -0.2, "ex": 0.0, "focal": 1.0}
+    near, _ = lit(MAIN.by_depth, 19, given)  # pixels of the height that MAIN has
+    tones, _ = lit(MAIN.two_tones, 19, {**given, "lx": 0.2, "threshold": 0.8})
+    corner, light, camera = np.moveaxis(tones, -1, 0)
+    assert near[..., 0].sum() > 2 * corner.sum() > 0 and not near[..., 1].any()
+    assert light.any() and light.sum() < corner.sum() and not (corner & ~near[..., 2]).any()
+    assert camera.sum() >= corner.sum()
