@@ -107,3 +107,40 @@ def f(n, t) integral [0, t] power(n, x)*[x < t/2] d(x)
 """).f
     n, t = np.array([0.0, 1, 2, 3, 2]), np.array([0.5, 1, 1.5, 2, 0.25])
     assert f(n, t).value == pytest.approx((t / 2) ** (n + 1) / (n + 1), rel=1e-13)
+
+
+def test_ranges_that_grow_with_a_variable_drawn_end_where_its_density_leaves_nothing() -> None:
+    """int_0^inf e^(-y/2) [sin 4y < t] dy: 2 less the stretches from asin(t)/4 to (pi - asin(t))/4, again each pi/2.
+    What lies beyond y = 300 is e^-150, and the roots there were looked for up to where doubles end."""
+    t = 0.3
+    a, repeated = math.asin(t) / 4, 1 - math.exp(-math.pi / 4)
+    low, high = math.exp(-a / 2), math.exp(-(math.pi / 4 - a) / 2)
+    text = "def f(t) integral (x ~ exponential(0.5)) (integral [0, x] [sin(4*y) < t] d(y)) d(x)"
+    answer = potto.deriv(potto.compile(text).f)((t, 1.0))
+    assert answer.value == pytest.approx(2 - 2 * (low - high) / repeated, abs=answer.error)
+    slope = (low + high) / (4 * math.sqrt(1 - t * t)) / repeated
+    assert answer.tangent == pytest.approx(slope, abs=answer.tangent_error)
+    assert answer.error < 1e-10 and answer.tangent_error < 1e-9 and answer.evals < 20_000_000
+
+
+def test_an_edge_along_a_side_of_the_box_up_to_rounding_leaves_no_infinite_area() -> None:
+    """A triangle that has a sliver of some 1e-24 in common with the box: lengths that are rounding do not grow."""
+    f = potto.compile("""
+def edge(ax, ay, bx, by, x, y) (bx - ax)*(y - ay) - (by - ay)*(x - ax)
+def f(ax, ay, bx, by, cx, cy, u, v, h) integral ([u, u + h], [v, v + h])
+    [edge(ax, ay, bx, by, x, y) >= 0 and edge(bx, by, cx, cy, x, y) >= 0 and edge(cx, cy, ax, ay, x, y) >= 0] d(x, y)
+""").f
+    corners = (0.140625001, 0.781250000000001, 0.140625, 0.21875, 0.671875000000001, 0.750000001)
+    answer = f(*corners, 0.140625, 0.78125, 1 / 64)
+    assert 0 <= answer.value < 1e-22
+    assert answer.error < 1e-22
+
+
+def test_samples_of_a_surface_across_a_variable_whose_range_follows_another() -> None:
+    """The place along z where sections leave the range of x depends on y, which is not placed before x: it crashed.
+    Below the plane x + y + z < t lies t^3/6 of the pyramid x + y < 1, z < 1, for t < 1."""
+    text = "def f(t) integral [0, 1] (integral [0, 1 - x] (integral [0, 1] [x + y + z < t] d(z)) d(y)) d(x)"
+    with potto.settings(method="mc", samples=4000, seed=1):
+        answer = potto.deriv(potto.compile(text).f)((0.7, 1.0))
+    assert abs(answer.value - 0.7**3 / 6) <= answer.error
+    assert abs(answer.tangent - 0.7**2 / 2) <= answer.tangent_error

@@ -164,7 +164,7 @@ def _growth(work: PanelBatch, index: Ints, high: bool) -> Array:
     near = np.where(turning[:, None], np.array(NEAR_TURNING), np.array(NEAR))
     u, rest = (1 - near, near) if high else (near, 1 - near)
     x, slope, label = substitution.points(seg, u, rest)
-    h, _ = work.values(seg, index, x, label, slope)
+    h, inner = work.values(seg, index, x, label, slope)
     h = h.reshape(work.width, -1, *h.shape[1:])[:, 0]
     with np.errstate(all="ignore"):
         power = np.log(h[..., 2] / h[..., 1]) / np.log(10.0)
@@ -174,4 +174,7 @@ def _growth(work: PanelBatch, index: Ints, high: bool) -> Array:
         least = 1 - np.where(np.isfinite(off), off, POWER)
         steady = np.isinf(h[..., 2]) | ((power >= least) & (before >= least))
         counts = ~(np.abs(h[..., 2]) * near[:, 2] < BLAMED * np.abs(h[..., 3:]).max(axis=-1))
+    if inner is not None:  # what integrals further in may be off says nothing of growth
+        own = inner.reshape(work.width, -1, *inner.shape[1:])[:, 0, :, 2]
+        counts &= ~(np.isfinite(own) & (np.abs(h[..., 2]) <= NOISE * own))
     return np.where(counts, np.where(steady, np.sign(h[..., 2]), np.nan), 0.0)

@@ -61,10 +61,23 @@ def _volume(plan: Plan, number: int, box: dict[str, Interval], batch: int) -> Ar
     return volume
 
 
+def _stretches(plan: Plan, number: int, box: dict[str, Interval]) -> Array:
+    """The size of the ranges of the variables further in, none of them infinite on shells of this one: (B, places)."""
+    volume: Array = np.ones(())
+    box = dict(box)
+    for level in (each.level for each in plan.levels[number + 1 :]):
+        below, above = enclosure((level.lo, level.hi), box)
+        box[level.variable] = ends = np.fmin(below[0], above[0]), np.fmax(below[1], above[1])
+        with np.errstate(invalid="ignore"):
+            volume = volume * (ends[1] - ends[0])
+    return np.where(np.isnan(volume), np.inf, volume)
+
+
 class _Range:
     """The range of one variable, others in a box."""
 
     def __init__(self, plan: Plan, number: int, box: dict[str, Interval], low: Array, high: Array) -> None:
+        self.plan, self.number = plan, number
         self.body, self.box = plan.mass, dict(box)
         self.level, self.low, self.high = plan.levels[number].level, low, high
 
@@ -113,8 +126,11 @@ class _Range:
         box = {**self.box, self.level.variable: ends if side > 0 else ends[::-1]}
         lo, hi = (np.broadcast_to(end, ends[0].shape) for end in enclosure((self.body,), box)[0])
         size = np.where(np.isnan(lo), 0.0, np.maximum(np.abs(lo), np.abs(hi)))
+        within = volume[:, None]
+        if np.isinf(volume).any():  # ranges further in that grow with this variable
+            within = np.minimum(within, _stretches(self.plan, self.number, box))
         with np.errstate(invalid="ignore"):
-            return np.where(size == 0, 0.0, size * np.abs(ends[1] - ends[0]) * volume[:, None])
+            return np.where(size == 0, 0.0, size * np.abs(ends[1] - ends[0]) * within)
 
 
 def _first(held: Array, allowed: Array) -> tuple[Any, Array]:

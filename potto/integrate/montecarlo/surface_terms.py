@@ -183,8 +183,9 @@ class Surface(Struct, dict=True):
             level = self.chart.plan.levels[number]
             if number == self.number and number not in along.follows:
                 ends = leaving(self.chart.plan.term, self.term, pivot, number)
-                u, weight = self.chart.crowded(ends, point.env, u)
-                labels[number] = u
+                if point.env.keys() >= set(ends.frame.params):  # others follow the pivot
+                    u, weight = self.chart.crowded(ends, point.env, u)
+                    labels[number] = u
             if number not in along.follows:
                 point = self.chart.place(point, labels, number, number + 1, directions=0)
             else:
