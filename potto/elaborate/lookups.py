@@ -2,7 +2,7 @@
 
 `interp` begins with the first value and adds, segment by segment, the slope times how far into the segment it goes:
 beyond the ends it is what it is there. `image` weighs pixels by how near their centres are. The kinks are those of
-`clamp` and `tent`, which the integrator knows.
+`between`, `clamp` and `tent`, which the integrator knows.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from potto.core.terms import (
     apply,
     array,
     const,
-    div,
     index,
     length,
     mul,
@@ -40,7 +39,7 @@ def interp(elaboration: Elaboration, xs: Term, ys: Term, x: Term) -> Term:
     place = _number(elaboration)
     size, after, first = length(xs), add(place, ONE), index(ys, ZERO)
     left, right = element(xs, place, size), element(xs, after, size)
-    into = div(apply("clamp", sub(x, left), ZERO, sub(right, left)), sub(right, left))
+    into = apply("between", x, left, right)
 
     def at(read: Read) -> Term:
         rise = mul(sub(read(element(ys, after, size)), read(element(ys, place, size))), into)

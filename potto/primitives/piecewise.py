@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import math
 from itertools import combinations
+from typing import Any
 
-from potto.core.terms import ONE, ZERO, Term, add, branch, const, neg, prim, sub
+from potto.core.terms import ONE, ZERO, Term, add, branch, const, div, mul, neg, prim, sub
 from potto.primitives.bounds import ends, extreme
-from potto.primitives.registry import Primitive, Terms, register
+from potto.primitives.registry import Elementwise, Ends, Primitive, Terms, register
 
 
 def _absolute_roots(y: Term) -> Terms:
@@ -140,8 +141,8 @@ tent = register(
         "tent",
         arity=1,
         surface=False,
-        lacks=frozenset({"discs"}),
         formula=lambda x: prim("max", ZERO, sub(ONE, prim("abs", x))),
+        cases=lambda x: (x, prim("max", ZERO, sub(ONE, x)), prim("max", ZERO, add(x, ONE))),
         doc="1 - |x| where that is positive, else 0: how near a place is to one of a lattice.",
         turns=(0.0,),
         image=(0.0, 1.0),
@@ -168,6 +169,42 @@ clamp = register(
         domain=((-1e3, 1e3), (-1e3, 1e3), (-1e3, 1e3)),
         kinks=lambda x, lo, hi: (sub(x, lo), sub(hi, x), sub(hi, lo)),
         example="clamp(1.5, 0, 1)",
+    )
+)
+
+def _between_partials(x: Term, a: Term, b: Term) -> Terms:
+    """As clamp has them: at a it moves, at b no more."""
+    way = sub(b, a)
+
+    def inside(slope: Term) -> Term:
+        return branch((sub(x, a),), False, branch((sub(b, x),), True, slope, ZERO), ZERO)
+
+    return inside(div(ONE, way)), inside(div(sub(x, b), mul(way, way))), inside(div(sub(a, x), mul(way, way)))
+
+
+def _between_ends(ops: Elementwise, x: Ends, a: Ends, b: Ends) -> Ends:
+    """It rises with x and falls with a and b, where a is before b."""
+
+    def part(x: Any, a: Any, b: Any) -> Any:
+        return ops.most(ops.least((x - a) / (b - a), 1.0), 0.0)
+
+    apart = a[1] < b[0]
+    return ops.where(apart, part(x[0], a[1], b[1]), 0.0), ops.where(apart, part(x[1], a[0], b[0]), 1.0)
+
+
+between = register(
+    Primitive(
+        "between",
+        arity=3,
+        surface=False,
+        formula=lambda x, a, b: div(prim("clamp", sub(x, a), ZERO, sub(b, a)), sub(b, a)),
+        cases=lambda x, a, b: (sub(x, a), prim("min", div(sub(x, a), sub(b, a)), ONE), ZERO),
+        doc="How much of the way from a to b is behind at x: 0 before a, 1 from b on.",
+        partials=_between_partials,
+        interval=_between_ends,
+        kinks=lambda x, a, b: (sub(x, a), sub(b, x)),
+        domain=((-1e3, 1e3), (-1e3, -1e-3), (1e-3, 1e3)),
+        example="interp([0, 2], [0, 1], 0.5)",
     )
 )
 

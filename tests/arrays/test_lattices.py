@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Callable
+
 import mpmath as mp
 import numpy as np
 import pytest
@@ -13,6 +16,8 @@ def line(x) interp([0, 1, 2], [0, 1, 3], x)
 def picked(photo: [h, w] Real, u, v) image(photo, u, v)
 def lit(photo: [h, w] Real, a, b, s) integral ([a, a + s], [b, b + s]) image(photo, u, v)^2*(u + 2*v) d(u, v)
 def above(photo: [h, w] Real, a, b, s, t) integral ([a, a + s], [b, b + s]) [image(photo, u, v) > t] d(u, v)
+def table(xs: [n] Real, ys: [n] Real, a, b) integral [a, b] interp(xs, ys, x)^2 d(x)
+def higher(xs: [n] Real, ys: [n] Real, a, b, t) integral [a, b] [interp(xs, ys, x) > t]*x d(x)
 def across(photo: [h, w] Real, c, t) integral [0, 1] [image(photo, c*x, x) > t] d(x)
 """
 
@@ -38,13 +43,22 @@ def borders(low: float, high: float, count: int) -> list[mp.mpf]:
     return [mp.mpf(low), *(inside if low < high else inside[::-1]), mp.mpf(high)]
 
 
+def exact(f: Callable[[mp.mpf], mp.mpf], ends: list[mp.mpf]) -> mp.mpf:
+    """The integral of what is a polynomial of degree 5 at most between these places, by three nodes of Gauss."""
+    total, node = mp.mpf(0), mp.sqrt(mp.mpf(3) / 5)
+    for low, high in itertools.pairwise(ends):
+        middle, half = (low + high) / 2, (high - low) / 2
+        total += half * (5 * f(middle - half * node) + 8 * f(middle) + 5 * f(middle + half * node)) / 9
+    return total
+
+
 def squared(photo: np.ndarray, a: float, b: float, s: float) -> mp.mpf:
     h, w = photo.shape
 
     def row(v: mp.mpf) -> mp.mpf:
-        return mp.quad(lambda u: bilinear(photo, u, v) ** 2 * (u + 2 * v), borders(a, a + s, w), maxdegree=3)
+        return exact(lambda u: bilinear(photo, u, v) ** 2 * (u + 2 * v), borders(a, a + s, w))
 
-    return mp.quad(row, borders(b, b + s, h), maxdegree=3)
+    return exact(row, borders(b, b + s, h))
 
 
 # Slopes at places
@@ -101,9 +115,7 @@ def test_points_in_pictures_of_all_sizes(programs: potto.Module, size: tuple[int
         ((2, 2), 0.4, 0.3, 0.0),
     ],
 )
-def test_the_square_of_a_look_up(
-    programs: potto.Module, size: tuple[int, int], a: float, b: float, s: float
-) -> None:
+def test_the_square_of_a_look_up(programs: potto.Module, size: tuple[int, int], a: float, b: float, s: float) -> None:
     photo = np.random.default_rng(7).random(size)
     found = potto.grad(programs.lit, ("a", "b", "s"))(photo, a, b, s)
     assert abs(found.value - squared(photo, a, b, s)) <= found.error + 1e-16 < 1e-12
@@ -153,3 +165,39 @@ def passed(t) integral ([0, 1], [0, 1]) image(photo, u, v)^2*[u < t] d(u, v)
     assert potto.grad(function, "t")(1.0).notes
     several = potto.grad(function, "t")(np.array([0.5, 0.6, 1.0]))
     assert several.tangent[0] == pytest.approx(column, abs=1e-14) and len(several.notes) == 1
+
+
+# Tables
+
+
+def line(xs: np.ndarray, ys: np.ndarray, x: mp.mpf) -> mp.mpf:
+    k = int(np.clip(np.searchsorted(xs, float(x), side="right") - 1, 0, len(xs) - 2))
+    way = (min(max(x, mp.mpf(xs[0])), mp.mpf(xs[-1])) - mp.mpf(xs[k])) / (mp.mpf(xs[k + 1]) - mp.mpf(xs[k]))
+    return mp.mpf(ys[k]) + way * (mp.mpf(ys[k + 1]) - mp.mpf(ys[k]))
+
+
+@pytest.mark.parametrize(("a", "b"), [(0.1, 0.9), (-0.5, 1.5), (0.8, 0.2), (0.25, 0.75), (0.3, 0.3)])
+@pytest.mark.parametrize("count", [2, 5, 40])
+def test_the_square_of_a_table(programs: potto.Module, a: float, b: float, count: int) -> None:
+    """0.25 and 0.75 are places of the table of five."""
+    xs, ys = np.linspace(0, 1, count), np.random.default_rng(count).random(count)
+    found = potto.grad(programs.table, ("a", "b", "ys"))(xs, ys, a, b)
+    ends = [mp.mpf(a), *(mp.mpf(x) for x in sorted(xs, reverse=b < a) if min(a, b) < x < max(a, b)), mp.mpf(b)]
+    wanted = exact(lambda x: line(xs, ys, x) ** 2, ends)
+    assert abs(found.value - wanted) <= found.error + 1e-16
+    assert found.tangent[0] == pytest.approx(-(float(line(xs, ys, mp.mpf(a))) ** 2), abs=1e-12)
+    assert found.tangent[1] == pytest.approx(float(line(xs, ys, mp.mpf(b))) ** 2, abs=1e-12)
+    moved = programs.table(xs, ys + 1e-6, a, b).value - programs.table(xs, ys - 1e-6, a, b).value
+    assert np.sum(found.tangent[2]) == pytest.approx(moved / 2e-6, abs=1e-8)  # differences of doubles
+    assert found.converged
+
+
+def test_a_condition_on_a_table(programs: potto.Module) -> None:
+    """A zigzag between 0 and 1 is above t in two stretches about each of its peaks, of length 2*(1 - t) places."""
+    count, t = 41, 0.3
+    xs = np.arange(count) / (count - 1)
+    ys = (np.arange(count) % 2).astype(float)
+    found = potto.grad(programs.higher, "t")(xs, ys, 0, 1, t)
+    step, peaks = 1 / (count - 1), xs[1::2]
+    assert abs(found.value - np.sum(peaks) * 2 * (1 - t) * step) <= found.error + 1e-15 < 1e-12
+    assert abs(found.tangent + np.sum(peaks) * 2 * step) <= found.tangent_error + 1e-14 < 1e-11

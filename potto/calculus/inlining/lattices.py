@@ -17,8 +17,10 @@ from potto.core.binders import apart
 from potto.core.terms import (
     ONE,
     ZERO,
+    Index,
     Integral,
     Prim,
+    Proj,
     Sum,
     Term,
     add,
@@ -48,30 +50,31 @@ REACH = 4  # places around the middle of tents, beyond which they are 0, however
 @lru_cache(maxsize=4096)
 def middle(term: Sum) -> Term | None:
     """Around which place the tent stands that the terms of a sum are in proportion to; None if there is none."""
-    body = term.body
-    for factor in body.args if isinstance(body, Prim) and body.op == "mul" else (body,):
-        if isinstance(factor, Prim) and factor.op == "tent":
-            found = substitute(factor.args[0], {term.variable: ZERO})
-            if sub(found, var(term.variable)) is factor.args[0]:
-                return found
-    return None
+    factor = _factor(term, "tent")
+    if factor is None:
+        return None
+    found = substitute(factor.args[0], {term.variable: ZERO})
+    return found if sub(found, var(term.variable)) is factor.args[0] else None
 
 
 class Walk(Struct, frozen=True):
-    """A look-up along a variable: at the place `slope * x + start`, kept between 0 and `last`."""
+    """A look-up along a variable: at the place `slope * x + start` of a lattice.
 
-    middle: Term
+    cells: of a place on a border the cell above, and that below it. border: between a cell and the one before it, by
+    its number; behind: the number of the last cell, which has no end, as that before the first, -1, has none. look: a
+    sum over the lattice, where the place is in a cell; None for other sums.
+    """
+
     variable: str
     slope: Term
     start: Term
-    last: Term
+    cells: Callable[[Term], tuple[Term, Term]]
+    border: Callable[[Term], Term]
+    behind: Term
+    look: Callable[[Sum, Term, Term], Term | None]
 
     def place(self, x: Term) -> Term:
         return add(mul(self.slope, x), self.start)
-
-    def cell(self, place: Term) -> Term:
-        """The number of a cell; that before the first and that behind the last have no end."""
-        return apply("clamp", place, const(-1), self.last)
 
 
 def by_cells(term: Integral) -> Term:
@@ -90,10 +93,10 @@ def _by_cells(term: Integral, varying: frozenset[str]) -> Term:
     number = term.variables.index(walk.variable)
     low, high = term.bounds[number]
     rising, count, begin = _course(walk, low, high)
-    cell = _exact(add(begin, if_(rising, var(step), neg(var(step)))), walk.last)
+    cell = _exact(add(begin, if_(rising, var(step), neg(var(step)))), walk.behind)
 
     def border(up: Term) -> Term:
-        return div(sub(add(cell, up), walk.start), walk.slope)
+        return div(sub(walk.border(add(cell, up)), walk.start), walk.slope)
 
     first, last = prim("eq", var(step), ZERO), prim("eq", var(step), count)
     bounds = list(term.bounds)
@@ -107,9 +110,7 @@ def _by_cells(term: Integral, varying: frozenset[str]) -> Term:
 
 def _course(walk: Walk, low: Term, high: Term) -> tuple[Term, Term, Term]:
     """Whether places rise on the way, how many borders between cells are crossed, and the cell that it begins in."""
-    ends = [(walk.cell(apply("floor", place)), walk.cell(sub(apply("ceil", place), ONE)))
-            for place in (walk.place(low), walk.place(high))]  # fmt: skip
-    (above, below), (above_last, below_last) = ends  # of a place on a border the cell above it, and that below
+    (above, below), (above_last, below_last) = walk.cells(walk.place(low)), walk.cells(walk.place(high))
     rising = prim("le", above, above_last)
     up, down = sub(below_last, above), sub(below, above_last)
     return rising, apply("max", ZERO, if_(rising, up, down)), if_(rising, above, below)
@@ -126,39 +127,125 @@ def _walk(term: Integral, varying: frozenset[str]) -> Walk | None:
     for node in postorder(term.body):
         if not isinstance(node, Sum) or node.lo is not ZERO:
             continue
-        at = middle(node)
-        if not isinstance(at, Prim) or at.op != "clamp" or at.args[1:] != (ZERO, node.hi):
-            continue
-        own = at.free & varying
-        if len(own) != 1 or not own <= set(term.variables):
+        found = _pixels(node) or _table(node)
+        own = found[0].free & varying if found else frozenset()
+        if found is None or len(own) != 1 or not own <= set(term.variables):
             continue
         (variable,) = own
         low, high = term.bounds[term.variables.index(variable)]
-        if not varying.isdisjoint(low.free | high.free):
-            continue
-        found = affine(at.args[0], (variable,))
-        if found is not None:
-            return Walk(at, variable, found.coefficients[0], found.rest, node.hi)
+        line = affine(found[0], (variable,))
+        if line is not None and varying.isdisjoint(low.free | high.free):
+            return Walk(variable, line.coefficients[0], line.rest, *found[1:])
     return None
 
 
 def _inside(body: Term, walk: Walk, cell: Term) -> Term:
-    """An integrand where the look-up is in one cell: between its two elements."""
-    near, far = apply("max", cell, ZERO), apply("min", add(cell, ONE), walk.last)
-    into = sub(walk.place(var(walk.variable)), cell)
+    """An integrand where the look-up is in one cell."""
+    place = walk.place(var(walk.variable))
 
     def change(_: Term, new: Term) -> Term:
-        if not isinstance(new, Sum) or middle(new) is not walk.middle or new.hi is not walk.last:
-            return new
-        read = _read(new)
-        return add(read(near), mul(into, sub(read(far), read(near))))
+        found = walk.look(new, place, cell) if isinstance(new, Sum) else None
+        return _without_opposites(new) if found is None else found
 
     return transform(body, change)
 
 
-def _read(term: Sum) -> Callable[[Term], Term]:
-    """What stands beside the tent, at a place."""
+def _without_opposites(term: Term) -> Term:
+    """A sum without what is read of arrays at plain places and taken away again: the first element of a table."""
+    if not isinstance(term, Prim) or term.op != "add":
+        return term
+    kept = list(term.args)
+    for arg in term.args:
+        if isinstance(arg, Index | Proj) and neg(arg) in kept and arg in kept:
+            kept.remove(arg)
+            kept.remove(neg(arg))
+    return add(*kept) if len(kept) < len(term.args) else term
+
+
+# A place, its cells, their borders, the last one, and what a sum is in one
+Lattice = tuple[
+    Term, Callable[[Term], tuple[Term, Term]], Callable[[Term], Term], Term, Callable[[Sum, Term, Term], Term | None]
+]
+
+
+def _pixels(node: Sum) -> Lattice | None:
+    """A lattice of whole numbers, from 0 to the last index of the sum: in a cell it is linear between two elements."""
+    at, last = middle(node), node.hi
+    if not isinstance(at, Prim) or at.op != "clamp" or at.args[1:] != (ZERO, last):
+        return None
+
+    def cells(place: Term) -> tuple[Term, Term]:
+        ends = apply("floor", place), sub(apply("ceil", place), ONE)
+        above, below = (apply("clamp", end, const(-1), last) for end in ends)
+        return above, below
+
+    def look(other: Sum, place: Term, cell: Term) -> Term | None:
+        if middle(other) is not at or other.hi is not last:
+            return None
+        read = _beside(other, "tent")
+        near, far = read(apply("max", cell, ZERO)), read(apply("min", add(cell, ONE), last))
+        return add(near, mul(sub(place, cell), sub(far, near)))
+
+    return at.args[0], cells, lambda cell: cell, last, look
+
+
+def _table(node: Sum) -> Lattice | None:
+    """A lattice of numbers that rise: in a cell a sum of rises is that of those behind, and a part of one."""
+    way = _factor(node, "between")
+    if way is None or node.variable in way.args[0].free:
+        return None
+    last, behind = node.hi, add(node.hi, ONE)
+
+    def end(which: int, place: Term) -> Term:
+        return substitute(way.args[which], {node.variable: place})
+
+    def cells(place: Term) -> tuple[Term, Term]:
+        slot = fresh("i", place.free | node.free)
+        found = []
+        for op in ("le", "lt"):
+            before = sum_(slot, ZERO, last, if_(prim(op, end(1, var(slot)), place), ONE, ZERO))
+            found.append(add(before, if_(prim(op, end(2, last), place), ONE, ZERO), const(-1)))
+        return found[0], found[1]
+
+    def border(cell: Term) -> Term:
+        return if_(prim("le", cell, last), end(1, apply("min", cell, last)), end(2, last))
+
+    def look(other: Sum, place: Term, cell: Term) -> Term | None:
+        own = _factor(other, "between")
+        if own is None or substitute(own, {other.variable: var(node.variable)}) is not way or other.hi is not last:
+            return None
+        rise = _beside(other, "between")
+        inner = apply("clamp", cell, ZERO, last)
+        part = mul(rise(inner), div(sub(place, end(1, inner)), sub(end(2, inner), end(1, inner))))
+        return add(_behind(rise, cell, behind), if_(prim("eq", cell, inner), part, ZERO))
+
+    return way.args[0], cells, border, behind, look
+
+
+def _behind(rise: Callable[[Term], Term], cell: Term, last: Term) -> Term:
+    """The sum of the rises in the cells before one: what it has risen to since the beginning, where they tell that."""
+    slot = fresh("i", cell.free | rise(ZERO).free)
+    each = rise(var(slot))
+    parts = each.args if isinstance(each, Prim) and each.op == "add" and len(each.args) == 2 else ()
+    for part in parts:
+        before = neg(part)
+        if slot in before.free and add(substitute(before, {slot: add(var(slot), ONE)}), part) is each:
+            return sub(substitute(before, {slot: apply("max", cell, ZERO)}), substitute(before, {slot: ZERO}))
+    return sum_(slot, ZERO, sub(apply("min", cell, last), ONE), each)
+
+
+def _factor(term: Sum, op: str) -> Prim | None:
+    """What the terms of a sum are in proportion to: the factor that is this builtin of the index."""
     body = term.body
+    for factor in body.args if isinstance(body, Prim) and body.op == "mul" else (body,):
+        if isinstance(factor, Prim) and factor.op == op and term.variable in factor.free:
+            return factor
+    return None
+
+
+def _beside(term: Sum, op: str) -> Callable[[Term], Term]:
+    """The other factors of the terms of a sum, by the index."""
+    own, body = _factor(term, op), term.body
     factors = body.args if isinstance(body, Prim) and body.op == "mul" else (body,)
-    rest = mul(*(f for f in factors if not (isinstance(f, Prim) and f.op == "tent" and term.variable in f.free)))
+    rest = mul(*(factor for factor in factors if factor is not own))
     return lambda place: substitute(rest, {term.variable: place})
