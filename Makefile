@@ -8,7 +8,7 @@ VSCODE := editors/vscode
 TORCH ?= torch==2.13.0
 TESTS := $(BIN)/python -m pytest -n auto --maxprocesses 8 --dist worksteal --durations 20
 
-.PHONY: demo gallery test quick fuzz check format clean native pictures test-bridges vsix e2e
+.PHONY: docs wheels demo gallery test quick fuzz check format clean native pictures test-bridges vsix e2e
 
 demo: $(STAMP)  ## the paper's programs, evaluated and differentiated
 	@PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python examples/demo.py
@@ -38,6 +38,14 @@ check: $(STAMP)  ## lints, types, floors
 native:  ## .venv-native: the packages as they stand, with the front end as machine code (needs a C compiler)
 	test -x .venv-native/bin/python || $(PYTHON) -m venv .venv-native
 	HATCH_BUILD_HOOKS_ENABLE=1 .venv-native/bin/python -m pip install -qq --disable-pip-version-check '.[dev]'
+
+docs: $(STAMP)  ## the pages as a site in build/site: links and anchors checked, their programs run
+	$(BIN)/python -c 'import material' 2>/dev/null || $(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[docs]'
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
+	$(BIN)/python -m pytest -n auto --maxprocesses 8 tests/docs
+
+wheels:  ## dist/: a wheel, and one with machine code where a C compiler is, each tried in a bare environment
+	PYTHON=$(PYTHON) .ci/wheels
 
 vsix: $(VSCODE)/node_modules/.stamp  ## the extension for Visual Studio Code, checked, tested and packaged
 	cd $(VSCODE) && npm run --silent check && npm run --silent test && npm run --silent package
