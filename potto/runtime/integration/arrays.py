@@ -1,6 +1,6 @@
 """Arrays end where an integral begins: what it reads of them is found beside it, and it integrates numbers.
 
-Owns `without_arrays`.
+Owns `without_arrays` and `in_numbers`.
 """
 
 from __future__ import annotations
@@ -97,6 +97,37 @@ def _read(machine: Machine, term: Integral, accesses: tuple[Access, ...], env: E
             here[access.name] = value
     found = substitute(term, parts) if parts else term
     return found, {name: here[name] for name in found.free}
+
+
+def in_numbers(term: Integral, env: Env) -> tuple[Integral, Env]:
+    """The same integral of the parts of the tuples that it is given, each under a name of its own."""
+    given = [name for name in term.free if isinstance(env[name], tuple)]
+    if not given:
+        return term, env
+    here = {name: env[name] for name in term.free}
+    found = _by_parts(term, tuple((name, _shape(here.pop(name))) for name in sorted(given)))
+    for name in given:
+        in_names(name, env[name], here)
+    return found, {name: here[name] for name in found.free}
+
+
+Shape = tuple["Shape", ...] | None  # of a tuple: those of its items; of anything else None
+
+
+def _shape(value: Value) -> Shape:
+    return tuple(map(_shape, value)) if isinstance(value, tuple) else None
+
+
+@lru_cache(maxsize=4096)
+def _by_parts(term: Integral, shapes: tuple[tuple[str, Shape], ...]) -> Integral:
+    def parts(name: str, shape: Shape) -> Term:
+        if shape is None:
+            return var(name)
+        return tuple_(parts(f"{name}.{place}", item) for place, item in enumerate(shape))
+
+    found = substitute(term, {name: parts(name, shape) for name, shape in shapes})
+    assert isinstance(found, Integral)
+    return found
 
 
 def in_names(name: str, value: Value, env: Env) -> Term:

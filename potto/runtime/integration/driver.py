@@ -25,7 +25,7 @@ from potto.runtime.answers.convergence import allowance, widest
 from potto.runtime.evaluation.local import locally
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.selection import apart
-from potto.runtime.integration.arrays import Differ, met, without_arrays
+from potto.runtime.integration.arrays import Differ, in_numbers, met, without_arrays
 from potto.runtime.integration.members import Whole
 from potto.runtime.integration.preparation import filled, held, placed, prepared
 from potto.runtime.integration.problem import Mixed, Problem, linked
@@ -47,6 +47,7 @@ def integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
         if not isinstance(ready, Integral):
             return summed(machine, ready, env)
         term = ready
+    term, env = in_numbers(term, env)
     return locally(machine, env, lambda own, here: _of_numbers(own, term, here))
 
 
