@@ -72,7 +72,7 @@ def test_a_function_among_what_is_given(m):
 
 
 @pytest.mark.parametrize(("name", "reason"), [
-    ("line", "runs away"), ("kink", "though a slope is left"), ("root", "no number"),
+    ("line", "runs away"), ("kink", "though a slope is left"), ("root", "not a number"),
 ])  # fmt: skip
 def test_what_is_no_minimum_is_said(m, name, reason):
     found = potto.fit(getattr(m, name), {"t": 0.9})

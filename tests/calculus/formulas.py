@@ -110,6 +110,8 @@ def _function(type: Function, rng: random.Random) -> str:
 
 
 def numbers(answer: object) -> np.ndarray:
+    if isinstance(answer, tuple | list):
+        return np.concatenate([numbers(item).ravel() for item in answer] or [np.zeros(0)])
     return np.array(answer, dtype=float)
 
 

@@ -63,7 +63,7 @@ def test_what_is_no_minimum_is_said_and_fails(potto: Potto) -> None:
     (["loss", "s=1"], "no parameter `s`", 1),
     (["loss", "t=1", "--bound", "t=1:0"], "from less to more", 2),
     (["loss", "t=1", "--bound", "q=0:1"], "which is not fitted", 1),
-    (["loss", "t=id"], "no number", 1),
+    (["loss", "t=id"], "not a number", 1),
     (["root", "t=-1"], "at the start", 1),
     (["two", "a=1", "b=1"], "give a target", 1),
     (["box", "b=1", "--with", "a=1", "--data", "none.csv"], "none.csv", 2),

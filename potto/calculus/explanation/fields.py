@@ -28,7 +28,7 @@ from potto.core.terms import (
 )
 from potto.query import Database
 from potto.types import Type, groups_of, interface
-from potto.types.types import ArrayOf, TupleOf, resolve, result_of
+from potto.types.types import ArrayOf, Function, TupleOf, resolve, result_of
 
 
 def parameter_types(type: Type) -> dict[str, Type]:
@@ -67,10 +67,13 @@ def _with_records(db: Database, call: App) -> Term:
 
 
 def _record(arg: Term, type: Type, dual: bool) -> Term:
-    """A tuple as the record that is wanted; `dual`: the value and the tangent."""
+    """A tuple as the record that is wanted; `dual`: the value and the tangent, of a function its derivative alone."""
+    if dual and isinstance(type, Function) and isinstance(arg, Tuple) and len(arg.items) == 2:
+        return arg.items[1]
     if not isinstance(type, TupleOf) or type.record is None or not isinstance(arg, Tuple):
         return arg
-    if dual and len(arg.items) == 2 and all(isinstance(item, Tuple) or item is ZERO for item in arg.items):
+    parts = [isinstance(item, Tuple) or item is ZERO for item in arg.items]
+    if dual and len(parts) == 2 and (all(parts) or any(isinstance(node, Deriv) for node in postorder(arg.items[1]))):
         return tuple_(_record(item, type, False) for item in arg.items)
     if len(arg.items) != len(type.items):
         return arg

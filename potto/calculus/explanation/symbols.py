@@ -41,6 +41,7 @@ from potto.core.terms import (
     transform,
     var,
 )
+from potto.primitives import PRIMITIVES
 
 _SECOND = var("snd")
 Rewrite = Callable[[Term], Term]
@@ -60,7 +61,7 @@ class Words(Struct, frozen=True):
     def text(self, term: Term, *inside: str) -> str:
         """A formula that is Potto, in the parameters, their tangents and the variables it is `inside` of. Raises
         NoFormula."""
-        plain = symbols(without_guards(simplify(term)), self.functions)
+        plain = symbols(without_guards(simplify(transform(term, _by_formula))), self.functions)
         known = self.names | {"snd", *inside}
         strangers = {name for name in plain.free - known if name.rstrip("'") != "delta"}  # `delta'`: its derivative
         if strangers:
@@ -69,6 +70,14 @@ class Words(Struct, frozen=True):
         if "..." in text:
             raise NoFormula("the formula is too long to be shown")
         return text
+
+
+def _by_formula(_: Term, node: Term) -> Term:
+    """What a program can't name, by what it can."""
+    entry = PRIMITIVES.get(node.op) if isinstance(node, Prim) else None
+    if entry is None or entry.surface or entry.formula is None or entry.truth:
+        return node
+    return entry.formula(*children(node))
 
 
 def symbols(term: Term, functions: Mapping[str, str]) -> Term:
