@@ -32,6 +32,7 @@ test-bridges: $(STAMP)  ## JAX, PyTorch and scipy: installed into .venv (PyTorch
 
 check: $(STAMP)  ## lints, types, floors
 	$(BIN)/ruff check .
+	$(BIN)/ruff format --check --quiet .
 	$(BIN)/mypy
 	$(BIN)/python -m pytest tests/test_architecture.py
 
@@ -58,6 +59,7 @@ pictures: $(STAMP)  ## the figures of the pages, light and dark
 
 format: $(STAMP)  ## what ruff can put right by itself
 	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
 
 clean:  ## start over
 	rm -rf $(VSCODE)/node_modules $(VSCODE)/e2e/node_modules $(VSCODE)/dist

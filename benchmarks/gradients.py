@@ -19,13 +19,13 @@ import potto
 from potto.kernels import compile as kernels
 from potto.python import gradients
 
-TRIANGLE = '''
+TRIANGLE = """
 def inside(ax, ay, bx, by, x, y) (bx - ax)*(y - ay) - (by - ay)*(x - ax)
 def tri(ax, ay, bx, by, cx, cy, p, q, r, s, u, w)
     integral ([0, 1], [0, 1])
         (p + q*x + r*y + s*x*y + u*x^2 + w*y^2)*[inside(ax, ay, bx, by, x, y) > 0]
             *[inside(bx, by, cx, cy, x, y) > 0]*[inside(cx, cy, ax, ay, x, y) > 0] d(x, y)
-'''
+"""
 NAMES = ("ax", "ay", "bx", "by", "cx", "cy", "p", "q", "r", "s", "u", "w")
 PLACES = (0.1, 0.1, 0.9, 0.2, 0.3, 0.8, 1.0, 0.5, 0.3, 0.2, 0.1, 0.4)
 

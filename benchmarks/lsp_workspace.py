@@ -35,16 +35,27 @@ def definition(module: int, index: int, imported: list[str]) -> list[str]:
         case 0:
             body = [f"def {name}(t, k)", f"    a = k^2 + {index}", f"    integral [0, 1] [x < t] * a * x d(x){extra}"]
         case 1:
-            body = [f"def {name}(t, k)", f"    scale = sqrt(t^2 + {index + 1})", "    shift = k/scale",
-                    f"    scale*exp(-shift){extra}"]
+            body = [
+                f"def {name}(t, k)",
+                f"    scale = sqrt(t^2 + {index + 1})",
+                "    shift = k/scale",
+                f"    scale*exp(-shift){extra}",
+            ]
         case 2:
-            body = [f"def {name}(t, k)", "    width = if k > 0 then k else 1",
-                    f"    integral ([0, 1], [0, 1]) [x + y*width < t] * (x - y) d(x, y){extra}"]
+            body = [
+                f"def {name}(t, k)",
+                "    width = if k > 0 then k else 1",
+                f"    integral ([0, 1], [0, 1]) [x + y*width < t] * (x - y) d(x, y){extra}",
+            ]
         case 3:
             body = [f"{name} = \\(t, k) . 1/(sqrt(2)*(t + k + {index + 2})^2 + 1)"]
         case 4:
-            body = [f"def {name}(t, k)", "    lo = min(t, k)", "    hi = max(t, k)",
-                    f"    (hi - lo)*sin({index}*t) + cos(k){extra}"]
+            body = [
+                f"def {name}(t, k)",
+                "    lo = min(t, k)",
+                "    hi = max(t, k)",
+                f"    (hi - lo)*sin({index}*t) + cos(k){extra}",
+            ]
         case _:
             body = [f"def {name}(t, k)", f"    u = t - k/{index + 1}", "    v = if u > 0 then log(1 + u) else u",
                     f"    integral [0, 2] v*x^2 d(x){extra}"]  # fmt: skip

@@ -212,9 +212,7 @@ def conditions() -> None:
     for n in (10, 40, 160, 640):
         body = " + ".join(f"{k}*[x < {k}*t/{n + 1}]" for k in range(1, n + 1))
         written = potto.deriv(potto.compile(f"def f(t) integral [0, 1] ({body}) d(x)").f)
-        looped = potto.deriv(
-            potto.compile(f"def f(t) integral [0, 1] sum k in 1..{n} (k*[x < k*t/{n + 1}]) d(x)").f
-        )
+        looped = potto.deriv(potto.compile(f"def f(t) integral [0, 1] sum k in 1..{n} (k*[x < k*t/{n + 1}]) d(x)").f)
         exact = sum(k * k / (n + 1) for k in range(1, n + 1))
         error = abs(written((0.9, 1.0)).tangent / exact - 1)
         a = best(lambda f=written: f((0.9, 1.0)), 3)

@@ -138,6 +138,7 @@ def sweep(asked: Asked) -> Iterator[Row]:
 
 # Pictures
 
+
 def pictures(asked: Asked) -> Iterator[Row]:
     m = potto.compile(EQUATION)
     x, y = hand.pixels()
@@ -224,13 +225,16 @@ def shading(asked: Asked) -> Iterator[Row]:
     edges = "\n".join(EQUATION.splitlines()[5:6])
     at = (0.13, -0.21, 1.23, 0.37, 0.41, 1.31, 0.2, 0.5, 0.3, 0.7)
     for degree, colour in ((1, "k0 + k1*x + k2*y + k3"), (2, "k0 + k1*x + k2*y + k3*x*y")):
-        text = edges + f"""
-def loss({', '.join(NAMES)})
+        text = (
+            edges
+            + f"""
+def loss({", ".join(NAMES)})
     shown = integral ([0, 1], [0, 1])
         ({colour} + FRESH)*[edge(x, y, ax, ay, bx, by) > 0 and edge(x, y, bx, by, cx, cy) > 0
             and edge(x, y, cx, cy, ax, ay) > 0] d(x, y)
     (shown - 0.4)^2
 """
+        )
         found, first = once(lambda text=text: potto.grad(fresh(text).loss, NAMES)(*at))
         program = potto.grad(fresh(text).loss, NAMES)
         far = off(found.tangent, _slopes(at, degree))

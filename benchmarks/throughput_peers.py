@@ -97,6 +97,7 @@ def _jax(quadax: bool) -> Iterator[Peer]:
         return quadgk(s, jnp.array([jnp.maximum(-c - x, 0.0) if cut else 0.0, 1.0]))[0]
 
     for name, cut in (("quadax, breakpoints by hand", True), ("quadax with where", False)):
+
         def whole(c: Any, cut: bool = cut) -> Any:
             ends = jnp.stack([jnp.zeros(()), -c, jnp.ones(())]) if cut else jnp.array([0.0, 1.0])
             return quadgk(jax.vmap(lambda x: inner(x, c, cut)), ends)[0]

@@ -78,4 +78,3 @@ def main() -> None:
         serve(reader, writer)
     except BrokenPipeError:
         os._exit(0)
-

@@ -97,9 +97,6 @@ def thumbnail(value: Value) -> bytes | None:
     return _png(np.round(np.clip(small, 0, 1) * 255).astype(np.uint8))
 
 
-
-
-
 def _png(pixels: npt.NDArray[np.uint8]) -> bytes:
     height, width, channels = pixels.shape
     head = struct.pack(">IIBBBBB", width, height, 8, 2 if channels == 3 else 0, 0, 0, 0)

@@ -128,9 +128,7 @@ def scaled(elaboration: Elaboration, factor: Term, term: Term) -> Term:
         case Tuple(items=items):
             return tuple_(scaled(elaboration, factor, item) for item in items)
         case If() if _gives_tuple(elaboration, term):
-            return if_(
-                term.condition, scaled(elaboration, factor, term.then), scaled(elaboration, factor, term.orelse)
-            )
+            return if_(term.condition, scaled(elaboration, factor, term.then), scaled(elaboration, factor, term.orelse))
         case Branch() if _gives_tuple(elaboration, term):
             then, orelse = scaled(elaboration, factor, term.then), scaled(elaboration, factor, term.orelse)
             made = branch(term.coordinates, term.strict, then, orelse)

@@ -125,10 +125,14 @@ def _with_tangents(elaboration: Elaboration, function: Term, args: tuple[Term, .
     elif not (isinstance(head, Deriv) and isinstance(head.function, Global)):
         return args
     expected = elaboration.shapes.parameters(function)
-    return tuple(
-        tuple_((arg, standing(elaboration, arg))) if lacks_tangents(elaboration.shapes.of(arg), wanted) else arg
-        for arg, wanted in zip(args, expected)
-    ) if len(expected) == len(args) else args
+    return (
+        tuple(
+            tuple_((arg, standing(elaboration, arg))) if lacks_tangents(elaboration.shapes.of(arg), wanted) else arg
+            for arg, wanted in zip(args, expected)
+        )
+        if len(expected) == len(args)
+        else args
+    )
 
 
 def _values(elaboration: Elaboration, count: int, filling: Filling[Value]) -> tuple[Value, ...]:

@@ -175,5 +175,3 @@ def _lambda(elaboration: Elaboration, node: nodes.Lambda, scope: Scope) -> Value
 @rule(nodes.Let)
 def _let(elaboration: Elaboration, node: nodes.Let, scope: Scope) -> Value:
     return elaboration.value(node.body, elaboration.block(node.bindings, scope))
-
-

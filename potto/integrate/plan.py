@@ -234,8 +234,10 @@ def _may_fold(term: Integral, levels: Sequence[LevelPlan]) -> bool:
     if all(monotone(cut.surface, variable, bounds) for cut, variable in inner):
         return False
     systems = [(system, level.variable) for level in levels[:number] for system in level.level.critical]
-    return number >= MOST_EQUATIONS or any(slope_of(along(cut), variable) is None for cut, variable in inner) or any(
-        slopes_of(system, variable) is None for system, variable in systems
+    return (
+        number >= MOST_EQUATIONS
+        or any(slope_of(along(cut), variable) is None for cut, variable in inner)
+        or any(slopes_of(system, variable) is None for system, variable in systems)
     )
 
 

@@ -388,7 +388,6 @@ class _Compiler:
         text = f"rt.sum({self.keep(term)}, {lo}, {hi}, {env}, {self.trace(term, 0)})"
         return self.dynamic(text, inexact, known)
 
-
     def fold(self, term: Fold) -> Known:
         env, known = self.environment(term.body.free - {term.variable, term.state})
         lo, hi, start = (self.known(part) for part in (term.lo, term.hi, term.start))

@@ -237,9 +237,11 @@ mixture = compose(
     Composition(
         "mixture",
         parameters=("w1", "measure1", "w2", "measure2", "..."),
-        takes=lambda inside: len(inside) >= 2
-        and len(inside) % 2 == 0
-        and all((inner is None) == (place % 2 == 0) for place, inner in enumerate(inside)),
+        takes=lambda inside: (
+            len(inside) >= 2
+            and len(inside) % 2 == 0
+            and all((inner is None) == (place % 2 == 0) for place, inner in enumerate(inside))
+        ),
         parts=_mixture,
         doc="One of several measures, each as often as the weight before it says; the weights need not add up to 1.",
         example="integral (x ~ mixture(1, normal(0, 1), 2, normal(3, 0.5))) x d(x)",

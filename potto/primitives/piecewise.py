@@ -130,6 +130,7 @@ maximum = register(
     )
 )
 
+
 def _tent_slope(x: Term) -> Terms:
     """The slope to the right: of tents that overlap one falls from where another rises."""
     falling = branch((sub(x, ONE),), False, ZERO, neg(ONE))
@@ -171,6 +172,7 @@ clamp = register(
         example="clamp(1.5, 0, 1)",
     )
 )
+
 
 def _between_partials(x: Term, a: Term, b: Term) -> Terms:
     """As clamp has them: at a it moves, at b no more."""

@@ -77,9 +77,7 @@ class Domain(Generic[V]):
         if self.rule(entry) is not None:
             return True
         return entry.formula is not None and all(
-            self.knows(node.op)
-            for node in postorder(formula_of(op, entry.arity or 2)[0])
-            if isinstance(node, Prim)
+            self.knows(node.op) for node in postorder(formula_of(op, entry.arity or 2)[0]) if isinstance(node, Prim)
         )
 
 

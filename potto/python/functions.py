@@ -63,9 +63,7 @@ class Function(Travelling):
 
     __doc__ = Doc(__doc__)
 
-    def __init__(
-        self, world: World, file: str, expr: nodes.Expr, type: Type, given: Given = ()
-    ) -> None:
+    def __init__(self, world: World, file: str, expr: nodes.Expr, type: Type, given: Given = ()) -> None:
         self._world = world
         self._file = file
         self._expr = expr

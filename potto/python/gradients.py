@@ -174,9 +174,7 @@ class GradientFunction:
         return f"<gradient of {self._function!r} by {', '.join(self._wrt)}>"
 
 
-def gradient(
-    call: Call, arguments: Sequence[tuple[str, Value]], wrt: tuple[str, ...], batch: Batch
-) -> Gradient:
+def gradient(call: Call, arguments: Sequence[tuple[str, Value]], wrt: tuple[str, ...], batch: Batch) -> Gradient:
     """The estimate of a call with its derivatives by the arguments named in `wrt`, for all of a batch at once."""
     run = _Run(call, arguments, batch, {})
     value = run.along_each(wrt)

@@ -13,9 +13,7 @@ from potto.types.types import Parameter, Type
 Given = tuple[tuple[tuple[Any, ...], dict[str, Any]], ...]  # per call the arguments by place and by name
 
 
-def labelled(
-    given: Given, groups: tuple[tuple[Parameter, ...], ...]
-) -> list[tuple[str, Any, Type | None]]:
+def labelled(given: Given, groups: tuple[tuple[Parameter, ...], ...]) -> list[tuple[str, Any, Type | None]]:
     """Every argument with the name of its parameter and the type of it, where these are known.
 
     Keywords bind by name; the others fill the parameters left, in order; a call may run over the end of its group.

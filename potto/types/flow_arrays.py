@@ -138,4 +138,3 @@ def _measure(value: Value) -> object:
     if isinstance(value, TupleValue):
         return tuple(map(_measure, value.items))
     return _measure(value.item) if isinstance(value, ListValue) else frozenset(flat(value))
-

@@ -297,9 +297,7 @@ class Decorating:
         closures = chain_of(value)
         effects = [effect for closure in closures for effect in closure.effects]
         self.settled = {s for e in effects if isinstance(e.to, Sink) for s in flat(e.value)}
-        self.plain = {
-            s for e in effects if isinstance(e.to, Sink) and e.to.kind in PLAIN_KINDS for s in flat(e.value)
-        }
+        self.plain = {s for e in effects if isinstance(e.to, Sink) and e.to.kind in PLAIN_KINDS for s in flat(e.value)}
         self.given: dict[Port, set[Source]] = {}
         for effect in effects:
             if isinstance(effect.to, Port):

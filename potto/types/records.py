@@ -64,9 +64,7 @@ def _within_itself(inference: Inference, annotation: nodes.NamedType, target: De
     return kinds.WITHIN_ITSELF(annotation.span, message, label="would have no end", help=help)
 
 
-def _no_type(
-    inference: Inference, annotation: nodes.NamedType, meaning: Meaning | None, known: str
-) -> Diagnostic:
+def _no_type(inference: Inference, annotation: nodes.NamedType, meaning: Meaning | None, known: str) -> Diagnostic:
     name = annotation.name
     message, label, near = f"there is no type `{name}`", "not known", tuple[str, ...]()
     if meaning is not None:

@@ -281,6 +281,19 @@ def _derivative(type: Type, parameters: frozenset[str]) -> Type:
 
 
 quick(
-    Real, Dist, RecordName, TupleOf, ArrayOf, Count, SizeVar, Shifted, AnySize, Parameter, Function, Diffeo, Truth, Var,
+    Real,
+    Dist,
+    RecordName,
+    TupleOf,
+    ArrayOf,
+    Count,
+    SizeVar,
+    Shifted,
+    AnySize,
+    Parameter,
+    Function,
+    Diffeo,
+    Truth,
+    Var,
     Unknown,
 )

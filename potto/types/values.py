@@ -175,6 +175,17 @@ HAZY = Scalar({HAZE: None})  # what is wrong: varies with it knows what, and bre
 
 
 quick(
-    Step, Joined, Spike, Scalar, TupleValue, ListValue, PortTuple, PortFunction, Effect, Closure, Choice, NoPort,
+    Step,
+    Joined,
+    Spike,
+    Scalar,
+    TupleValue,
+    ListValue,
+    PortTuple,
+    PortFunction,
+    Effect,
+    Closure,
+    Choice,
+    NoPort,
     Abstract,
 )

@@ -113,9 +113,7 @@ class _Work(Struct):
         return found
 
 
-def _out_of_sight(
-    pair: tuple[int, int], known: Mapping[int, Point], component: int, low: float, high: float
-) -> bool:
+def _out_of_sight(pair: tuple[int, int], known: Mapping[int, Point], component: int, low: float, high: float) -> bool:
     """Whether both ends lie above, or both below, what is to be seen, and neither is the utmost point."""
     a, b = (known[place][component][0] for place in pair)
     values = [point[component][0] for point in known.values()]

@@ -115,9 +115,7 @@ class _State(Struct, frozen=True):
         return cls(files, {(f, n): chunk_text(session.db, f, n) for f in files for n in names(session.db, f)})
 
 
-def _reasons(
-    session: Conversation, again: set[Definition], before: dict[Definition, str | None]
-) -> dict[str, str]:
+def _reasons(session: Conversation, again: set[Definition], before: dict[Definition, str | None]) -> dict[str, str]:
     """Why each definition was compiled again, and which are gone."""
     why: dict[str, str] = {}
     now = [(file, name) for file in _files(session) for name in names(session.db, file)]

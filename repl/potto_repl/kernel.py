@@ -98,9 +98,7 @@ class PottoKernel(Kernel):
         """Whether a console should hand the cell in."""
         return {"status": "complete"} if is_over(code) else {"status": "incomplete", "indent": indentation(code)}
 
-    def do_inspect(
-        self, code: str, cursor_pos: int, detail_level: int = 0, omit_sections: Any = ()
-    ) -> dict[str, Any]:
+    def do_inspect(self, code: str, cursor_pos: int, detail_level: int = 0, omit_sections: Any = ()) -> dict[str, Any]:
         """What the name at the cursor means."""
         import re
 

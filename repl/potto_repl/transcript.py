@@ -151,5 +151,3 @@ def _expected(value: Valued) -> str | None:
     if "mc" in estimate.method or ROUGH in estimate.shortfalls or not estimate.converged:
         return None  # it was sampled, or made of what was: another seed, other digits; or it missed its tolerance
     return value.text
-
-

@@ -189,11 +189,14 @@ def mixed(xs: [n] Real, ys: [n] Real) dot(xs + 2*ys, -xs/2)
 
 
 def test_duals_of_arrays_in_the_language() -> None:
-    module = potto.compile(PROGRAM + """
+    module = potto.compile(
+        PROGRAM
+        + """
 slope = deriv(squares)(([1, 2, 3], [1, 0, 2]))
 bent = deriv(differences)(([1, 2, 4], [1, 0, 2]))
 still = deriv(powers)(dcs=([1, 2], [0, 1]))
-""")
+"""
+    )
     assert (module.slope.value, module.slope.tangent) == (14, 14)
     assert (module.bent.value.tolist(), module.bent.tangent.tolist()) == ([1, 2], [-1, 2])
     assert module.still.tangent == pytest.approx(0.5, rel=1e-15)

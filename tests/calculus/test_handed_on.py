@@ -26,8 +26,11 @@ def steps(names: str, body: str) -> list[tuple[str, str]] | None:
         ("xyz", "x*sqrt(y)/(1 + z)", [("x", ""), ("sqrt(y)", ""), ("1/(z + 1)", "")]),
         ("xyz", "(1 + x)*cos(x*y*z)", [("x + 1", "x"), ("1", "y*x@known"), ("cos(z*y@known)", "")]),
         ("xyz", "sin(x*y)*cos(y*z)", [("1", "x"), ("sin(y*x@known)", "y"), ("cos(z*y@known)", "")]),
-        ("xyz", "cos(2*x + 4*y*y + z)*tanh(t + x + 2*y*y)",
-         [("1", "2*x"), ("tanh(t + 2*y*y + 0.5*x@known)", "4*y*y + x@known"), ("cos(z + y@known)", "")]),
+        (
+            "xyz",
+            "cos(2*x + 4*y*y + z)*tanh(t + x + 2*y*y)",
+            [("1", "2*x"), ("tanh(t + 2*y*y + 0.5*x@known)", "4*y*y + x@known"), ("cos(z + y@known)", "")],
+        ),
         ("xyz", "sin(x + y)*cos(x*z)", [("1", "x"), ("sin(y + x@known)", "x@known"), ("cos(z*y@known)", "")]),
         ("xyz", "cos(x*z)*sin(y + z)*exp(x*y*z)", None),
     ],

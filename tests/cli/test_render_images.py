@@ -65,7 +65,7 @@ def test_greys_and_signs(potto: Potto, tmp_path) -> None:
     potto("render", "s.po", "\\(x, y) . x", "--size", "2x1", "--range", "0,1", "-o", "g.png", s=SCENE)
     assert pixels(tmp_path / "g.png").tolist() == [[[64] * 3, [191] * 3]]
     potto("render", "s.po", "curried", "c=1", "--wrt", "c", "--box", "-1,1,0,1", "--size", "2x1", "-o", "g.png")
-    (below, above), = pixels(tmp_path / "g-dc.png").tolist()
+    ((below, above),) = pixels(tmp_path / "g-dc.png").tolist()
     assert below[2] > 200 > below[0] and above[0] > 200 > above[2]  # blue, red
 
 

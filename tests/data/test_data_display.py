@@ -40,8 +40,11 @@ def test_summaries(value: float | Array | Table, expected: str) -> None:
     assert summary(value) == expected
 
 
-@given(hnp.arrays(np.float64, hnp.array_shapes(max_dims=3, max_side=40),
-                  elements=st.floats(allow_nan=False, allow_infinity=False)))
+@given(
+    hnp.arrays(
+        np.float64, hnp.array_shapes(max_dims=3, max_side=40), elements=st.floats(allow_nan=False, allow_infinity=False)
+    )
+)
 def test_summaries_are_short_lines(numbers: np.ndarray) -> None:  # fmt: skip
     shown = summary(of(numbers))
     assert "\n" not in shown and "nan" not in shown and "inf" not in shown

@@ -35,8 +35,12 @@ def test_objects_are_columns(data: dict[str, Any]) -> None:
     assert found == data and list(found) == list(data)
 
 
-@given(st.recursive(st.one_of(numbers, st.none(), st.booleans(), st.text(max_size=2)),
-                    lambda inner: st.one_of(st.lists(inner, max_size=3), st.dictionaries(st.text(max_size=2), inner))))
+@given(
+    st.recursive(
+        st.one_of(numbers, st.none(), st.booleans(), st.text(max_size=2)),
+        lambda inner: st.one_of(st.lists(inner, max_size=3), st.dictionaries(st.text(max_size=2), inner)),
+    )
+)
 def test_any_json_is_answered(data: Any) -> None:  # fmt: skip
     from pathlib import Path
 

@@ -177,5 +177,5 @@ def _expression(db: Database, text: str) -> Term:
 
 
 def test_what_is_wrong_elaborates_all_the_same():
-    for body in ("c.foca", "c with fokal = 2", "t with x = 2", "xs.y", "load(\"a.csv\")"):
+    for body in ("c.foca", "c with fokal = 2", "t with x = 2", "xs.y", 'load("a.csv")'):
         assert lint(term(f"record C(focal: Real)\ndef f(c: C, t, xs: [n] Real) {body}")) == []

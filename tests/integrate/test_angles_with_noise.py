@@ -111,9 +111,9 @@ def test_in_two_variables(body: str, inner: Callable[[Any, Any], Any], clip: Any
     f = potto.compile(f"def f(w)\n    integral {body}\n").f
 
     def exact(w: Any) -> Any:
-        kinks = [-mp.pi/2, mp.pi/2] + ([-mp.acos(w), mp.acos(w)] if clip == 0 else [])
+        kinks = [-mp.pi / 2, mp.pi / 2] + ([-mp.acos(w), mp.acos(w)] if clip == 0 else [])
         ends = sorted([mp.mpf(-3), mp.mpf(4), mp.mpf("0.6"), *kinks])
-        return mp.quad(lambda a: max(inner(a, w), 0)*mp.npdf(a, mp.mpf(0.6), mp.mpf(0.2)), ends)
+        return mp.quad(lambda a: max(inner(a, w), 0) * mp.npdf(a, mp.mpf(0.6), mp.mpf(0.2)), ends)
 
     found = potto.deriv(f)((0.8, 1.0))
     with mp.workdps(25):

@@ -92,6 +92,7 @@ def test_several_variables() -> None:
         "[y < 0.25] d(x, y)\n"
     ).f
     with mp.workdps(30):
+
         def below(x: mp.mpf) -> mp.mpf:
             return mp.expm1(-x / 4) / mp.expm1(-x)
 
@@ -103,9 +104,7 @@ def test_several_variables() -> None:
 
 def test_of_several_results() -> None:
     """Chance, mean and square at once."""
-    f = potto.compile(
-        "def f(w) integral (x ~ mixture(w, normal(1, 1), 3, normal(-1, 2))) ([x < 0], x, x*x) d(x)\n"
-    ).f
+    f = potto.compile("def f(w) integral (x ~ mixture(w, normal(1, 1), 3, normal(-1, 2))) ([x < 0], x, x*x) d(x)\n").f
     chance, mean, square = f(2.0).value
     with mp.workdps(30):
         exact = (2 * normal(mp.mpf(0), mp.mpf(1), mp.mpf(1)) + 3 * normal(mp.mpf(0), mp.mpf(-1), mp.mpf(2))) / 5

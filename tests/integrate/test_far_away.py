@@ -38,9 +38,7 @@ def test_the_radius_of_a_disc(far: float) -> None:
 def test_a_disc_that_moves(far: float) -> None:
     """Weighted by (x - far)^2 it is pi/4 (d^2 + 1/16) for a disc of radius 1/2 at the distance d."""
     box, o = f"[{far - 1!r}, {far + 1!r}]", f"({far!r})"
-    f = potto.compile(
-        f"def f(t)\n    integral ({box}, {box}) [(x - t)^2 + (y - {o})^2 < 1/4]*(x - {o})^2 d(x, y)"
-    ).f
+    f = potto.compile(f"def f(t)\n    integral ({box}, {box}) [(x - t)^2 + (y - {o})^2 < 1/4]*(x - {o})^2 d(x, y)").f
     answer = potto.deriv(f)((far + 0.3, 1.0))
     with mp.workdps(50):
         d = mp.mpf(far + 0.3) - mp.mpf(far)

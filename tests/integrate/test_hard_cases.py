@@ -69,9 +69,7 @@ def second_derivative(c: dict[str, Any]) -> Estimate:
         return core.ONE if name == wanted else core.ZERO
 
     duals = tuple(
-        core.tuple_(
-            (core.tuple_((core.const(x), unit(n, first))), core.tuple_((unit(n, other), core.ZERO)))
-        )
+        core.tuple_((core.tuple_((core.const(x), unit(n, first))), core.tuple_((unit(n, other), core.ZERO))))
         for n, x in zip(p.parameters, p.point, strict=True)
     )
     return evaluate(core.app(core.deriv(core.deriv(p.function)), duals), nothing, Settings())

@@ -58,6 +58,7 @@ def test_an_integral(text: str, f: Value, lo: float, hi: float, t: float) -> Non
         "def fa(a, b) snd(deriv(f)((a, 1), (b, 0)))\ndef fb(a, b) snd(deriv(f)((a, 0), (b, 1)))\n"
     )
     with mp.workdps(30):
+
         def wanted(a: mp.mpf, b: mp.mpf) -> mp.mpf:
             return mp.quad(lambda x: f(a * x), [lo, (lo + b) / 2, b])
 

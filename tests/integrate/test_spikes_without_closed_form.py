@@ -121,10 +121,13 @@ def test_what_a_function_under_two_derivatives_has_captured_moves() -> None:
 
 
 def test_what_is_not_seen_is_refused() -> None:
-    m = potto.compile(PROGRAM + """
+    m = potto.compile(
+        PROGRAM
+        + """
 def often(n, y, a) if n > 0 then often(n - 1, y, a) + snd(deriv(mixed)((y, 0), (a, 1))) else 0
 def f(a) integral [0, 1] often(2, x, a) d(x)
-""")
+"""
+    )
     with pytest.raises(potto.PottoError) as caught:
         m.f(0.4)
     assert [d.code for d in caught.value.diagnostics] == ["P0510"]
@@ -140,17 +143,20 @@ def g(a) integral [0, 1] x*snd(deriv(G)((x, x - 0.64), (a, 1))) d(x)
     got = potto.deriv(m.f)((0.3437, 1.0))
     assert abs(got.value + 0.59 * (1 - 0.59 * 0.3437)) <= 1e-15 and abs(got.tangent - 0.59**2) <= 1e-14
     # Along y - 0.64 as well: c a/y^2 more of it, times y (y - 0.64), from c a on.
-    exact = mpmath.diff(lambda a: mpmath.quad(lambda y: -0.59 + 0.59*a*(y - 0.64)/y, [0.59*a, 1]), 0.3437)
+    exact = mpmath.diff(lambda a: mpmath.quad(lambda y: -0.59 + 0.59 * a * (y - 0.64) / y, [0.59 * a, 1]), 0.3437)
     got = potto.deriv(m.g)((0.3437, 1.0))
     assert abs(got.tangent - exact) <= 1e-12 + got.tangent_error and got.tangent_error <= 1e-11
 
 
 def test_a_delta_where_its_factor_jumps_has_no_meaning() -> None:
-    m = potto.compile(PROGRAM + """
+    m = potto.compile(
+        PROGRAM
+        + """
 def f(a) integral [0, 1] (if [x > a] then x else 0)*snd(deriv(mixed)((x, 0), (a, 1))) d(x)
 def bend(a) integral [0, 1] abs(x - a)*snd(deriv(mixed)((x, 0), (a, 1))) d(x)
 def rim(a) integral [0, 1] snd(deriv(mixed)((x, 0), (a, 1))) d(x)
-""")
+"""
+    )
     with pytest.raises(potto.PottoError) as caught:
         m.f(0.4)
     assert [d.code for d in caught.value.diagnostics] == ["P0505"]

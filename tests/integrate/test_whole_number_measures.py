@@ -49,6 +49,7 @@ def test_poisson(r: float) -> None:
 
 def test_binomial() -> None:
     with mp.workdps(40):
+
         def wanted(p: mp.mpf) -> mp.mpf:
             return mp.fsum(binomial(k, 10, p) for k in range(3))
 
@@ -60,6 +61,7 @@ def test_binomial() -> None:
 def test_whole_numbers_and_others(method: str) -> None:
     """A sum around an integral with a jump that moves."""
     with mp.workdps(40):
+
         def wanted(r: mp.mpf, t: mp.mpf) -> mp.mpf:
             return mp.fsum(poisson(k, r) * mp.ncdf(2 * (t - k)) for k in range(60))
 

@@ -18,13 +18,14 @@ TEXTS = [
     "import a as k\rdef h(θ)\r    k.f(θ)/(\u2028 3\n",
     "",
     "diffeo c(x, y; t) = (x + y + t, x - y)\ndef f(t) integral ([0,1],[0,1]) [c((x, y), t)] d(x, y)\n",
-    "((((((((((\n))))\n    d(x)\n\"\x00\ud800",
+    '((((((((((\n))))\n    d(x)\n"\x00\ud800',
 ]
 JUNK: list[Any] = [None, 3, -1, 1e300, "x", [], {}, [{}], {"line": 10**12, "character": 0}, True, "\ud800", {"uri": 1}]
 
 
 def params(rng: random.Random, uris: list[str]) -> Any:
     """Parameters that fit many methods, often with something wrong in them."""
+
     def point() -> Any:
         return {"line": rng.randrange(5), "character": rng.randrange(30)}
 

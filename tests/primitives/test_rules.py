@@ -55,6 +55,7 @@ def test_no_rule_is_missing(primitive: Primitive, domain: str) -> None:
 
 def ends(primitive: Primitive) -> st.SearchStrategy[list[tuple[float, float]]]:
     """Bounds of every argument, now wide, now narrow."""
+
     def bounds(lo: float, hi: float) -> st.SearchStrategy[tuple[float, float]]:
         lo, hi = max(lo, -40.0), min(hi, 40.0)
         width = st.sampled_from([0.0, 1e-9, 1e-3, 0.3, 4.0, 100.0])

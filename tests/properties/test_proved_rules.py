@@ -137,7 +137,7 @@ def test_a_rule_errs_by_no_more_than_was_proved(seed: int) -> None:
                 off = error(region, term, cell, frames, at)
                 assert abs(off) <= region.error + 1e-13 * size, term
                 step = 1e-4 * radius
-                rate = (error(region, term, cell, frames, at + step) - error(region, term, cell, frames, at - step))
+                rate = error(region, term, cell, frames, at + step) - error(region, term, cell, frames, at - step)
                 assert abs(rate) / (2 * step) <= region.rate({"c": 1.0}) + 1e-13 * size / step, term
                 largest = max(largest, abs(off) / region.error if region.error > 1e-11 else 0.0)
         checked += 1

@@ -21,14 +21,14 @@ from potto.python import gradients
 
 NAMES = ("a", "b", "c", "d")
 ULPS = 1e-13  # of the size of what is added up: some hundred roundings
-PIECES = '''
+PIECES = """
 def part(u, v) integral [0, 1] (1 + u*x)*[x < v*u] d(x)
 def nested(u, v) integral [0, 1] (integral [0, x] exp(u*y)*[y < v] d(y))^2 d(x)
 def power(u, n) if n < 1 then 1 else u*power(u, n - 1)
 def pair(u, v) (u*v, sin(u) - v^2)
 def turned(u, v, s) s(u)*cos(v)
 sharp = \\x . integral [0, 1] [y < x] d(y)
-'''
+"""
 
 
 def expression(pick: random.Random, depth: int, names: tuple[str, ...] = NAMES) -> str:

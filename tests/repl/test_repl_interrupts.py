@@ -100,7 +100,9 @@ def test_a_file_whose_loading_was_interrupted_is_loaded_the_next_time(tmp_path, 
             signal.signal(signal.SIGALRM, old)
     assert interrupted
     assert not talk(f":load {path}").failed
-    assert talk.data("name1(1)")["value"] == pytest.approx((math.sin(1) + 1)*(math.sin(1) + math.cos(1) - 1), rel=1e-12)
+    assert talk.data("name1(1)")["value"] == pytest.approx(
+        (math.sin(1) + 1) * (math.sin(1) + math.cos(1) - 1), rel=1e-12
+    )
     assert f":load {path}" in talk(":undo").text and "entry 1" in talk(":undo").text
 
 

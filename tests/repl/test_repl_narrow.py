@@ -36,7 +36,13 @@ def test_help_fits_and_breaks_between_words(talk, columns):
 
 @pytest.mark.parametrize("columns", [20, 30, 40, 60, 80])
 def test_messages_fit(talk, columns):
-    for text in (RULE, "x + 1", "def f(" + "very_long_name, "*9 + "t) nothing", ":tpye 1", "1" + " + 1"*99 + " + y"):
+    for text in (
+        RULE,
+        "x + 1",
+        "def f(" + "very_long_name, " * 9 + "t) nothing",
+        ":tpye 1",
+        "1" + " + 1" * 99 + " + y",
+    ):
         shown = lines(talk(text), columns)
         code = [line for line in shown if "|" in line]
         assert all(width(line) <= columns for line in code), (text, code)

@@ -87,9 +87,7 @@ def completed_diffeo(place: At, chunk: ChunkAt, condition: Expr) -> str | None:
     return f"diffeo({', '.join(shown)})"
 
 
-def judged(
-    db: Database, chunk: ChunkAt, condition: Expr, role: Role = "bracket"
-) -> tuple[Term, ...] | Problem | None:
+def judged(db: Database, chunk: ChunkAt, condition: Expr, role: Role = "bracket") -> tuple[Term, ...] | Problem | None:
     """The coordinates of a comparison over variables of integration, completed, or why there are none; None for what is
     no comparison over them."""
     term = compared(db, chunk, condition)
@@ -102,7 +100,6 @@ def judged(
         return None
     verdict = judge(term.coordinates, variables, {}, role=role)
     return verdict if isinstance(verdict, Problem) else (*term.coordinates, *verdict.completion)
-
 
 
 def compared(db: Database, chunk: ChunkAt, condition: Expr) -> Branch | None:

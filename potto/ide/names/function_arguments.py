@@ -23,6 +23,7 @@ MOST = 50  # that are offered for one parameter
 NEAR = 20  # modules beside a file that are looked at where nothing in it fits
 _USUAL = ("x", "y", "z")
 
+
 def fits(db: Database, file: str, name: str, type: Type, beside: bool = True) -> tuple[str, ...]:
     """Texts of functions that a parameter of this type of the definition `name` can be given, the likeliest first.
 

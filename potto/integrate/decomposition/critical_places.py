@@ -82,8 +82,7 @@ def _speeds(
 def _places(
     system: Critical, variable: str, env: dict[str, Value], low: Array, high: Array
 ) -> tuple[Ints, Array, Array] | None:
-    """Whose the solutions are, where (n, P), and how far off along the variable that is cut; None if not all are known.
-    """
+    """Whose the solutions are, where (n, P), and how far off along what is cut; None if not all are known."""
     slopes = slopes_of(system, variable)
     if slopes is None:
         return None

@@ -49,7 +49,6 @@ class Edge(Columns):
     bound_t: Array
 
 
-
 class Meeting(Columns):
     """Jumps at one place that move apart, for some of the batch: `owner` (B,), place (B,), speeds (n, k, B).
 
@@ -61,7 +60,6 @@ class Meeting(Columns):
     x: Array
     speeds: Array
     merged_t: Array
-
 
 
 class Sliver(Columns):
@@ -79,7 +77,6 @@ class Sliver(Columns):
     speed: Array
     upper: bool
     passes: Array
-
 
 
 class Fold(Struct):

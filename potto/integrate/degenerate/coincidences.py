@@ -221,9 +221,7 @@ def at_a_bound(scene: Scene, seg: Segments, edges: Sequence[Edge]) -> tuple[Arra
         order = np.argsort(-speed, axis=0, kind="stable")
         after, speed = np.cumsum(1 << order, axis=0), np.take_along_axis(speed, order, axis=0)
         growth = speed - np.append(speed[1:], np.zeros((1, *speed.shape[1:])), axis=0)
-        gained = [
-            np.where(g > 0, (picked(f, a) - f[0][:, None]) * g, 0.0) for a, g in zip(after, growth, strict=True)
-        ]
+        gained = [np.where(g > 0, (picked(f, a) - f[0][:, None]) * g, 0.0) for a, g in zip(after, growth, strict=True)]
         found.append(sign * np.sum(gained, axis=0))
     return found[0], found[1], np.abs(f[0])[:, None] + np.abs(f[-1])[:, None]
 
@@ -307,9 +305,7 @@ def placed(
     return here, {g: take(m, owner) for g, m in sides.items()}
 
 
-def surfaces_at(
-    level: LevelPlan, here: dict[str, Value], count: int, machine: Evaluator
-) -> list[tuple[Array, Array]]:
+def surfaces_at(level: LevelPlan, here: dict[str, Value], count: int, machine: Evaluator) -> list[tuple[Array, Array]]:
     """The surfaces that a level decides the sides of, with their rounding, (B,) each."""
     return [(v, e) for v, e, _ in _with_slopes(level, here, count, machine.with_directions(0))]
 

@@ -128,6 +128,7 @@ def _jumps(steps: Array, size: Array) -> Bools:
     far, near = steps[:, 0], steps[:, 1]
     return np.asarray(((near > 0.5 * far) & (near > DISCONTINUITY * size)).any(axis=0))
 
+
 def _bends(scene: Scene, owner: Ints, x: Array, upper: bool) -> bool:
     """Whether it is plain that no surface runs along the bound: all sections in the innermost variable are slow."""
     levels, frozen = scene.parent.plan.levels, scene.machine.with_directions(0)

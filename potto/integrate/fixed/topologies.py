@@ -47,9 +47,7 @@ class _Cells(Struct):
         return _Cells(self.rows[:, :, index], self.members[index], gather(self.env, index))
 
 
-def topologies(
-    plan: Straight, machine: Evaluator, env: dict[str, Value], batch: int
-) -> tuple[Bools, list[Alike]]:
+def topologies(plan: Straight, machine: Evaluator, env: dict[str, Value], batch: int) -> tuple[Bools, list[Alike]]:
     """Which members are plain, and all cells of these, by what is integrated over them."""
     moving = machine.costs is not None  # then it is told how surfaces move
     tracking = (machine if moving else machine.with_directions(0)).tracking()

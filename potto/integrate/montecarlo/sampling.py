@@ -179,8 +179,7 @@ def _quasi(plan: Plan, machine: Any, env: dict[str, Value], method: str, told: T
 
 def _enough(sums: Sums, settings: Any, rtol: float) -> bool:
     return all(
-        bool((e <= np.maximum(settings.atol, rtol * np.abs(x))).all())
-        for x, e in ((sums.v, sums.e), (sums.t, sums.et))
+        bool((e <= np.maximum(settings.atol, rtol * np.abs(x))).all()) for x, e in ((sums.v, sums.e), (sums.t, sums.et))
     )
 
 

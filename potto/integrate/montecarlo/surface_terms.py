@@ -191,9 +191,7 @@ class Surface(Struct, dict=True):
             else:
                 point.env[label_name(level.variable)] = Cell(offset(self.ends[number], u))
         assert along.plan is not None
-        values = machine.tracking().evaluate(
-            along.plan.frame, {p: point.env[p] for p in along.plan.frame.params}, None
-        )
+        values = machine.tracking().evaluate(along.plan.frame, {p: point.env[p] for p in along.plan.frame.params}, None)
         assert isinstance(values, tuple)
         lo, hi, rows = frame_rows(along.plan, values)
         return lo, hi, rows + searched_rows(along.plan, point.env, lo, hi, n, machine), weight
@@ -277,8 +275,7 @@ class Surface(Struct, dict=True):
         (phi, one), (_, other) = found
         up = phi >= 0
         above, below = (
-            Sums(np.where(first, one.v, other.v), np.where(first, one.e, other.e), one.t, one.et)
-            for first in (up, ~up)
+            Sums(np.where(first, one.v, other.v), np.where(first, one.e, other.e), one.t, one.et) for first in (up, ~up)
         )
         return above, below
 
@@ -326,9 +323,7 @@ class Surface(Struct, dict=True):
         rates = np.where(far, np.nan, np.where(np.isfinite(rates), rates, 0.0))
         return np.where(change == 0, 0.0, rates * change)
 
-    def around(
-        self, labels: list[Array | None], pivot: int, marked: dict[int, int]
-    ) -> tuple[Array, Array, Array]:
+    def around(self, labels: list[Array | None], pivot: int, marked: dict[int, int]) -> tuple[Array, Array, Array]:
         """phi just below and just above points along the pivot, and its tangents just above."""
         u = labels[pivot]
         assert u is not None

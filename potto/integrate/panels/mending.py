@@ -23,9 +23,7 @@ CLOSE = (1e-6, 1e-4, 1e-2)
 UNREACHED = 1e-12
 
 
-def mend(
-    evaluated: Evaluated, seg: Segments, index: Ints, u: Array, du: Array, h: Array, bounds: Array | None
-) -> None:
+def mend(evaluated: Evaluated, seg: Segments, index: Ints, u: Array, du: Array, h: Array, bounds: Array | None) -> None:
     """Put values, and bounds of their errors, from further in where channels (C, P, n) are no numbers.
 
     u, du: (P, n) as for the map. Of nodes so close to an end that integrals further in give up, of 1/(x + y) along y at

@@ -174,9 +174,7 @@ class PanelBatch(Struct, dict=True):
             bound = (bound * np.abs(weight)).reshape(-1, *x.shape)
         return h.reshape(-1, *x.shape), bound
 
-    def integrand(
-        self, index: Ints, x: Array, weight: Array | None = None
-    ) -> tuple[Array, Array | None, Array | None]:
+    def integrand(self, index: Ints, x: Array, weight: Array | None = None) -> tuple[Array, Array | None, Array | None]:
         """F, D_theta F and, if nodes move, dF/dx at nodes, (m, 1 + k or more, P, n); their error bounds; and the part
         of the tangents' that is one factor of all of them.
 

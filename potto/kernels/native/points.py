@@ -145,9 +145,7 @@ def _frame(arrays: list[Array], shape: tuple[int, ...]) -> list[int]:
     return found
 
 
-def _text(
-    operations: Sequence[Operation], arrays: Sequence[str], given: Sequence[str], outputs: Sequence[str]
-) -> str:
+def _text(operations: Sequence[Operation], arrays: Sequence[str], given: Sequence[str], outputs: Sequence[str]) -> str:
     """A function of the frame (`_frame`, then where the outputs go) and of the numbers that are the same everywhere."""
     at = Vectors()
     values: dict[str, str] = {}

@@ -211,4 +211,3 @@ def _total(node: Node, at: Ints, size: int, shape: tuple[int, ...]) -> Node:
 
 def _plus(a: Value, b: Value) -> Value:
     return combined(operator.add, a, b)
-

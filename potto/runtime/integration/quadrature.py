@@ -45,9 +45,7 @@ def within(most: int | None, plan: Plan, machine: Machine, env: dict[str, Value]
     return sums
 
 
-def in_parts(
-    plan: Plan, machine: Machine, env: dict[str, Value], batch: int, turned: Iterable[Plan] = ()
-) -> Sums:
+def in_parts(plan: Plan, machine: Machine, env: dict[str, Value], batch: int, turned: Iterable[Plan] = ()) -> Sums:
     """Quadrature: what a product rule settles first, then a bounded number of members of the batch at a time.
 
     turned: plans with other variables innermost, by which a rule may settle members that it did not, since a surface is
@@ -101,9 +99,7 @@ def _alike(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> t
     return by_shapes(plan.straight, plan.degrees, machine, env, batch)
 
 
-def iterated(
-    plan: Plan, machine: Machine, env: dict[str, Value], batch: int, start_order: int = START_ORDER
-) -> Sums:
+def iterated(plan: Plan, machine: Machine, env: dict[str, Value], batch: int, start_order: int = START_ORDER) -> Sums:
     """Iterated quadrature with cuts."""
     if batch <= BATCH:
         return Iteration(plan, machine, start_order).whole(env, batch)

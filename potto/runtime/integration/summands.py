@@ -180,9 +180,7 @@ def _moving(value: Value, directions: int) -> list[int]:
     return list(range(directions))
 
 
-def _column(
-    column: Array | tuple[Leaf, ...] | str, env: dict[str, Value], slots: Sequence[Slots], width: int
-) -> Value:
+def _column(column: Array | tuple[Leaf, ...] | str, env: dict[str, Value], slots: Sequence[Slots], width: int) -> Value:
     """What stands in the place of one parameter: members along the last axis."""
     if isinstance(column, np.ndarray):
         return Cell(column, None, (None,) * width)

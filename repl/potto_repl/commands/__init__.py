@@ -2,5 +2,4 @@
 
 from potto_repl.commands import asking, checking, drawing, evaluating, files, fitting, help, keeping, settings, system
 
-__all__ = ["asking", "checking", "drawing", "evaluating", "files", "fitting", "help", "keeping", "settings",
-           "system"]
+__all__ = ["asking", "checking", "drawing", "evaluating", "files", "fitting", "help", "keeping", "settings", "system"]

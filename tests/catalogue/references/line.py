@@ -224,7 +224,14 @@ TRUTHS: dict[str, Callable[[Any], Truth]] = {
 SECONDS: dict[str, Value] = {
     name: second(VALUES[name][0], 1e-5)
     for name in (
-        "cubic", "quintic", "damped", "waves", "normal waves", "moving bound", "delta of a cubic", "delta, damped",
+        "cubic",
+        "quintic",
+        "damped",
+        "waves",
+        "normal waves",
+        "moving bound",
+        "delta of a cubic",
+        "delta, damped",
         "sum of deltas",
     )
 }

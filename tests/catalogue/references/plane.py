@@ -287,6 +287,7 @@ def disc_under_wave(t: Any) -> Any:
 
 def moving_triangle(t: Any) -> Any:
     """x y + y^2 < 1/2 below the diagonal up to t > 1/2: y < x up to 1/2, then below the root."""
+
     def over(x: Any) -> Any:
         return (-x + mp.sqrt(x * x + 2)) / 2
 
