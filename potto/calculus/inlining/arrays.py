@@ -1,6 +1,6 @@
 """Arrays taken out of integrands, so that what integrates sees numbers alone.
 
-Owns `touching`, `inlined`, `summands`, `loops`, `unrolled` and `hoisted`. What reads an array at a plain place is found
+Owns `touching`, `inlined`, `summands`, `loops`, `unrolled` and `bound`. What reads an array at a plain place is found
 once, beside the integral, under a name of its own. A sum under an integral becomes a sum of integrals wherever the
 integrand is linear in it; other sums, folds and arrays that vary with a variable of integration are written out.
 """
@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from functools import lru_cache
-
-from msgspec import Struct
 
 from potto.calculus.differentiation.dual import Differentiator
 from potto.calculus.inlining.expand import Resolve, expanded, named
@@ -64,13 +62,6 @@ ARRAYS: tuple[type[Term], ...] = (Array, Index, Length, ListOf, Fold, Data)
 MOST_STEPS = 1000  # of a loop that is written out
 
 
-class Access(Struct, frozen=True):
-    """What is found beside an integral: the name under which the integrand has it, and the term."""
-
-    name: str
-    term: Term
-
-
 Loop = tuple[str, Term, Term]  # the index of a sum, from, to
 Summand = tuple[tuple[Loop, ...], Term]
 
@@ -92,7 +83,7 @@ def inlined(term: Integral, touches: Callable[[Term], bool], resolve: Resolve, a
     found = expanded(term, lambda name: resolve(name) if touches(name) else None, derive)
     if any(isinstance(node, App) and any(_is_array(arg, arrays) for arg in node.args) for node in postorder(found)):
         found = expanded(found, resolve, derive)
-    found = apart(_pushed(_functions(found, resolve), frozenset(_bound(found))))
+    found = apart(_pushed(_functions(found, resolve), frozenset(bound(found))))
     assert isinstance(found, Integral)
     return found
 
@@ -118,7 +109,7 @@ def _is_array(term: Term, arrays: frozenset[str]) -> bool:
     return isinstance(term, Array | ListOf | Data) or (isinstance(term, Var) and term.name in arrays)
 
 
-def _bound(term: Term) -> Iterable[str]:
+def bound(term: Term) -> Iterable[str]:
     return (name for node in postorder(term) for name in bound_names(node))
 
 
@@ -177,7 +168,7 @@ def summands(term: Integral) -> Term:
 
     An integral of an array is an array of integrals.
     """
-    varying = frozenset(_bound(term))
+    varying = frozenset(bound(term))
     body = term.body
     if isinstance(body, Array):
         body = substitute(body.body, {body.variable: var(place := fresh(body.variable, term.free | varying))})
@@ -272,7 +263,7 @@ class _Linear:
 
 def loops(term: Integral) -> tuple[Term, ...]:
     """The plain bounds of loops over arrays that vary with variables of integration: what `unrolled` has to know."""
-    varying, arrays = frozenset(_bound(term)), Holding(*ARRAYS)
+    varying, arrays = frozenset(bound(term)), Holding(*ARRAYS)
     found: dict[Term, None] = {}
     for node in postorder(term):
         if _is_loop(node, varying, arrays):
@@ -303,7 +294,7 @@ class TooMany(Exception):
 @lru_cache(maxsize=1024)
 def unrolled(term: Integral, known: tuple[tuple[Term, float], ...]) -> Integral:
     """The integral with the loops written out whose bounds are known. Raises TooMany."""
-    varying, arrays, ends = frozenset(_bound(term)), Holding(*ARRAYS), dict(known)
+    varying, arrays, ends = frozenset(bound(term)), Holding(*ARRAYS), dict(known)
 
     def change(node: Term, new: Term) -> Term:
         known = all(part in ends or isinstance(part, Const) for part in _ends(node))
@@ -333,77 +324,3 @@ def _steps(node: Term, first: float, last: float) -> Term:
             return state
         case _:
             return node
-
-
-# Reads at plain places
-
-
-@lru_cache(maxsize=1024)
-def hoisted(term: Integral) -> tuple[Integral, tuple[Access, ...]]:
-    """The integral with what it reads of arrays at plain places under names of its own.
-
-    What stands on one side of a plain condition is read only where that holds.
-    """
-    inside, arrays = frozenset(_bound(term)), Holding(*ARRAYS)
-    guards: dict[Term, list[tuple[Term, ...]]] = {}
-    _gather(term, (), inside, arrays, guards)
-    names, taken = dict[Term, Term](), set(term.free | inside)
-    accesses: list[Access] = []
-    for node, ways in guards.items():
-        name = fresh(_stem(node), taken)
-        taken.add(name)
-        names[node] = var(name)
-        accesses.append(Access(name, _guarded(node, ways)))
-    found = transform(
-        term, lambda node, new: names.get(node, new), lambda node: () if node in names else children(node)
-    )
-    assert isinstance(found, Integral)
-    return found, tuple(accesses)
-
-
-def _gather(
-    root: Term, guard: tuple[Term, ...], inside: frozenset[str], arrays: Holding,
-    found: dict[Term, list[tuple[Term, ...]]],
-) -> None:  # fmt: skip
-    """Note what is read under these conditions. Recursion only at plain conditionals."""
-    waiting, seen = [root], set[Term]()
-    while waiting:
-        node = waiting.pop()
-        if node in seen or not arrays(node):
-            continue
-        seen.add(node)
-        plain = inside.isdisjoint(node.free)
-        if plain and isinstance(node, (*ARRAYS, Proj, Sum, If, Branch)):
-            found.setdefault(node, []).append(guard)
-        elif isinstance(node, If | Branch) and (condition := _condition(node, inside)) is not None:
-            _gather(node.then, (*guard, condition), inside, arrays, found)
-            _gather(node.orelse, (*guard, prim("not", condition)), inside, arrays, found)
-            waiting += children(node)[:-2]
-        else:
-            waiting += children(node)
-
-
-def _condition(node: If | Branch, inside: frozenset[str]) -> Term | None:
-    """The plain condition under which the first side is taken, if it is plain."""
-    if isinstance(node, If):
-        return node.condition if inside.isdisjoint(node.condition.free) else None
-    if not inside.isdisjoint(node.surface.free):
-        return None
-    return prim("lt" if node.strict else "le", ZERO, node.surface)
-
-
-def _guarded(node: Term, ways: list[tuple[Term, ...]]) -> Term:
-    if () in ways:
-        return node
-    conditions = [way[0] if len(way) == 1 else prim("and", *way) for way in ways]
-    return if_(conditions[0] if len(conditions) == 1 else prim("or", *conditions), node, ZERO)
-
-
-def _stem(node: Term) -> str:
-    """What a read is called: after the array."""
-    while not isinstance(node, Var):
-        below = children(node)
-        if not below:
-            return "data"
-        node = below[0]
-    return node.name.split("@")[0]

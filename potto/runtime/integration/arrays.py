@@ -9,8 +9,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from potto.calculus.inlining.arrays import MOST_STEPS, Access, TooMany, hoisted, inlined, loops, summands, unrolled
+from potto.calculus.inlining.arrays import MOST_STEPS, TooMany, inlined, loops, summands, unrolled
 from potto.calculus.inlining.lattices import by_cells
+from potto.calculus.inlining.reads import Access, hoisted
 from potto.core.terms import Index, Integral, Term, function_of, substitute, tuple_, var
 from potto.diagnostics import PottoError, declare
 from potto.kernels import errors

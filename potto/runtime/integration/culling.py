@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from msgspec import Struct
 
-from potto.calculus.inlining.arrays import Access, hoisted, inlined, loops, summands
+from potto.calculus.inlining.arrays import inlined, loops, summands
 from potto.calculus.inlining.expand import expanded
+from potto.calculus.inlining.reads import Access, hoisted
 from potto.core.terms import Index, Integral, Prim, Sum, Term, Var, function_of, lam, outside, substitute
 from potto.diagnostics import PottoError
 from potto.integrate.decomposition.culling import Pairs, culls, remaining

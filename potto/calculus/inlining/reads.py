@@ -1,0 +1,107 @@
+"""What integrands read of arrays at plain places, found once beside the integral.
+
+Owns `hoisted`.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+from msgspec import Struct
+
+from potto.calculus.inlining.arrays import ARRAYS, bound
+from potto.core.terms import (
+    ZERO,
+    Branch,
+    Holding,
+    If,
+    Integral,
+    Proj,
+    Sum,
+    Term,
+    Var,
+    children,
+    fresh,
+    if_,
+    prim,
+    transform,
+    var,
+)
+
+
+class Access(Struct, frozen=True):
+    """What is found beside an integral: the name under which the integrand has it, and the term."""
+
+    name: str
+    term: Term
+
+
+@lru_cache(maxsize=1024)
+def hoisted(term: Integral) -> tuple[Integral, tuple[Access, ...]]:
+    """The integral with what it reads of arrays at plain places under names of its own.
+
+    What stands on one side of a plain condition is read only where that holds.
+    """
+    inside, arrays = frozenset(bound(term)), Holding(*ARRAYS)
+    guards: dict[Term, list[tuple[Term, ...]]] = {}
+    _gather(term, (), inside, arrays, guards)
+    names, taken = dict[Term, Term](), set(term.free | inside)
+    accesses: list[Access] = []
+    for node, ways in guards.items():
+        name = fresh(_stem(node), taken)
+        taken.add(name)
+        names[node] = var(name)
+        accesses.append(Access(name, _guarded(node, ways)))
+    found = transform(
+        term, lambda node, new: names.get(node, new), lambda node: () if node in names else children(node)
+    )
+    assert isinstance(found, Integral)
+    return found, tuple(accesses)
+
+
+def _gather(
+    root: Term, guard: tuple[Term, ...], inside: frozenset[str], arrays: Holding,
+    found: dict[Term, list[tuple[Term, ...]]],
+) -> None:  # fmt: skip
+    """Note what is read under these conditions. Recursion only at plain conditionals."""
+    waiting, seen = [root], set[Term]()
+    while waiting:
+        node = waiting.pop()
+        if node in seen or not arrays(node):
+            continue
+        seen.add(node)
+        plain = inside.isdisjoint(node.free)
+        if plain and isinstance(node, (*ARRAYS, Proj, Sum, If, Branch)):
+            found.setdefault(node, []).append(guard)
+        elif isinstance(node, If | Branch) and (condition := _condition(node, inside)) is not None:
+            _gather(node.then, (*guard, condition), inside, arrays, found)
+            _gather(node.orelse, (*guard, prim("not", condition)), inside, arrays, found)
+            waiting += children(node)[:-2]
+        else:
+            waiting += children(node)
+
+
+def _condition(node: If | Branch, inside: frozenset[str]) -> Term | None:
+    """The plain condition under which the first side is taken, if it is plain."""
+    if isinstance(node, If):
+        return node.condition if inside.isdisjoint(node.condition.free) else None
+    if not inside.isdisjoint(node.surface.free):
+        return None
+    return prim("lt" if node.strict else "le", ZERO, node.surface)
+
+
+def _guarded(node: Term, ways: list[tuple[Term, ...]]) -> Term:
+    if () in ways:
+        return node
+    conditions = [way[0] if len(way) == 1 else prim("and", *way) for way in ways]
+    return if_(conditions[0] if len(conditions) == 1 else prim("or", *conditions), node, ZERO)
+
+
+def _stem(node: Term) -> str:
+    """What a read is called: after the array."""
+    while not isinstance(node, Var):
+        below = children(node)
+        if not below:
+            return "data"
+        node = below[0]
+    return node.name.split("@")[0]
