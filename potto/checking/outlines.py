@@ -9,18 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from potto.calculus.inlining.expand import expanded
-from potto.calculus.surfaces.branch_cuts import opened
+from potto.checking.written_out import written_out
 from potto.core.printer import format_term
 from potto.core.simplify import simplify
 from potto.core.terms import (
     App,
     Branch,
     Delta,
-    Deriv,
-    Global,
     Integral,
-    Lam,
     Term,
     add,
     const,
@@ -28,7 +24,6 @@ from potto.core.terms import (
     postorder,
     substitute,
 )
-from potto.elaborate import core, elaborate_expression
 from potto.query import Database
 from potto.syntax import nodes
 
@@ -37,14 +32,7 @@ MOST = 40  # outlines of one picture
 
 def outlines(db: Database, file: str, expr: nodes.Expr, axes: Sequence[str]) -> tuple[str, ...]:
     """Functions, as Potto writes them, that are zero where a surface is seen; each depends on an axis."""
-    term = elaborate_expression(db, file, expr).term
-    while isinstance(term, Deriv | Global):
-        term = term.function if isinstance(term, Deriv) else core(db, term.module, term.name).term
-    whole = opened(expanded(term, lambda g: core(db, g.module, g.name).term))
-    params: list[str] = []
-    while isinstance(whole, Lam):
-        params += whole.params
-        whole = whole.body
+    params, whole = written_out(db, file, expr)
     found: dict[str, None] = {}
     for surface in _surfaces(whole):
         free = [name for name in params if name in surface.free]

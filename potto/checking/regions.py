@@ -14,17 +14,13 @@ from msgspec import Struct
 from potto.calculus.differentiation.boundary_terms import jumps
 from potto.calculus.differentiation.dual import Differentiator
 from potto.calculus.explanation.explain import equation
-from potto.calculus.inlining.expand import expanded
-from potto.calculus.surfaces.branch_cuts import opened
+from potto.checking.written_out import written_out
 from potto.core.printer import format_term
 from potto.core.simplify import simplify
 from potto.core.terms import (
     ONE,
     App,
-    Deriv,
-    Global,
     Integral,
-    Lam,
     Term,
     children,
     integral,
@@ -32,7 +28,7 @@ from potto.core.terms import (
     substitute,
     var,
 )
-from potto.elaborate import core, elaborate_expression
+from potto.elaborate import core
 from potto.query import Database
 from potto.syntax import nodes
 
@@ -72,14 +68,7 @@ def regions(db: Database, file: str, expr: nodes.Expr, wrt: str) -> tuple[Region
     What depends on what is bound outside of it, as an integral in a sum, is left out. Raises PottoError where an
     integrand has no derivative in symbols.
     """
-    term = elaborate_expression(db, file, expr).term
-    while isinstance(term, Deriv | Global):
-        term = term.function if isinstance(term, Deriv) else core(db, term.module, term.name).term
-    whole = opened(expanded(term, lambda g: core(db, g.module, g.name).term))
-    params: list[str] = []
-    while isinstance(whole, Lam):
-        params += whole.params
-        whole = whole.body
+    params, whole = written_out(db, file, expr)
     work = Differentiator(lambda g: core(db, g.module, g.name).term, folding=True)
     known = frozenset(params)
     return tuple(_region(node, tuple(params), work, wrt) for node in _outermost(whole) if node.free <= known)
