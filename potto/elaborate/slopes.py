@@ -19,7 +19,7 @@ from potto.modules.free import free_references
 from potto.source import Span
 from potto.syntax import nodes
 from potto.types import infer_expression
-from potto.types.types import REAL, ArrayOf, Diffeo, Function, Parameter, TupleOf, Type, groups_of, resolve
+from potto.types.types import REAL, ArrayOf, Function, Parameter, TupleOf, Type, groups_of, holds_functions, resolve
 
 NOWHERE = Span(0, 0)
 Along = Callable[[Term], Term]
@@ -36,7 +36,7 @@ def slope(elaboration: Elaboration, form: str, node: nodes.Apply, function: Valu
     if not parameters or len(places) < len(written):
         return hole("there is no such parameter to differentiate by")
     if not written:
-        moving = [place for place, p in enumerate(parameters) if not _is_function(p.type)]
+        moving = [place for place, p in enumerate(parameters) if not holds_functions(p.type)]
         places = [0] if form == "D" else moving
     return _Slope(elaboration, groups, elaboration.as_term(function)).by(places)
 
@@ -45,10 +45,6 @@ def _bare(expr: nodes.Expr) -> nodes.Expr:
     while isinstance(expr, nodes.Paren):
         expr = expr.inner
     return expr
-
-
-def _is_function(type: Type) -> bool:
-    return isinstance(resolve(type), Function | Diffeo)
 
 
 def _type_of(elaboration: Elaboration, value: Value) -> Type:
@@ -132,13 +128,17 @@ class _Slope:
         return place
 
     def dual(self, term: Term, type: Type, tangent: Term | None) -> Term:
-        """A parameter with its tangent; None: it rests."""
-        if _is_function(type):
-            return deriv(term)
-        if tangent is None and isinstance(type, TupleOf) and any(_is_function(item) for item in type.items):
-            items = (self.dual(proj(term, place), resolve(item), None) for place, item in enumerate(type.items))
-            return tuple_(items)
-        return tuple_((term, self.zero(type, term) if tangent is None else tangent))
+        """A parameter with its tangent; None: it rests, as all do in which there are functions."""
+        if not holds_functions(type):
+            return tuple_((term, self.zero(type, term) if tangent is None else tangent))
+        match resolve(type):
+            case TupleOf(items):
+                return tuple_([self.dual(proj(term, place), item, None) for place, item in enumerate(items)])
+            case ArrayOf(_, item):
+                place = self._place()
+                return array(place, length(term), self.dual(index(term, var(place)), item, None))
+            case _:
+                return deriv(term)
 
     def zero(self, type: Type, term: Term) -> Term:
         """The tangent of what rests, in its shape."""

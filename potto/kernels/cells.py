@@ -7,7 +7,7 @@ cells, tuples, arrays (`rows`) and lists of values, and functions (anything with
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Protocol, Union
 
 import numpy as np
@@ -139,6 +139,8 @@ class FunctionLike(Protocol):
     lam: Lam
     captured: dict[str, Value]
 
+    def held(self) -> Iterable[Value]: ...
+
     def pattern(self, directions: int) -> Pattern: ...
     def change(self, how: Callable[[Value], Value]) -> FunctionLike: ...
 
@@ -235,7 +237,7 @@ def all_cells(value: Value) -> list[Cell]:
         return [value]
     if isinstance(value, Rows):
         return all_cells(value.item)
-    items = value if isinstance(value, tuple | list) else value.captured.values()
+    items = value if isinstance(value, tuple | list) else value.held()
     return [cell for item in items for cell in all_cells(item)]
 
 
@@ -269,7 +271,7 @@ def all_arrays(value: Value) -> list[Array]:
         return value.arrays()
     if isinstance(value, Rows):
         return value.batches()
-    items = value if isinstance(value, tuple | list) else value.captured.values()
+    items = value if isinstance(value, tuple | list) else value.held()
     return [a for item in items for a in all_arrays(item)]
 
 

@@ -29,6 +29,7 @@ from potto.types.types import (
     Unknown,
     function,
     groups_of,
+    holds_functions,
     resolve,
     result_of,
 )
@@ -105,11 +106,11 @@ def _unnamed(inference: Inference, node: nodes.Apply, form: str, parameters: Seq
         first = parameters[:1]
         fine = first and _may_move(inference, node.arguments[0].value, form, first[0])
         return [first[0].type] if fine else None
-    moving = [p.type for p in parameters if not isinstance(resolve(p.type), Function | Diffeo)]
+    moving = [p.type for p in parameters if not holds_functions(p.type)]
     for type in moving:
         _number_unless_known(type)
     if not moving:
-        message = "every parameter of this function is a function, so there is no number to differentiate by"
+        message = "every parameter of this function is a function or holds one: there is no number to differentiate by"
         inference.report(kinds.MISMATCH(node.arguments[0].value.span, message, label="no parameter that is a number"))
     return moving or None
 
@@ -144,8 +145,9 @@ def _may_move(inference: Inference, at: nodes.Expr, form: str, parameter: Parame
     if isinstance(found, Meta):
         _number_unless_known(found)
         return True
-    if isinstance(found, Function | Diffeo):
-        message, help = f"{name} is a function, and derivatives are taken by numbers", f"name a number: `{form}(f, c)`"
+    if holds_functions(found):
+        is_one = "is a function" if isinstance(found, Function | Diffeo) else "holds a function"
+        message, help = f"{name} {is_one}, and derivatives are taken by numbers", f"name a number: `{form}(f, c)`"
     elif form == "D" and not isinstance(found, Real | Unknown):
         message = f"`D` differentiates by one number, but {name} is {describe(found)}"
         shown = f"grad(f, {parameter.name})" if parameter.name else "grad(f)"

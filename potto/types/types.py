@@ -209,6 +209,19 @@ def result_of(type: Type) -> Type:
     return type
 
 
+def holds_functions(type: Type) -> bool:
+    """Whether it is a function, or a tuple or array in which there is one."""
+    match resolve(type):
+        case Function() | Diffeo():
+            return True
+        case TupleOf(items):
+            return any(holds_functions(item) for item in items)
+        case ArrayOf(_, item):
+            return holds_functions(item)
+        case _:
+            return False
+
+
 def dual_name(name: str) -> str:
     """The name that `deriv` gives to a parameter."""
     return "d" + name

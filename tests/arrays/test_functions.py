@@ -60,3 +60,54 @@ def test_functions_in_records_and_tuples() -> None:
 def test_a_condition_that_varies_chooses_between_numbers() -> None:
     with pytest.raises(potto.PottoError, match="P0313"):
         potto.compile("def f(t) integral [0, 1] (if [x < t] then sin else cos)(x) d(x)")
+
+
+SCENE = potto.compile(r"""
+record Shape(r: Real, shade: Real -> Real)
+def unit(x) 1
+def ramp(x) x
+def below(k) \x . [x < k]
+def one(s: Shape, t) integral [0, 1] s.shade(x)*[x < s.r*t] d(x)
+def apart(shapes: [n] Shape, t) sum s in shapes (integral [0, 1] s.shade(x)*[x < s.r*t] d(x))
+def under(shapes: [n] Shape, t) integral [0, 1] sum s in shapes (s.shade(x)*[x < s.r*t]) d(x)
+def colour(shapes: [n] Shape, t) sum s in shapes (s.shade(t)*s.r)
+def of_each(fs: [n] (Real* -> Real*), t) sum f in fs (integral [0, 1] f(x)*[x < t] d(x))
+def at(fs: [n] (Real* -> Real*), i, t) integral [0, 1] fs[i](x)*[x < t] d(x)
+scene = [Shape(r=0.5, shade=unit), Shape(r=0.25, shade=ramp), Shape(r=0.8, shade=below(0.3))]
+row = [Shape(r=(i + 1)/4, shade=\x . x*i) for i in 0..3]
+def thresholds(ks: [n] Real) apart([Shape(r=1, shade=below(k)) for k in ks], 1)
+""")
+
+
+@pytest.mark.parametrize("name", ["apart", "under"])
+def test_a_scene_is_a_list_of_shapes_with_shaders(name: str) -> None:
+    """At t = 1: 0.5 + 0.25^2/2 + 0.3; by t, 0.5*1 + 0.25*0.25, and nothing by the third, whose shader ends before."""
+    assert SCENE.eval(f"{name}(scene, 1)").value == pytest.approx(0.83125, rel=1e-13)
+    assert SCENE.eval(f"D({name}, t)(scene, 1)").value == pytest.approx(0.5625, rel=1e-12)
+    assert SCENE.eval(f"grad({name})(scene, 0.25)").value == pytest.approx(0.5 + 0.0625 / 4 + 0.8, rel=1e-12)
+
+
+def test_functions_of_one_lambda_differ_by_what_they_have_captured() -> None:
+    """With r = (i + 1)/4 and the shader i*x: the sum of i*r^2/2, and by t (at 1/2, where nothing meets) of i*r^2/2."""
+    radii = np.arange(1, 5) / 4
+    exact = float((np.arange(4) * radii**2 / 2).sum())
+    assert SCENE.eval("apart(row, 1)").value == pytest.approx(exact, rel=1e-13)
+    assert SCENE.eval("D(apart, t)(row, 0.5)").value == pytest.approx(exact, rel=1e-12)
+    assert SCENE.eval("colour(row, 2)").value == 2 * float((np.arange(4) * radii).sum())
+    assert SCENE.eval("grad(thresholds)([0.1, 0.7, 0.3])").value == pytest.approx([1, 1, 1], rel=1e-12)
+
+
+def test_members_of_a_batch_choose_functions_with_surfaces_of_their_own() -> None:
+    assert SCENE.eval("of_each([unit, ramp, below(0.3)], 0.5)").value == pytest.approx(0.5 + 0.125 + 0.3, rel=1e-13)
+    functions = [SCENE.unit, SCENE.ramp]
+    found = SCENE.at(functions, np.array([0.0, 1, 1, 0]), np.array([0.5, 0.5, 1, 1]))
+    assert found.value == pytest.approx([0.5, 0.125, 0.5, 1], rel=1e-13)
+    assert SCENE.eval("D(of_each, t)([unit, ramp, below(0.3)], 0.2)").value == pytest.approx(2.2, rel=1e-12)
+
+
+def test_what_holds_a_function_rests() -> None:
+    assert SCENE.eval("D(one, t)(scene[1], 1)").value == pytest.approx(0.0625, rel=1e-12)
+    with pytest.raises(potto.PottoError, match="`s` holds a function"):
+        SCENE.eval("grad(one, s)(scene[0], 1)")
+    with pytest.raises(potto.PottoError, match="a second derivative stops at a tuple, record or array"):
+        SCENE.eval(r"D(\t . D(one, t)(scene[0], t))(1)")

@@ -15,7 +15,7 @@ from potto.diagnostics import PottoError, declare
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Number, Rows, Value, all_arrays, listed
 from potto.kernels.rows import gathered
-from potto.runtime.evaluation.functions import Chosen, Closure
+from potto.runtime.evaluation.functions import Closure, chosen, holds_functions
 from potto.runtime.evaluation.machine import Machine
 
 OUT_OF_RANGE = declare("P0511", "an index that is out of range")
@@ -33,23 +33,23 @@ def array(machine: Machine, term: ArrayTerm, size: Value, env: Env) -> Value:
     params = tuple(sorted(term.body.free | {term.variable}))
     body = lam(params, term.body)
     shape = np.broadcast_shapes(*(a.shape for v in env.values() for a in all_arrays(v)))
-    if count == 0 or machine.linker.functional(term.body):
-        return _one_by_one(machine, body, count, env, term.variable)
+    if count == 0:
+        return Rows(Cell(np.zeros(0), None, (None,) * machine.directions), 0)
     places = np.arange(count, dtype=float).reshape(count, *(1,) * len(shape))
     here = {**env, term.variable: Cell(places, None, (None,) * machine.directions)}
     value = machine.run(body, [here[name] for name in params], None)
+    if holds_functions(value):
+        return _one_by_one(machine, body, count, env, term.variable)
     return Rows(_in_front(value, count, shape, 0), count)
 
 
 def _one_by_one(machine: Machine, body: Any, count: int, env: Env, variable: str) -> Value:
-    """An array of functions: each has captured a place of its own."""
+    """An array with functions in it: each has captured a place of its own."""
     found = []
     for place in range(count):
         here = {**env, variable: Cell(float(place), None, (None,) * machine.directions)}
         found.append(machine.run(body, [here[name] for name in body.params], None))
-    if found:
-        return listed(found)
-    return Rows(Cell(np.zeros(0), None, (None,) * machine.directions), 0)
+    return listed(found)
 
 
 def _size(size: Value) -> int:
@@ -111,11 +111,20 @@ def element(whole: Value, place: Value) -> Value:
         places = _places(place.v, len(whole))
         if np.ptp(places) == 0:
             return whole[int(places.flat[0])]
-        options: list[Any] = whole
-        if all(isinstance(option, Closure) for option in options):
-            return Chosen(options, Cell(places.astype(float)))
-        raise errors.wrong_call("where rows are of different lengths, all members of a batch have one index")
+        return _among(whole, places)
     raise errors.wrong_call("only an array has elements", "to call a function, write parentheses")
+
+
+def _among(options: list[Any], places: Any) -> Value:
+    """For each of a batch the option at its place: functions, or records in which there are some, part by part."""
+    if all(isinstance(option, Closure) for option in options):
+        return chosen(options, places, _among)
+    if all(isinstance(option, tuple) for option in options):
+        return tuple(_among(list(parts), places) for parts in zip(*options, strict=True))
+    rows = listed(options)
+    if isinstance(rows, Rows):
+        return gathered(rows, places)
+    raise errors.wrong_call("where rows are of different lengths, all members of a batch have one index")
 
 
 def _places(place: Number, size: int) -> Any:

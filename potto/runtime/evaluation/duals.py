@@ -15,7 +15,7 @@ from potto.kernels.cells import Cell, Rows, Trace, Value, map_cells
 from potto.kernels.tape import Untaped
 from potto.runtime.evaluation.arguments import fit, uncurried
 from potto.runtime.evaluation.compared import compared
-from potto.runtime.evaluation.functions import Closure, Derivative, Paired
+from potto.runtime.evaluation.functions import Closure, Derivative, Paired, holds_functions
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.second_derivatives import dual_function
 
@@ -42,6 +42,9 @@ def call_derivative(
 
 def _with_tangent(arg: Value, directions: int) -> Value:
     """A plain number, or an array of them, as a dual with tangent 0; a dual as it is."""
+    if isinstance(arg, tuple | list) and holds_functions(arg):
+        message = "a second derivative stops at a tuple, record or array in which there are functions"
+        raise errors.wrong_call(message, "give the functions as parameters of their own")
     if isinstance(arg, Cell | Rows):
         motionless = (None,) * directions
         return arg, map_cells(arg, lambda _: Cell(0.0, None, motionless, motionless))
@@ -62,6 +65,8 @@ def merge(arg: Value) -> Value:
         return Rows(merge_still(arg.item), arg.size)
     if not isinstance(arg, tuple):
         raise errors.wrong_call("a derivative takes duals, pairs `(value, tangent)`")
+    if holds_functions(arg):  # which are duals of their own, so that each item is one
+        return tuple([merge(item) for item in arg])
     if len(arg) == 2 and all(isinstance(part, Cell) for part in arg):
         v, t = arg
         assert isinstance(v, Cell) and isinstance(t, Cell)

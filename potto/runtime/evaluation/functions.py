@@ -1,14 +1,16 @@
 """Functions as values at run time.
 
-Owns `Closure`, `Derivative` and `Paired`. A closure is a term with the values of its free variables. `deriv f` keeps
-f: where it is called it takes duals; where it is given to a derivative as the dual of f, f itself is differentiated.
-A function written by hand for duals (`Paired`) is called with pairs instead.
+Owns `Closure`, `Derivative`, `Paired` and `Chosen`. A closure is a term with the values of its free variables.
+`deriv f` keeps f: where it is called it takes duals; where it is given to a derivative as the dual of f, f itself is
+differentiated. A function written by hand for duals (`Paired`) is called with pairs instead.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
+
+import numpy as np
 
 from potto.core.terms import Lam
 from potto.kernels.cells import Cell, Pattern, Rows, Value, pad
@@ -30,6 +32,10 @@ class Closure:
     def pattern(self, directions: int) -> Pattern:
         moves = tuple(any(_moves(v, d) for v in self.captured.values()) for d in range(directions))
         return (self.inexact, *moves)
+
+    def held(self) -> Iterable[Value]:
+        """The values that belong to it."""
+        return self.captured.values()
 
     def change(self, how: Callable[[Value], Value]) -> Closure:
         if not self.captured:
@@ -70,7 +76,10 @@ class Paired(Closure):
 
 
 class Chosen(Closure):
-    """One of several functions for each member of a batch: the one at its place."""
+    """One of several functions for each member of a batch: the one at its place.
+
+    Its own term is that of the first: what asks for terms takes members apart before (`settled`).
+    """
 
     __slots__ = ("options", "places")
 
@@ -83,10 +92,65 @@ class Chosen(Closure):
         patterns = [option.pattern(directions) for option in self.options]
         return (self.inexact, *(any(p[1 + d] for p in patterns) for d in range(directions)))
 
+    def held(self) -> Iterable[Value]:
+        return (self.places, *self.options)
+
     def change(self, how: Callable[[Value], Value]) -> Closure:
         options: list[Any] = [option.change(how) for option in self.options]
         places: Any = how(self.places)
         return Chosen(options, places)
+
+
+def holds_functions(value: Value) -> bool:
+    """Whether there is a function in a tuple or array, however deep."""
+    return isinstance(value, Closure) or (isinstance(value, tuple | list) and any(map(holds_functions, value)))
+
+
+def chosen(options: Sequence[Closure], places: Any, among: Callable[[list[Any], Any], Value]) -> Closure:
+    """The functions at places, for a batch: those of one term are one function of what each of them has captured.
+
+    among: from values, one for each of the options, and places, the values there.
+    """
+    kinds: dict[object, list[int]] = {}
+    for number, option in enumerate(options):
+        kind = option.lam if type(option) is Closure else id(option)
+        kinds.setdefault((kind, option.inexact), []).append(number)
+    merged: list[Closure] = []
+    group, within = np.empty(len(options), dtype=np.int64), np.zeros(len(options), dtype=np.int64)
+    for own, numbers in enumerate(kinds.values()):
+        group[numbers], within[numbers] = own, np.arange(len(numbers))
+        first = options[numbers[0]]
+        if len(numbers) > 1 and first.captured:
+            at = np.where(group[places] == own, within[places], 0)
+            held = {n: among([options[i].captured[n] for i in numbers], at) for n in first.captured}
+            first = Closure(first.lam, held, first.inexact, first.origin)
+        merged.append(first)
+    return merged[0] if len(merged) == 1 else Chosen(merged, Cell(group[places].astype(float)))
+
+
+def settled(value: Value) -> Value:
+    """The value, of its functions that are chosen those that all members have chosen."""
+    if isinstance(value, tuple):
+        return tuple([settled(item) for item in value])
+    if isinstance(value, list):
+        return [settled(item) for item in value]
+    if not isinstance(value, Closure):
+        return value
+    if isinstance(value, Chosen) and np.ptp(places := np.asarray(value.places.v)) == 0:
+        return settled(value.options[int(places.flat[0])])
+    return value.change(settled) if any(True for _ in choices(value)) else value
+
+
+def choices(value: Value) -> Iterator[Chosen]:
+    """The functions in a value that not all members have chosen alike, outer ones first."""
+    if isinstance(value, Chosen):
+        yield value
+    if isinstance(value, Closure):
+        for inner in value.held():
+            yield from choices(inner)
+    elif isinstance(value, tuple | list):
+        for inner in value:
+            yield from choices(inner)
 
 
 def _moves(value: Value, direction: int) -> bool:

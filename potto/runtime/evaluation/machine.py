@@ -129,12 +129,6 @@ class Linker:
         self.exactness[term] = result
         return result
 
-    def functional(self, term: Term) -> bool:
-        """Whether a term is a function, as the elements of some arrays are."""
-        while isinstance(term, If | Branch):
-            term = term.then
-        return isinstance(term, Lam | Deriv) or (isinstance(term, Global) and self.function(term) is not None)
-
     def reached(self, *terms: Term) -> tuple[tuple[str, str, bytes], ...]:
         """The definitions that terms lead to, with the digests of what they are: what a plan depends on."""
         found = self.reaches.get(terms)
@@ -320,6 +314,8 @@ class Machine:
     def derived(self, function: Value) -> Value:
         if not isinstance(function, Closure):
             raise errors.wrong_call("`deriv` needs a function", "write the integral as a function of its parameters")
+        if isinstance(function, Chosen):
+            return Chosen([Derivative(option) for option in function.options], function.places)
         return Derivative(function)
 
     def project(self, value: Value, index: int) -> Value:

@@ -22,9 +22,10 @@ from potto.kernels import errors
 from potto.kernels.cells import Array, Cell, Ints, Value, all_arrays, map_arrays, pad
 from potto.kernels.making import making
 from potto.runtime.answers.convergence import allowance, widest
+from potto.runtime.evaluation.functions import Chosen, choices, settled
 from potto.runtime.evaluation.local import locally
 from potto.runtime.evaluation.machine import Machine
-from potto.runtime.evaluation.selection import apart
+from potto.runtime.evaluation.selection import Pick, apart
 from potto.runtime.integration.arrays import Differ, in_numbers, met, without_arrays
 from potto.runtime.integration.members import Whole
 from potto.runtime.integration.preparation import filled, held, placed, prepared
@@ -47,6 +48,9 @@ def integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
         if not isinstance(ready, Integral):
             return summed(machine, ready, env)
         term = ready
+    different = next((each for name in term.free for each in choices(env[name])), None)
+    if different is not None:
+        return _by_choice(machine, term, env, different)
     term, env = in_numbers(term, env)
     return locally(machine, env, lambda own, here: _of_numbers(own, term, here))
 
@@ -71,6 +75,19 @@ def _of_numbers(machine: Machine, term: Integral, env: dict[str, Value]) -> Valu
             note_rims(machine, term, env)
         return machine.evaluate(function_of(ready), {n: env[n] for n in ready.free}, None)
     return integrate(machine, term, env)
+
+
+def _by_choice(machine: Machine, term: Integral, env: dict[str, Value], different: Chosen) -> Value:
+    """The members for which one function is the same together: what it does is part of what is integrated."""
+    places = np.asarray(different.places.v)
+    shape = np.broadcast_shapes(places.shape, *(a.shape for value in env.values() for a in all_arrays(value)))
+    full = np.broadcast_to(places, shape)
+    masks = [full == place for place in np.unique(places)]
+
+    def evaluated(_: int, here: dict[str, Value], pick: Pick) -> Value:
+        return integral(machine, term, {name: settled(value) for name, value in here.items()})
+
+    return apart(masks, env, evaluated)
 
 
 def _by_length(machine: Machine, term: Integral, env: dict[str, Value], ends: Array) -> Value:
