@@ -19,6 +19,6 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 _cache = tempfile.TemporaryDirectory(prefix="potto-tests-")
 os.environ["POTTO_CACHE"] = _cache.name
 
-settings.register_profile("repeatable", derandomize=True, deadline=None)
-settings.register_profile("explore", deadline=None)
+settings.register_profile("repeatable", derandomize=True, deadline=None, max_examples=25)
+settings.register_profile("explore", deadline=None, max_examples=200)
 settings.load_profile("repeatable")

@@ -103,6 +103,11 @@ class Sums(Columns):
         self.v[:, members] = self.t[:, :, members] = np.nan
         self.unknown(members)
 
+    def undefined(self, batch: int) -> Ints:
+        """The members that have come to no number, or to an infinite one."""
+        defined = np.isfinite(self.v).all(axis=0) & np.isfinite(self.t).all(axis=(0, 1))
+        return np.nonzero(~np.broadcast_to(defined, (batch,)))[0]
+
     def unknown(self, members: Any) -> None:
         """Nothing is known of how far off some of the integrals are."""
         self.e[:, members] = self.et[:, :, members] = np.inf

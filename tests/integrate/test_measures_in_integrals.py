@@ -5,8 +5,10 @@ Derivatives by every parameter and by the place of the jump, by differences of t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 from mpmath import mp
 
@@ -104,3 +106,34 @@ def test_a_range_around_a_variable_far_out() -> None:
     answer = potto.deriv(f)((0.5, 1.0))
     assert answer.converged and abs(answer.value - 1.0) <= answer.error < 1e-12
     assert abs(answer.tangent - 1.0) <= answer.tangent_error < 1e-11
+
+
+GROWING = potto.compile("""
+def moment(k, s) integral (t ~ normal(0, s)) exp(k*t/s) d(t)
+def beyond(k, s, a) integral (t ~ normal(0, s)) exp(k*t/s)*[t > a*s] d(t)
+def call(m, s, a) integral (t ~ normal(m, s)) max(exp(t) - a, 0) d(t)
+""")
+
+
+@pytest.mark.parametrize("scale", [1e-8, 1, 1e8])
+@pytest.mark.parametrize("k", [0.4, 3, 10])
+def test_what_a_density_weighs_may_overflow_far_out(k: float, scale: float) -> None:
+    """exp(k t) has the mean exp(k^2/2) and, beyond a, that times the normal tail beyond a - k."""
+    found = potto.grad(GROWING.moment, "k")(k, scale)
+    assert found.converged
+    assert found.value == pytest.approx(math.exp(k * k / 2), rel=1e-12)
+    assert found.tangent == pytest.approx(k * math.exp(k * k / 2), rel=1e-11)
+    tail = GROWING.beyond(k, scale, 1.0)
+    assert tail.value == pytest.approx(math.exp(k * k / 2) * math.erfc((1 - k) / math.sqrt(2)) / 2, rel=1e-10)
+
+
+def test_a_kink_that_is_rounded_to_its_other_side_is_no_peak() -> None:
+    """Black's formula; of 2,000 such kinks some twenty lie where the payoff is already more than 0 by rounding."""
+    rng = np.random.default_rng(0)
+    a, s = 3 * rng.exponential(1, 2000), rng.uniform(0.5, 2, 2000)
+    d = (s - 1 - np.log(a)) / s
+    exact = [math.exp(v - 1 + v * v / 2) * math.erfc(-(x + v) / math.sqrt(2)) / 2 - k * math.erfc(-x / math.sqrt(2)) / 2
+             for v, x, k in zip(s, d, a, strict=True)]  # fmt: skip
+    found = GROWING.call(s - 1, s, a)
+    assert found.value == pytest.approx(np.array(exact), rel=1e-10)
+    assert found.stats["evaluations"] < 250 * 2000  # 211 a member; 340 where such kinks are looked into

@@ -16,7 +16,7 @@ from potto.integrate.adaptive.root_sums import Rows, over_roots
 from potto.integrate.columns import distinct
 from potto.integrate.decomposition.critical_places import critical_rows
 from potto.integrate.decomposition.cuts import Cuts, at_rest, frame_rows, segments, standing
-from potto.integrate.decomposition.effective_range import concentrated
+from potto.integrate.decomposition.effective_range import concentrated, pulled_in
 from potto.integrate.decomposition.meetings import Row
 from potto.integrate.decomposition.sections import searched_rows
 from potto.integrate.decomposition.vanishing import vanishes
@@ -99,6 +99,8 @@ class Iteration(Struct):
         moving = cuts.moving and machine.directions > 0
         work = PanelBatch(self, number, level, env, here, sides, machine, moving, batch, root, slack, cuts.conflict)
         sums = integrated(work)
+        if not number and (lost_far_out := sums.undefined(batch)).size:
+            self.nearer(work, sums, lost_far_out)
         if collapsed:
             sums = count_collapsed(scene, collapsed, sums)
         self.count_events(scene, cuts, sums)
@@ -116,6 +118,23 @@ class Iteration(Struct):
             if gone is not None:
                 sums.lose(gone)
         return sums
+
+    def nearer(self, work: PanelBatch, sums: Sums, members: Ints) -> None:
+        """Integrate again, for members that have come to no number, without what is so far out that it is next to
+        nothing: a density is 0 there to rounding, and what it weighs overflows."""
+        rows = np.nonzero(np.isin(work.seg.owner, members))[0]
+        seg = work.seg.pick(rows)
+        left_out = pulled_in(self.plan, work.number, work.env, seg, work.batch)
+        if left_out is None:
+            return
+        sides = {g: take(m, rows) for g, m in work.sides.items()}
+        again = integrated(PanelBatch(
+            self, work.number, work.level, work.env, seg, sides, work.machine, work.moving, work.batch, work.root,
+            work.slack, work.conflict,
+        ))  # fmt: skip
+        again.e += left_out
+        again.et += left_out
+        sums.put(members, again.pick(members))
 
     def count_events(self, scene: Scene, cuts: Cuts, sums: Sums) -> None:
         """Add, or say, what cuts matter that lie on a bound or on one another, and surfaces that fold here."""

@@ -1,7 +1,8 @@
 """How much of an infinite range an integrand takes up: a density leaves next to nothing beyond some place.
 
-Owns `concentrated`. What the integrand is at most, on shells that double around where it is concentrated, follows from
-its enclosure; where what all the shells farther out can hold is below rounding, nothing needs to be looked for.
+Owns `concentrated` and `pulled_in`. What the integrand is at most, on shells that grow around where it is concentrated,
+follows from its enclosure; where what all the shells farther out can hold is below rounding, nothing needs to be looked
+for, nor evaluated.
 """
 
 from __future__ import annotations
@@ -12,13 +13,15 @@ import numpy as np
 
 from potto.core.terms import Var, postorder
 from potto.integrate.decomposition.meetings import as_array
+from potto.integrate.pieces import gather
 from potto.integrate.plan import Plan
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.intervals import ANYTHING, Interval, enclosure
-from potto.kernels.cells import Array, Cell, Value
+from potto.integrate.rules.substitution import Segments, choose
+from potto.kernels.cells import Array, Cell, Ints, Value
 
 SIZES = 4.0 ** np.arange(-22, 23)  # of shells, before one of them is looked at more closely
-PARTS = 16  # into which that is divided
+PARTS = 32  # into which that is divided
 NOTHING = EPS * EPS  # of what a shell holds at most
 
 
@@ -32,13 +35,57 @@ def concentrated(
     low, high = as_array(np.minimum(lo.v, hi.v), batch), as_array(np.maximum(lo.v, hi.v), batch)
     if np.isfinite(low).all() and np.isfinite(high).all():
         return None
+    box = _box(plan, env, batch)
+    low, high, lost = _Range(plan, number, box, low, high).found(_volume(plan, number, box, batch))
+    return (Cell(low), Cell(high), lost) if np.isfinite(low).all() and np.isfinite(high).all() else None
+
+
+def pulled_in(plan: Plan, number: int, env: dict[str, Value], seg: Segments, batch: int) -> Array | None:
+    """Give infinite segments the ends beyond which there is next to nothing; and say how much there is, at most, (B,).
+
+    What is far out is not evaluated, where a density is 0 to rounding and what it weighs overflows. None where nothing
+    changes: no end is infinite, or none is known.
+    """
+    rows = np.nonzero(np.isinf(seg.a) | np.isinf(seg.b))[0]
+    if not rows.size:
+        return None
+    owner, low, high = seg.owner[rows], seg.a[rows], seg.b[rows]
+    alike, one = _alike(plan, env, owner, low, high, batch)
+    box = _box(plan, gather(env, owner[one]), one.size)
+    start, end = np.full(one.size, -np.inf), np.full(one.size, np.inf)
+    np.maximum.at(start, alike, low)
+    np.minimum.at(end, alike, high)
+    near, far, lost = (
+        found[alike] for found in _Range(plan, number, box, start, end).found(_volume(plan, number, box, one.size))
+    )
+    near, far = np.where(np.isinf(low), near, low), np.where(np.isinf(high), far, high)
+    known = (np.isfinite(near) | ~np.isinf(low)) & (np.isfinite(far) | ~np.isinf(high)) & (near < far)
+    if not known.any():
+        return None
+    rows, owner = rows[known], owner[known]
+    seg.a[rows], seg.b[rows] = near[known], far[known]
+    seg.kind[rows] = choose(seg.a[rows], seg.b[rows], seg.left[rows], seg.right[rows])
+    left_out: Array = np.bincount(owner, lost[known], minlength=batch).astype(float)
+    return left_out
+
+
+def _alike(plan: Plan, env: dict[str, Value], owner: Ints, low: Array, high: Array, batch: int) -> tuple[Ints, Ints]:
+    """Which segments are alike in all that their integrands depend on, and one of each kind: those that differ only by
+    where they begin have the same far end."""
+    given = [value.v for name in sorted(plan.mass.free) if isinstance(value := env.get(name), Cell)]
+    columns = [np.isinf(low), np.isinf(high), *(as_array(v, batch)[owner] for v in given if np.ndim(v))]
+    _, one, alike = np.unique(np.stack(columns), axis=1, return_index=True, return_inverse=True)
+    return alike.reshape(-1), one
+
+
+def _box(plan: Plan, env: dict[str, Value], batch: int) -> dict[str, Interval]:
+    """The environment as intervals, a row for each member."""
     box: dict[str, Interval] = {node.name: ANYTHING for node in postorder(plan.mass) if isinstance(node, Var)}
     for name, value in env.items():
         if isinstance(value, Cell):
             column = as_array(value.v, batch)[:, None]
             box[name] = column, column
-    own = _Range(plan, number, box, low, high)
-    return own.found(_volume(plan, number, box, batch))
+    return box
 
 
 def _volume(plan: Plan, number: int, box: dict[str, Interval], batch: int) -> Array:
@@ -53,9 +100,9 @@ def _volume(plan: Plan, number: int, box: dict[str, Interval], batch: int) -> Ar
         )
         if not (np.isfinite(below).all() and np.isfinite(above).all()):
             found = _Range(plan, inner, box, below, above).found(np.ones(batch))
-            if found is None:
+            below, above = as_array(found[0], batch), as_array(found[1], batch)
+            if not (np.isfinite(below).all() and np.isfinite(above).all()):
                 return np.full(batch, np.inf)
-            below, above = as_array(found[0].v, batch), as_array(found[1].v, batch)
         box[level.variable] = below[:, None], above[:, None]
         volume *= above - below
     return volume
@@ -81,19 +128,17 @@ class _Range:
         self.body, self.box = plan.mass, dict(box)
         self.level, self.low, self.high = plan.levels[number].level, low, high
 
-    def found(self, volume: Array) -> tuple[Cell, Cell, Array] | None:
+    def found(self, volume: Array) -> tuple[Array, Array, Array]:
+        """The ends of what matters, infinite where none is known, and what is left out at most."""
         ends, lost = [], np.zeros(self.low.size)
         for side, bound, other in ((-1.0, self.low, self.high), (1.0, self.high, self.low)):
             infinite = np.isinf(bound)
             if not infinite.any():
-                ends.append(Cell(bound))
+                ends.append(bound)
                 continue
-            start = self.middle(side, other)
-            place, left = self.end(side, start, volume)
-            if not np.isfinite(place[infinite]).all():
-                return None
-            ends.append(Cell(np.where(infinite, place, bound)))
-            lost += np.where(infinite, left, 0.0)
+            place, left = self.end(side, self.middle(side, other), volume)
+            ends.append(np.where(infinite, place, bound))
+            lost += np.where(infinite & np.isfinite(place), left, 0.0)
         return ends[0], ends[1], lost
 
     def middle(self, side: float, other: Array) -> Array:
@@ -111,11 +156,14 @@ class _Range:
         far = start[:, None] + side * np.concatenate(([0.0], SIZES, [np.inf]))
         held = self.held(side, far, volume)
         most = np.max(held, axis=1, initial=0.0, where=np.isfinite(held))
+        row = np.arange(start.size)
+        at, left = _first(held, NOTHING * most)
+        reach = far[row, np.where(at <= SIZES.size, at, 0)]
+        most = np.minimum(most, np.max(self.held(side, _parts(start, reach), volume), axis=1, initial=0.0))
         at, left = _first(held, NOTHING * most)
         known = at <= SIZES.size
         at = np.where(known, at, 0)
-        row, nearer = np.arange(start.size), np.maximum(at - 1, 0)
-        fine = far[row, nearer, None] + np.linspace(0, 1, PARTS + 1) * (far[row, at] - far[row, nearer])[:, None]
+        fine = _parts(far[row, np.maximum(at - 1, 0)], far[row, at])
         within = self.held(side, fine, volume)
         part, left = _first(np.concatenate((within, left[:, None]), axis=1), NOTHING * most)
         return np.where(known, fine[row, np.minimum(part, PARTS)], np.inf), left
@@ -131,6 +179,11 @@ class _Range:
             within = np.minimum(within, _stretches(self.plan, self.number, box))
         with np.errstate(invalid="ignore"):
             return np.where(size == 0, 0.0, size * np.abs(ends[1] - ends[0]) * within)
+
+
+def _parts(start: Array, end: Array) -> Array:
+    parts: Array = start[:, None] + np.linspace(0, 1, PARTS + 1) * (end - start)[:, None]
+    return parts
 
 
 def _first(held: Array, allowed: Array) -> tuple[Any, Array]:
