@@ -88,7 +88,7 @@ exponential = register(
         variance=lambda r: div(div(ONE, r), r),
         valid=lambda r: ((prim("lt", ZERO, r), "the rate must be positive"),),
         domain=((0.1, 10.0),),
-        hints=lambda r: tuple(div(const(k), r) for k in (3.0,)),
+        hints=lambda r: tuple(div(const(k), r) for k in (3.0, 12.0, 40.0)),
         doc="The waiting time for an event that happens r times in a unit of time, on average.",
         example="integral (x ~ exponential(2)) x d(x)",
     )

@@ -69,7 +69,7 @@ logistic = register(
         variance=lambda m, s: div(mul(s, s, PI, PI), const(3.0)),
         valid=scale_conditions,
         domain=((-3.0, 3.0), (0.1, 5.0)),
-        hints=lambda m, s: spread(m, s, (1.0,)),
+        hints=lambda m, s: spread(m, s, (4.0, 14.0, 40.0)),
         doc="The logistic distribution with mean m and scale s, whose cdf is the sigmoid of (x - m)/s.",
         example="integral (x ~ logistic(0, 1)) x^2 d(x)",
     )
@@ -93,7 +93,7 @@ cauchy = register(
         variance=None,
         valid=scale_conditions,
         domain=((-3.0, 3.0), (0.1, 5.0)),
-        hints=lambda m, s: spread(m, s, (1.0,)),
+        hints=lambda m, s: spread(m, s, (1.0, 10.0)),
         doc="The Cauchy distribution around m with half width s. Its mean does not exist.",
         example="integral (x ~ cauchy(0, 1)) [x < 1] d(x)",
     )
@@ -122,7 +122,7 @@ laplace = register(
         variance=lambda m, s: mul(TWO, s, s),
         valid=scale_conditions,
         domain=((-3.0, 3.0), (0.1, 5.0)),
-        hints=lambda m, s: spread(m, s, (1.0,)),
+        hints=lambda m, s: spread(m, s, (3.0, 12.0, 40.0)),
         doc="The Laplace distribution around m, which falls off exponentially on either side at the scale s.",
         example="integral (x ~ laplace(0, 1)) abs(x) d(x)",
     )

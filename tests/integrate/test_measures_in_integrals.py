@@ -137,3 +137,10 @@ def test_a_kink_that_is_rounded_to_its_other_side_is_no_peak() -> None:
     found = GROWING.call(s - 1, s, a)
     assert found.value == pytest.approx(np.array(exact), rel=1e-10)
     assert found.stats["evaluations"] < 250 * 2000  # 211 a member; 340 where such kinks are looked into
+
+
+def test_what_grows_fast_towards_a_cut_is_no_power_of_the_distance_to_it() -> None:
+    """Cut at -3, exp(t) under a normal density leans to that cut from the left, as a singularity there would."""
+    found = potto.grad(GROWING.moment, "k")(1.0, 1.0)
+    assert found.converged and found.value == pytest.approx(math.exp(0.5), rel=1e-14)
+    assert found.error < 1e-12 and found.stats["evaluations"] < 300  # 700, and no more digits than 10, where graded
