@@ -143,4 +143,4 @@ def test_what_grows_fast_towards_a_cut_is_no_power_of_the_distance_to_it() -> No
     """Cut at -3, exp(t) under a normal density leans to that cut from the left, as a singularity there would."""
     found = potto.grad(GROWING.moment, "k")(1.0, 1.0)
     assert found.converged and found.value == pytest.approx(math.exp(0.5), rel=1e-14)
-    assert found.error < 1e-12 and found.stats["evaluations"] < 300  # 700, and no more digits than 10, where graded
+    assert found.error < 1e-12 and found.stats["evaluations"] < 400  # 862, and no more than 10 digits, where graded

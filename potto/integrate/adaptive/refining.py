@@ -23,6 +23,7 @@ from potto.integrate.degenerate.degeneracies import steps_at_cuts
 from potto.integrate.events import BUDGET_SPENT
 from potto.integrate.panels.panel_batch import PanelBatch
 from potto.integrate.pieces import Ends, Pieces, Sums, all_of
+from potto.integrate.rules.substitution import GRADE
 
 MOST_HALVINGS = 64
 # Nodes for pieces that were too coarse: first more of them on the same piece, then on halves.
@@ -30,9 +31,10 @@ HIGH_ORDER = HALF_ORDER = 14
 MORE = 6  # for graded pieces, on which what is smooth is a polynomial, whose end looks like a fast decay
 # The relative error of a piece up to which more nodes promise more than halves do.
 PROMISING = 1e-2
-# From which relative error on a graded piece is also measured as it is: what grows fast towards an end is taken for a
-# power, and a grade for that is harder than the integrand itself, however short the piece (`exp(t)` under a normal).
-ROUGH = 1e-8
+# From which relative error on a steeply graded piece is also measured as it is, and up to which it is then taken for
+# smooth: what grows fast towards an end is taken for a steep power, and a grade for that is harder than the integrand
+# itself, however short the piece (`exp(t)` under a normal density).
+ROUGH, SMOOTH = 1e-8, 1e-12
 DOUBTFUL_ROUNDS = 8
 LONG = 8  # after how many halvings it is looked for members that take longer than the others
 
@@ -128,12 +130,12 @@ def replaced(work: PanelBatch, old: Pieces, new: Pieces, order: int, tally: Tall
     new = work.measure(new, order)
     if (graded := np.nonzero((new.end != 0) & (new.error <= PROMISING * new.size).all(axis=0))[0]).size:
         new.held_against(work.measure(new.places(graded), order + MORE), graded)
-    if (rough := np.nonzero((new.end != 0) & (new.error > ROUGH * new.size).any(axis=0))[0]).size:
+    if (rough := np.nonzero((np.abs(new.end) > GRADE) & (new.error > ROUGH * new.size).any(axis=0))[0]).size:
         level = new.places(rough)
         level.end = np.zeros(rough.size, dtype=np.int64)
         level = work.measure(level, order).settled()
-        better = (level.error <= new.error[:, rough]).all(axis=0)
-        new.settled().put(rough[better], level.pick(better))
+        smooth = (level.error <= SMOOTH * level.size).all(axis=0)
+        new.settled().put(rough[smooth], level.pick(smooth))
     new.excess, new.stuck = np.tile(old.excess, copies), np.tile(old.stuck, copies)
     tally.replace(work, old, new)
     return new
