@@ -14,6 +14,7 @@ import pytest
 from _pytest.mark.structures import ParameterSet
 from formulas import Given, Shown, has_value, near
 from generated_definitions import definition
+from how_many import examples
 
 import potto
 from potto.checking.library import Library
@@ -129,7 +130,7 @@ def test_generated(seed: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("block", range(20))
-def test_a_thousand_generated(block: int) -> None:
+@pytest.mark.parametrize("block", range(examples(10, 20)))
+def test_many_generated(block: int) -> None:
     for seed in range(1000 + 50 * block, 1050 + 50 * block):
         _check_generated(seed)

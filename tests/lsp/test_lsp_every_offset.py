@@ -1,4 +1,7 @@
-"""Every request about a place, at every offset of every example, through a real server: never an internal error."""
+"""Every request about a place, all along every example, through a real server: never an internal error.
+
+The features themselves are asked more often by `tests/ide/test_every_offset.py`; `make fuzz` asks at every offset.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from how_many import examples
 from lsp_client import Client
 from lsp_sessions import capabilities_of
 from potto_lsp.features import FEATURES
@@ -71,5 +75,5 @@ def test_at_some_offsets(name: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
-def test_at_every_offset(path: Path) -> None:
-    at_offsets(path, 1)
+def test_at_offsets_of_every_example(path: Path) -> None:
+    at_offsets(path, examples(11, 1))

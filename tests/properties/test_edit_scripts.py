@@ -1,18 +1,18 @@
 """Random edits: the incremental front end says what one says that has never seen another text; and a body edit runs
 nothing that is not its own.
 
-`POTTO_SCRIPTS=100000 pytest -m slow tests/properties/test_edit_scripts.py` runs as many scripts.
+`make fuzz` runs more of them.
 """
 
 from __future__ import annotations
 
-import os
 import random
 from collections.abc import Hashable
 from typing import Any
 
 import pytest
 from edited_programs import WORKSPACE, edited, library
+from how_many import examples
 
 import potto.ide as ide
 from potto.checking.library import Library
@@ -21,7 +21,7 @@ from potto.modules.texts import content
 from potto.types import interface
 
 ROOT = "/edited"
-SCRIPTS = int(os.environ.get("POTTO_SCRIPTS", "500"))
+SCRIPTS = examples(150, 500)
 
 
 def seen(lib: Library, offsets: dict[str, list[int]]) -> dict[Hashable, Any]:
