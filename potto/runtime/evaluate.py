@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from potto.calculus.surfaces.branch_cuts import opened
 from potto.calculus.surfaces.discontinuities import TooDeep
 from potto.core.printer import format_term
 from potto.core.terms import Integral, Sum, Term
@@ -74,7 +73,7 @@ class Program:
         """The value of a term, with every internal limit turned into a PottoError."""
 
         def found(machine: Machine) -> Value:
-            return guarded(lambda: machine.term(opened(term), dict(env or {})))
+            return guarded(lambda: machine.term(self.linker.ready(term), dict(env or {})))
 
         value = found(machine)
         return widened(value, machine, found) if machine.record.used and not machine.directions else value

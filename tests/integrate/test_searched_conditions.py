@@ -186,3 +186,16 @@ def test_a_sum_in_a_condition_is_the_sum_written_out(n: int, given: str) -> None
         assert abs(one.value - other.value) <= one.error + other.error
         assert abs(one.tangent - other.tangent) <= one.tangent_error + other.tangent_error
         assert one.converged and one.evals <= 2 * other.evals
+
+
+@pytest.mark.parametrize("text", [
+    "k = 0.3\ndef f(t) integral [0, 1] [sin(x) + x^2*t < k] d(x)",
+    "half = 0.15\nk = 2*half\ndef below(x, t, q) [sin(x) + x^2*t < q]\ndef f(t) integral [0, 1] below(x, t, k) d(x)",
+    "k = 0.6/2\ndef below(x, t) [sin(x) + x^2*t < k]\ndef f(t) integral [0, 1] below(x, t) d(x)",
+])  # fmt: skip
+def test_a_number_may_have_a_name(text: str) -> None:
+    """The root r of the surface; t moves it by -r^2/(cos r + 2 t r)."""
+    root = mp.findroot(lambda x: mp.sin(x) + x**2 / 2 - mp.mpf("0.3"), 0.27)
+    found = potto.grad(potto.compile(text).f)(0.5)
+    assert found.value == pytest.approx(float(root), rel=1e-14)
+    assert found.tangent == pytest.approx(float(-(root**2) / (mp.cos(root) + root)), rel=1e-12)

@@ -30,7 +30,8 @@ from potto.calculus.checking.solvability import (
 from potto.calculus.differentiation.deltas import without_deltas
 from potto.calculus.differentiation.derivative import NotSmooth
 from potto.calculus.differentiation.dual import Differentiator
-from potto.calculus.inlining.expand import expanded
+from potto.calculus.inlining.expand import Resolve, expanded
+from potto.calculus.inlining.numbers import with_numbers
 from potto.calculus.inlining.relevance import may_integrate
 from potto.calculus.solving.inverse_map import Failure, Inverse, invert, listed
 from potto.calculus.solving.isolate import Guard
@@ -103,7 +104,8 @@ def check_conditions(db: Database, file: str, name: str) -> tuple[Diagnostic, ..
     spans = dict(elaborated.origins)
     fallback = Span(0, 0) if item is None else item.name_span
     products = _products(db, elaborated.term, found, spans, fallback)
-    return (*_judged(found, spans, fallback, _maps(item, chunk_text(db, file, name))), *products)
+    maps = _maps(item, chunk_text(db, file, name))
+    return (*_judged(found, spans, fallback, maps, lambda g: _whole(db, g)), *products)
 
 
 def _maps(item: nodes.Definition | None, text: str | None) -> frozenset[Span]:
@@ -162,9 +164,9 @@ def _faultless(db: Database, target: Global) -> Term | None:
 
 
 def _judged(
-    found: Iterable[Condition], spans: Mapping[Term, Span], fallback: Span, maps: frozenset[Span]
+    found: Iterable[Condition], spans: Mapping[Term, Span], fallback: Span, maps: frozenset[Span], resolve: Resolve
 ) -> Iterable[Diagnostic]:
-    """What is said of conditions; `maps` is where the text says `diffeo(...)`."""
+    """What is said of conditions; `maps` is where the text says `diffeo(...)`, `resolve` gives definitions."""
     said: set[tuple[str, Span, str]] = set()
     wrong = Holding(Hole)
     for condition in found:
@@ -174,7 +176,8 @@ def _judged(
         own = isinstance(condition.anchor, Branch) and condition.anchor.coordinates == condition.coordinates
         span = spans.get(condition.anchor, fallback)
         role: Role = "delta" if condition.delta else "map" if span in maps else "bracket"
-        problem = _verdict(condition.coordinates, condition.variables, tuple(condition.box.items()), own, role)
+        coordinates = tuple(with_numbers(c, resolve) for c in condition.coordinates)
+        problem = _verdict(coordinates, condition.variables, tuple(condition.box.items()), own, role)
         if problem is not None:
             key = (problem.kind.code, span, problem.message)
             if key not in said:

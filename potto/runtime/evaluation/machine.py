@@ -16,6 +16,7 @@ import numpy as np
 
 from potto.calculus.differentiation.deltas import PRODUCT_OF_DELTAS
 from potto.calculus.inlining.currying import sizes_of
+from potto.calculus.inlining.numbers import with_numbers
 from potto.calculus.surfaces.branch_cuts import opened
 from potto.core.terms import (
     Array,
@@ -110,8 +111,21 @@ class Linker:
     def term(self, module: str, name: str) -> Term:
         key = (module, name)
         if key not in self.terms:
-            self.terms[key] = opened(self.lookup(module, name))
+            self.terms[key] = self.ready(self.lookup(module, name))
         return self.terms[key]
+
+    def ready(self, term: Term) -> Term:
+        """The term as it is evaluated: with branch cuts told, and numbers in the place of their names."""
+        return with_numbers(opened(term), self._number)
+
+    def _number(self, name: Global) -> Term | None:
+        """The term of a definition that has no value yet; of a broken one nothing is said before it is needed."""
+        if (name.module, name.name) in self.held:
+            return None
+        try:
+            return self.lookup(name.module, name.name)
+        except PottoError:
+            return None
 
     def inexact(self, term: Term) -> bool:
         """Whether a value of the term may carry an integration error: whether an integral is reached from it."""
