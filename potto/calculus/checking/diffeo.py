@@ -31,7 +31,7 @@ from potto.calculus.differentiation.deltas import without_deltas
 from potto.calculus.differentiation.derivative import NotSmooth
 from potto.calculus.differentiation.dual import Differentiator
 from potto.calculus.inlining.expand import Resolve, expanded
-from potto.calculus.inlining.numbers import with_numbers
+from potto.calculus.inlining.numbers import as_parameters
 from potto.calculus.inlining.relevance import may_integrate
 from potto.calculus.solving.inverse_map import Failure, Inverse, invert, listed
 from potto.calculus.solving.isolate import Guard
@@ -176,7 +176,7 @@ def _judged(
         own = isinstance(condition.anchor, Branch) and condition.anchor.coordinates == condition.coordinates
         span = spans.get(condition.anchor, fallback)
         role: Role = "delta" if condition.delta else "map" if span in maps else "bracket"
-        coordinates = tuple(with_numbers(c, resolve) for c in condition.coordinates)
+        coordinates = tuple(as_parameters(c, resolve) for c in condition.coordinates)
         problem = _verdict(coordinates, condition.variables, tuple(condition.box.items()), own, role)
         if problem is not None:
             key = (problem.kind.code, span, problem.message)
