@@ -9,6 +9,8 @@ in the middle of a cell, is not plain, and is left to the general way.
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 from msgspec import Struct
 
@@ -43,8 +45,10 @@ class _Cells(Struct):
     members: Ints
     env: dict[str, Value]
 
-    def pick(self, index: Ints) -> _Cells:
-        return _Cells(self.rows[:, :, index], self.members[index], gather(self.env, index))
+    def pick(self, index: Ints, names: Collection[str]) -> _Cells:
+        """Some of the cells, with those numbers that are still asked for."""
+        env = {name: value for name, value in self.env.items() if name in names}
+        return _Cells(self.rows[:, :, index], self.members[index], gather(env, index))
 
 
 def topologies(plan: Straight, machine: Evaluator, env: dict[str, Value], batch: int) -> tuple[Bools, list[Alike]]:
@@ -58,7 +62,7 @@ def topologies(plan: Straight, machine: Evaluator, env: dict[str, Value], batch:
         cells = _along(plan, i, tracking, cells, plain)
     sides = _sides(plan, tracking, cells, plain)
     kept = np.nonzero(plain[cells.members])[0]
-    return plain, _gathered(plan, machine, cells.pick(kept), sides[kept])
+    return plain, _gathered(plan, machine, cells.pick(kept, ()), sides[kept])
 
 
 def _along(plan: Straight, i: int, machine: Evaluator, cells: _Cells, plain: Bools) -> _Cells:
@@ -74,7 +78,8 @@ def _along(plan: Straight, i: int, machine: Evaluator, cells: _Cells, plain: Boo
     plain[cells.members[~fine]] = False
     at, index = np.nonzero((np.arange(1, len(places))[:, None] < count) & fine)
     low, high = order[at, index], order[at + 1, index]
-    inner = cells.pick(index)
+    later = (*plan.frames[i + 1 :], plan.surfaces)
+    inner = cells.pick(index, {name for function in later for name in function.params})
     inner.rows = np.concatenate((inner.rows, np.stack((low, high))[None]))
     inner.env[plan.variables[i]] = Cell(0.5 * (places[low, index] + places[high, index]))
     return inner
