@@ -199,3 +199,12 @@ def test_a_number_may_have_a_name(text: str) -> None:
     found = potto.grad(potto.compile(text).f)(0.5)
     assert found.value == pytest.approx(float(root), rel=1e-14)
     assert found.tangent == pytest.approx(float(-(root**2) / (mp.cos(root) + root)), rel=1e-12)
+
+
+def test_a_number_that_is_an_integral_is_to_be_a_parameter() -> None:
+    text = "big = integral [0, 1] x d(x)\ndef f(t) integral [0, 1] [sin(x) + x^2*t < big] d(x)"
+    with pytest.warns(UserWarning, match="a definition has an error"):
+        module = potto.compile(text)
+    with pytest.raises(potto.PottoError, match="no inverse was found") as caught:
+        module.f(0.5)
+    assert caught.value.diagnostics[0].help == "make `big` a parameter, and give the definition as its argument"

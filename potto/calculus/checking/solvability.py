@@ -23,7 +23,7 @@ from potto.calculus.solving.inverse_map import Failure, Inverse, dependence, inv
 from potto.calculus.solving.solve import Sections, sections
 from potto.calculus.surfaces.nested_brackets import nested, pieces
 from potto.core.printer import format_term
-from potto.core.terms import Branch, If, Integral, Prim, Term, postorder, var
+from potto.core.terms import App, Branch, Global, If, Integral, Prim, Term, postorder, var
 from potto.diagnostics import Kind, declare
 from potto.primitives import PRIMITIVES
 
@@ -240,6 +240,11 @@ def no_inverse(
         reasons = (*reasons, "what an integral comes to is found by numbers, and the surface has to be known before")
         what = " or ".join(f"`{name}`" for name in variables if name in inner.free)
         help = f"write what `{format_term(inner)}` comes to as a formula in {what}" if what else help
+    called = {node.function for node in postorder(surface) if isinstance(node, App)}
+    named = next((node for node in postorder(surface) if isinstance(node, Global) and node not in called), None)
+    if named is not None and role == "bracket":  # what is arithmetic, or an array, is not seen as a name here
+        reasons = (*reasons, f"`{named.name}` is found by numbers, and the surface has to be known before")
+        help = f"make `{named.name}` a parameter, and give the definition as its argument"
     return Problem(
         NO_INVERSE,
         f"no inverse was found for `{format_term(surface)}` in {listed(variables, 'or')}",
