@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from itertools import pairwise
 from typing import Any
 
 from potto.core.consing import Base, made, make
@@ -96,9 +97,10 @@ class Index(Base, frozen=True, eq=False):
 
 
 class Length(Base, frozen=True, eq=False):
-    """How many elements an array has."""
+    """How many elements an array has, which are numbers that rise if that is asked."""
 
     array: Term
+    rising: bool = False
 
 
 class Data(Base, frozen=True, eq=False):
@@ -278,10 +280,15 @@ def index(array: Term, place: Term) -> Term:
     return make(Index, array.free | place.free, array, place)
 
 
-def length(array: Term) -> Term:
-    if isinstance(array, ListOf):
+def length(array: Term, rising: bool = False) -> Term:
+    if isinstance(array, ListOf) and not (rising and len(array.items) > 1 and not _rise(array.items)):
         return const(len(array.items))
-    return array.size if isinstance(array, Array) else make(Length, array.free, array)
+    return array.size if isinstance(array, Array) and not rising else make(Length, array.free, array, rising)
+
+
+def _rise(items: tuple[Term, ...]) -> bool:
+    numbers = [item.value for item in items if isinstance(item, Const)]
+    return len(numbers) == len(items) and all(a < b for a, b in pairwise(numbers))
 
 
 def data(path: str, content: str, column: str) -> Data:

@@ -138,7 +138,7 @@ def rebuild(term: Term, parts: tuple[Term, ...]) -> Term:
         case Index():
             return index(*parts)
         case Length():
-            return length(*parts)
+            return length(parts[0], term.rising)
         case Deriv():
             return deriv(parts[0])
 

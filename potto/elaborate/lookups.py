@@ -43,7 +43,7 @@ def interp(elaboration: Elaboration, xs: Term, ys: Term, x: Term) -> Term:
 
     def at(read: Read) -> Term:
         rise = mul(sub(read(element(ys, after, size)), read(element(ys, place, size))), into)
-        return add(read(first), sum_(_name(place), ZERO, sub(size, const(2)), rise))
+        return add(read(first), sum_(_name(place), ZERO, sub(length(xs, rising=True), const(2)), rise))
 
     return _by_numbers(elaboration, elaboration.shapes.of(first), first, at, _itself)
 

@@ -18,6 +18,7 @@ from potto.elaborate.values import Builtin, Closure, Value
 from potto.modules.free import free_references
 from potto.source import Span
 from potto.syntax import nodes
+from potto.syntax.written import without_parentheses
 from potto.types import infer_expression
 from potto.types.types import REAL, ArrayOf, Function, Parameter, TupleOf, Type, groups_of, holds_functions, resolve
 
@@ -31,7 +32,7 @@ def slope(elaboration: Elaboration, form: str, node: nodes.Apply, function: Valu
     groups = groups_of(_type_of(elaboration, function)) or ((Parameter(None, REAL),),)
     parameters = [parameter for group in groups for parameter in group]
     written = [argument.value for argument in node.arguments[1:]]
-    names = [name.id for name in map(_bare, written) if isinstance(name, nodes.Name)]
+    names = [name.id for name in map(without_parentheses, written) if isinstance(name, nodes.Name)]
     places = [place for name in names for place, parameter in enumerate(parameters) if parameter.name == name]
     if not parameters or len(places) < len(written):
         return hole("there is no such parameter to differentiate by")
@@ -39,12 +40,6 @@ def slope(elaboration: Elaboration, form: str, node: nodes.Apply, function: Valu
         moving = [place for place, p in enumerate(parameters) if not holds_functions(p.type)]
         places = [0] if form == "D" else moving
     return _Slope(elaboration, groups, elaboration.as_term(function)).by(places)
-
-
-def _bare(expr: nodes.Expr) -> nodes.Expr:
-    while isinstance(expr, nodes.Paren):
-        expr = expr.inner
-    return expr
 
 
 def _type_of(elaboration: Elaboration, value: Value) -> Type:

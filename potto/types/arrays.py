@@ -8,9 +8,10 @@ from potto.diagnostics import Suggestion, shortened, suggest
 from potto.source import Span
 from potto.syntax import nodes
 from potto.syntax.printer import print_expression
+from potto.syntax.written import number, without_parentheses
 from potto.types import kinds
 from potto.types.context import Inference, rule
-from potto.types.infer import strip, value_only
+from potto.types.infer import value_only
 from potto.types.integrals import summed
 from potto.types.mismatches import between, describe, mismatch
 from potto.types.scope import Local
@@ -75,13 +76,9 @@ def _in_range(inference: Inference, size: Type, node: nodes.Index, place: int) -
 
 def _whole(inference: Inference, index: nodes.Expr) -> None:
     """Report an index that is written as a number that is not whole."""
-    written = strip(index)
-    sign = 1.0
-    if isinstance(written, nodes.Unary) and written.op == "-":
-        written, sign = strip(written.operand), -1.0
-    if not isinstance(written, nodes.Number):
+    value = number(index)
+    if value is None:
         return
-    value = sign * written.value
     lower = max(math.floor(value), 0) if math.isfinite(value) else 0
     near = dict.fromkeys((lower, lower + 1)) if 0 < value < 1e9 else (0,)
     inference.report(kinds.NOT_WHOLE(
@@ -95,7 +92,7 @@ def _from_the_end(inference: Inference, known: int, node: nodes.Index, place: in
     """Report an index below 0 into an array of any size."""
     if known >= 0:
         return
-    index, array = node.indices[place], strip(node.array)
+    index, array = node.indices[place], without_parentheses(node.array)
     help, suggestions = "indices count from 0", tuple[Suggestion, ...]()
     if isinstance(array, nodes.Name) and not place:
         help += f"; the last element is `{array.id}[len({array.id}) - 1]`"
@@ -121,11 +118,8 @@ def _out_of_range(inference: Inference, known: int, size: int, index: nodes.Expr
 
 def _constant(expr: nodes.Expr) -> int | None:
     """The whole number that is written."""
-    expr = strip(expr)
-    if isinstance(expr, nodes.Unary) and expr.op == "-":
-        found = _constant(expr.operand)
-        return None if found is None else -found
-    return int(expr.value) if isinstance(expr, nodes.Number) and expr.value.is_integer() else None
+    found = number(expr)
+    return int(found) if found is not None and found.is_integer() else None
 
 
 @rule(nodes.Field)
@@ -169,7 +163,7 @@ def _count(inference: Inference, over: nodes.Range) -> Type:
 
 def _size(inference: Inference, expr: nodes.Expr) -> Type:
     """A bound as a size and a number: `n - 1`, `len(xs) - 1`, `3`. Negative ones are counted too."""
-    expr = strip(expr)
+    expr = without_parentheses(expr)
     constant = _constant(expr)
     if constant is not None:
         return Count(constant)

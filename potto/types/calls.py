@@ -18,9 +18,10 @@ from potto.quick import replace
 from potto.source import Span
 from potto.syntax import nodes
 from potto.syntax.printer import print_expression
+from potto.syntax.written import without_parentheses
 from potto.types import kinds
 from potto.types.context import Inference, Plan, rule
-from potto.types.infer import is_known, special, strip
+from potto.types.infer import is_known, special
 from potto.types.loading import loaded
 from potto.types.mismatches import between, comparison, describe, mismatch
 from potto.types.motionless import check_tangents, takes_duals
@@ -53,7 +54,7 @@ from potto.types.vectors import vector_form
 def _apply(inference: Inference, node: nodes.Apply) -> Type:
     form = special(inference, node.function)
     if form is not None:
-        inference.meanings[id(strip(node.function))] = Builtin(form)
+        inference.meanings[id(without_parentheses(node.function))] = Builtin(form)
         of_vectors = vector_form(form)
         if of_vectors is not None:
             return of_vectors(inference, node)
@@ -116,7 +117,7 @@ def _apply_unknown(inference: Inference, node: nodes.Apply, callee: Meta, types:
 
 def _variadic(inference: Inference, node: nodes.Apply, types: Sequence[Type]) -> Type | None:
     """`min` and `max` take any number of arguments from two."""
-    meaning = inference.meanings.get(id(strip(node.function)))
+    meaning = inference.meanings.get(id(without_parentheses(node.function)))
     primitive = PRIMITIVES.get(meaning.name) if isinstance(meaning, Builtin) else None
     if primitive is None or primitive.arity is not None or len(types) <= 2:
         return None
@@ -165,9 +166,9 @@ def _no_names(argument: nodes.Argument, node: nodes.Apply) -> Diagnostic:
 
 def callee_name(node: nodes.Apply) -> str:
     """What a call applies, in the middle of a sentence."""
-    target = strip(node.function)
+    target = without_parentheses(node.function)
     while isinstance(target, nodes.Apply):
-        target = strip(target.function)
+        target = without_parentheses(target.function)
     if isinstance(target, nodes.Name):
         return f"`{target.id}`"
     return f"`{target.path}.{target.name}`" if isinstance(target, nodes.Member) else "this function"
@@ -370,7 +371,7 @@ def _deriv(inference: Inference, node: nodes.Apply) -> Type:
         return UNKNOWN
     if not isinstance(found, Function | Meta):
         help = "write it as a function of what it depends on: `deriv(\\t . …)`"
-        if isinstance(strip(inner), nodes.Apply):
+        if isinstance(without_parentheses(inner), nodes.Apply):
             help = "derive the function and apply the result: `deriv(f)(…)`"
         message = f"`deriv` takes a function, but this is {describe(found)}"
         inference.report(kinds.NOT_A_FUNCTION(inner.span, message, label=describe(found), help=help))

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from potto.diagnostics import Diagnostic
 from potto.syntax import nodes
+from potto.syntax.written import without_parentheses
 from potto.types import kinds
 from potto.types.context import Condition, Inference, rule
-from potto.types.infer import strip, value_only
+from potto.types.infer import value_only
 from potto.types.mismatches import comparison, describe, mismatch
 from potto.types.scope import Local
 from potto.types.types import (
@@ -62,7 +63,7 @@ def _bracket(inference: Inference, node: nodes.Bracket) -> Type:
 
 def _operand(inference: Inference, node: nodes.Logic | nodes.Unary, operand: nodes.Expr, where: str) -> None:
     """An operand of `and`, `or`, `not`: in a condition it may be a bracket, elsewhere it is a comparison."""
-    inner = strip(operand)
+    inner = without_parentheses(operand)
     if id(node) in inference.mixed:
         if isinstance(inner, nodes.Bracket):
             inference.infer(operand)
@@ -75,7 +76,7 @@ def _truth(inference: Inference, expr: nodes.Expr, where: str) -> None:
     found = resolve(inference.infer(expr))
     if isinstance(found, Truth | Unknown):
         return
-    bracket = isinstance(strip(expr), nodes.Bracket | nodes.ListLiteral)
+    bracket = isinstance(without_parentheses(expr), nodes.Bracket | nodes.ListLiteral)
     inference.report(
         kinds.NOT_A_CONDITION(
             expr.span,
@@ -104,7 +105,7 @@ def _if(inference: Inference, node: nodes.If) -> Type:
 
 def _condition(inference: Inference, node: nodes.If) -> None:
     """Infer a condition and find out of which kind it is."""
-    expr = strip(node.condition)
+    expr = without_parentheses(node.condition)
     if isinstance(expr, nodes.Logic | nodes.Unary):
         inference.mixed.add(id(expr))
     found = resolve(inference.infer(node.condition))
@@ -129,13 +130,13 @@ def _coordinates(found: Type, expr: nodes.Expr) -> bool:
 def is_bracket(inference: Inference, expr: nodes.Expr) -> bool:
     """Whether an expression is an Iverson bracket, or a local name for one."""
     for _ in range(len(inference.locals) + 1):
-        expr = strip(expr)
+        expr = without_parentheses(expr)
         if isinstance(expr, nodes.Bracket) or id(expr) in inference.brackets:
             return True
         meaning = inference.meanings.get(id(expr))
         if not isinstance(meaning, Local) or meaning.kind != "local" or meaning.value is None:
             return False
-        value = strip(meaning.value)
+        value = without_parentheses(meaning.value)
         if isinstance(value, nodes.Bracket) and not _one_surface(value):
             return False
         expr = value
@@ -159,7 +160,7 @@ def _no_condition(found: Type, expr: nodes.Expr) -> Diagnostic:
 
 def _one_surface(bracket: nodes.Bracket) -> bool:
     """Whether a bracket is a single inequality: only such a one can be given a name and still decide a condition."""
-    inner = strip(bracket.condition)
+    inner = without_parentheses(bracket.condition)
     return isinstance(inner, nodes.Compare) and len(inner.rest) == 1 and inner.rest[0].op not in ("==", "!=")
 
 

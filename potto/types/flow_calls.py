@@ -8,6 +8,7 @@ from potto.modules.builtins import DERIVATIVES, LOOK_UPS, VECTORS
 from potto.primitives import PRIMITIVES
 from potto.syntax import nodes
 from potto.syntax.printer import print_expression
+from potto.syntax.written import without_parentheses
 from potto.types.algebra import flat, jumps_of, merge, still
 from potto.types.apply import call
 from potto.types.calls import callee_name
@@ -15,7 +16,6 @@ from potto.types.context import Plan
 from potto.types.dualize import dual, slope_value
 from potto.types.flow import Walk, walks
 from potto.types.flow_arrays import element
-from potto.types.infer import strip
 from potto.types.rules import lone_delta, nonlinear
 from potto.types.scope import Builtin
 from potto.types.types import Parameter, groups_of
@@ -37,7 +37,7 @@ from potto.types.values import (
 
 @walks(nodes.Apply)
 def _apply(walk: Walk, node: nodes.Apply) -> Value:
-    meaning = walk.inference.meanings.get(id(strip(node.function)))
+    meaning = walk.inference.meanings.get(id(without_parentheses(node.function)))
     name = meaning.name if isinstance(meaning, Builtin) else ""
     if name == "delta":
         return _delta(walk, node)

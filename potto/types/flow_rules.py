@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from potto.source import Span
 from potto.syntax import nodes
+from potto.syntax.written import without_parentheses
 from potto.types.algebra import (
     flat,
     join,
@@ -16,7 +17,6 @@ from potto.types.algebra import (
 from potto.types.flow import Surfaces, Walk, walks
 from potto.types.flow_arrays import parts_of
 from potto.types.flow_calls import builtin_value
-from potto.types.infer import strip
 from potto.types.rules import nonlinear, product_of_deltas
 from potto.types.scope import Builtin, Global, Local, Meaning, Member
 from potto.types.types import UNKNOWN, Unknown
@@ -45,7 +45,7 @@ def _error(walk: Walk, node: nodes.ErrorExpr) -> Value:
 
 @walks(nodes.Paren)
 def _paren(walk: Walk, node: nodes.Paren) -> Value:
-    return walk.value(strip(node))
+    return walk.value(without_parentheses(node))
 
 
 @walks(nodes.Name, nodes.Member)
@@ -210,7 +210,7 @@ def _jumping_condition(walk: Walk, node: nodes.If) -> Scalar:
 
 def plain_condition(walk: Walk, expr: nodes.Expr) -> Scalar:
     """The value of a plain condition, each of whose parts must not vary."""
-    expr = strip(expr)
+    expr = without_parentheses(expr)
     match expr:
         case nodes.Logic(operands=operands):
             return _scalar(joined(plain_condition(walk, operand) for operand in operands))

@@ -13,6 +13,7 @@ from potto.diagnostics import Diagnostic
 from potto.modules.builtins import DERIVATIVES, SPECIALS
 from potto.primitives import PRIMITIVES
 from potto.syntax import nodes
+from potto.syntax.written import without_parentheses
 from potto.types import kinds
 from potto.types.annotations import written_type
 from potto.types.context import Inference, rule
@@ -49,14 +50,7 @@ def _error(inference: Inference, node: nodes.ErrorExpr) -> Type:
 
 @rule(nodes.Paren)
 def _paren(inference: Inference, node: nodes.Paren) -> Type:
-    return inference.infer(strip(node))
-
-
-def strip(expr: nodes.Expr) -> nodes.Expr:
-    """An expression without the parentheses around it."""
-    while isinstance(expr, nodes.Paren):
-        expr = expr.inner
-    return expr
+    return inference.infer(without_parentheses(node))
 
 
 # Names
@@ -254,9 +248,9 @@ def _returned_late(inference: Inference, result: Type, body: nodes.Expr) -> None
 
 def _curries(inference: Inference, body: nodes.Expr) -> bool:
     """Whether a function as a result is only one more group of parameters."""
-    body = strip(body)
+    body = without_parentheses(body)
     while isinstance(body, nodes.Let):
-        body = strip(body.body)
+        body = without_parentheses(body.body)
     match body:
         case nodes.Name():
             meaning = inference.meanings.get(id(body))
@@ -331,7 +325,7 @@ def is_known(inference: Inference, expr: nodes.Expr) -> bool:
 
 def special(inference: Inference, expr: nodes.Expr) -> str | None:
     """`deriv`, `delta` or a builtin of vectors if that is what a function's name means here."""
-    expr = strip(expr)
+    expr = without_parentheses(expr)
     if not isinstance(expr, nodes.Name) or inference.scope.find(expr.id):
         return None
     if expr.id not in SPECIALS and vector_form(expr.id) is None:

@@ -41,6 +41,7 @@ WITHIN_ITSELF = declare("P0331", "a record that contains itself")
 UNKNOWN_FIELD = declare("P0332", "a field that a record does not have")
 NO_RECORD = declare("P0333", "`with` behind something that is not a record")
 EMPTY = declare("P0334", "the least or the greatest of nothing")
+NO_RISE = declare("P0335", "places that are written in the wrong order")
 
 UNUSED_LOCAL = declare("P0610", "a local name that is not used", "warning")
 UNUSED_VARIABLE = declare("P0611", "a variable of integration that is not used", "warning")

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
+from potto.diagnostics import Related
 from potto.syntax import nodes
+from potto.syntax.written import number, without_parentheses
 from potto.types import kinds
 from potto.types.context import Inference
 from potto.types.format import format_type
@@ -31,6 +35,7 @@ def interp(inference: Inference, node: nodes.Apply, types: list[Type]) -> Type:
             label=f"`{a}` and `{b}`", help="take as many of both",
         ))  # fmt: skip
     _several(inference, resolve(size), places, "interp")
+    _rising(inference, places)
     inference.need_number(x, node.arguments[2].value, "where `interp` looks")
     return _looked_up(inference, item, values)
 
@@ -51,6 +56,22 @@ def image(inference: Inference, node: nodes.Apply, types: list[Type]) -> Type:
 def _several(inference: Inference, size: Type, expr: nodes.Expr, name: str) -> None:
     if isinstance(size, Count) and size.number < 1:
         inference.report(kinds.SIZES(expr.span, f"`{name}` needs a place at least", label="no elements"))
+
+
+def _rising(inference: Inference, places: nodes.Expr) -> None:
+    """Report the first of the numbers of a list that is not larger than the one before."""
+    written = without_parentheses(places)
+    if not isinstance(written, nodes.ListLiteral):
+        return
+    for before, place in pairwise(written.items):
+        first, second = number(before), number(place)
+        if first is not None and second is not None and not first < second:
+            inference.report(kinds.NO_RISE(
+                place.span, f"`interp` looks between places that rise, but {second:g} stands behind {first:g}",
+                label="not above the one before", related=(Related(before.span, "the place before"),),
+                help="sort the places, with the values beside them",
+            ))  # fmt: skip
+            return
 
 
 def _looked_up(inference: Inference, item: Type, expr: nodes.Expr) -> Type:

@@ -14,6 +14,7 @@ from potto.quick import replace
 from potto.source import Span
 from potto.syntax import nodes
 from potto.syntax.printer import print_expression
+from potto.syntax.written import without_parentheses
 from potto.types import kinds
 from potto.types.context import Inference, Plan
 from potto.types.mismatches import around
@@ -78,10 +79,7 @@ def is_derivative(inference: Inference, expr: nodes.Expr) -> bool:
 
 
 def _derives(inference: Inference, node: nodes.Apply) -> bool:
-    head: nodes.Expr = node.function
-    while isinstance(head, nodes.Paren):
-        head = head.inner
-    meaning = inference.meanings.get(id(head))
+    meaning = inference.meanings.get(id(without_parentheses(node.function)))
     return isinstance(meaning, Builtin) and meaning.name == "deriv"
 
 
@@ -95,8 +93,7 @@ def _calls(inference: Inference, node: nodes.Apply) -> tuple[list[nodes.Apply], 
     calls: list[nodes.Apply] = []
     head: nodes.Expr = node
     while True:
-        while isinstance(head, nodes.Paren):
-            head = head.inner
+        head = without_parentheses(head)
         if not isinstance(head, nodes.Apply) or _derives(inference, head):
             return calls, head
         calls.append(head)
@@ -128,8 +125,7 @@ def _motionless(
 ) -> Diagnostic:
     innermost = calls[-1]
     plan = inference.plans[id(innermost)]
-    while isinstance(first, nodes.Paren):
-        first = first.inner
+    first = without_parentheses(first)
     if plan.spread and isinstance(first, nodes.Tuple):
         first = first.items[0]
     several = sum(len(call.arguments) for call in calls) > 1 or plan.spread
@@ -172,9 +168,7 @@ def _written(calls: Sequence[nodes.Apply], head: nodes.Expr, first: nodes.Expr, 
     """The call with its first argument moving."""
 
     def changed(value: nodes.Expr) -> nodes.Expr:
-        inner = value
-        while isinstance(inner, nodes.Paren):
-            inner = inner.inner
+        inner = without_parentheses(value)
         if inner is first:
             return moved
         if isinstance(inner, nodes.Tuple) and any(item is first for item in inner.items):

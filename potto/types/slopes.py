@@ -11,9 +11,10 @@ from collections.abc import Sequence
 from potto.diagnostics import Diagnostic
 from potto.modules.hints import did_you_mean, instead, near_names
 from potto.syntax import nodes
+from potto.syntax.written import without_parentheses
 from potto.types import kinds
 from potto.types.context import Inference
-from potto.types.infer import is_known, strip
+from potto.types.infer import is_known
 from potto.types.mismatches import describe
 from potto.types.types import (
     REAL,
@@ -67,7 +68,7 @@ def slope(inference: Inference, node: nodes.Apply, form: str) -> Type:
 
 def _no_function(inner: nodes.Expr, form: str, found: Type) -> Diagnostic:
     help = f"write it as a function of what it depends on: `{form}(\\t . …)`"
-    if isinstance(strip(inner), nodes.Apply):
+    if isinstance(without_parentheses(inner), nodes.Apply):
         help = f"differentiate the function and apply the result: `{form}(f)(…)`"
     message = f"`{form}` takes a function, but this is {describe(found)}"
     return kinds.NOT_A_FUNCTION(inner.span, message, label=describe(found), help=help)
@@ -119,7 +120,7 @@ def _named(
     inference: Inference, argument: nodes.Argument, form: str, parameters: Sequence[Parameter]
 ) -> Parameter | None:
     names = [parameter.name for parameter in parameters if parameter.name]
-    written = strip(argument.value)
+    written = without_parentheses(argument.value)
     if not isinstance(written, nodes.Name):
         help = f"the numbers are given to what it makes: `{form}(f, c)(0.3)`" if names else ""
         message = f"what follows the function in `{form}(…)` is the name of a parameter"

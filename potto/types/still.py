@@ -8,8 +8,8 @@ definition, whose type is known; and a term has to show what an argument is, sin
 from __future__ import annotations
 
 from potto.syntax import nodes
+from potto.syntax.written import without_parentheses
 from potto.types.context import Inference
-from potto.types.infer import strip
 from potto.types.motionless import head_of
 from potto.types.scope import Builtin, Global, Local, Meaning
 from potto.types.types import UNKNOWN, ArrayOf, Dist, Meta, Real, TupleOf, Type, resolve
@@ -61,9 +61,9 @@ def stands_still(inference: Inference, call: nodes.Apply, argument: nodes.Expr, 
 
 def _of_a_definition(inference: Inference, head: nodes.Expr) -> bool:
     """Whether a function is `deriv(f)` or another name of it, where f is a definition."""
-    head = strip(head)
+    head = without_parentheses(head)
     if isinstance(head, nodes.Apply):
-        inner = strip(head.arguments[0].value) if len(head.arguments) == 1 else head
+        inner = without_parentheses(head.arguments[0].value) if len(head.arguments) == 1 else head
         meaning = _meaning(inference, head.function)
         derives = isinstance(meaning, Builtin) and meaning.name == "deriv"
         return derives and isinstance(_meaning(inference, inner), Global)
@@ -74,7 +74,7 @@ def _of_a_definition(inference: Inference, head: nodes.Expr) -> bool:
 
 
 def _meaning(inference: Inference, expr: nodes.Expr) -> Meaning | None:
-    return inference.meanings.get(id(strip(expr)))
+    return inference.meanings.get(id(without_parentheses(expr)))
 
 
 def _is_bound(inference: Inference, local: Local) -> bool:
@@ -88,7 +88,7 @@ def _is_bound(inference: Inference, local: Local) -> bool:
 def _evident(inference: Inference, expr: nodes.Expr) -> bool:
     """Whether the term of an expression shows what it is made of: the types of lambdas' parameters and of what loops go
     through are known to inference alone."""
-    expr = strip(expr)
+    expr = without_parentheses(expr)
     if isinstance(resolve(inference.types.get(id(expr), UNKNOWN)), Real | Dist):
         return True
     match expr:

@@ -201,3 +201,38 @@ def test_a_condition_on_a_table(programs: potto.Module) -> None:
     step, peaks = 1 / (count - 1), xs[1::2]
     assert abs(found.value - np.sum(peaks) * 2 * (1 - t) * step) <= found.error + 1e-15 < 1e-11
     assert abs(found.tangent + np.sum(peaks) * 2 * step) <= found.tangent_error + 1e-14 < 1e-11
+
+
+@pytest.mark.parametrize(("xs", "first", "second"), [
+    ([0, 2, 1], "2.0", "1.0"),
+    ([0, 1, 1], "1.0", "1.0"),
+    ([0, 0, 1], "0.0", "0.0"),
+    ([float("nan"), 0, 1], "nan", "0.0"),
+])  # fmt: skip
+def test_places_that_do_not_rise_are_told(programs: potto.Module, xs: list[float], first: str, second: str) -> None:
+    """At a point, under an integral, in a condition and in a gradient, by either spelling of a batch."""
+    calls: list[Callable[[], object]] = [
+        lambda: potto.compile("def at(xs: [n] Real, ys: [n] Real, x) interp(xs, ys, x)").at(xs, [0, 1, 2], 0.5),
+        lambda: programs.table(xs, [0, 1, 2], 0.2, 0.7),
+        lambda: programs.higher(xs, [0, 1, 2], 0.2, 0.7, 0.5),
+        lambda: programs.table(xs, [0, 1, 2], np.linspace(0, 0.5, 5), 0.7),
+        lambda: potto.grad(programs.table, wrt=("ys",))(xs, [0, 1, 2], 0.2, 0.7),
+    ]
+    for call in calls:
+        with pytest.raises(potto.PottoError) as told:
+            call()
+        assert [d.code for d in told.value.diagnostics] == ["P0514"]
+        assert f"{second} stands behind {first}" in told.value.diagnostics[0].message
+
+
+def test_places_made_in_the_program() -> None:
+    program = potto.compile("""
+def squares(x) interp([0.1*i for i in 0..10], [i^2 for i in 0..10], x)
+def flat(x) interp([1 for i in 0..3], [i for i in 0..3], x)
+def moved(a) integral [0, 2] interp([0, a, 2], [0, 1, 0], x) d(x)
+""")
+    assert abs(program.squares(0.55) - 30.5) < 1e-12
+    assert abs(program.moved(0.5) - 1) < 1e-12  # a tent of base 2 and height 1, wherever its peak
+    for call in (lambda: program.flat(0.5), lambda: program.moved(2.0)):
+        with pytest.raises(potto.PottoError, match="`interp` looks between places that rise"):
+            call()

@@ -10,6 +10,7 @@ import contextlib
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any
 
 from mpmath import mp
@@ -154,7 +155,7 @@ class Oracle:
             case Index():
                 return self.element(self.run(term.array, env), self.decide(term.index, env))
             case Length():
-                return mp.mpf(len(self.run(term.array, env)))
+                return self.length(self.run(term.array, env), term.rising)
             case Data(path=path, column=column):
                 return self.data[path, column]
             case Deriv(function=inner):
@@ -204,6 +205,11 @@ class Oracle:
         for place in range(lo, hi + 1):
             state = self.run(term.body, {**env, term.variable: mp.mpf(place), term.state: state})
         return state
+
+    def length(self, whole: Value, rising: bool) -> Value:
+        if rising and not all(a < b for a, b in pairwise(whole)):
+            raise ValueError("places that do not rise")
+        return mp.mpf(len(whole))
 
     def element(self, whole: Value, place: Any) -> Value:
         if int(place) != place or not 0 <= place < len(whole):

@@ -22,6 +22,7 @@ from potto.query import Database
 from potto.source import Span
 from potto.syntax import extent, node_at, nodes, walk
 from potto.syntax.nodes import Expr
+from potto.syntax.written import without_parentheses
 
 
 def bracket_fixes(place: At, said: Diagnostic) -> Iterator[Offer]:
@@ -51,12 +52,6 @@ def condition_at(place: At, chunk: ChunkAt, span: Span) -> Expr | None:
             else:
                 break
     return None
-
-
-def without_parentheses(expr: Expr) -> Expr:
-    while isinstance(expr, nodes.Paren):
-        expr = expr.inner
-    return expr
 
 
 def _bracket(place: At, chunk: ChunkAt, condition: Expr, said: Diagnostic) -> Iterator[Offer]:

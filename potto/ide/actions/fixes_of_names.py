@@ -16,6 +16,7 @@ from potto.modules import find_module
 from potto.modules.workspace import definers, module_name
 from potto.source import Span
 from potto.syntax import nodes, walk
+from potto.syntax.written import without_parentheses
 
 _NAME = re.compile(r"[^\W\d]\w*")
 MOST_MODULES = 5  # that are offered to import a name from
@@ -72,10 +73,7 @@ def _groups(chunk: ChunkAt, item: nodes.Item | None, span: Span) -> list[list[st
     calls: dict[Span, nodes.Apply] = {}
     for node in () if item is None else walk(item):
         if isinstance(node, nodes.Apply):
-            function = node.function
-            while isinstance(function, nodes.Paren):
-                function = function.inner
-            calls[function.span] = node
+            calls[without_parentheses(node.function).span] = node
     groups: list[list[str]] = []
     used: set[str] = set()
     while span in calls:

@@ -11,7 +11,7 @@ from potto.calculus.checking.solvability import Problem
 from potto.checking.check import definition_diagnostics
 from potto.core.printer import format_term
 from potto.core.simplify import simplify
-from potto.ide.actions.fixes_of_conditions import compared, judged, without_parentheses
+from potto.ide.actions.fixes_of_conditions import compared, judged
 from potto.ide.hover.derivatives import code, condition_infos, condition_markdown, fence
 from potto.ide.hover.local_names import written
 from potto.ide.model import Hover
@@ -19,6 +19,7 @@ from potto.ide.names.places import ChunkAt
 from potto.query import Database
 from potto.source import Span
 from potto.syntax import extent, node_at, nodes
+from potto.syntax.written import without_parentheses
 from potto.types.kinds import VARYING_CONDITION
 
 RULE = "\n\n---\n\n"

@@ -16,6 +16,7 @@ from potto.ide.names.symbols import callee
 from potto.modules import names, parsed
 from potto.query import Database, query
 from potto.syntax import children, live_expressions, nodes, parse_expression
+from potto.syntax.written import without_parentheses
 from potto.types import Function, Parameter, Real, TupleOf, Type, Var, groups_of, interface, result_of
 from potto.types.types import resolve
 
@@ -90,9 +91,7 @@ def _calls(node: nodes.Node) -> Iterator[nodes.Apply]:
 
 def point_of(db: Database, file: str, text: str) -> Point | None:
     """A call in a file's scope as a point; None if it is not a call of a definition with all its arguments."""
-    tree = parse_expression(text).expr
-    while isinstance(tree, nodes.Paren):
-        tree = tree.inner
+    tree = without_parentheses(parse_expression(text).expr)
     made = _point(db, file, text, tree) if isinstance(tree, nodes.Apply) else None
     return None if made is None else made[1]
 

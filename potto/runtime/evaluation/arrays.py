@@ -21,6 +21,7 @@ from potto.runtime.evaluation.machine import Machine
 OUT_OF_RANGE = declare("P0511", "an index that is out of range")
 NO_PLACE = declare("P0512", "an index or a size that is not a whole number")
 RAGGED = declare("P0513", "sizes that do not agree")
+NO_RISE = declare("P0514", "places of a look-up that do not rise")
 
 MOST_ELEMENTS = 100_000_000
 
@@ -146,12 +147,31 @@ def _places(place: Number, size: int) -> Any:
     return at.astype(np.int64)
 
 
-def length(machine: Machine, whole: Value) -> Value:
-    """How many elements an array has."""
+def length(machine: Machine, whole: Value, rising: bool) -> Value:
+    """How many elements an array has, which are numbers that rise if that is asked."""
     if isinstance(whole, Rows):
         count = whole.size
     elif isinstance(whole, tuple | list):
         count = len(whole)
     else:
         raise errors.wrong_call("only an array has a length")
+    if rising:
+        _see_that_it_rises(whole)
     return Cell(float(count), None, (None,) * machine.directions)
+
+
+def _see_that_it_rises(whole: Value) -> None:
+    if not isinstance(whole, Rows) or not isinstance(whole.item, Cell):
+        raise errors.wrong_call("`interp` looks between places that are numbers")
+    numbers = np.asarray(whole.item.v)
+    if not numbers.ndim:
+        numbers = np.full(whole.size, numbers)
+    with np.errstate(invalid="ignore"):
+        bad = np.argwhere(~(np.diff(numbers, axis=0) > 0))
+    if bad.size:
+        place, *member = map(int, bad[0])
+        first, second = (float(numbers[at, *member]) for at in (place, place + 1))
+        message = f"`interp` looks between places that rise, but {second!r} stands behind {first!r}"
+        note = f"they are the elements {place} and {place + 1} of its first argument"
+        help = "sort them, with the values beside them"
+        raise PottoError([NO_RISE(errors.NOWHERE, message, notes=(note,), help=help)])
