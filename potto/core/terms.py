@@ -71,6 +71,7 @@ from potto.core.walking import postorder_by as postorder_by
 from potto.core.walking import rebuild as rebuild
 from potto.core.walking import rename_bound as rename_bound
 from potto.core.walking import replaced as replaced
+from potto.core.walking import stem as stem
 from potto.core.walking import substitute as substitute
 from potto.core.walking import transform as transform
 from potto.core.walking import unknown as unknown

@@ -240,11 +240,16 @@ def fresh(name: str, taken: Iterable[str]) -> str:
     """A name like `name` that is not taken: `x`, `x'1`, `x'2`, ..."""
     if not isinstance(taken, Set):
         taken = set(taken)
-    stem, number, candidate = name.split("'")[0], 0, name
+    number, candidate = 0, name
     while candidate in taken:
         number += 1
-        candidate = f"{stem}'{number}"
+        candidate = f"{stem(name)}'{number}"
     return candidate
+
+
+def stem(name: str) -> str:
+    """What a fresh name was made from: the name that a person wrote."""
+    return name.split("'")[0]
 
 
 def postorder_by(root: Term, below: Callable[[Term], Sequence[Term]]) -> list[Term]:

@@ -23,6 +23,7 @@ from potto.core.terms import (
     Term,
     Tuple,
     Var,
+    stem,
     transform,
     tuple_,
 )
@@ -81,6 +82,8 @@ class Shapes:
                 return self.of(inner)
             case App() | Global() | Deriv():
                 return self._called(term)
+            case Lam(params=params, body=body):
+                return Function(tuple(Parameter(stem(p), self.names.get(p, REAL)) for p in params), self.of(body))
             case _:
                 return REAL
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from potto.core.terms import ONE, ZERO, Term, app, array, deriv, hole, index, length, proj, tuple_, var
+from potto.core.terms import ONE, ZERO, Term, Var, app, array, deriv, hole, index, length, proj, tuple_, var
 from potto.elaborate.arrays import shaped
 from potto.elaborate.builtins import parameters_of
 from potto.elaborate.conditions import choose, compare
@@ -29,7 +29,9 @@ Along = Callable[[Term], Term]
 
 def slope(elaboration: Elaboration, form: str, node: nodes.Apply, function: Value) -> Value:
     """What `D(f, …)` or `grad(f, …)` stands for, where f is `function`."""
-    groups = groups_of(_type_of(elaboration, function)) or ((Parameter(None, REAL),),)
+    groups = groups_of(_type_of(elaboration, function))
+    if isinstance(function, Var) and not groups:  # a parameter of which nothing else is known
+        groups = ((Parameter(None, REAL),),)
     parameters = [parameter for group in groups for parameter in group]
     written = [argument.value for argument in node.arguments[1:]]
     names = [name.id for name in map(without_parentheses, written) if isinstance(name, nodes.Name)]

@@ -18,6 +18,7 @@ from typing import Any
 MOMENT = 0.01  # seconds until an interrupt that could not be raised comes again
 
 _before: list[Any] = []
+_coming: list[threading.Timer] = []  # interrupts that come again
 
 
 @contextmanager
@@ -74,6 +75,10 @@ def kept_interrupts() -> Iterator[None]:
     try:
         yield
     finally:
+        while _coming:  # none may come when this is over
+            timer = _coming.pop()
+            timer.cancel()
+            timer.join()
         sys.unraisablehook = hook
         signal.signal(signal.SIGINT, handler)
 
@@ -91,6 +96,7 @@ def _again() -> None:
     """Interrupt once more, in a moment."""
     timer = threading.Timer(MOMENT, _thread.interrupt_main)
     timer.daemon = True
+    _coming.append(timer)
     timer.start()
 
 

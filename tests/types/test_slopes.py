@@ -29,6 +29,21 @@ def renderer(c)(shader)
 def two(t)
     (t^2, 3*t)
 
+def area(a, t)
+    integral [0, 1] [x < t]*(x + a) d(x)
+
+def shifted(t, a)
+    integral [0, 1] [x < t + a]*x d(x)
+
+def curried(a)(b)
+    a^2*b^3
+
+def scaled(xs: [n] Real, t)
+    t*sum x in xs (x^2)
+
+def seen(cam: Camera, t)
+    cam.focal^2*cam.eye.0*t
+
 def of(k, t)
     D(k)(t) + D(\x . x*t)(1)
 
@@ -57,6 +72,20 @@ def program() -> potto.Module:
         ("grad(f)(0.3)", 1.0),
         (r"D(\t . t^3)(2)", 12.0),
         (r"D(D(\t . t^3))(2)", 12.0),
+        ("D(D(area))(2, 0.5)", 0.0),  # area is t^2/2 + a*t
+        ("D(D(area, t), t)(2, 0.5)", 1.0),
+        ("D(D(area, a), t)(2, 0.5)", 1.0),
+        ("grad(D(area, t))(2, 0.5)", (1.0, 1.0)),
+        ("D(grad(area), t)(2, 0.5)", (1.0, 1.0)),
+        ("D(D(shifted))(0.3, 0.2)", 1.0),  # (t + a)^2/2
+        ("D(D(D(curried, b), b), a)(2)(3)", 72.0),
+        ("grad(D(curried, b))(2)(3)", (108.0, 72.0)),
+        ("grad(D(scaled, t), xs)([1, 2], 3)[1]", 4.0),
+        ("D(grad(scaled, xs), t)([1, 2], 3)[1]", 4.0),
+        ("D(grad(seen, cam), t)(Camera((5, 7), 3), 2).focal", 30.0),
+        (r"D([\(x, y) . x*y^2][0], y)(2, 3)", 12.0),
+        (r"D(grad(\(x, y) . x*y^2), y)(2, 3)", (6.0, 4.0)),
+        (r"D(if 1 > 0 then \(x, y) . x^3*y else \(x, y) . y, y)(2, 3)", 8.0),
         ("D(sin)(0)", 1.0),
         ("D(two)(3)", (6.0, 3.0)),
         ("grad(h, cam)(Camera((5, 7), 3), 2).focal", 12.0),
