@@ -75,7 +75,7 @@ def plot(path: str, found: dict[str, list[Row]]) -> None:
     try:
         import matplotlib
     except ImportError:
-        raise SystemExit("a plot needs matplotlib: pip install 'potto[bench]'") from None
+        raise SystemExit("a plot needs matplotlib: pip install '.[bench]'") from None
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 

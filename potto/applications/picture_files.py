@@ -14,6 +14,7 @@ import numpy as np
 
 from potto.applications.images import Grid
 from potto.applications.png import encode
+from potto.extras import install_command
 from potto.kernels.cells import Array
 
 # Endings with what they need: the package, the name that it is imported by, our extra.
@@ -38,7 +39,7 @@ def complaint(path: str, known: dict[str, tuple[str, str, str] | None] = NEEDS) 
         return f"{what}: end the name with {', '.join(list(known)[:-1])} or {list(known)[-1]}"
     needed = known[ending]
     if needed is not None and find_spec(needed[1]) is None:
-        return f"`{ending}` needs {needed[0]}: pip install 'potto[{needed[2]}]'"
+        return f"`{ending}` needs {needed[0]}: {install_command(needed[2])}"
     folder = os.path.dirname(path)
     if folder and not os.path.isdir(folder):
         return f"there is no folder `{folder}` for `{path}`"

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from potto.bridges.flat import Flat, Leaf, Shapes
+from potto.extras import install_command
 from potto.kernels.errors import wrong_call
 from potto.python.functions import Function
 from potto.python.gradients import Names
@@ -39,7 +40,7 @@ def to_jax(
     try:
         import jax
     except ImportError:
-        raise wrong_call("JAX is not installed", "pip install 'potto[jax]'") from None
+        raise wrong_call("JAX is not installed", install_command("jax")) from None
     flat = Flat(function, wrt, given)
     answer = _rules(flat, jax)
 

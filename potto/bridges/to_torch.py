@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from potto.bridges.flat import Flat, Leaf, Shapes
+from potto.extras import install_command
 from potto.kernels.errors import wrong_call
 from potto.python.functions import Function
 from potto.python.gradients import Names
@@ -36,7 +37,7 @@ def to_torch(
     try:
         import torch
     except ImportError:
-        raise wrong_call("PyTorch is not installed", "pip install 'potto[torch]'") from None
+        raise wrong_call("PyTorch is not installed", install_command("torch")) from None
     flat = Flat(function, wrt, given)
     answer = _functions(torch)
 

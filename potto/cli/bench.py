@@ -8,6 +8,7 @@ import itertools
 from typing import TYPE_CHECKING
 
 from potto.cli.console import Console
+from potto.extras import install_command
 
 if TYPE_CHECKING:
     from potto.bench.adapter import Adapter
@@ -42,7 +43,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if chosen is None or adapters is None:
         return 2
     if options.plot and not has_matplotlib():
-        console.complain("potto bench: --plot needs matplotlib; install it with `pip install 'potto[bench]'`")
+        console.complain(f"potto bench: --plot needs matplotlib; install it with `{install_command('bench')}`")
         return 2
     if not options.seconds > 0:
         console.complain("potto bench: --seconds must be positive")

@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 from potto.cli.console import Console
+from potto.extras import install_command
 
 SUMMARY = "make Potto known to Jupyter, as a kernel for notebooks"
 EXAMPLE = "  potto kernel install"
@@ -25,7 +26,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     place = folder / "kernel.json"
     if options.action == "install":
         if importlib.util.find_spec("ipykernel") is None:
-            console.complain("potto kernel: ipykernel is not installed\ntry `pip install 'potto[jupyter]'`")
+            console.complain(f"potto kernel: ipykernel is not installed\ntry `{install_command('jupyter')}`")
             return 1
         folder.mkdir(parents=True, exist_ok=True)
         command = [sys.executable, "-P", "-m", "potto_repl.kernel", "-f", "{connection_file}"]

@@ -17,6 +17,7 @@ from msgspec import Struct
 from potto.data.mistakes import NO_PACKAGE, DataMistake, Refused, malformed
 from potto.data.scanlines import CHANNELS, deep
 from potto.data.values import Array, Item, Number, Row, Sizes
+from potto.extras import install_command
 
 if TYPE_CHECKING:
     import numpy as np
@@ -128,4 +129,4 @@ def _converted(image: Any, head: _Head) -> Any:
 
 def _without_pillow() -> DataMistake:
     message = "to read pictures takes Pillow, which is not installed"
-    return DataMistake(NO_PACKAGE, message, expected="Pillow", hint="pip install 'potto[images]'")
+    return DataMistake(NO_PACKAGE, message, expected="Pillow", hint=install_command("images"))

@@ -17,6 +17,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from potto.diagnostics import PottoError, declare
+from potto.extras import install_command
 from potto.source import Span
 
 if TYPE_CHECKING:
@@ -95,7 +96,7 @@ def problem(name: str, value: object) -> str | None:
         from importlib.util import find_spec  # takes its time to load, and hardly anybody asks
 
         if value == "native" and find_spec("llvmlite") is None:
-            return "machine code needs llvmlite: pip install 'potto[jit]'"
+            return f"machine code needs llvmlite: {install_command('jit')}"
         return None
     if name not in Settings.__struct_fields__:
         known = (*Settings.__struct_fields__, "executor")

@@ -13,6 +13,7 @@ from msgspec.structs import replace
 
 from potto.applications.pictures import Curve, Plot, image_of
 from potto.diagnostics import PottoError
+from potto.extras import install_command
 from potto.kernels.errors import wrong_call
 from potto.python.functions import Function
 from potto.python.gradients import grad
@@ -35,7 +36,7 @@ def sliders(
     try:
         import ipywidgets
     except ImportError:
-        raise wrong_call("sliders need ipywidgets: `pip install 'potto[notebook]'`") from None
+        raise wrong_call(f"sliders need ipywidgets: `{install_command('notebook')}`") from None
     boxes = {name: _range(name, box) for name, box in ranges.items()}
     fixed = given or {}
     _must_cover(function, axes, {*boxes, *fixed})

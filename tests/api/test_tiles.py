@@ -93,7 +93,7 @@ def killed_once(mark: str, fn: Callable[..., Any], *args: Any) -> Any:
 @contextmanager
 def dask_executor() -> Iterator[Executor]:
     if importlib.util.find_spec("distributed") is None:
-        pytest.skip("needs dask.distributed: pip install 'potto[distributed]'")
+        pytest.skip("needs dask.distributed: pip install '.[distributed]'")
     from distributed import Client, LocalCluster
 
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:

@@ -18,6 +18,7 @@ from potto.bench.ours import OURS
 from potto.bench.peers import BATCH, PEERS, SCALAR, cells
 from potto.bench.problems import QUANTITIES, catalogue
 from potto.bench.report import needed, table
+from potto.extras import install_command
 
 PROBLEMS = {p.id: p for p in catalogue()}
 STEP, QUAD, EIGHT = PROBLEMS["step"], PROBLEMS["eq1-quad"], PROBLEMS["eight"]
@@ -177,7 +178,7 @@ def test_the_plot(capsys, tmp_path: Path):
 def test_the_plot_needs_a_library(capsys, monkeypatch):
     monkeypatch.setattr("potto.bench.plotting.has_matplotlib", lambda: False)
     assert main(["bench", "step", "--plot", "x.png"]) == 2
-    assert "pip install 'potto[bench]'" in capsys.readouterr().err
+    assert install_command("bench") in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("words", "said"), [

@@ -19,6 +19,7 @@ from hypothesis.extra import numpy as hnp
 
 from potto.data import Array, Number, Row, Sizes, shape_of, thumbnail, values_of
 from potto.data.files import MEMORY
+from potto.extras import install_command
 
 Image: Any = pytest.importorskip("PIL.Image")
 
@@ -124,7 +125,7 @@ def test_what_is_said_without_pillow(monkeypatch: pytest.MonkeyPatch) -> None:
     MEMORY.clear()
     monkeypatch.setitem(sys.modules, "PIL", None)
     found = mistake("p.png", content)
-    assert (found.code, found.hint) == ("P0804", "pip install 'potto[images]'")
+    assert (found.code, found.hint) == ("P0804", install_command("images"))
     assert shape_of(Path("p.png"), content) == Sizes((2, 3))
     monkeypatch.undo()
     assert isinstance(values_of(Path("p.png"), content), Array)

@@ -51,7 +51,21 @@ def test_every_extra_that_pages_and_messages_name_exists() -> None:
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["optional-dependencies"]
     texts = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]
     texts += [path for folder in ("potto", "repl", "lsp") for path in (ROOT / folder).rglob("*.py")]
-    named = {name for path in texts for name in re.findall(r"pip install '[\w.]+\[(\w+)\]'", path.read_text("utf-8"))}
-    assert "jit" in named and named <= set(extras)
+    named = {name for path in texts for name in re.findall(r"pip install '\.\[(\w+)\]'", path.read_text("utf-8"))}
+    called = {name for path in texts for name in re.findall(r"""install_command\(['"](\w+)""", path.read_text("utf-8"))}
+    assert "jit" in named & called and named | called <= set(extras)
+    assert not [path for path in texts if re.search(r"pip install '?potto", path.read_text("utf-8"))], "not released"
     tried = set(re.findall(r"\$\{(?:EXTRAS|RESOLVED)-([\w ]+)\}", (ROOT / ".ci/wheels").read_text("utf-8")))
     assert set(extras) - {"dev"} <= {word for words in tried for word in words.split()}
+
+
+def test_messages_name_the_libraries_that_pyproject_asks_for() -> None:
+    import tomllib
+
+    from potto.extras import install_command
+
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["optional-dependencies"]
+    for extra, wanted in extras.items():
+        told = re.findall("'([^']*)'", install_command(extra))
+        assert sorted(one.lower().replace("_", "-") for one in wanted) == sorted(told), extra
+    assert install_command("nothing") == "pip install '.[nothing]'"

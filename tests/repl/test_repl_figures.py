@@ -9,6 +9,7 @@ import pytest
 
 from potto.applications import figures
 from potto.applications.pictures import Curve, Image, Plot, course, ticks
+from potto.extras import install_command
 
 HALF = "def g(t) integral [0, 1] [x < t]*t^2 d(x)"
 
@@ -40,10 +41,10 @@ def test_without_matplotlib_a_png_is_bare_and_says_so(talk, monkeypatch: pytest.
     monkeypatch.setattr(figures, "has_matplotlib", lambda: False)
     talk.all(HALF, ":plot g")
     said = talk(":save plot.png")
-    assert not said.failed and "pip install 'potto[plots]'" in said.text
+    assert not said.failed and install_command("plots") in said.text
     assert (talk.folder / "plot.png").read_bytes().startswith(b"\x89PNG")
     refused = talk(":save plot.pdf")
-    assert refused.failed and "pip install 'potto[plots]'" in refused.text and ".svg" in refused.text
+    assert refused.failed and install_command("plots") in refused.text and ".svg" in refused.text
     assert "note" not in talk(":save plot.svg").text
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 
+from potto.extras import install_command
 from potto.modules.texts import chunk_text
 from potto.reports.render import display_name
 from potto_repl.following import bring, refreshed
@@ -139,11 +140,11 @@ def _save_picture(session: Conversation, path: str, suffix: str) -> list[Part]:
         data = picture.svg().encode() if suffix == ".svg" else picture.png()
     else:
         help = "a picture that ends with .svg does without"
-        raise Refusal(f"`{suffix}` needs matplotlib: pip install 'potto[plots]'", help)
+        raise Refusal(f"`{suffix}` needs matplotlib: {install_command('plots')}", help)
     _write(path, data)
     said = [answer(f"{path}: {len(data):,} bytes", saved=path, bytes=len(data))]
     if suffix == ".png" and not has_matplotlib():
-        said.append(note("axes and labels need matplotlib, `pip install 'potto[plots]'`; a .svg has them without"))
+        said.append(note(f"axes and labels need matplotlib, `{install_command('plots')}`; a .svg has them without"))
     return said
 
 
