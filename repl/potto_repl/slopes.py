@@ -53,17 +53,17 @@ def numbers_of(called: Called) -> list[str]:
     return [name for parameter, (name, _) in pairs if not isinstance(resolve(parameter.type), _NO_NUMBERS)]
 
 
-def dual_text(called: Called, wrt: str) -> str:
+def dual_text(called: Called, wrt: str, tangent: float = 1) -> str:
     """The call of the derivative in the direction of one parameter."""
     rest = iter(called.given)
-    groups = [", ".join(_dual(p, *next(rest), wrt) for p in group) for group in called.head.groups]
+    groups = [", ".join(_dual(p, *next(rest), wrt, tangent) for p in group) for group in called.head.groups]
     return f"deriv({called.head.text}){''.join(f'({group})' for group in groups)}"
 
 
-def _dual(parameter: Parameter, name: str, value: nodes.Expr, wrt: str) -> str:
+def _dual(parameter: Parameter, name: str, value: nodes.Expr, wrt: str, tangent: float) -> str:
     text, type = print_expression(value), resolve(parameter.type)
     if name == wrt:
-        return f"({text}, 1)"
+        return f"({text}, {tangent!r})"
     if isinstance(type, Function | Diffeo):
         return f"deriv({text})"
     if isinstance(type, TupleOf):

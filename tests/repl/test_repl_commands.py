@@ -133,6 +133,21 @@ def test_check_in_two_dimensions_and_without_bounds(talk):
     assert data["discretized"] == pytest.approx(1, rel=1e-3)
 
 
+def test_check_where_numbers_are_small(talk):
+    """A step that suits 1 would move 0.02 beyond 0. One variable is the reference evaluator's, two are extrapolated."""
+    talk("def touch(a, d) integral [0, pi] [a*sin(t) > d] d(t)")  # pi - 2 asin(d/a)
+    talk("def cap(r, h) integral ([0, r], [0, r]) [x^2 + y^2 < r^2]*[x < h] d(x, y)")
+    for call, exact in {
+        "touch(0.02, 0.01)": 100 / math.sqrt(3),
+        "touch(2e-5, 1e-5)": 1e5 / math.sqrt(3),
+        "cap(0.002, 0.001)": 0.002 * math.asin(0.5),
+    }.items():
+        data = talk(f":check {call}").parts[0].data["check"]
+        assert data["agree"], call
+        assert data["derivative"] == pytest.approx(exact, rel=1e-9)
+        assert data["differences"] == pytest.approx(exact, rel=1e-8)
+
+
 def test_time_has_the_phases(talk):
     talk(JUMP)
     data = talk.data(":time f(0.3)")

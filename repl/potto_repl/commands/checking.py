@@ -23,14 +23,15 @@ from potto.runtime.answers.shown import as_dual
 from potto.runtime.evaluate import Program
 from potto.syntax import nodes, print_expression
 from potto_repl.discretized import dimensions, discretized, points_of
-from potto_repl.expressions import Called, call_of
+from potto_repl.expressions import Called, call_of, checked
 from potto_repl.registry import command
 from potto_repl.reply import Part
 from potto_repl.session import Conversation
-from potto_repl.slopes import Slope, slopes
+from potto_repl.slopes import Slope, dual_text, slopes
 
 DIGITS = 12  # of the reference evaluator's differences
 STEPS = 7
+SHRUNK = 3  # how often its step is made smaller
 
 
 class Difference(Struct, frozen=True):
@@ -90,24 +91,47 @@ def _compared(session: Conversation, called: Called, slope: Slope) -> Iterator[P
 
 def _difference(session: Conversation, called: Called, slope: Slope) -> Difference:
     term = elaborate_expression(session.db, session.file, slope.expr).term
+    scale = _scale(session, called, slope.name)
     if importlib.util.find_spec("mpmath") is not None and _depth(session, term) <= 1:
-        found = _exact_difference(session, term)
+        found = _exact_difference(session, called, slope.name, scale)
         if found is not None:
             return found
-    return _extrapolated(session, called, slope)
+    return _extrapolated(session, called, slope, scale)
 
 
-def _exact_difference(session: Conversation, term: Term) -> Difference | None:
+def _scale(session: Conversation, called: Called, name: str) -> float:
+    """How far from its place a number can be moved: as far as it is from 0, and by 1 at 0."""
+    where = abs(float(session.evaluate(print_expression(dict(called.given)[name]), session.settings).estimate.value))
+    return where if where > 1e-6 else 1.0
+
+
+def _exact_difference(session: Conversation, called: Called, name: str, scale: float) -> Difference | None:
+    """With steps that shrink until two of them agree; None where none do, or the value is nothing to be told so."""
+    before = _reference(session, called, name, scale)
+    for _ in range(SHRUNK):
+        scale /= 8
+        now = _reference(session, called, name, scale)
+        if before is None or now is None:
+            return None
+        if abs(now - before) <= 1e-9 * max(abs(now), abs(before)):
+            error = max(abs(now - before), 10.0**-DIGITS * max(abs(now), 1.0))
+            return Difference(now, error, f"central, {DIGITS + 15} digits")
+        before = now
+    return None
+
+
+def _reference(session: Conversation, called: Called, name: str, scale: float) -> float | None:
+    """The reference evaluator's derivative, with a step that is a hundredth of `scale`."""
     from potto.core.reference import NotAccurate, evaluate
 
+    expr = checked(session, dual_text(called, name, scale), ":check f(0.3)").expr
     try:
-        value = evaluate(term, None, session.world.lookup, digits=DIGITS)
+        value = evaluate(elaborate_expression(session.db, session.file, expr).term, None, session.world.lookup, DIGITS)
     except (NotAccurate, PottoError, ArithmeticError, ValueError, TypeError):
-        return None  # the reference evaluator cannot vouch for it; extrapolation can
+        return None  # it cannot vouch for it; extrapolation can
     if not isinstance(value, tuple) or len(value) != 2 or isinstance(value[1], tuple | list) or callable(value[1]):
         return None
-    slope = float(value[1].real)
-    return Difference(slope, 10.0**-DIGITS * max(abs(slope), 1.0), f"central, {DIGITS + 15} digits")
+    return float(value[1].real) / scale
 
 
 def _depth(session: Conversation, term: Term) -> int:
@@ -131,12 +155,11 @@ def _has_deltas(session: Conversation, term: Term) -> bool:
     return any(isinstance(node, Delta) for each in _reached(session, term) for node in postorder(each))
 
 
-def _extrapolated(session: Conversation, called: Called, slope: Slope) -> Difference:
+def _extrapolated(session: Conversation, called: Called, slope: Slope, scale: float) -> Difference:
     """Ridders' method: central differences with shrinking steps, extrapolated to none."""
     settings = replace(session.settings, method="quadrature", rtol=1e-13, atol=0.0)
     at = dict(called.given)[slope.name]
-    where = float(session.evaluate(print_expression(at), settings).estimate.value)
-    step, shrink = 0.05 * max(abs(where), 0.2), 1.6
+    step, shrink = 0.05 * scale, 1.6
     table: list[list[float]] = []
     best, error = 0.0, float("inf")
     for i in range(STEPS):
