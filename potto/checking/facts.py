@@ -27,6 +27,7 @@ from potto.query import Database
 from potto.syntax import nodes
 from potto.types import derivative_type, format_type, interface
 
+LONG = 800  # characters that a person still reads
 _COPY = re.compile(r"'\d+")  # the mark of a copy of a bound variable: `x'1` is another x
 
 
@@ -67,7 +68,8 @@ class DerivativeFacts(Struct, frozen=True):
             lines += ["", "body" if self.integrals else "function", *_lines(self.body)]
         said = [part.interior for part in (*self.integrals, self.body) if part is not None and not part.boundary]
         if self.derivative and said != [self.derivative]:
-            lines += ["", *_part("whole", (self.derivative,))]
+            long = f"left out, {len(self.derivative):,} characters long: --json has it"
+            lines += ["", *_part("whole", (self.derivative if len(self.derivative) <= LONG else long,))]
         lines += ["", *_part("surfaces", self.surfaces or ("none",)), *_part("where", self.where)]
         return "\n".join(lines)
 

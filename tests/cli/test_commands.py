@@ -289,6 +289,15 @@ def test_deriv_of_a_definition_around_integrals_of_others(potto: Potto) -> None:
     assert math.isclose(potto("eval", "main.po", formula, "--json").json["value"], 1.8, rel_tol=1e-12)
 
 
+def test_a_derivative_that_nobody_would_read_is_left_to_json(potto: Potto) -> None:
+    text = "def touch(a, d, w) integral [0, pi/w] [a*sin(w*t) > d] d(t)"
+    ran = potto("deriv", "t.po", "touch", t=text)
+    told = next(line for line in ran.out.splitlines() if line.startswith("  whole"))
+    whole = potto("deriv", "t.po", "touch", "--json").json["derivative"]
+    assert len(whole) > 1000 and f"{len(whole):,} characters" in told and "--json" in told
+    assert max(map(len, ran.out.splitlines())) < 200
+
+
 def test_the_whole_of_a_choice_and_its_delta_can_be_read(potto: Potto) -> None:
     out = potto("deriv", "main.po", "f", main="def f(y, a) if [y > a] then a*y else 2*y\n").out
     assert "whole     (if [a < y] then " in out and ") + (a*y - 2*y)*delta(" in out

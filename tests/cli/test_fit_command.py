@@ -32,6 +32,12 @@ def test_for_machines(potto: Potto) -> None:
     assert answer["value"] < 1e-15 and answer["evaluations"] >= answer["steps"] > 0
 
 
+def test_what_is_not_fitted_is_told_where_it_goes(potto: Potto) -> None:
+    ran = potto("fit", "p.po", "shaded", "t=0.5", "s=id", p=PROGRAM)
+    assert ran.status == 1 and "`s` starts at something that is not a number" in ran.err and "`--with s=id`" in ran.err
+    assert potto("fit", "p.po", "shaded", "t=0.5", "--with", "s=id").status == 0
+
+
 def test_a_table_of_measurements(potto: Potto, tmp_path) -> None:
     (tmp_path / "t.csv").write_text(TABLE)
     ran = potto("fit", "p.po", "box", "b=0.7", "--with", "a=1", "--data", "t.csv", "--target", "y", p=PROGRAM)
