@@ -8,7 +8,7 @@ VSCODE := editors/vscode
 TORCH ?= torch==2.13.0
 TESTS := $(BIN)/python -m pytest -n auto --maxprocesses 8 --dist worksteal --durations 20
 
-.PHONY: docs wheels demo gallery test quick fuzz check format clean native pictures test-bridges vsix e2e
+.PHONY: docs wheels demo gallery test quick fuzz check format clean native pictures test-bridges hours vsix e2e
 
 demo: $(STAMP)  ## the paper's programs, evaluated and differentiated
 	@PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python examples/demo.py
@@ -29,7 +29,10 @@ fuzz: $(STAMP)  ## every law, with examples that nobody has seen
 test-bridges: $(STAMP)  ## JAX, PyTorch and scipy: installed into .venv (PyTorch for the CPU), their own gradient checks run
 	$(BIN)/python -m pip install -qq --disable-pip-version-check 'jax>=0.4.36' optax
 	$(BIN)/python -c 'import torch' 2>/dev/null || $(BIN)/python -m pip install -qq --disable-pip-version-check $(TORCH)
-	$(BIN)/python -m pytest -rs tests/bridges tests/docs/test_readme.py
+	$(BIN)/python -m pytest -rs tests/bridges tests/docs/test_readme.py tests/docs/test_hours.py
+
+hours:  ## a stranger's first hours, docs/hour-*.md, in a fresh clone with JAX and PyTorch
+	PYTHON=$(PYTHON) TORCH=$(TORCH) .ci/hours
 
 check: $(STAMP)  ## lints, types, floors
 	$(BIN)/ruff check .

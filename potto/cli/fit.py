@@ -129,7 +129,7 @@ def _fitted(
     for name, text in options.start:
         value = argument_in(world, file, text)
         if not isinstance(value, float):
-            help = f"numbers are fitted; what stays as it is goes behind --with: `--with {name}={text}`"
+            help = f"numbers are fitted; what stays as it is goes behind --with: `--with {name}=…`"
             raise wrong_call(f"`{name}` starts at something that is not a number", help)
         start[name] = value
     given = arguments_in(world, file, options.given)

@@ -34,7 +34,7 @@ def test_for_machines(potto: Potto) -> None:
 
 def test_what_is_not_fitted_is_told_where_it_goes(potto: Potto) -> None:
     ran = potto("fit", "p.po", "shaded", "t=0.5", "s=id", p=PROGRAM)
-    assert ran.status == 1 and "`s` starts at something that is not a number" in ran.err and "`--with s=id`" in ran.err
+    assert ran.status == 1 and "`s` starts at something that is not a number" in ran.err and "`--with s=…`" in ran.err
     assert potto("fit", "p.po", "shaded", "t=0.5", "--with", "s=id").status == 0
 
 
