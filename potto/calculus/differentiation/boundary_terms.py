@@ -43,10 +43,12 @@ from potto.core.terms import (
     If,
     Integral,
     Prim,
+    Sum,
     Term,
     Tuple,
     add,
     branch,
+    children,
     const,
     delta,
     fresh,
@@ -133,11 +135,11 @@ def _at_root(node: Integral, flips: Flips, root: Root, rate: Rate, sums: list[Lo
     speed = rate(root.at)
     if speed is ZERO:
         return
-    body, instances = _instances(node.body, flips, sums, box_of(node), root.at.free)
-    left, right = (substitute(f, {root.variable: root.at}) for f in (body(False), body(True)))
-    if left is right:
+    instances = _instances(node.body, sums, root.at.free)
+    fall = substitute(_fall(node.body, flips, sums, instances, box_of(node)), {root.variable: root.at})
+    if vanishes(fall):
         return
-    gain = scaled(difference(left, right), speed)
+    gain = scaled(fall, speed)
     lo, hi = node.bounds[node.variables.index(root.variable)]
     gain = between(root.at, lo, hi, gain)
     if root.index is not None and root.counts is not None:
@@ -158,31 +160,64 @@ def _name(term: Term) -> str:
     return name
 
 
-def _instances(
-    body: Term, flips: Flips, sums: list[Loop], box: Box, used: Iterable[str] = ()
-) -> tuple[Callable[[bool], Term], dict[str, Term]]:
-    """The forced integrand; under sums only the instance of a branch that flips is forced, the others fall."""
-    if not sums:
-        return (lambda right: forced(body, flips, right, box)), {}
-    taken = {n for t in postorder(body) for n in t.free} | {s.variable for s in sums} | set(used)
+def _instances(body: Term, sums: list[Loop], used: Iterable[str] = ()) -> dict[str, Term]:
+    """For the index of each loop around a branch a name for the one value at which the branch flips."""
+    taken = {n for t in postorder(body) for n in t.free} | {s.variable for s in sums} | set(used) if sums else set()
     names: dict[str, Term] = {}
     for item in sums:
         name = fresh(item.variable, taken)
         taken.add(name)
         names[item.variable] = var(name)
-    here = conjunction(prim("eq", var(s.variable), names[s.variable]) for s in sums)
+    return names
 
-    def run(right: bool) -> Term:
+
+def _fall(body: Term, flips: Flips, sums: list[Loop], instances: Mapping[str, Term], box: Box) -> Term:
+    """The integrand left of where the branches flip, less that right of it: under loops, of one instance of them."""
+    if not sums:
+        return difference(forced(body, flips, False, box), forced(body, flips, True, box))
+    found = _linear_fall(body, flips, [loop.variable for loop in sums], box)
+    if found is not None:
+        return substitute(found, instances)
+    here = conjunction(prim("eq", var(s.variable), instances[s.variable]) for s in sums)
+
+    def side(right: bool) -> Term:
         signs = {f.branch: f.right if right else f.left for f in flips}
 
         def change(node: Term, new: Term) -> Term:
             if isinstance(node, Branch) and node in signs and isinstance(new, Branch):
-                return if_(here, side_of(substitute(signs[node], names), new.then, new.orelse, box), new)
+                return if_(here, side_of(substitute(signs[node], instances), new.then, new.orelse, box), new)
             return new
 
         return transform(body, change)
 
-    return run, names
+    return difference(side(False), side(True))
+
+
+def _linear_fall(node: Term, flips: Flips, around: list[str], box: Box) -> Term | None:
+    """How much a term falls where one instance flips, if it is linear in the loops around that: the others go out."""
+    flipped = {flip.branch for flip in flips}
+    if flipped.isdisjoint(postorder(node)):
+        return zero_like(node)
+    if not around:
+        return difference(forced(node, flips, False, box), forced(node, flips, True, box))
+    parts = children(node)
+    moved = [part for part in parts if not flipped.isdisjoint(postorder(part))]
+
+    def below(part: Term) -> Term | None:
+        return _linear_fall(part, flips, around, box)
+
+    match node:
+        case Sum() if node.variable in around and moved == [node.body]:
+            return _linear_fall(node.body, flips, [name for name in around if name != node.variable], box)
+        case Prim(op="add" | "neg"):
+            falls = [fall for fall in map(below, moved) if fall is not None]
+            whole = add(*falls) if len(falls) == len(moved) else None
+            return whole if whole is None or node.op == "add" else neg(whole)
+        case Prim(op="mul") if len(moved) == 1:
+            fall = below(moved[0])
+            return None if fall is None else scaled(fall, mul(*(part for part in parts if part is not moved[0])))
+        case _:
+            return None
 
 
 def at_bounds(node: Integral, rate: Rate) -> list[Term]:
@@ -327,10 +362,9 @@ def _jump_at(body: Term, surface: Term, members: Sequence[tuple[Branch, Term]], 
     if speed is ZERO:
         return None
     sums = loops_over(body, members[0][0])
-    sided, instances = _instances(body, [Flip(b, neg(side), side) for b, side in members], sums, NOWHERE)
-    positive, negative = sided(True), sided(False)
-    if positive is negative:
+    instances = _instances(body, sums)
+    jump = _fall(body, [Flip(b, side, neg(side)) for b, side in members], sums, instances, NOWHERE)
+    if vanishes(jump):
         return None
     over = tuple((_name(instances[s.variable]), *_ends(s, instances)) for s in sums)
-    jump = difference(positive, negative)
     return JumpTerm(substitute(surface, instances), jump, substitute(speed, instances), over)

@@ -15,6 +15,7 @@ from potto.calculus.differentiation.boundary_terms import at_bounds, at_surfaces
 from potto.calculus.differentiation.deltas import without_deltas, without_leftovers
 from potto.calculus.differentiation.derivative import NotSmooth, partial, total, zero_like
 from potto.calculus.differentiation.level_sets import level_set, steep, transported
+from potto.calculus.inlining.choices import calls_of_items, jumps_as_function
 from potto.calculus.inlining.expand import Resolve, expanded, heads_of, known_function
 from potto.calculus.surfaces.case_split import resolved
 from potto.calculus.surfaces.trace import spine
@@ -162,7 +163,7 @@ class Differentiator:
     def carried_out(self, term: Term) -> Term:
         """Calls of known functions carried out, derivatives of known functions too, with deltas for jumps."""
         inside = Differentiator(self.resolve, not self.frozen, frozen=self.frozen, folding=self.folding)
-        return expanded(term, self.resolve, inside.function)
+        return calls_of_items(expanded(term, self.resolve, inside.function), self.resolve)
 
 
 class _Pass:
@@ -248,10 +249,20 @@ class _Pass:
 
     def call(self, node: App) -> Dual:
         head, groups = spine(node)
-        if isinstance(head, Lam):
-            whole = expanded(node, nothing_known)
-            if whole is not node:
+        swept = not self.owner.frozen and any(
+            jumps_as_function(arg, self.owner.resolve)
+            for group in groups
+            for arg in group
+            if not isinstance(arg, Var) and not self.tangents.keys().isdisjoint(arg.free)
+        )  # on pairs it would say nothing of how its jumps move
+        if swept or isinstance(head, Lam | Index | Proj | If):
+            chosen = calls_of_items(node, self.owner.resolve)
+            whole = expanded(chosen, self.owner.resolve if swept else nothing_known)
+            again = swept and any(isinstance(n, App) and spine(n)[0] is head for n in postorder(whole))
+            if whole is not node and not again:
                 return _Pass(self.owner, self.tangents).run(whole)
+        if swept:
+            raise NotSmooth("a function whose jumps move is handed on to where they are not seen")
         function = self.function(head)
         result: Term = function
         for group in groups:

@@ -11,7 +11,8 @@ from collections.abc import Callable, Iterable
 from functools import lru_cache
 
 from potto.calculus.differentiation.dual import Differentiator
-from potto.calculus.inlining.expand import Resolve, expanded, named
+from potto.calculus.inlining.choices import at_place, calls_of_items
+from potto.calculus.inlining.expand import Resolve, expanded
 from potto.core.binders import apart
 from potto.core.terms import (
     ZERO,
@@ -21,7 +22,6 @@ from potto.core.terms import (
     Const,
     Data,
     Fold,
-    Global,
     Holding,
     If,
     Index,
@@ -35,7 +35,6 @@ from potto.core.terms import (
     Tuple,
     Var,
     add,
-    app,
     apply,
     array,
     bound_names,
@@ -47,7 +46,6 @@ from potto.core.terms import (
     index,
     list_of,
     postorder,
-    prim,
     proj,
     rebuild,
     substitute,
@@ -83,26 +81,9 @@ def inlined(term: Integral, touches: Callable[[Term], bool], resolve: Resolve, a
     found = expanded(term, lambda name: resolve(name) if touches(name) else None, derive)
     if any(isinstance(node, App) and any(_is_array(arg, arrays) for arg in node.args) for node in postorder(found)):
         found = expanded(found, resolve, derive)
-    found = apart(_pushed(_functions(found, resolve), frozenset(bound(found))))
+    found = apart(_pushed(calls_of_items(found, resolve), frozenset(bound(found))))
     assert isinstance(found, Integral)
     return found
-
-
-def _functions(term: Term, resolve: Resolve) -> Term:
-    """With calls of functions in arrays and tuples as calls of those, chosen by the place."""
-
-    def change(_: Term, new: Term) -> Term:
-        if not isinstance(new, App) or not isinstance(new.function, Index | Proj):
-            return new
-        whole = new.function.array if isinstance(new.function, Index) else new.function.term
-        known = named(whole, resolve) if isinstance(whole, Global) else whole
-        if isinstance(new.function, Proj) and isinstance(known, Tuple):
-            return app(known.items[new.function.index], new.args)
-        if isinstance(new.function, Index) and isinstance(known, ListOf) and known.items:
-            return _chosen(tuple(app(item, new.args) for item in known.items), new.function.index)
-        return new
-
-    return expanded(transform(term, change), resolve) if any(isinstance(n, App) for n in postorder(term)) else term
 
 
 def _is_array(term: Term, arrays: frozenset[str]) -> bool:
@@ -140,7 +121,7 @@ def _read(node: Term) -> Term:
             checked = index(array(place, whole.size, var(place)), node.index)  # that it is one of the places
             return substitute(whole.body, {whole.variable: checked})
         case ListOf(items=items) if isinstance(node, Index) and items:
-            return _chosen(items, node.index)
+            return at_place(items, node.index)
         case _:
             return node
 
@@ -148,16 +129,6 @@ def _read(node: Term) -> Term:
 def _read_of(node: Term, whole: Term) -> Term:
     """The same read of another array or tuple."""
     return _read(rebuild(node, (whole, *children(node)[1:])))
-
-
-def _chosen(items: tuple[Term, ...], place: Term) -> Term:
-    """The item at a place that is known at run time."""
-    slot = fresh("i", place.free)
-    place = index(array(slot, const(len(items)), var(slot)), place)
-    found = items[-1]
-    for number, item in reversed(list(enumerate(items[:-1]))):
-        found = if_(prim("eq", place, const(number)), item, found)
-    return found
 
 
 # Sums

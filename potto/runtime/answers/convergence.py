@@ -112,6 +112,16 @@ def widest(before: Any, after: Any) -> Any:
         return max(float(np.min(before)), float(np.min(after)))
 
 
+def over(within: Any, shape: tuple[int, ...]) -> Any:
+    """An allowance over a batch of this shape: of one that does not go together with it the least."""
+    if not np.ndim(within) or np.shape(within) == shape:
+        return within
+    try:
+        return np.broadcast_to(within, shape)
+    except ValueError:
+        return float(np.min(within, initial=np.inf))
+
+
 def missed(value: Any, error: Any, within: Any, settings: Settings, drawn: bool) -> Shortfalls:
     """Why numbers are not as accurate as was asked for. `drawn`: they are made of samples; within: see `allowance`."""
     rtol = settings.asked(drawn)
@@ -119,11 +129,7 @@ def missed(value: Any, error: Any, within: Any, settings: Settings, drawn: bool)
         return {}
     v, e = np.abs(np.asarray(value, dtype=float)), np.asarray(error, dtype=float)
     v, e = np.broadcast_arrays(v, e)
-    if np.ndim(within) and np.shape(within) != v.shape:
-        try:
-            within = np.broadcast_to(within, v.shape)
-        except ValueError:
-            within = float(np.min(within, initial=np.inf))
+    within = over(within, v.shape)
     bad = ~((e <= rtol * v) | (e <= settings.atol) | (e <= within)) | np.isnan(v)
     bad = np.where(np.isinf(v), ~np.isfinite(e), bad)  # an infinity may be known to be one
     if not bad.any():

@@ -11,7 +11,8 @@ import numpy as np
 
 from potto.diagnostics import PottoError
 from potto.integrate.events import DISAGREE, Events
-from potto.kernels.cells import Cell, Value
+from potto.integrate.pieces import still
+from potto.kernels.cells import Cell, Value, map_cells
 from potto.runtime.evaluation.functions import Closure, Derivative
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.record import Record
@@ -43,6 +44,24 @@ def compared(machine: Machine, inner: Derivative, groups: Groups, value: Value) 
     return first, _unknown(value[1])
 
 
+def held(machine: Machine, first: Derivative, groups: Groups, value: Value) -> Value:
+    """What the formula of a first derivative gives, with its tangents without bound where its value is wrong."""
+    if machine.frozen or machine.taping or not machine.root or not machine.directions:
+        return value
+    quiet = machine.with_directions(0)
+    other = quiet.changed(events=Events(), record=Record(costs=None, gauge=machine.record.gauge))
+    try:
+        found = other.call(first, tuple(tuple(map(still, group)) for group in groups), None)
+    except PottoError:
+        return value
+    finally:
+        machine.record.evaluations += other.record.evaluations
+    if other.record.shortfalls or _agree(value, found, SLACK * _largest(found)):
+        return value
+    machine.note(DISAGREE)
+    return map_cells(value, _with_unknown_tangents)
+
+
 def _value(dual: Value) -> Value:
     """The value of a dual."""
     if isinstance(dual, Derivative):
@@ -72,3 +91,7 @@ def _unknown(value: Value) -> Value:
     if isinstance(value, Cell):
         return Cell(value.v, value.v * 0.0 + np.inf)
     return tuple(map(_unknown, value)) if isinstance(value, tuple) else value
+
+
+def _with_unknown_tangents(cell: Cell) -> Cell:
+    return Cell(cell.v, cell.e, cell.t, tuple(None if t is None else t * 0.0 + np.inf for t in cell.t))

@@ -14,7 +14,7 @@ from potto.kernels import errors
 from potto.kernels.cells import Cell, Rows, Trace, Value, map_cells
 from potto.kernels.tape import Untaped
 from potto.runtime.evaluation.arguments import fit, uncurried
-from potto.runtime.evaluation.compared import compared
+from potto.runtime.evaluation.compared import compared, held
 from potto.runtime.evaluation.functions import Closure, Derivative, Paired, holds_functions
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.second_derivatives import dual_function
@@ -30,7 +30,8 @@ def call_derivative(
     if machine.directions or isinstance(primal, Paired):
         machine.record.second = machine.record.second or machine.directions > 0
         pairs = tuple(tuple(_with_tangent(arg, machine.directions) for arg in group) for group in groups)
-        return machine.call(dual_function(machine, primal), pairs, None)
+        value = machine.call(dual_function(machine, primal), pairs, None)
+        return value if isinstance(primal, Paired) else held(machine, Derivative(primal), groups, value)
     _, arities = uncurried(primal.lam, sizes_of(groups))
     carrying = machine.with_directions(1)
     dual_groups = tuple(

@@ -23,7 +23,7 @@ from potto.kernels.cells import Array, Cell, Ints, Rows, Value, all_arrays, comb
 from potto.kernels.making import making
 from potto.kernels.tape import Edge, Node
 from potto.kernels.whole import UNIT_ROUNDOFF
-from potto.runtime.answers.convergence import merged, widest
+from potto.runtime.answers.convergence import merged, over, widest
 from potto.runtime.evaluation.functions import Closure
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.reach import Reach
@@ -181,7 +181,7 @@ def _evaluated(machine: Machine, term: Sum, here: Env, at: Ints, size: int, shap
         merged(record.shortfalls, {why: mask.reshape(shape) if shape else bool(mask.any())})
     if np.ndim(within):
         most = np.zeros(size)
-        np.maximum.at(most, at, np.broadcast_to(within, at.shape))
+        np.maximum.at(most, at, over(within, at.shape))
         within = most.reshape(shape) if shape else float(most[0])
     record.within = widest(record.within, within)
     return value

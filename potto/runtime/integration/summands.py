@@ -21,7 +21,7 @@ from potto.kernels import errors
 from potto.kernels.cells import Array, Bools, Cell, Number, Value, all_arrays, combined, map_arrays, pad
 from potto.kernels.tape import Node
 from potto.kernels.whole import ROUNDING, UNIT_ROUNDOFF
-from potto.runtime.answers.convergence import widest
+from potto.runtime.answers.convergence import over, widest
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.sums import CHUNK
 
@@ -130,7 +130,10 @@ def _evaluated(
             together = together.changed(summed=not shape)
             own = together if machine.taping and width else together.with_directions(width)
             value = pad(own.run(batch.function, args, None), width)
-        within, told = record.within, [*record.shortfalls.values(), *(np.isfinite(e.backward) for e in record.edges)]
+        within, told = (
+            over(record.within, (*shape, size)),
+            [*record.shortfalls.values(), *(np.isfinite(e.backward) for e in record.edges)],
+        )
     except PottoError:  # as it is written, it says what is wrong, and where
         return None, ~bad
     finally:
