@@ -64,3 +64,5 @@ def test_a_formula_that_misses_a_part_is_found_out() -> None:
     assert abs(got.value[1] - 1.97) <= 1e-12  # of y + 2 at -t
     assert got.error[1] <= 1e-11 and got.tangent_error[1] == float("inf")
     assert not got.converged and "disagree about the first one" in got.reasons[0]
+    short = m.eval("D(D(f))(0.03)")
+    assert not short.converged and short.error == float("inf") and "disagree" in short.reasons[0]
