@@ -94,4 +94,5 @@ def _unknown(value: Value) -> Value:
 
 
 def _with_unknown_tangents(cell: Cell) -> Cell:
-    return Cell(cell.v, cell.e, cell.t, tuple(None if t is None else t * 0.0 + np.inf for t in cell.t))
+    tangents = tuple([0.0 if t is None else t for t in cell.t])
+    return Cell(cell.v, cell.e, tangents, tuple([t * 0.0 + np.inf for t in tangents]))
