@@ -1,6 +1,6 @@
 """What Python's own tools say about functions of Potto: signatures, annotations and docstrings, from the program.
 
-Owns `signature_of`, `annotations_of`, `comment_of`, `identifier` and `Doc`.
+Owns `signature_of`, `annotations_of`, `comment_of`, `identifier`, `typeset_derivative` and `Doc`.
 """
 
 from __future__ import annotations
@@ -63,6 +63,15 @@ def comment_of(world: World, file: str, expr: nodes.Expr | None) -> str | None:
     if not isinstance(target, DefinitionTarget):
         return None
     return documentation(world.db, target.file, target.name) or None
+
+
+def typeset_derivative(world: World, file: str, expr: nodes.Expr) -> str | None:
+    """The derivative of what an expression stands for, as notebooks typeset it; None where no formula is known."""
+    from potto.checking.typeset import derivative_latex, function_derivative
+
+    found = function_derivative(world.db, file, expr, "f")
+    text = derivative_latex(found, found.name)
+    return None if text is None else f"${text}$"
 
 
 class Doc:

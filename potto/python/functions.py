@@ -23,7 +23,7 @@ from potto.python.accepting import accepted, with_tangents
 from potto.python.arguments import Batch, batch_of, misfit, moving, value_of
 from potto.python.arrays import has_arrays, with_arrays
 from potto.python.calls import Call, Form
-from potto.python.described import Doc, annotations_of, signature_of
+from potto.python.described import Doc, annotations_of, signature_of, typeset_derivative
 from potto.python.labels import Given, labelled
 from potto.python.tiles import in_tiles
 from potto.python.travel import Travelling
@@ -219,6 +219,14 @@ class Function(Travelling):
         from potto.checking.facts import surfaces
 
         return surfaces(self._world.db, self._file, self._expr)
+
+    def _repr_latex_(self) -> str | None:
+        """For notebooks: a derivative as a formula, with its interior and its boundary. Other functions have none."""
+        match self._expr:
+            case nodes.Apply(function=nodes.Name(id="deriv"), arguments=(argument,)) if self._is_derivative():
+                return typeset_derivative(self._world, self._file, argument.value)
+            case _:
+                return None
 
     def __repr__(self) -> str:
         given = "".join(

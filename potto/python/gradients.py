@@ -23,6 +23,7 @@ from potto.projects.settings import current
 from potto.python.accepting import as_given
 from potto.python.arguments import Batch, value_of
 from potto.python.calls import Call
+from potto.python.described import typeset_derivative
 from potto.python.forms import as_matrix, bounds_of, by_name, form_of, in_lists, must_match, tangents_of, weighted
 from potto.python.functions import Function, bound, must_be_function
 from potto.runtime.answers.estimate import Estimate
@@ -169,6 +170,10 @@ class GradientFunction:
         found = self._function.in_tiles(args, kwargs, self._wrt)
         assert isinstance(found, Gradient)
         return in_given_form(found, self._function, args, kwargs)
+
+    def _repr_latex_(self) -> str | None:
+        """For notebooks: the derivative as a formula, with its interior and its boundary."""
+        return typeset_derivative(self._function._world, self._function._file, self._function._expr)
 
     def __repr__(self) -> str:
         return f"<gradient of {self._function!r} by {', '.join(self._wrt)}>"

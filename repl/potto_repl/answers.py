@@ -13,6 +13,8 @@ from msgspec.structs import replace
 
 from potto.calculus.differentiation.higher_order import NoText, first_derivative
 from potto.calculus.explanation.explain import describe
+from potto.calculus.explanation.layout import DerivativeText
+from potto.checking.typeset import derivative_latex
 from potto.core.printer import format_term
 from potto.core.terms import App, Deriv, Global, Lam, Term
 from potto.elaborate import elaborate_expression
@@ -97,11 +99,12 @@ def _valued(session: Conversation, outcome: Valued) -> Iterator[Part]:
         return
     name = outcome.names[-1] if outcome.names else ""
     if not outcome.estimates:
-        shown, tangent = _in_symbols(session, name) if outcome.text.startswith("<") else ("", "")
+        shown, found = _in_symbols(session, name) if outcome.text.startswith("<") else ("", None)
         plain = Estimate(None, None, text=shown or outcome.text)
         yield from value_parts(plain, outcome.type, session.settings, name=name)
-        if tangent:
-            yield Part("answer", f"  tangent     {pretty(tangent, session.options.unicode)}", {"tangent_text": tangent})
+        if found is not None and found.tangent and len(found.tangent) <= LONG:
+            data = {"tangent_text": found.tangent, "_latex": lambda: derivative_latex(found, "f")}
+            yield Part("answer", f"  tangent     {pretty(found.tangent, session.options.unicode)}", data)
         return
     estimate = outcome.estimates[0]
     file, expr = _expression(session, name)
@@ -125,8 +128,8 @@ def _kept_parts(session: Conversation, file: str, expr: nodes.Expr, dual: Estima
     return found
 
 
-def _in_symbols(session: Conversation, name: str) -> tuple[str, str]:
-    """A function as it is written, and the tangent of a derivative with its deltas; nothing where they are too long."""
+def _in_symbols(session: Conversation, name: str) -> tuple[str, DerivativeText | None]:
+    """A function as it is written, nothing where that is too long; and of a derivative what it is in symbols."""
     term = elaborate_expression(session.db, session.file, nodes.Name(Span(0, 0), name)).term
     while isinstance(term, Global):
         known = session.world.lookup(term.module, term.name)
@@ -136,20 +139,18 @@ def _in_symbols(session: Conversation, name: str) -> tuple[str, str]:
     text, head = format_term(term), term
     while isinstance(head, App):
         head = head.function
-    tangent = ""
-    if isinstance(head, Deriv):
-        tangent = _tangent(session, head.function)
-    return (text if len(text) <= LONG else "", tangent if len(tangent) <= LONG else "")
+    found = _derivative(session, head.function) if isinstance(head, Deriv) else None
+    return text if len(text) <= LONG else "", found
 
 
-def _tangent(session: Conversation, function: Term) -> str:
+def _derivative(session: Conversation, function: Term) -> DerivativeText | None:
     def resolve(target: Global) -> Term:
         return session.world.lookup(target.module, target.name)
 
     try:
-        return describe(first_derivative(function, resolve), "", "", resolve).tangent
+        return describe(first_derivative(function, resolve), "", "", resolve)
     except NoText:
-        return ""
+        return None
 
 
 def _expression(session: Conversation, name: str) -> tuple[str, nodes.Expr]:

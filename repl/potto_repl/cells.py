@@ -31,9 +31,12 @@ def result(part: Part) -> dict[str, str] | None:
 
     Its name is left out, for the notebook writes `Out[3]` beside it.
     """
+    data = part.data or {}
+    typeset = data["_latex"]() if "_latex" in data else None
+    if typeset is not None:
+        return {"text/plain": part.plain(), "text/latex": f"${typeset}$"}
     if part.kind != "answer" or not _NAMED.match(part.text):
         return None
-    data = part.data or {}
     found = {"text/plain": _NAMED.sub("", part.plain(), count=1)}
     rows = [row for row in data.get("_rows", ()) if row[1] is not None]
     if rows:

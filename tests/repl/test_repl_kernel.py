@@ -75,6 +75,17 @@ def test_a_derivative_is_a_table_of_its_parts(client):
     assert data["text/latex"].startswith("$\\begin{aligned}\\text{value}") and "0.25" in data["text/latex"]
 
 
+def test_a_derivative_in_symbols_is_typeset(client):
+    """By `:deriv`, and where a derivative is itself the answer."""
+    _, shown = run(client, "def g(theta) integral [0, 1] [x < theta]*x d(x)\n:deriv g\nderiv g")
+    texts = [content["data"].get("text/latex") for kind, content in shown if kind == "execute_result"]
+    found = [text for text in texts if text]
+    assert len(found) == 2
+    assert all(
+        r"\delta\left(\theta - x\right) \, \partial \theta" in text and r"\int_{0}^{1}" in text for text in found
+    )
+
+
 def test_errors_name_the_cell_and_its_line(client):
     reply, shown = run(client, "def twice(x) 2*x\ntwice(2)\n\ntwice(nowhere)")
     said = "".join(content["text"] for kind, content in shown if kind == "stream" and content["name"] == "stderr")

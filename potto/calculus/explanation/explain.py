@@ -137,7 +137,7 @@ def describe(
     known = [work.carried_out(i) for i in _outermost(body)]
     integrals = tuple(_integral(unnested(i), work, tangents, words) for i in known if isinstance(i, Integral))
     found = DerivativeText(name, type_text, tangent, isinstance(body, Integral), integrals, conditions)
-    found = replace(found, problems=tuple(problems), smooth=tangent)
+    found = replace(found, problems=tuple(problems), smooth=tangent, parameters=tuple(params))
     if not integrals and not problems:
         plain = work.carried_out(body)
         found = replace(found, surfaces=_own_surfaces(plain, tangents))

@@ -45,6 +45,7 @@ class DerivativeText(Struct, frozen=True):
     which `tangent` ends with; smooth: what it is before.
     conditions: where it has a value. problems: why there is no whole in symbols.
     by: the name of a definition that is this derivative, if it was asked about that.
+    parameters: what it is differentiated by; the tangent of `t` is `dt`.
     """
 
     name: str
@@ -58,6 +59,7 @@ class DerivativeText(Struct, frozen=True):
     by: str = ""
     smooth: str = ""
     deltas: tuple[str, ...] = ()
+    parameters: tuple[str, ...] = ()
 
     @property
     def notes(self) -> tuple[str, ...]:

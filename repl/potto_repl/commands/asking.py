@@ -5,19 +5,16 @@ from __future__ import annotations
 import difflib
 import os
 
-from potto.calculus.differentiation.higher_order import NoText, first_derivative
-from potto.calculus.explanation.explain import describe, explain_derivative
 from potto.calculus.explanation.layout import DerivativeText
 from potto.checking.facts import surfaces
-from potto.core.terms import Deriv, Global, Term
-from potto.elaborate import core_term, elaborate_expression
+from potto.checking.typeset import derivative_latex, function_derivative
 from potto.modules import DefinitionTarget, ModuleTarget, chunk_start, names, resolve
 from potto.modules.lookup import find_module, resolve_module, scope
 from potto.modules.texts import chunk_text
 from potto.reports import pages
 from potto.reports.render import display_name
 from potto.syntax import nodes, print_expression
-from potto.types import derivative_type, format_type, interface
+from potto.types import format_type, interface
 from potto.types.types import Diffeo, Function
 from potto_repl.documentation import documentation, documented
 from potto_repl.expressions import Asked, checked, without_parens
@@ -53,27 +50,14 @@ def show_derivative(session: Conversation, text: str) -> Part:
         raise Refusal(f"`{text.strip()}` is no function, so there is nothing to differentiate by")
     found = derivative_text(session, asked)
     shown = found.text.replace(f"d{UNNAMED} :", "its derivative :", 1) if found.name == UNNAMED else found.text
-    data = {"name": found.name, "type": found.type, "tangent": found.tangent, "text": shown}
+    data = {"name": found.name, "type": found.type, "tangent": found.tangent, "text": shown,
+            "_latex": lambda: derivative_latex(found, "f" if found.name == UNNAMED else found.name)}  # fmt: skip
     return Part("answer", pretty(shown, session.options.unicode), data)
 
 
 def derivative_text(session: Conversation, asked: Asked) -> DerivativeText:
     """The derivative of a function in symbols, of a name under its own."""
-    expr = without_parens(asked.expr)
-    if isinstance(expr, nodes.Name):
-        target = session.target(expr.id)
-        if target is not None and not isinstance(core_term(session.db, target.file, target.name), Deriv):
-            return explain_derivative(session.db, target.file, target.name)
-    term = elaborate_expression(session.db, session.file, asked.expr).term
-    type = format_type(derivative_type(asked.type))
-
-    def resolve(target: Global) -> Term:
-        return core_term(session.db, target.module, target.name)
-
-    try:
-        return describe(first_derivative(term, resolve), UNNAMED, type, resolve)
-    except NoText as problem:
-        return DerivativeText(UNNAMED, type, "", False, (), (str(problem),))
+    return function_derivative(session.db, session.file, asked.expr, UNNAMED)
 
 
 @command("surfaces", argument="EXPR", completes="expression")
