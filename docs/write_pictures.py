@@ -59,6 +59,9 @@ FIGURES: dict[str, Callable[[], list[Plot | Image]]] = {
     "figure-plot": lambda: session(G, ":plot g, deriv g 0 0.9"),
     "figure-noise": lambda: session(NOISY, ":set method mc", ":set samples 1000", ":plot h, deriv h 0.05 1.9"),
     "figure-render": lambda: rendered(str(WORKED / "picture.po"), "pixel", "r=0.7", "--wrt", "r", "--size", "192"),
+    "figure-moon": lambda: rendered(
+        str(WORKED / "moon.po"), "moon", "c=0.3", "--wrt", "c", "--box=-1,1,-1,1", "--size", "64",
+    ),
     "figure-surfaces": lambda: rendered(
         str(WORKED / "painted.po"), "pixel", "t=0.5", "--wrt", "t", "--size", "192", "--surfaces",
     ),

@@ -137,7 +137,7 @@ class World(Library):
             whole = Span(0, len(text))
             raise ProgramError([Located(EXPRESSION, placed(d, whole, 0)) for d in error.diagnostics], sources) from None
         warned = [absolute(self.db, EXPRESSION, d, 0) for d in inferred.diagnostics if d.code == NO_TANGENT.code]
-        found = [*warned, *remarks(estimate, Span(0, len(text)), chosen)]
+        found = [*warned, *remarks(estimate, Span(0, len(text)))]
         said = tuple(Located(EXPRESSION, d) for d in found)
         return Answer(estimate, format_type(inferred.type), said)
 

@@ -98,7 +98,7 @@ class Script:
                 estimates.append(estimate)
                 kept = value if len(arguments) == 1 else None
                 place = argument.span.shift(self.start)
-                yield from (Located(self.file, d) for d in remarks(estimate, place, self.settings))
+                yield from (Located(self.file, d) for d in remarks(estimate, place))
         yield Shown(span.shift(self.start), " ".join(texts), tuple(estimates), kept)
 
     def items(self, iterable: nodes.Expr, env: Environment) -> list[Value]:
@@ -159,11 +159,8 @@ def placed(diagnostic: Diagnostic, place: Span, start: int) -> Diagnostic:
     return replace(diagnostic, span=place)
 
 
-def remarks(estimate: Estimate, place: Span, settings: Settings) -> Iterator[Diagnostic]:
-    """What a reader of a number should know: that it is not accurate enough, that its derivative is one-sided.
-
-    Of an answer by sampling nobody expects the accuracy of quadrature; its digits say how good it is.
-    """
+def remarks(estimate: Estimate, place: Span) -> Iterator[Diagnostic]:
+    """What a reader of a number should know: that it is not accurate enough, that its derivative is one-sided."""
     if (_has_nan(estimate.value) or _has_nan(estimate.tangent)) and DIVERGENT.isdisjoint(estimate.shortfalls):
         why = [shortfall for shortfall in estimate.shortfalls if shortfall.alike == UNDEFINED]
         yield NO_NUMBER(
@@ -173,12 +170,12 @@ def remarks(estimate: Estimate, place: Span, settings: Settings) -> Iterator[Dia
             if why
             else "a builtin was used where it is not defined, or a parameter is not a number itself",
         )
-    elif not estimate.converged and settings.method in ("auto", "quadrature") and {*estimate.shortfalls} != {ROUGH}:
+    elif not estimate.converged and {*estimate.shortfalls} != {ROUGH}:
         reason = "; ".join(estimate.reasons)
         yield NOT_CONVERGED(
             place,
             f"this estimate did not reach the accuracy asked for: {reason}",
-            help=estimate.advice,
+            help=estimate.options,
         )
     for note in estimate.notes:
         yield ONE_SIDED(place, str(note))

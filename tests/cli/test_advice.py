@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from command_runs import Potto
 
@@ -19,6 +21,18 @@ def test_the_hint_suits_the_reason(potto: Potto, program: str, expression: str, 
     ran = potto("eval", "main.po", expression, "--max-evals", "2000", main=program + "\n")
     assert ran.status == 0 and "warning[P0501]" in ran.err
     assert says in ran.err and f"--{not_}" not in ran.err and (not_ == "max" or not_ not in ran.err)
+
+
+def test_sampling_that_missed_says_what_to_do_and_that_helps(potto: Potto) -> None:
+    program = "def f(t) integral [0, 1] [x < t] d(x)\n"
+    asked = ("eval", "main.po", "f(0.25)", "--method", "mc", "--rtol", "1e-2")
+    short = potto(*asked, "--samples", "100000", main=program)
+    assert short.status == 0 and short.out.startswith("not converged: ")
+    proposed = re.search(r"sample more \(`--samples`\) or ask for less accuracy \(`--rtol (.*)`\)", short.err)
+    assert proposed is not None
+    for more in (("--samples", "4000000"), ("--rtol", proposed[1], "--samples", "100000")):
+        ran = potto(*asked, *more, main=program)
+        assert ran.status == 0 and "not converged" not in ran.out and not ran.err
 
 
 @pytest.mark.parametrize("method", ["quadrature", "mc"])

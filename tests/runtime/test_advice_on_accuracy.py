@@ -31,7 +31,7 @@ def test_the_accuracy_that_is_proposed_can_be_had(text: str, budget: int) -> Non
     if answer.converged:
         return
     assert str(answer).startswith("not converged: ")
-    proposed = re.search(r"`--rtol ([\d.e-]+)`", answer.advice)
+    proposed = re.search(r"`potto.settings\(rtol=([\d.e-]+)\)`", answer.advice)
     if proposed is None:
         assert not answer.error <= 0.05 * abs(answer.value)  # there is nothing to propose
         return

@@ -7,6 +7,7 @@ None with its text in `text`. An estimate is a number, and an array, itself: the
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from functools import reduce
 from operator import or_
@@ -118,7 +119,13 @@ class Estimate(Operators, Struct, frozen=True, eq=False):
 
     @property
     def advice(self) -> str:
-        """What helps against the reasons, each advice once; with the accuracy that can be had, where that is known."""
+        """What helps against the reasons, each advice once, as Python says it; with the accuracy that can be had, where
+        that is known: `potto.settings(rtol=1e-3)`."""
+        return re.sub(r"`--([a-z-]+)(?: ([^`]+))?`", _setting, self.options)
+
+    @property
+    def options(self) -> str:
+        """The same with options of the command line: `--rtol 1e-3`."""
         told = "; ".join(dict.fromkeys(why.advice for why in self.shortfalls))
         reached = attainable(*self._shown) if told and self.value is not None else None
         return told if reached is None else told.replace("(`--rtol`)", f"(`--rtol {reached:.0e}`)").replace("e-0", "e-")
@@ -287,6 +294,13 @@ class Estimate(Operators, Struct, frozen=True, eq=False):
     @property
     def _shown(self) -> Pair:
         return self._parts, self.error if self.tangent is None else (self.error, self.tangent_error)
+
+
+def _setting(option: re.Match[str]) -> str:
+    """`--rtol 1e-3` as a setting of Python's."""
+    name, value = option[1].replace("-", "_"), option[2] or "…"
+    value = f'"{value}"' if value[0].isalpha() else value
+    return f"`potto.settings({name}={value})`"
 
 
 def _plain(estimate: Estimate, changes: Mapping[str, Any]) -> Estimate:
