@@ -168,24 +168,32 @@ def _kind(value: Value) -> object:
     return None
 
 
-def _stacked(items: Sequence[Value]) -> Value:
+def _stacked(items: Sequence[Value], depth: int = 0) -> Value:
+    """Elements as one, each part with the places along a new first axis. depth: how many axes are places already."""
     first = items[0]
     if isinstance(first, tuple):
-        return tuple([_stacked([item[place] for item in items]) for place in range(len(first))])  # type: ignore[index]
+        return tuple([_stacked([item[place] for item in items], depth) for place in range(len(first))])  # type: ignore[index]
     if isinstance(first, Rows):
-        return Rows(_stacked([item.item for item in items]), first.size)  # type: ignore[union-attr]
+        return Rows(_stacked([item.item for item in items], depth + 1), first.size)  # type: ignore[union-attr]
     cells: list[Cell] = list(items)  # type: ignore[arg-type]
     k = max(len(cell.t) for cell in cells)
     columns = [(c.v, c.e, *(c.t or (None,) * k), *(c.et or (None,) * k)) for c in cells]
-    v, e, *rest = [_column(parts) for parts in zip(*columns, strict=True)]
+    v, e, *rest = [_column(parts, depth) for parts in zip(*columns, strict=True)]
     assert v is not None
     return Cell(v, e, tuple(rest[:k]), tuple(rest[k:]))
 
 
-def _column(parts: Sequence[Part | None]) -> Part | None:
+def _column(parts: Sequence[Part | None], depth: int) -> Part | None:
+    """What is the same all over a batch has axes of places alone, which must not be taken for those of the batch."""
     if all(part is None for part in parts):
         return None
-    return np.stack(np.broadcast_arrays(*[0.0 if part is None else part for part in parts]), axis=0)
+    full: list[Part] = [0.0 if part is None else part for part in parts]
+    if depth:
+        most = max(map(np.ndim, full))
+        full = [
+            x if not 0 < np.ndim(x) < most else np.reshape(x, np.shape(x) + (1,) * (most - np.ndim(x))) for x in full
+        ]
+    return np.stack(np.broadcast_arrays(*full), axis=0)
 
 
 def pattern(value: Value, directions: int) -> Pattern:

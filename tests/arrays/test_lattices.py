@@ -236,3 +236,14 @@ def moved(a) integral [0, 2] interp([0, a, 2], [0, 1, 0], x) d(x)
     for call in (lambda: program.flat(0.5), lambda: program.moved(2.0)):
         with pytest.raises(potto.PottoError, match="`interp` looks between places that rise"):
             call()
+
+
+def test_a_look_up_in_a_condition_within_a_condition() -> None:
+    """In the cells at the ends the formula of the segments would be of what is not there."""
+    program = potto.compile("""
+def up(ys: [m] Real, x) interp([0.1, 0.7], ys, x)
+def f(t, ys: [m] Real) integral [-0.5, 1] x*[(if [up(ys, x) > t] then 1 else up(ys, x)) > 0.5] d(x)
+""")
+    value = program.f(0.8, [0.4, 1.0])  # interp passes 0.5 at x = 0.2, and its sides above t stay above
+    assert value.converged and abs(value - (1 - 0.2**2) / 2) < 1e-12
+    assert abs(program.f(0.3, [0.4, 1.0]) - (1 - 0.5**2) / 2) < 1e-12  # all of it is above t

@@ -222,3 +222,21 @@ def test_the_least_and_the_greatest_over_a_range_that_a_number_ends() -> None:
     assert M.lowest(3, 2.0).value == 4.0
     moved = potto.deriv(M.highest_under)((3, 0), (0.3, 1))  # 3*[x < t] is the greatest: 3*t
     assert (moved.value, moved.tangent) == (pytest.approx(0.9), pytest.approx(3.0))
+
+
+def test_a_batch_goes_through_arrays_of_arrays_of_which_some_move() -> None:
+    """Rows that are the same all over the batch beside rows that differ, also where there are as many of both."""
+    module = potto.compile("""
+def total(a: [n, m] Real) sum i in 0..n-1, j in 0..m-1 ((1 + i + 10*j)*a[i, j])
+def first(t) total([[t, 1, 2], [1, 2, 3]])
+def last(t) total([[1, 2, 3], [2, t, t]])
+def corner(t) [[[t, 1], [2, 3]], [[4, 5], [6, 7]]]
+""")
+    for count in (2, 3, 4):
+        t = np.linspace(1, 2, count)
+        assert module.first(t).value == pytest.approx(t + 145, rel=1e-15)
+        assert module.last(t).value == pytest.approx(90 + 34 * t, rel=1e-15)
+        slopes = potto.grad(module.last)(t).tangent
+        assert slopes == pytest.approx(np.full(count, 34.0), rel=1e-15)
+        assert module.corner(t).value[:, 0, 0, 0].tolist() == t.tolist()
+        assert module.corner(t).value[:, 1].tolist() == [[[4, 5], [6, 7]]] * count

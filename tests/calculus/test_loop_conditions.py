@@ -70,3 +70,12 @@ def test_a_callee_that_loops_itself():
             integral ([0, 1], [0, 1]) singular(x, y, xs) d(x, y)
     """
     assert codes(text) == ["P0401"]
+
+
+STEPS = "[(fold s = x for i in 0..n-1 (if [s < t] then {} else s - xs[i])) < 1]"
+
+
+def test_brackets_at_the_steps_of_a_condition():
+    """They are told apart once the loop is written out, where each case can be searched for."""
+    assert codes(integral("a sum", STEPS.format("s + xs[i]"))) == ["P0616"]
+    assert codes(integral("a sum", STEPS.format("s + (integral [0, 1] exp(-x*z^2) d(z))"))) == ["P0402"]

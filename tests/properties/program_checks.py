@@ -11,6 +11,7 @@ import math
 import random
 import time
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -119,6 +120,9 @@ def _settled(backward: float, forward: float, error: float) -> Slope:
     return Slope(backward, forward, error if error < 1e-3 * size else math.inf)
 
 
+Source = Callable[[int, bool, int, float], tuple[str, Program]]
+
+
 @dataclass(frozen=True)
 class Asked:
     """How a program is spelled, where it is evaluated, and what it is asked for."""
@@ -129,6 +133,7 @@ class Asked:
     flat: bool = False
     settings: tuple[tuple[str, Any], ...] = ()
     unit: float = 1.0  # in which t is given: parameters may be large, or small
+    source: Source = random_program  # what writes the program
 
     @property
     def method(self) -> str:
@@ -156,7 +161,7 @@ def check(number: int) -> str:
 
 def held(ask: Asked) -> str:
     """What came of one program. Raises Wrong."""
-    text, program = random_program(ask.number, ask.flat, ask.spelling, ask.unit)
+    text, program = ask.source(ask.number, ask.flat, ask.spelling, ask.unit)
     context = f"{ask}\n{text}"
     try:
         value, off = estimate(program, **ask.point.moved(0.0))
@@ -194,7 +199,7 @@ def held(ask: Asked) -> str:
 def _function(ask: Asked) -> Any:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", potto.ProgramWarning)  # where only `f` is broken
-        return potto.compile(random_program(ask.number, ask.flat, ask.spelling, ask.unit)[0]).f
+        return potto.compile(ask.source(ask.number, ask.flat, ask.spelling, ask.unit)[0]).f
 
 
 def _answer(ask: Asked, context: str) -> Any:

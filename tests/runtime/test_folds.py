@@ -297,3 +297,28 @@ def turned(k, n)
     found = answer()
     assert abs(found.value - math.cos(180)) <= found.error <= 4 * whole.error < 2e-12
     assert abs(found.tangent + 600 * math.sin(180)) <= found.tangent_error <= 4 * whole.tangent_error < 4e-9
+
+
+THERMOSTAT = """
+def after(s, t, h, n) fold s = s for i in 1..n (if [s < t] then s + h else 0.5*s)
+def below(t, h, n) integral [0, 1] [after(s, t, h, n) < 0.6] d(s)
+def mean(t, h, n) integral [0, 1] after(s, t, h, n) d(s)
+"""
+
+
+@pytest.mark.parametrize("steps", [1, 3, 9])
+def test_a_jump_at_each_step_within_a_condition(steps: int) -> None:
+    """Which states end below a number: exactly, from the pieces on which the last state is affine."""
+    module = potto.compile(THERMOSTAT)
+    t, h = 0.55, 0.17
+    pieces = [(0.0, 1.0, 1.0, 0.0)]  # from, to, and the state there as slope*s + rest
+    for _ in range(steps):
+        stepped = []
+        for low, high, slope, rest in pieces:
+            cut = min(max((t - rest) / slope, low), high)
+            stepped += [(low, cut, slope, rest + h), (cut, high, slope / 2, rest / 2)]
+        pieces = [piece for piece in stepped if piece[0] < piece[1]]
+    ends = [(low, min(high, max(low, (0.6 - rest) / slope))) for low, high, slope, rest in pieces]
+    assert module.below(t, h, steps) == pytest.approx(sum(high - low for low, high in ends), abs=1e-13)
+    mean = sum((high - low) * (slope * (low + high) / 2 + rest) for low, high, slope, rest in pieces)
+    assert module.mean(t, h, steps) == pytest.approx(mean, abs=1e-13)

@@ -21,7 +21,7 @@ from potto.calculus.differentiation.derivative import NotSmooth, partial
 from potto.calculus.solving.enclosable import searchable
 from potto.calculus.solving.inverse_map import Failure, Inverse, dependence, invert, jacobian, listed
 from potto.calculus.solving.solve import Sections, sections
-from potto.calculus.surfaces.nested_brackets import nested, pieces
+from potto.calculus.surfaces.nested_brackets import in_loops, pieces
 from potto.core.printer import format_term
 from potto.core.terms import App, Branch, Global, If, Integral, Prim, Term, postorder, var
 from potto.diagnostics import Kind, declare
@@ -75,7 +75,7 @@ def judge(
     several coordinates is declared a diffeomorphism, which must have an inverse."""
     if len(coordinates) > 1:
         role = "map"
-    if any(map(nested, coordinates)):
+    if any(map(in_loops, coordinates)):
         return _broken(coordinates) if role == "map" else _in_cases(coordinates[0], variables, box, role)
     return _judged(coordinates, variables, box, whole, role)
 
@@ -85,7 +85,7 @@ def _in_cases(surface: Term, variables: Sequence[str], box: Box, role: Role) -> 
     verdicts: list[Verdict] = []
     empty: Problem | None = None
     for case in pieces(surface):
-        if nested(case) or not case.free.intersection(variables):
+        if in_loops(case) or not case.free.intersection(variables):
             continue
         found = _judged((case,), variables, box, False, role)
         if isinstance(found, Verdict):

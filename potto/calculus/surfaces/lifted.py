@@ -160,7 +160,7 @@ class _Trees:
     def of(self, node: Term) -> Tree:
         if isinstance(node, BINDERS) or not children(node):
             return self.leaf(node)
-        if isinstance(node, Branch) and (node in self.inner or self.nests(node)):
+        if isinstance(node, Branch) and self.is_decision(node):
             then, orelse = self.memo[node.then], self.memo[node.orelse]
 
             def decided(coordinates: tuple[Term, ...], region: Region) -> Tree:
@@ -176,6 +176,11 @@ class _Trees:
             return self.leaf(self.short(proj(parts[0], node.index) if isinstance(node, Proj) else rebuild(node, parts)))
 
         return self.walk(parts, self.region, built)
+
+    def is_decision(self, node: Branch) -> bool:
+        """Whether a conditional is one of the tree; one with decisions on its sides is, since it may guard them."""
+        sides = self.memo[node.then], self.memo[node.orelse]
+        return node in self.inner or self.nests(node) or any(isinstance(side, Split) for side in sides)
 
     def walk(self, trees: Sequence[Tree], region: Region, build: Build) -> Tree:
         """What `build` makes of the leaves that several trees have in common, in each part of a region."""
