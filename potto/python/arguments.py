@@ -169,6 +169,9 @@ def _shapes(argument: Any) -> Iterable[tuple[int, ...]]:
             yield from _shapes(item)
 
 
+LARGEST = 2**53  # up to here every whole number is a float
+
+
 def value_of(name: str, argument: Any, batch: Batch, to_function: ToFunction) -> Value:
     """A Python value as a value of Potto. Raises PottoError for one that is none."""
     function = to_function(argument)
@@ -191,6 +194,29 @@ def value_of(name: str, argument: Any, batch: Batch, to_function: ToFunction) ->
     if isinstance(argument, Rows):
         return over_batch(argument, batch.rows)
     raise no_kind(name, argument, "numbers, numpy arrays, tuples, lists and functions of Potto are accepted")
+
+
+NUMBERS = Batch(None)
+# Of arguments that are plain numbers or tuples of them: for each 0, or how many.
+Kinds = tuple[int, ...]
+
+
+def kinds_of(args: tuple[Any, ...]) -> Kinds:
+    """The kinds of arguments; none if they are not all plain. Whether they fit depends on nothing else."""
+    kinds = []
+    for arg in args:
+        if arg.__class__ is float or (arg.__class__ is int and abs(arg) <= LARGEST):
+            kinds.append(0)
+        elif arg.__class__ is tuple and arg and not any(kinds_of(arg)) and len(kinds_of(arg)) == len(arg):
+            kinds.append(len(arg))
+        else:
+            return ()
+    return tuple(kinds)
+
+
+def numbers_of(args: tuple[Any, ...]) -> list[Value]:
+    """Plain arguments as values."""
+    return [tuple(numbers_of(arg)) if arg.__class__ is tuple else Cell(float(arg)) for arg in args]
 
 
 def _double(name: str, argument: Any) -> float:

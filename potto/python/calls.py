@@ -37,6 +37,7 @@ class Call(Struct, frozen=True, eq=False):
     expr: nodes.Expr
     form: Form
     _known: dict[int, Term] = {}
+    _dual: dict[int, bool] = {}
 
     def run(self, values: Sequence[Value], batch: Batch) -> Estimate:
         """The estimate of the call for these arguments. Raises PottoError."""
@@ -44,9 +45,19 @@ class Call(Struct, frozen=True, eq=False):
         with Clock() as clock:
             value = self.value(values, machine)
         estimate = report(value, machine, clock)
-        term = self.elaborated
-        body = term.body if values and isinstance(term, Lam) else term
-        return batch.shaped(as_dual(estimate) if gives_dual(body, self.world.program.linker) else estimate)
+        return batch.shaped(as_dual(estimate) if self._gives_dual() else estimate)
+
+    def _gives_dual(self) -> bool:
+        """Whether the answer is a dual; found out once for the present texts."""
+        revision = self.world.db.revision
+        if revision not in self._dual:
+            term = self.elaborated
+            body = (
+                term.body if sum(count + len(words) for count, words in self.form) and isinstance(term, Lam) else term
+            )
+            self._dual.clear()
+            self._dual[revision] = gives_dual(body, self.world.program.linker)
+        return self._dual[revision]
 
     def value(self, values: Sequence[Value], machine: Machine | None = None) -> Value:
         """The value of the call for these arguments. Raises PottoError."""

@@ -20,7 +20,7 @@ from potto.evaluating.world import World
 from potto.kernels.cells import Rows, Value
 from potto.kernels.errors import wrong_call
 from potto.python.accepting import accepted, with_tangents
-from potto.python.arguments import Batch, batch_of, misfit, moving, value_of
+from potto.python.arguments import NUMBERS, Batch, Kinds, batch_of, kinds_of, misfit, moving, numbers_of, value_of
 from potto.python.arrays import has_arrays, with_arrays
 from potto.python.calls import Call, Form
 from potto.python.described import Doc, annotations_of, signature_of, typeset_derivative
@@ -70,11 +70,15 @@ class Function(Travelling):
         self._type = type
         self._given = given
         self._calls: dict[Form, Call] = {}
+        self._fitting: dict[Kinds, int] = {}  # arguments of which kinds are known to fit, since which texts
         self._known: tuple[int, Value] | None = None
         self._derives: tuple[int, bool] | None = None
         self._groups: tuple[int, tuple[tuple[Parameter, ...], ...]] | None = None
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        kinds = () if kwargs or self._given else kinds_of(args)
+        if kinds and self._fitting.get(kinds) == self._world.db.revision:
+            return self._call(((args, kwargs),)).run(numbers_of(args), NUMBERS)
         given = (*self._given, (args, kwargs))
         rest = groups_of(self._type)[1:]
         if rest and (args or kwargs) and len(args) + len(kwargs) <= len(groups_of(self._type)[0]):
@@ -83,10 +87,12 @@ class Function(Travelling):
         return self._run(given)
 
     def _run(self, given: Given) -> Estimate:
-        given = self._taken(given)
+        asked, given = given, self._taken(given)
         arguments, batch = self._arguments(given)
         if self._is_derivative():
             self._must_move(given)
+        if len(given) == 1 and given == asked and not given[0][1] and (kinds := kinds_of(given[0][0])):
+            self._fitting[kinds] = self._world.db.revision
         return in_tiles(self, given, (), arguments, batch)
 
     def in_tiles(self, args: tuple[Any, ...], kwargs: dict[str, Any], wrt: tuple[str, ...]) -> Estimate:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -34,7 +34,11 @@ from potto.runtime.evaluation.machine import Linker, Machine, Record, Semantics
 from potto.runtime.evaluation.selection import chosen, lazy
 from potto.runtime.evaluation.sums import total
 
+if TYPE_CHECKING:
+    from potto.runtime.integration.direct import Direct
+
 Lookup = Callable[[str, str], Term]
+V = TypeVar("V")
 
 
 def _integral(machine: Machine, term: Integral, env: dict[str, Value]) -> Value:
@@ -65,18 +69,30 @@ class Program:
 
     def __init__(self, lookup: Lookup, held: Mapping[tuple[str, str], Value] | None = None) -> None:
         self.linker = Linker(lookup, SEMANTICS, held)
+        self._direct: dict[Term, Direct | None] = {}
 
     def machine(self, settings: Settings) -> Machine:
         return Machine(self.linker, settings, Record())
 
     def value(self, machine: Machine, term: Term, env: Mapping[str, Value] | None = None) -> Value:
         """The value of a term, with every internal limit turned into a PottoError."""
+        given = env or {}
 
         def found(machine: Machine) -> Value:
-            return guarded(lambda: machine.term(self.linker.ready(term), dict(env or {})))
+            short = self._shortest(term) if given else None
+            value = None if short is None else guarded(lambda: short.value(machine, given))
+            return guarded(lambda: machine.term(self.linker.ready(term), dict(given))) if value is None else value
 
         value = found(machine)
         return widened(value, machine, found) if machine.record.used and not machine.directions else value
+
+    def _shortest(self, term: Term) -> Direct | None:
+        """The one integral that a call is, if it is; found out once."""
+        if term not in self._direct:
+            from potto.runtime.integration.direct import direct
+
+            self._direct[term] = direct(self.linker.ready(term), self.linker)
+        return self._direct[term]
 
     def evaluate(self, term: Term, settings: Settings = DEFAULTS, env: Mapping[str, Value] | None = None) -> Estimate:
         """The estimate of a term. Raises PottoError where the program has no value."""
@@ -98,7 +114,7 @@ def evaluate(term: Term, lookup: Lookup, settings: Settings = DEFAULTS) -> Estim
     return Program(lookup).evaluate(term, settings)
 
 
-def guarded(action: Callable[[], Value]) -> Value:
+def guarded(action: Callable[[], V]) -> V:
     try:
         with np.errstate(all="ignore"):
             return action()

@@ -1,6 +1,6 @@
 """One integral between known cuts, straight through: no pieces, no refinement, as many nodes as were proved enough.
 
-Owns `Straight` and `straight`. Where all cuts are closed forms and on every cell between them the integrand is one
+Owns `certain`. Where all cuts are closed forms and on every cell between them the integrand is one
 analytic formula, `proofs` says beforehand how many nodes do. What is left is a short program: bounds and cuts as
 formulas of the variables further out, the nodes between them, the formula at the nodes, weighted sums. Its derivative
 is that of the program, whose nodes move with the parameters (Reynolds' transport theorem: a surface that moves takes
@@ -13,29 +13,14 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from functools import cached_property
-from typing import Any
 
 import numpy as np
-from msgspec import Struct
 
-from potto.core.terms import (
-    Branch,
-    Const,
-    Integral,
-    Lam,
-    Term,
-    children,
-    function_of,
-    postorder,
-    prim,
-    rebuild,
-    tuple_,
-)
-from potto.integrate.fixed.moving_sums import Totals, evaluated, summed
-from potto.integrate.levels import LevelPlan
+from potto.core.terms import Const, children
+from potto.integrate.fixed.alone import summed_alone
+from potto.integrate.fixed.moving_sums import Totals, evaluated
+from potto.integrate.fixed.straight import CLEAR, Straight
 from potto.integrate.pieces import Evaluator, Sums
-from potto.integrate.rules.complex_enclosures import enclosable
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.intervals import Interval, enclosure
 from potto.integrate.rules.proved_orders import Cell as Stretch
@@ -43,13 +28,11 @@ from potto.integrate.rules.proved_orders import Region, proved
 from potto.kernels.cells import Cell, Value
 from potto.kernels.making import making
 
-MOST_VARIABLES, MOST_CUTS, MOST_CELLS, MOST_NODES, MOST_TERMS = 3, 13, 24, 60_000, 600
+MOST_CELLS, MOST_NODES = 24, 60_000
 # The truncation error that is proved for the value, as a part of the accuracy that is asked for; nobody gains by less
 # than LOOSEST.
 MARGIN = 1e-3
 LOOSEST = 1e-8
-# How many times its rounding a surface must be away from 0, and cuts from each other.
-CLEAR = 64.0
 # A region of parameters: this part of the power of two below a parameter's size, or below the first variable's range.
 REGION = 2.0**-5
 TINY = 1e-280
@@ -61,106 +44,6 @@ APART = 1e-6
 UNKNOWN = object()
 
 Path = tuple[tuple[int, int], ...]
-
-
-class Straight(Struct, frozen=True, dict=True, eq=False):
-    """The terms of an integral for this way: frames per variable (bounds, then cuts), the integrand without calls.
-
-    jumps: per variable the surfaces that it crosses, with the rows of the frame that are their places. turning: the
-    rows where something is like a square root. surfaces: what the integrand's branches depend on, as one function to a
-    tuple. names: parameters. regions: what was proved of the rules for cells in a region, None where nothing
-    could be. settled: of a region in all of which the cells are the same.
-    """
-
-    variables: tuple[str, ...]
-    frames: tuple[Lam, ...]
-    jumps: tuple[tuple[tuple[Term, tuple[int, ...]], ...], ...]
-    turning: tuple[frozenset[int], ...]
-    body: Term
-    surfaces: Lam
-    names: tuple[str, ...]
-    faces: dict[tuple[bool, ...], Term] = {}
-    regions: dict[Any, object] = {}
-    lowered: dict[Any, Any] = {}
-    settled: dict[Any, Region] = {}
-
-    @cached_property
-    def items(self) -> tuple[tuple[Term, ...], ...]:
-        return tuple(children(frame.body) for frame in self.frames)
-
-    def face(self, sides: tuple[bool, ...]) -> Term:
-        """The integrand on one side of each of its surfaces."""
-        found = self.faces.get(sides)
-        if found is None:
-            side = dict(zip(children(self.surfaces.body), sides, strict=True))
-            found = self.faces[sides] = _on_sides(self.body, side)
-        return found
-
-
-def straight(term: Integral, body: Term, levels: Sequence[LevelPlan]) -> Straight | None:
-    """The terms for this way; None if a cut has no closed form, or the integrand no formula that can be bounded.
-
-    body: the integrand with calls carried out.
-    """
-    if len(levels) > MOST_VARIABLES or any(_not_plain(level) for level in levels):
-        return None
-    nodes = postorder(body)
-    if len(nodes) > MOST_TERMS:
-        return None
-    surfaces = tuple(dict.fromkeys(node.surface for node in nodes if isinstance(node, Branch)))
-    cuts = (cut for level in levels for cut in children(level.frame.body))
-    if not all(map(enclosable, (*surfaces, _all_sides(body), *cuts))):
-        return None
-    places, frames = zip(*(_distinct(level.frame) for level in levels), strict=True)
-    free = body.free.union(*(frame.body.free for frame in frames)) - set(term.variables)
-    jumps = tuple(
-        tuple(
-            (cut.surface, tuple({place[row] for row, (at, _) in enumerate(level.rows, 2) if at == number}))
-            for number, cut in enumerate(level.level.cuts)
-            if cut.jumps
-        )
-        for level, place in zip(levels, places, strict=True)
-    )
-    turning = tuple(
-        frozenset(place[row] for row, (_, turns) in enumerate(level.rows, 2) if turns)
-        for level, place in zip(levels, places, strict=True)
-    )
-    return Straight(term.variables, frames, jumps, turning, body, function_of(tuple_(surfaces)), tuple(sorted(free)))
-
-
-def _distinct(frame: Lam) -> tuple[dict[int, int], Lam]:
-    """A frame with each formula once: where a line meets a bound in a corner, a cut is that bound for all parameters.
-    With the new place of each row."""
-    items = children(frame.body)
-    kept = list(dict.fromkeys(items))
-    if len(kept) == len(items) or items[0] is items[1]:
-        return {row: row for row in range(len(items))}, frame
-    return {row: kept.index(item) for row, item in enumerate(items)}, function_of(tuple_(kept))
-
-
-def _not_plain(level: LevelPlan) -> bool:
-    return bool(level.found or any(level.turned)) or len(level.rows) > MOST_CUTS
-
-
-def _all_sides(body: Term) -> Term:
-    """A term with everything in it that the integrand has on any of its sides."""
-    memo: dict[Term, Term] = {}
-    for node in postorder(body):
-        if isinstance(node, Branch):
-            memo[node] = prim("add", memo[node.then], memo[node.orelse])
-        else:
-            memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
-    return memo[body]
-
-
-def _on_sides(body: Term, sides: Mapping[Term, bool]) -> Term:
-    memo: dict[Term, Term] = {}
-    for node in postorder(body):
-        if isinstance(node, Branch):
-            memo[node] = memo[node.then if sides[node.surface] else node.orelse]
-        else:
-            memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
-    return memo[body]
 
 
 # Where the cells are
@@ -249,7 +132,7 @@ def _around(values: Mapping[str, float], size: Mapping[str, float]) -> Places | 
     """The region in which parameters of this size lie; None where they are too small for one."""
     places = []
     for name, value in values.items():
-        step = 2.0 ** math.floor(math.log2(size[name])) * REGION
+        step = math.ldexp(REGION, math.frexp(size[name])[1] - 1)
         if step < TINY:
             return None
         places.append((name, round(value / (2 * step)) * 2 * step, step))
@@ -322,6 +205,16 @@ def _region(
 
 def certain(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Sums | None:
     """The integral for one set of parameters; None where something about it is not plain."""
+    found = proved_sum(plan, machine, env)
+    if found is None:
+        return None
+    block = np.array((found.number, found.error))[:, None, :, None]
+    added = np.array([[found.gross[0]], [max(found.gross[1:], default=0.0)]])
+    return Sums(block[0, :, 0], block[1, :, 0], block[0, :, 1:], block[1, :, 1:], gross=added)
+
+
+def proved_sum(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Totals | None:
+    """The same as plain numbers, errors with what rules leave out."""
     if machine.frozen or machine.side:
         return None
     values: dict[str, float] = {}
@@ -341,7 +234,8 @@ def certain(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Sums |
         except _NotPlain:
             return None
         if not cells:
-            return Sums.zeros(1, machine.directions, 1)
+            nothing = [0.0] * (1 + machine.directions)
+            return Totals(nothing, nothing, nothing)
         if len(cells) <= MOST_CELLS:
             region = _region(plan, cells, values, reach, shortest, rtol)
         if region is None or sum(region.outer) * math.prod(region.inner) > MOST_NODES:
@@ -349,8 +243,8 @@ def certain(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Sums |
         if places is not None and region is plan.regions.get((cells, places, rtol)):
             with making:
                 _settle(plan, region, places, rtol)
-    sums = summed(plan.variables, plan.frames, region, machine, env, frame)
-    return None if sums is None else _accurate(sums, region, machine, [env[name] for name in plan.names])
+    found = summed_alone(plan, region, machine, env, frame)
+    return None if found is None else _accurate(found, region, machine, [env[name] for name in plan.names])
 
 
 def _settle(plan: Straight, region: Region, places: Places, rtol: float) -> None:
@@ -361,7 +255,7 @@ def _settle(plan: Straight, region: Region, places: Places, rtol: float) -> None
         plan.settled[places, rtol] = region
 
 
-def _accurate(found: Totals, region: Region, machine: Evaluator, parameters: Sequence[Value]) -> Sums | None:
+def _accurate(found: Totals, region: Region, machine: Evaluator, parameters: Sequence[Value]) -> Totals | None:
     """The answer, if it is as accurate as was asked for, or as its rounding allows."""
     k = machine.directions
     truncation = [region.error]
@@ -373,11 +267,9 @@ def _accurate(found: Totals, region: Region, machine: Evaluator, parameters: Seq
             speeds[name] = 0.0 if t is None else float(t)
         truncation.append(region.rate(speeds))
     errors, unit = [], EPS * max(found.gross)
-    for x, rounding, gross, beyond in zip(found.number, found.rounding, found.gross, truncation, strict=True):
+    for x, rounding, gross, beyond in zip(found.number, found.error, found.gross, truncation, strict=True):
         asked = 0.5 * max(machine.atol, machine.rtol * abs(x))
         if not (rounding <= asked and beyond <= max(asked, NOISE * gross, unit)):
             return None
         errors.append(rounding + beyond)
-    block = np.array((found.number, errors))[:, None, :, None]
-    added = np.array([[found.gross[0]], [max(found.gross[1:], default=0.0)]])
-    return Sums(block[0, :, 0], block[1, :, 0], block[0, :, 1:], block[1, :, 1:], gross=added)
+    return Totals(found.number, errors, found.gross)

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from potto.integrate.fixed.a_priori import Straight
 from potto.integrate.fixed.product_rule import CANCELS, FEW, Rule
+from potto.integrate.fixed.straight import Straight
 from potto.integrate.fixed.topologies import Alike, topologies
 from potto.integrate.pieces import Evaluator, Sums, gather, together
 from potto.kernels.cells import Array, Bools, Cell, Value

@@ -16,11 +16,11 @@ import numpy as np
 from msgspec import Struct, field
 
 from potto.core.terms import Term
-from potto.integrate.fixed.a_priori import Straight
 from potto.integrate.fixed.axes import Axis, Raw
 from potto.integrate.fixed.rule_text import NAME, ONE, Place, RuleText
+from potto.integrate.fixed.straight import Straight
 from potto.integrate.pieces import Evaluator
-from potto.kernels.cells import Cell, Ints, Value
+from potto.kernels.cells import Array, Cell, Ints, Value
 from potto.kernels.making import counts
 from potto.kernels.native.objects import Loaded
 from potto.kernels.native.points import address
@@ -60,8 +60,7 @@ class Lowered(Struct, frozen=True):
         constants = np.array(numbers, dtype=float)
         sizes = [3 * k1 + 3, *(axis.transform.shape[1] * k1 for axis in axes)]
         out = np.empty((blocks, sum(sizes), LANES))
-        frame = [blocks, sum(sizes), address(out), *(x for axis in axes for x in _told(axis)), *map(address, taken)]
-        table = np.array(frame, dtype=np.int64)
+        table = frame_of(out, axes, taken)
         function.call(address(table), address(constants))
         counts.native_points += count * math.prod(len(axis.nodes) for axis in axes)
         whole = out.transpose(1, 0, 2).reshape(sum(sizes), -1)[:, :count]
@@ -69,6 +68,12 @@ class Lowered(Struct, frozen=True):
         parts = np.split(whole[sizes[0] :], np.cumsum(sizes[1:])[:-1])
         found = [part.reshape(-1, k1, count).transpose(1, 2, 0) for part in parts]
         return Raw(number, found, most, off, rest[0] > 0, rest[1], rest[2])
+
+
+def frame_of(out: Array, axes: Sequence[Axis], taken: Sequence[Array]) -> Ints:
+    """What the function is told: how many blocks and rows, where they go, the nodes, and where what it takes is."""
+    told = [len(out), out.shape[1], address(out), *(x for axis in axes for x in _told(axis)), *map(address, taken)]
+    return np.array(told, dtype=np.int64)
 
 
 def lowered(plan: Straight, face: Term, directions: int, env: Mapping[str, Value]) -> Lowered:

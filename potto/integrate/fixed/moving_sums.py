@@ -69,11 +69,15 @@ def _layout(region: Region) -> _Layout:
 
 
 class Totals(Struct, frozen=True):
-    """Values and tangents (1 + k,), the rounding of each, and what each is when nothing cancels."""
+    """Values and tangents (1 + k,), how far rounding puts each off, and what each is when nothing cancels."""
 
     number: list[float]
-    rounding: list[float]
+    error: list[float]
     gross: list[float]
+
+    def plus(self, other: Totals) -> Totals:
+        mine, theirs = (self.number, self.error, self.gross), (other.number, other.error, other.gross)
+        return Totals(*([x + y for x, y in zip(a, b, strict=True)] for a, b in zip(mine, theirs, strict=True)))
 
 
 def summed(

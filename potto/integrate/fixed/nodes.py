@@ -13,10 +13,10 @@ import numpy as np
 from msgspec import Struct
 
 from potto.core.terms import Term, function_of, tuple_
-from potto.integrate.fixed.a_priori import Straight
 from potto.integrate.fixed.axes import Axis, Raw
 from potto.integrate.fixed.edges import EDGE, edges_of
 from potto.integrate.fixed.moving_sums import evaluated, product
+from potto.integrate.fixed.straight import Straight
 from potto.integrate.pieces import Evaluator, dense, still
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays

@@ -11,11 +11,11 @@ import math
 import numpy as np
 from msgspec import Struct
 
-from potto.integrate.fixed.a_priori import Straight
 from potto.integrate.fixed.axes import Axis, Raw
 from potto.integrate.fixed.lowered import Lowered, lowered
 from potto.integrate.fixed.moving_sums import SUMMED
 from potto.integrate.fixed.nodes import at_once
+from potto.integrate.fixed.straight import Straight
 from potto.integrate.fixed.topologies import Alike
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.gauss import analytic_truncation

@@ -14,8 +14,8 @@ import numpy as np
 from msgspec import Struct
 
 from potto.core.terms import Lam, Term, function_of
-from potto.integrate.fixed.a_priori import Straight
 from potto.integrate.fixed.edges import EDGE, edges_of
+from potto.integrate.fixed.straight import Straight
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.gauss import EPS
 from potto.kernels.native.elementary import module

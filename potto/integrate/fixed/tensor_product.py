@@ -23,9 +23,9 @@ from potto.calculus.solving.enclosable import enclosable
 from potto.calculus.surfaces.discontinuities import Finding
 from potto.core.kinds import union_of
 from potto.core.terms import Integral, Lam, Term, function_of, postorder, tuple_
-from potto.integrate.fixed.a_priori import Straight
 from potto.integrate.fixed.axes import Axis
 from potto.integrate.fixed.lowered import lowered
+from potto.integrate.fixed.straight import Straight
 from potto.integrate.pieces import Evaluator, Sums, dense, gather, still
 from potto.integrate.rules.gauss import EPS, gauss, truncation
 from potto.integrate.rules.intervals import Interval

@@ -16,9 +16,9 @@ from msgspec import Struct
 
 from potto.core.terms import Const, Term, children
 from potto.integrate.columns import distinct
-from potto.integrate.fixed.a_priori import CLEAR, Straight
 from potto.integrate.fixed.lowered_order import by_numpy, sorted_rows
 from potto.integrate.fixed.moving_sums import evaluated
+from potto.integrate.fixed.straight import CLEAR, Straight
 from potto.integrate.pieces import Evaluator, gather
 from potto.kernels.cells import Array, Bools, Cell, Ints, Number, Value
 

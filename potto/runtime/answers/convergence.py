@@ -10,6 +10,7 @@ absolute bound.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any
@@ -65,16 +66,22 @@ def adds_nothing(body: Term) -> bool:
 
 def allowance(term: Integral, sums: Sums, rtol: float) -> Any:
     """The error of each of a batch of integrals up to which it, or its derivative, is 0 as accurately as asked for."""
+    if sums.v.size == 1 and sums.gross is not None:  # numpy takes its time over a single number
+        rates = float(max(sums.gross[1, 0], *map(abs, sums.t.flat), 0.0))
+        return allowance_of_one(term, float(sums.gross[0, 0]), rates, rtol)
     most = np.inf if adds_nothing(term.body) else UNIT
     share = min(rtol, CANCELS)
-    if sums.v.size == 1 and sums.gross is not None:  # numpy takes its time over a single number
-        gross, rates = float(sums.gross[0, 0]), float(max(sums.gross[1, 0], *map(abs, sums.t.flat), 0.0))
-        return share * max(min(gross, most) if gross < np.inf else 0.0, min(rates, UNIT) if rates < np.inf else 0.0)
     value, rate = np.abs(sums.v).max(axis=0), np.abs(sums.t).max(axis=(0, 1), initial=0.0)
     if sums.gross is not None:
         value, rate = np.maximum(sums.gross[0], value), np.maximum(sums.gross[1], rate)
     value = np.where(np.isfinite(value), np.minimum(value, most), 0.0)
     return share * np.maximum(value, np.where(np.isfinite(rate), np.minimum(rate, UNIT), 0.0))
+
+
+def allowance_of_one(term: Integral, gross: float, rates: float, rtol: float) -> float:
+    """The same for a single integral: from what is added up for its value, and the most for one of its derivatives."""
+    value = 0.0 if gross == math.inf else gross if adds_nothing(term.body) else min(gross, UNIT)
+    return min(rtol, CANCELS) * max(value, min(rates, UNIT) if rates < math.inf else 0.0)
 
 
 def missing(term: Integral, sums: Sums, settings: Settings, env: dict[str, Value]) -> Bools:

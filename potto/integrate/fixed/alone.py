@@ -1,0 +1,155 @@
+"""The rule of a region (`a_priori`) by machine code, for one set of parameters.
+
+Owns `summed_alone`. What is a batch of members to the function (`lowered`) are here the cells of one integral, which
+differ in nothing but the rows of the frames between which they lie. All that is the same at every call is laid out
+once: tables of nodes, rows, room for what comes out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from msgspec import Struct
+
+from potto.core.terms import Term
+from potto.integrate.fixed.axes import Axis
+from potto.integrate.fixed.lowered import Lowered, frame_of, lowered
+from potto.integrate.fixed.moving_sums import SUMMED, Totals, summed
+from potto.integrate.fixed.product_rule import ELSEWHERE, TRACKED
+from potto.integrate.fixed.straight import Straight
+from potto.integrate.pieces import Evaluator
+from potto.integrate.rules.proved_orders import Cell as Stretch
+from potto.integrate.rules.proved_orders import Region
+from potto.kernels.cells import Array, Cell, Ints, Value
+from potto.kernels.making import counts
+from potto.kernels.native.objects import Loaded
+from potto.kernels.native.points import address
+from potto.kernels.native.vectors import LANES
+
+MOST_REGIONS = 512
+# Of a parameter: its name, and the direction of a tangent; -1 for the value.
+Read = tuple[str, int]
+
+
+class _Layout(Struct):
+    """What one call of the function for some cells reads and writes.
+
+    frame, constants: what it takes; tables: what the frame points to. out: (blocks, rows, LANES), `told` rows of which
+    count, and of the last block as many lanes as there are `cells`.
+    """
+
+    reads: tuple[Read, ...]
+    constants: Array
+    out: Array
+    frame: Ints
+    tables: Sequence[Array]
+    told: int
+    cells: int
+
+    def run(self, function: Loaded, env: Mapping[str, Cell]) -> list[list[float]]:
+        """Row by row what the function gives for each of the cells."""
+        self.constants[:] = [env[name].v if d < 0 else env[name].t[d] for name, d in self.reads]
+        function.call(address(self.frame), address(self.constants))
+        if len(self.out) == 1:
+            return self.out[0, : self.told, : self.cells].tolist()  # type: ignore[no-any-return]
+        rows = self.out[:, : self.told].transpose(1, 0, 2).reshape(self.told, -1)
+        return rows[:, : self.cells].tolist()  # type: ignore[no-any-return]
+
+
+class Face(Struct, frozen=True):
+    """The cells of a region that have one integrand. idle: layouts that no thread uses right now."""
+
+    way: Lowered
+    cells: tuple[Stretch, ...]
+    axes: tuple[Axis, ...]
+    k1: int
+    nodes: int
+    idle: list[_Layout] = []
+
+    def layout(self) -> _Layout:
+        count = len(self.cells)
+        blocks = -(-count // LANES)
+        lanes = np.minimum(np.arange(blocks * LANES), count - 1)
+        rows = np.array([cell.rows for cell in self.cells], dtype=float)[lanes]  # (lanes, variables, 2)
+        ends = [np.ascontiguousarray(rows[:, i, side]) for i in range(rows.shape[1]) for side in (0, 1)]
+        told = 3 * self.k1 + 3
+        out = np.empty((blocks, told + self.k1 * len(self.axes), LANES))
+        frame = frame_of(out, self.axes, ends)
+        reads = tuple(
+            (place.name, -1 if place.part.kind == "v" else place.part.direction)
+            for place in self.way.places
+            if place.kind == "number"
+        )
+        return _Layout(reads, np.empty(len(reads)), out, frame, ends, told, count)
+
+    def summed(self, function: Loaded, env: Mapping[str, Cell]) -> Totals | None:
+        """The sums over all nodes of the cells; None where cuts cross."""
+        try:
+            layout = self.idle.pop()
+        except IndexError:
+            layout = self.layout()
+        rows = layout.run(function, env)
+        self.idle.append(layout)
+        if not min(rows[3 * self.k1]) > 0:
+            return None
+        k1, share = self.k1, ELSEWHERE if self.nodes > TRACKED else 1.0
+        number = [sum(row) for row in rows[:k1]]
+        gross = [max(sum(most), sum(map(abs, row))) for most, row in zip(rows[k1 : 2 * k1], rows, strict=False)]
+        off = (sum(row) for row in rows[2 * k1 : 3 * k1])
+        return Totals(number, [share * x + ELSEWHERE * SUMMED * y for x, y in zip(off, gross, strict=True)], gross)
+
+
+def summed_alone(
+    plan: Straight, region: Region, machine: Evaluator, env: dict[str, Value], frame: tuple[Cell, ...]
+) -> Totals | None:
+    """Weighted sums over the nodes of all cells, by machine code once that pays, else by numpy; None where cuts cross.
+
+    frame: the bounds and cuts of the outermost variable.
+    """
+    cells: Any = env  # of those among the parameters `a_priori` has seen to it
+    if machine.backend == "numpy" or any(cells[name].e is not None or any(cells[name].et) for name in plan.names):
+        return summed(plan.variables, plan.frames, region, machine, env, frame)
+    faces = _faces(plan, region, machine, cells)
+    functions = [face.way.function(machine) for face in faces]
+    if None in functions:
+        with faces[0].way.promotion.by_numpy():
+            return summed(plan.variables, plan.frames, region, machine, env, frame)
+    total: Totals | None = None
+    for face, function in zip(faces, functions, strict=True):
+        assert function is not None
+        found = face.summed(function, cells)
+        if found is None:
+            return None
+        machine.count(face.nodes)
+        counts.native_points += face.nodes
+        total = found if total is None else total.plus(found)
+    return total
+
+
+def _faces(plan: Straight, region: Region, machine: Evaluator, env: dict[str, Any]) -> list[Face]:
+    """The integrands of a region, for parameters that move as these do."""
+    kinds = tuple([tuple([None if t is None else t == 1.0 for t in env[name].t]) for name in plan.names])
+    key = region, machine.directions, kinds
+    found: list[Face] | None = plan.alone.get(key)
+    if found is None:
+        if len(plan.alone) >= MOST_REGIONS:
+            plan.alone.clear()
+        found = plan.alone[key] = [_face(plan, region, machine, env, body) for body in _bodies(region)]
+    return found
+
+
+def _bodies(region: Region) -> list[Term]:
+    return list(dict.fromkeys(cell.body for cell in region.cells))
+
+
+def _face(plan: Straight, region: Region, machine: Evaluator, env: dict[str, Any], body: Term) -> Face:
+    """The cells with one integrand, all by the largest of their orders: what is proved holds for more nodes as well."""
+    own = [(cell, order) for cell, order in zip(region.cells, region.outer, strict=True) if cell.body is body]
+    cells, orders = zip(*own, strict=True)
+    every = max(orders), *region.inner
+    nodes = len(cells) * math.prod(every)
+    axes = tuple(Axis.of(order, True, (False, False), nodes > TRACKED) for order in every)
+    return Face(lowered(plan, body, machine.directions, env), cells, axes, 1 + machine.directions, nodes)

@@ -1,0 +1,135 @@
+"""An integral between known cuts as a short program: bounds and cuts, the nodes between them, the integrand, sums.
+
+Owns `Straight` and `straight`: the terms of an integral all of whose cuts are closed forms, and whose integrand is one
+analytic formula on every cell between them. How many nodes do is proved in `a_priori` for one set of parameters, and
+told by coefficients in `alike` for many.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+from msgspec import Struct
+
+from potto.core.terms import (
+    Branch,
+    Integral,
+    Lam,
+    Term,
+    children,
+    function_of,
+    postorder,
+    prim,
+    rebuild,
+    tuple_,
+)
+from potto.integrate.levels import LevelPlan
+from potto.integrate.rules.complex_enclosures import enclosable
+from potto.integrate.rules.proved_orders import Region
+
+MOST_VARIABLES, MOST_CUTS, MOST_TERMS = 3, 13, 600
+# How many times its rounding a surface must be away from 0, and cuts from each other.
+CLEAR = 64.0
+
+
+class Straight(Struct, frozen=True, dict=True, eq=False):
+    """The terms of an integral for this way: frames per variable (bounds, then cuts), the integrand without calls.
+
+    jumps: per variable the surfaces that it crosses, with the rows of the frame that are their places. turning: the
+    rows where something is like a square root. surfaces: what the integrand's branches depend on, as one function to a
+    tuple. names: parameters. regions: what was proved of the rules for cells in a region, None where nothing
+    could be. settled: of a region in all of which the cells are the same.
+    """
+
+    variables: tuple[str, ...]
+    frames: tuple[Lam, ...]
+    jumps: tuple[tuple[tuple[Term, tuple[int, ...]], ...], ...]
+    turning: tuple[frozenset[int], ...]
+    body: Term
+    surfaces: Lam
+    names: tuple[str, ...]
+    faces: dict[tuple[bool, ...], Term] = {}
+    regions: dict[Any, object] = {}
+    lowered: dict[Any, Any] = {}
+    alone: dict[Any, Any] = {}
+    settled: dict[Any, Region] = {}
+
+    @cached_property
+    def items(self) -> tuple[tuple[Term, ...], ...]:
+        return tuple(children(frame.body) for frame in self.frames)
+
+    def face(self, sides: tuple[bool, ...]) -> Term:
+        """The integrand on one side of each of its surfaces."""
+        found = self.faces.get(sides)
+        if found is None:
+            side = dict(zip(children(self.surfaces.body), sides, strict=True))
+            found = self.faces[sides] = _on_sides(self.body, side)
+        return found
+
+
+def straight(term: Integral, body: Term, levels: Sequence[LevelPlan]) -> Straight | None:
+    """The terms for this way; None if a cut has no closed form, or the integrand no formula that can be bounded.
+
+    body: the integrand with calls carried out.
+    """
+    if len(levels) > MOST_VARIABLES or any(_not_plain(level) for level in levels):
+        return None
+    nodes = postorder(body)
+    if len(nodes) > MOST_TERMS:
+        return None
+    surfaces = tuple(dict.fromkeys(node.surface for node in nodes if isinstance(node, Branch)))
+    cuts = (cut for level in levels for cut in children(level.frame.body))
+    if not all(map(enclosable, (*surfaces, _all_sides(body), *cuts))):
+        return None
+    places, frames = zip(*(_distinct(level.frame) for level in levels), strict=True)
+    free = body.free.union(*(frame.body.free for frame in frames)) - set(term.variables)
+    jumps = tuple(
+        tuple(
+            (cut.surface, tuple({place[row] for row, (at, _) in enumerate(level.rows, 2) if at == number}))
+            for number, cut in enumerate(level.level.cuts)
+            if cut.jumps
+        )
+        for level, place in zip(levels, places, strict=True)
+    )
+    turning = tuple(
+        frozenset(place[row] for row, (_, turns) in enumerate(level.rows, 2) if turns)
+        for level, place in zip(levels, places, strict=True)
+    )
+    return Straight(term.variables, frames, jumps, turning, body, function_of(tuple_(surfaces)), tuple(sorted(free)))
+
+
+def _distinct(frame: Lam) -> tuple[dict[int, int], Lam]:
+    """A frame with each formula once: where a line meets a bound in a corner, a cut is that bound for all parameters.
+    With the new place of each row."""
+    items = children(frame.body)
+    kept = list(dict.fromkeys(items))
+    if len(kept) == len(items) or items[0] is items[1]:
+        return {row: row for row in range(len(items))}, frame
+    return {row: kept.index(item) for row, item in enumerate(items)}, function_of(tuple_(kept))
+
+
+def _not_plain(level: LevelPlan) -> bool:
+    return bool(level.found or any(level.turned)) or len(level.rows) > MOST_CUTS
+
+
+def _all_sides(body: Term) -> Term:
+    """A term with everything in it that the integrand has on any of its sides."""
+    memo: dict[Term, Term] = {}
+    for node in postorder(body):
+        if isinstance(node, Branch):
+            memo[node] = prim("add", memo[node.then], memo[node.orelse])
+        else:
+            memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
+    return memo[body]
+
+
+def _on_sides(body: Term, sides: Mapping[Term, bool]) -> Term:
+    memo: dict[Term, Term] = {}
+    for node in postorder(body):
+        if isinstance(node, Branch):
+            memo[node] = memo[node.then if sides[node.surface] else node.orelse]
+        else:
+            memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
+    return memo[body]

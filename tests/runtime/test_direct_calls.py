@@ -1,0 +1,128 @@
+"""Calls that are one integral, on the short way from arguments to the answer: as exact as ever, and the same."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+import potto
+from potto.kernels.making import counts
+from potto.runtime.evaluate import Program
+
+BACKENDS = [
+    "numpy",
+    pytest.param(
+        "native",
+        marks=pytest.mark.skipif(importlib.util.find_spec("llvmlite") is None, reason="llvmlite is not installed"),
+    ),
+]
+RENDERER = r"""
+def quad(x, y, c) 1/(sqrt(2)*(x + y + c) + 2)^2
+def f(c) integral ([0, 1], [0, 1]) quad(x, y, c)*[x + y + c >= 0] d(x, y)
+def twice(a) f(a)
+def two(a, b) integral [0, 2] (if [x < a] then exp(-b*x) else x^2) d(x)
+def shaded(c, shader) integral [0, 1] shader(x, c)*[x < c] d(x)
+shader = \(x, c) . exp(c*x)
+"""
+
+
+def quad(c: float) -> tuple[mp.mpf, mp.mpf]:
+    """The value of f and its derivative: over s = x + y, whose density is s up to 1 and 2 - s from there."""
+    with mp.workdps(30):
+        inside = [p for p in (max(-mp.mpf(c), 0), 1, 2) if p >= -c]
+
+        def value(c: mp.mpf) -> mp.mpf:
+            return mp.quad(lambda s: min(s, 2 - s) / (mp.sqrt(2) * (s + c) + 2) ** 2, inside)
+
+        jump = min(-mp.mpf(c), 2 + mp.mpf(c)) / 4 if -2 < c < 0 else mp.mpf(0)
+        slope = mp.quad(lambda s: -2 * mp.sqrt(2) * min(s, 2 - s) / (mp.sqrt(2) * (s + c) + 2) ** 3, inside)
+        return value(mp.mpf(c)), slope + jump
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("name", ["f", "twice"])
+def test_value_and_derivative_are_right(name: str, backend: str) -> None:
+    function = getattr(potto.compile(RENDERER), name)
+    slope = potto.deriv(function)
+    with potto.settings(backend=backend):
+        for c in (-0.7, -0.70001, -1.3, -1.9999999, -1e-8, 0.5, 1e8):
+            exact, rate = quad(c)
+            found = slope((c, 1.0))
+            assert abs(found.value - exact) <= found.error
+            assert abs(found.tangent - rate) <= found.tangent_error
+            assert function(c).value == pytest.approx(float(exact), rel=1e-14, abs=0)
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_several_directions_at_once(backend: str) -> None:
+    two = potto.compile(RENDERER).two
+    with potto.settings(backend=backend):
+        for a, b in ((0.6, 1.3), (1.9, -0.4), (0.6, 1.3)):
+            found = potto.grad(two, wrt=["a", "b"])(a, b)
+            value = -math.expm1(-b * a) / b + (8 - a**3) / 3
+            by_a = math.exp(-b * a) - a * a
+            by_b = a * math.exp(-b * a) / b + math.expm1(-b * a) / b**2
+            assert abs(found.value - value) <= found.error + 1e-15  # the closed forms are rounded as well
+            assert np.allclose(found.tangent, (by_a, by_b), rtol=1e-13, atol=0)
+
+
+def test_functions_are_part_of_what_is_integrated() -> None:
+    module = potto.compile(RENDERER)
+    other = potto.compile(r"shader = \(x, c) . x").shader
+    for c in (0.3, 0.31):  # the second call has all that the first one found out
+        exact = math.expm1(c * c) / c
+        assert module.shaded(c, module.shader).value == pytest.approx(exact, rel=1e-14, abs=0)
+        assert module.shaded(c, other).value == pytest.approx(c * c / 2, rel=1e-14, abs=0)
+        dual = potto.deriv(module.shaded)((c, 1.0), potto.deriv(other))
+        assert dual.tangent == pytest.approx(c, rel=1e-14, abs=0)
+
+
+def test_the_general_way_gives_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = potto.compile(RENDERER)
+    places = [-1.99, -1.2, -0.7, -0.3, 0.4]
+    short = [potto.deriv(module.f)((c, 1.0)) for c in places]
+    monkeypatch.setattr(Program, "_shortest", lambda self, term: None)
+    for c, found in zip(places, short, strict=True):
+        general = potto.deriv(module.f)((c, 1.0))
+        assert (found.value, found.tangent) == (general.value, general.tangent)
+        assert (found.error, found.method, found.evals) == (general.error, general.method, general.evals)
+        assert (found.converged, found.notes) == (general.converged, general.notes)
+
+
+def test_where_the_edge_lies_on_a_corner_the_general_way_says_so() -> None:
+    f = potto.compile("def f(t) integral [0, 1] [x < t] d(x)").f
+    assert not potto.deriv(f)((0.3, 1.0)).notes
+    found = potto.deriv(f)((1.0, 1.0))
+    assert "one-sided derivatives differ (1 backward, 0 forward)" in str(found.notes[0])
+    assert math.isnan(f(math.nan).value)
+
+
+def test_arguments_with_errors_keep_them() -> None:
+    f = potto.compile("def f(t) integral [0, 1] [x < t] d(x)").f
+    f(0.3)
+    inexact = potto.compile("def g(s) integral [0, s] exp(-x*x) d(x)").g(1)
+    found = f(inexact)
+    assert found.error >= inexact.error > 0
+    assert abs(found.value - float(mp.sqrt(mp.pi) / 2 * mp.erf(1))) <= found.error
+
+
+def test_an_edit_counts_at_once() -> None:
+    for factor in (2, 3):
+        f = potto.compile(f"def f(t) integral [0, 1] {factor}*[x < t] d(x)", name="edited").f
+        assert f(0.25) == factor / 4
+
+
+@pytest.mark.skipif(importlib.util.find_spec("llvmlite") is None, reason="llvmlite is not installed")
+def test_machine_code_says_that_it_answered() -> None:
+    f = potto.compile("def f(t) integral [0, 1] exp(0.0625*x)*[x < t] d(x)").f
+    with potto.settings(backend="native"):
+        f(0.3)
+        before = counts.native_points
+        found = f(0.31)
+    assert counts.native_points > before
+    assert found.stats["points by machine code"] == found.evals
+    assert found.value == pytest.approx(math.expm1(0.0625 * 0.31) / 0.0625, rel=1e-14, abs=0)
