@@ -91,7 +91,8 @@ class Function(Travelling):
         arguments, batch = self._arguments(given)
         if self._is_derivative():
             self._must_move(given)
-        if len(given) == 1 and given == asked and not given[0][1] and (kinds := kinds_of(given[0][0])):
+        kinds = () if len(given) != 1 or given[0][1] else kinds_of(asked[0][0])
+        if kinds and given == asked:
             self._fitting[kinds] = self._world.db.revision
         return in_tiles(self, given, (), arguments, batch)
 
