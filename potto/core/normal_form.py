@@ -10,30 +10,34 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from fractions import Fraction
+from functools import lru_cache
 
 from potto.core import polynomials
-from potto.core.polynomials import Monomial, Polynomial, TooLarge, bounded, total
+from potto.core.polynomials import ONE, Exact, Monomial, Polynomial, TooLarge, bounded, exact, over, size_of, total
 from potto.core.terms import (
     Const,
     Prim,
     Term,
     Var,
     children,
-    postorder,
     prim,
     rebuild,
+    unknown,
 )
+from potto.core.walking import Kept
 from potto.primitives import PRIMITIVES
 
 _LARGEST = 64  # monomials; an expansion larger than that becomes an atom
 _HIGHEST = 16  # powers of sums that are expanded
 
 
+_FOUND: Kept[Polynomial] = Kept()
+
+
 def normal_form(term: Term) -> Polynomial:
     """The polynomial that a term is; empty where it is 0."""
-    forms: dict[Term, Polynomial] = {}
-    for node in postorder(term):
+    forms = _FOUND.table()
+    for node in unknown(term, forms):
         forms[node] = _node(node, forms)
     return forms[term]
 
@@ -68,7 +72,7 @@ def _monomial_order(monomial: Monomial) -> tuple[int, list[tuple[tuple[int, str]
 def _node(node: Term, forms: Mapping[Term, Polynomial]) -> Polynomial:
     match node:
         case Const(name=None, value=value) if math.isfinite(value):
-            return {(): Fraction(value)} if value else {}
+            return {(): exact(value)} if value else {}
         case Prim(op=op, args=args) if op in _RULES:
             try:
                 return _RULES[op](*(forms[a] for a in args))
@@ -92,18 +96,18 @@ def _tidy(part: Term, forms: Mapping[Term, Polynomial]) -> Term:
 def _atom(term: Term) -> Polynomial:
     """A term that is not taken apart (or whose constructor has folded it to a number)."""
     if isinstance(term, Const) and term.name is None and math.isfinite(term.value):
-        return {(): Fraction(term.value)} if term.value else {}
-    return {((term, 1),): Fraction(1)}
+        return {(): exact(term.value)} if term.value else {}
+    return {((term, 1),): 1}
 
 
 def _symmetric(op: str, inner: Term, forms: Mapping[Term, Polynomial]) -> Polynomial:
     """f(-x) is -f(x) or f(x): the sign of the leading coefficient of the argument is taken out."""
     form = forms[inner]
     flipped = bool(form) and form[leading(form)] < 0
-    written = as_term(_scaled(form, Fraction(-1)) if flipped else form)
+    written = as_term(_scaled(form, -1) if flipped else form)
     if written is None:
         return _atom(prim(op, inner))
-    return _scaled(_atom(prim(op, written)), Fraction(-1 if flipped and PRIMITIVES[op].parity < 0 else 1))
+    return _scaled(_atom(prim(op, written)), -1 if flipped and PRIMITIVES[op].parity < 0 else 1)
 
 
 # Arithmetic
@@ -117,24 +121,25 @@ def _sum(*parts: Polynomial) -> Polynomial:
     return total(parts, _LARGEST)
 
 
-def _scaled(a: Polynomial, factor: Fraction) -> Polynomial:
+def _scaled(a: Polynomial, factor: Exact) -> Polynomial:
     return _bounded({m: c * factor for m, c in a.items()})
 
 
 def _product(*parts: Polynomial) -> Polynomial:
-    result: Polynomial = {(): Fraction(1)}
+    result = ONE
     for part in parts:
         if len(result) * len(part) > 4 * _LARGEST:
             raise TooLarge
-        grown: dict[Monomial, Fraction] = {}
+        grown: dict[Monomial, Exact] = {}
         for m, c in result.items():
             for n, d in part.items():
                 key = _join(m, n)
-                grown[key] = grown.get(key, Fraction(0)) + c * d
+                grown[key] = grown.get(key, 0) + c * d
         result = _bounded({m: c for m, c in grown.items() if c})
     return result
 
 
+@lru_cache(maxsize=16384)
 def _join(first: Monomial, second: Monomial) -> Monomial:
     if not first or not second:
         return first or second
@@ -157,7 +162,7 @@ def _inverse(a: Polynomial) -> Polynomial:
     if not a:
         raise TooLarge
     first = leading(a)
-    scale = 1 / a[first]
+    scale = over(1, a[first])
     if len(a) == 1:
         return {tuple((atom, -n) for atom, n in first): scale}
     monic = as_term(_scaled(a, scale))
@@ -167,26 +172,30 @@ def _inverse(a: Polynomial) -> Polynomial:
 
 
 def _power(base: Polynomial, exponent: Polynomial) -> Polynomial:
-    n = exponent.get((), Fraction(0))
-    if (exponent and list(exponent) != [()]) or n.denominator != 1 or abs(n) > _HIGHEST:
+    n = exponent.get((), 0)
+    if (exponent and list(exponent) != [()]) or n.denominator != 1 or size_of(n) > _HIGHEST:
         raise TooLarge
     if len(base) == 1:
         ((monomial, coefficient),) = base.items()
-        return _bounded({tuple((a, k * int(n)) for a, k in monomial if n): coefficient ** int(n)})
+        return _bounded({tuple((a, k * int(n)) for a, k in monomial if n): _raised(coefficient, int(n))})
     if n < 0:
         return _power(_inverse(base), {(): -n})
     return _product(*(base,) * int(n))
 
 
+def _raised(value: Exact, n: int) -> Exact:
+    return value**n if n >= 0 else over(1, value**-n)
+
+
 def _root(a: Polynomial) -> Polynomial:
     """The square root of the square of a number; others are atoms."""
-    value = a.get((), Fraction(0))
+    value = a.get((), 0)
     if len(a) > 1 or (a and list(a) != [()]) or value < 0:
         raise TooLarge
-    exact = Fraction(math.isqrt(value.numerator), math.isqrt(value.denominator))
-    if exact * exact != value:
+    root = over(math.isqrt(value.numerator), math.isqrt(value.denominator))
+    if root * root != value:
         raise TooLarge
-    return {(): exact} if exact else {}
+    return {(): root} if root else {}
 
 
 _RULES: dict[str, Callable[..., Polynomial]] = {

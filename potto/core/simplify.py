@@ -11,7 +11,7 @@ from fractions import Fraction
 from functools import lru_cache
 
 from potto.core.normal_form import as_term, leading, normal_form
-from potto.core.polynomials import Polynomial
+from potto.core.polynomials import Exact, Polynomial, over, size_of
 from potto.core.rewrite import Rewriter
 from potto.core.terms import ZERO, Term
 
@@ -36,13 +36,13 @@ def normalized_surface(surface: Term) -> tuple[Term, int]:
         return ZERO, 1
     first = leading(form)
     side = 1 if form[first] > 0 else -1
-    monic = {monomial: coefficient / form[first] for monomial, coefficient in form.items()}
-    written = as_term(monic) or as_term(_scaled(form, abs(form[first]), side))
+    monic = {monomial: over(coefficient, form[first]) for monomial, coefficient in form.items()}
+    written = as_term(monic) or as_term(_scaled(form, size_of(form[first]), side))
     return (surface, 1) if written is None else (written, side)
 
 
-def _scaled(form: Polynomial, size: Fraction, side: int) -> Polynomial:
+def _scaled(form: Polynomial, size: Exact, side: int) -> Polynomial:
     """A polynomial times the power of two that brings `size` to between 1 and 2: doubles stay doubles."""
     power = size.numerator.bit_length() - size.denominator.bit_length()
     power -= size < Fraction(2) ** power
-    return {monomial: side * coefficient / Fraction(2) ** power for monomial, coefficient in form.items()}
+    return {monomial: over(side * coefficient, Fraction(2) ** power) for monomial, coefficient in form.items()}

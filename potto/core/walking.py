@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence, Set
 from operator import attrgetter, is_
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
 from potto.core.folding import apply
 from potto.core.kinds import (
@@ -53,6 +53,7 @@ from potto.core.kinds import (
 )
 
 Binder = TypeVar("Binder", bound=Term)
+Found = TypeVar("Found")
 
 
 def children(term: Term) -> tuple[Term, ...]:
@@ -194,6 +195,20 @@ def unknown(root: Term, known: Container[Term], below: Callable[[Term], Sequence
     """The parts of a term that nothing is known of yet, children first: what is known is not gone into."""
     order = postorder(root, below=lambda node: () if node in known else below(node))
     return [node for node in order if node not in known]
+
+
+class Kept(Generic[Found]):
+    """What was found out about terms, in a table for as long as it is not too large. Then comes a new one; whoever
+    fills the one before goes on with that."""
+
+    def __init__(self, most: int = 4096) -> None:
+        self.most = most
+        self.found: dict[Term, Found] = {}
+
+    def table(self) -> dict[Term, Found]:
+        if len(self.found) > self.most:
+            self.found = {}
+        return self.found
 
 
 class Holding:

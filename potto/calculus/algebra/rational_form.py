@@ -11,8 +11,6 @@ uses no identity between atoms. What is decided and solved here may be defined a
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from fractions import Fraction
 from functools import lru_cache
 
 from msgspec import Struct
@@ -24,11 +22,15 @@ from potto.core.normal_form import as_term as ordered
 from potto.core.normal_form import normal_form
 from potto.core.polynomials import (
     ONE,
+    Exact,
     Monomial,
     Polynomial,
     TooLarge,
     divided,
+    exact,
+    over,
     shared_by,
+    size_of,
     sorted_monomial,
     total,
     without,
@@ -58,9 +60,11 @@ from potto.core.terms import (
     postorder_by,
     prim,
     rebuild,
+    unknown,
 )
+from potto.core.walking import Kept
 
-_LARGEST = 400
+_LARGEST = 128  # monomials
 
 
 class Rational(Struct, frozen=True):
@@ -74,22 +78,42 @@ class Rational(Struct, frozen=True):
         return self.below == ONE
 
 
+# By the variable along which sums are taken apart: what terms share is multiplied out once, and what has grown too
+# large is not tried again in every term that contains it.
+_FOUND: dict[str | None, Kept[Rational | None]] = {}
+
+
 def normal(term: Term, name: str | None = None) -> Rational | None:
     """The normal form; None where it would be too large or a value is not a number.
 
     name: sums that do not vary with this variable are atoms: few monomials, which tell less.
     """
-    memo: dict[Term, Rational] = {}
+    known = _FOUND.setdefault(name, Kept()).table()
+    for node in unknown(term, known, lambda node: _summed(node, name)):
+        try:
+            known[node] = _node(node, [_small(known[part]) for part in _summed(node, name)])
+        except TooLarge:
+            known[node] = None
+    return known[term]
 
-    def whole(node: Term) -> bool:
-        return name is not None and name not in node.free and isinstance(node, Prim) and node.op == "add"
 
-    try:
-        for node in postorder_by(term, lambda node: () if whole(node) else children(node)):
-            memo[node] = _atom(node) if whole(node) else _node(node, memo)
-    except TooLarge:
-        return None
-    return memo[term]
+def _summed(node: Term, name: str | None) -> tuple[Term, ...]:
+    """The parts of whose normal forms that of a term is made; none of an atom."""
+    if not isinstance(node, Prim) or (name is not None and name not in node.free and node.op == "add"):
+        return ()
+    match node.op:
+        case "add" | "neg" | "mul" | "div" | "exp":
+            return node.args
+        case "pow" if isinstance(node.args[1], Const) and node.args[1].value.is_integer():
+            return node.args[:1]
+        case _:
+            return ()
+
+
+def _small(form: Rational | None) -> Rational:
+    if form is None:
+        raise TooLarge
+    return form
 
 
 @lru_cache(maxsize=8192)
@@ -216,15 +240,15 @@ def as_term(polynomial: Polynomial, rounded: bool = False) -> Term | None:
 # Arithmetic
 
 
-def _node(node: Term, memo: Mapping[Term, Rational]) -> Rational:
+def _node(node: Term, args: list[Rational]) -> Rational:
+    """args: the normal forms of the parts that it is made of. Raises TooLarge."""
     if isinstance(node, Const) and node.name is None:
         if not abs(node.value) < float("inf"):
             raise TooLarge
-        return Rational({(): Fraction(node.value)} if node.value else {}, ONE)
+        return Rational({(): exact(node.value)} if node.value else {}, ONE)
     if not isinstance(node, Prim):
         return _atom(node)
-    args = [memo[a] for a in node.args if a in memo]
-    match node.op:
+    match node.op if args else "":
         case "add":
             result = args[0]
             for arg in args[1:]:
@@ -239,18 +263,18 @@ def _node(node: Term, memo: Mapping[Term, Rational]) -> Rational:
             return result
         case "div":
             return _product(args[0], _flip(args[1]))
-        case "pow" if isinstance(node.args[1], Const) and node.args[1].value.is_integer():
+        case "pow":
+            assert isinstance(node.args[1], Const)
             return _power(args[0], int(node.args[1].value))
-        case "pow" if isinstance(node.args[1], Const) and node.args[1].value == 0.5:
-            return _atom(prim("sqrt", node.args[0]))
         case "exp":
             return _exponential(node, args[0])
         case _:
-            return _atom(node)
+            half = node.op == "pow" and isinstance(node.args[1], Const) and node.args[1].value == 0.5
+            return _atom(prim("sqrt", node.args[0]) if half else node)
 
 
 def _atom(term: Term) -> Rational:
-    return Rational({((term, 1),): Fraction(1)}, ONE)
+    return Rational({((term, 1),): 1}, ONE)
 
 
 def _plus(a: Rational, b: Rational) -> Rational:
@@ -290,12 +314,12 @@ def _reduced(top: Polynomial, below: Polynomial) -> Rational:
     if top == below:
         return Rational(ONE, ONE)
     if len(below) > 1 or len(top) > 1:
-        exact = divided(top, below, _LARGEST)
-        if exact is not None:
-            return Rational(exact, ONE)
-        exact = divided(below, top, _LARGEST)
-        if exact is not None:
-            return _reduced(ONE, exact)
+        whole = divided(top, below, _LARGEST)
+        if whole is not None:
+            return Rational(whole, ONE)
+        whole = divided(below, top, _LARGEST)
+        if whole is not None:
+            return _reduced(ONE, whole)
     if below != ONE:
         shared = shared_by([*top, *below])
         if shared:
@@ -303,8 +327,8 @@ def _reduced(top: Polynomial, below: Polynomial) -> Rational:
             below = {without(m, shared): c for m, c in below.items()}
         lead = next(iter(below.values()))
         if lead != 1:
-            top = {m: c / lead for m, c in top.items()}
-            below = {m: c / lead for m, c in below.items()}
+            top = {m: over(c, lead) for m, c in top.items()}
+            below = {m: over(c, lead) for m, c in below.items()}
     return Rational(top, below)
 
 
@@ -315,10 +339,21 @@ def _times(a: Polynomial, b: Polynomial) -> Polynomial:
         return a
     if len(a) * len(b) > 4 * _LARGEST:
         raise TooLarge
-    return total(tuple(_joined(m, n, c * d) for m, c in a.items() for n, d in b.items()), _LARGEST)
+    plain: dict[Monomial, Exact] = {}
+    others: list[Polynomial] = []
+    for m, c in a.items():
+        for n, d in b.items():
+            monomial, square = _joined(m, n)
+            if square is None:
+                plain[monomial] = plain.get(monomial, 0) + c * d
+            else:
+                others.append(_times(square, {monomial: c * d}))
+    return total((plain, *others), _LARGEST)
 
 
-def _joined(first: Monomial, second: Monomial, coefficient: Fraction) -> Polynomial:
+@lru_cache(maxsize=16384)
+def _joined(first: Monomial, second: Monomial) -> tuple[Monomial, Polynomial | None]:
+    """The product of two monomials, and what it is still to be multiplied with where an identity knows a square."""
     counts = dict(first)
     for atom, n in second:
         counts[atom] = counts.get(atom, 0) + n
@@ -328,8 +363,8 @@ def _joined(first: Monomial, second: Monomial, coefficient: Fraction) -> Polynom
             rest = {a: k for a, k in counts.items() if a is not atom}
             if n > 2:
                 rest[atom] = n - 2
-            return _times(square, {sorted_monomial(rest): coefficient})
-    return {sorted_monomial(counts): coefficient}
+            return sorted_monomial(rest), square
+    return sorted_monomial(counts), None
 
 
 @lru_cache(maxsize=1024)
@@ -339,8 +374,7 @@ def _square(atom: Term) -> Polynomial | None:
         (inner,) = atom.args
         if atom.op in ("cos", "cosh"):
             other = prim("sin" if atom.op == "cos" else "sinh", inner)
-            sign = Fraction(-1 if atom.op == "cos" else 1)
-            return {(): Fraction(1), ((other, 2),): sign}
+            return {(): 1, ((other, 2),): -1 if atom.op == "cos" else 1}
         if atom.op == "sqrt":
             found = normal(inner)
             return found.top if found is not None and found.whole else None
@@ -360,12 +394,12 @@ def _exponential(node: Prim, inner: Rational) -> Rational:
     top: dict[Term, int] = {}
     below: dict[Term, int] = {}
     for monomial, coefficient in inner.top.items():
-        whole = coefficient.denominator == 1 and abs(coefficient) <= 64
-        scale = Fraction(1) if whole else coefficient
-        part = as_term({monomial: abs(scale)})
+        whole = coefficient.denominator == 1 and size_of(coefficient) <= 64
+        scale: Exact = 1 if whole else coefficient
+        part = as_term({monomial: size_of(scale)})
         if part is None:
             return _atom(node)
         side = top if (coefficient > 0) else below
         atom = prim("exp", part)
-        side[atom] = side.get(atom, 0) + (int(abs(coefficient)) if whole else 1)
-    return Rational({sorted_monomial(top): Fraction(1)}, {sorted_monomial(below): Fraction(1)})
+        side[atom] = side.get(atom, 0) + (int(size_of(coefficient)) if whole else 1)
+    return Rational({sorted_monomial(top): 1}, {sorted_monomial(below): 1})

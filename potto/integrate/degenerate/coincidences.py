@@ -26,7 +26,7 @@ from potto.integrate.decomposition.meetings import Edge, Meeting, as_array
 from potto.integrate.events import Fold, TwoSided, on_a_bound
 from potto.integrate.levels import LevelPlan
 from potto.integrate.panels.iterated import Iterated
-from potto.integrate.pieces import Evaluator, Sums, gather, mostly, still, take
+from potto.integrate.pieces import Evaluator, Sums, components, gather, mostly, still, take
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.substitution import Segments
 from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Value, pad
@@ -35,6 +35,9 @@ MOST_AT_ONE_PLACE = 4
 SURE = 1.001  # what rounding may add to a bound
 # Beside a place, in its own size: where surfaces that are 0 at it, to so many times their rounding, have a side.
 BESIDE, CLEAR = 1e-7, 4.0
+# The part of the range of a variable over which what happens at a place where it is cut may be seen beside it: where a
+# radicand is the square of the distance from it, it is 0 to rounding up to 1e-8 from there.
+BESIDE_A_CUT = 2.0**-20
 
 
 class Scene(Struct, frozen=True):
@@ -169,6 +172,10 @@ def note_folds(scene: Scene, cuts: Cuts) -> None:
     levels, number = scene.parent.plan.levels, scene.number
     for fold in cuts.folds:
         counts = scene.counted(fold.owner)
+        if number and counts.any():
+            apart = _apart(scene, fold.owner)
+            counts = np.zeros_like(counts)
+            counts[apart] = scene.counted(fold.owner[apart])
         if not counts.any():
             continue
         owner, x = fold.owner[counts], float(fold.x[counts][0])
@@ -178,6 +185,30 @@ def note_folds(scene: Scene, cuts: Cuts) -> None:
         all_of_it = None if number else tuple(map(int, owner))
         event = Fold(named, number, fold.cut, x, all_of_it, tuple(map(float, outer)))
         scene.machine.note(event, scene.below(owner))
+
+
+def _apart(scene: Scene, owner: Ints) -> Ints:
+    """The nodes of variables further out at which something happens, but for those beside one another: crowded next to
+    the end of a panel, as rules have them where they turn, they are within rounding of the place where it is cut."""
+    levels = scene.parent.plan.levels[: scene.number]
+    cells = [scene.env[level.variable] for level in levels]
+    places = np.stack([as_array(cell.v, scene.batch) for cell in cells if isinstance(cell, Cell)])[:, owner]
+    members = np.zeros((1, owner.size)) if scene.root is None else scene.root[None, owner]
+    order = np.lexsort((*places[::-1], *members))
+    outer, x = np.concatenate((members, places[:-1]))[:, order], places[-1, order]
+    reach = _reach(scene, levels[-1])[owner[order]]
+    near = np.zeros(owner.size + 1, dtype=bool)
+    near[1:-1] = (outer[:, 1:] == outer[:, :-1]).all(axis=0)
+    near[1:-1] &= np.diff(x) <= BESIDE_A_CUT * np.where(np.isfinite(reach), reach, 1 + np.abs(x))[1:]
+    return np.sort(order[~(near[1:] | near[:-1])])
+
+
+def _reach(scene: Scene, level: LevelPlan) -> Array:
+    """How far the range of a variable further out goes, for each of a batch."""
+    quiet = scene.machine.with_directions(0)
+    ends = quiet.evaluate(level.bounds, {n: still(scene.env[n]) for n in level.bounds.params}, None)
+    lo, hi = (as_array(cell.v, scene.batch) for cell in components(ends))
+    return np.abs(hi - lo)
 
 
 def _not_known(scene: Scene, sums: Sums, owner: Ints, unknown: Bools, named: TwoSided) -> None:

@@ -85,15 +85,18 @@ class Table(Struct, frozen=True):
         return Cell(v, e, tuple(t), tuple(et))
 
 
-def tabulated(segments: Segments, k: int, function: Function, rtol: float) -> Table | None:
-    """The function on the segments; None where it is not continuous, or does not become smooth on pieces."""
+def tabulated(
+    segments: Segments, k: int, function: Function, rtol: float, exhausted: Callable[[], bool]
+) -> Table | None:  # fmt: skip
+    """The function on the segments; None where it is not continuous, does not become smooth on pieces, or takes more
+    than there is."""
     count = segments.a.size
     todo = (np.arange(count), np.zeros(count), np.ones(count))
     done: list[tuple[Ints, Array, Array, Array, Array, Array]] = []
     rule, largest, total = gauss(ORDER), np.zeros(2 + k), 0
     for turn in range(ROUNDS):
         coefficients, error, most = _measured(segments, todo, k, function, rule)
-        if not np.isfinite(coefficients).all():
+        if exhausted() or not np.isfinite(coefficients).all():
             return None
         total += todo[0].size
         largest = np.maximum(largest, most)

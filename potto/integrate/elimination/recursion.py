@@ -53,7 +53,7 @@ START_ORDER = 16
 # The accuracy of each step as a part of what is asked for.
 SHARE = 0.02
 FINEST = 1e-14
-AFFORDABLE = 3_000_000  # evaluations, a few seconds: more than that is no good use of one number
+AFFORDABLE = 3_000_000  # evaluations, a few seconds: more than that is no good use of one number, and not waited for
 FARTHEST = np.finfo(float).max
 SLIVER = 16  # roundings of its ends, that a piece of a table is longer than
 MOST_PLACES = 64  # where the integral over one variable is not smooth in the number that it depends on
@@ -174,10 +174,13 @@ class _Tabled(Iteration):
         return tracking.evaluate(WEIGHTED, {"further": pad(further, machine.directions), "weight": weight}, None)
 
 
-def one_by_one(known: Eliminated, machine: Any, env: dict[str, Value]) -> Sums | None:
-    """The integral, each step from the table of the next; None where one can't be made."""
+def one_by_one(
+    known: Eliminated, machine: Any, env: dict[str, Value], affordable: int = AFFORDABLE
+) -> Sums | None:  # fmt: skip
+    """The integral, each step from the table of the next; None where one can't be made, or it takes more evaluations
+    than can be afforded."""
     settings = machine.settings
-    most = min(settings.max_evals, int(machine.record.spent) + AFFORDABLE)
+    most = min(settings.max_evals, int(machine.record.spent) + affordable)
     finer = replace(settings, rtol=max(SHARE * settings.rtol, FINEST), atol=0.0, max_evals=most)
     fine = machine.changed(settings=finer)
     spans = _spans(known.steps, env)
@@ -196,7 +199,7 @@ def one_by_one(known: Eliminated, machine: Any, env: dict[str, Value]) -> Sums |
         inside = replace(plan, levels=(*plan.levels, *plan.levels))
         iteration = _Tabled(inside, fine, START_ORDER, tracked=True, further=further)
         further = _table(iteration, state, span, fine, env)
-        if further is None or (isinstance(below, Table) and not below.seen):
+        if further is None or fine.exhausted() or (isinstance(below, Table) and not below.seen):
             return None
     return sums
 
@@ -224,7 +227,7 @@ def _table(
 
     if found.conflict or not segments.a.size:
         return None
-    return tabulated(segments, machine.directions, function, machine.rtol)
+    return tabulated(segments, machine.directions, function, machine.rtol, machine.exhausted)
 
 
 def _spans(steps: Sequence[Step], env: dict[str, Value]) -> list[tuple[float, float]]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from potto.integrate.elimination.recursion import Eliminated, one_by_one
+from potto.integrate.elimination.recursion import AFFORDABLE, Eliminated, one_by_one
 from potto.integrate.events import Fold
 from potto.integrate.pieces import Sums
 from potto.runtime.evaluation.machine import Machine
@@ -18,15 +18,16 @@ from potto.runtime.integration.problem import Problem
 ACCURATE, WORTH = 1e-8, 1e-4
 
 
-def step_by_step(problem: Problem, limit: float) -> Sums | None:
-    """The integrals of a batch, where each variable hands one number on; None where errors are larger than `limit`."""
+def step_by_step(problem: Problem, limit: float, affordable: int = AFFORDABLE) -> Sums | None:
+    """The integrals of a batch, where each variable hands one number on; None where errors are larger than `limit`, or
+    one of them takes more evaluations than can be afforded."""
     known = problem.steps()
     if known is None:
         return None
     rows = []
     for i in range(problem.batch):
         alone = problem.member(i)
-        row = _member(known, alone)
+        row = _member(known, alone, affordable)
         if row is None or alone.events or not accurate(row, max(limit, alone.machine.rtol), alone.machine):
             return None
         rows.append(row)
@@ -34,7 +35,7 @@ def step_by_step(problem: Problem, limit: float) -> Sums | None:
     return Sums.joined(rows)
 
 
-def _member(known: Eliminated, problem: Problem) -> Sums | None:
+def _member(known: Eliminated, problem: Problem, affordable: int) -> Sums | None:
     """One integral, looked at from both sides where a surface folds in the outermost variable."""
 
     def tabled(there: Problem) -> Sums:
@@ -43,7 +44,7 @@ def _member(known: Eliminated, problem: Problem) -> Sums | None:
             raise _NotEvaluated
         return found
 
-    row = one_by_one(known, problem.machine, problem.env)
+    row = one_by_one(known, problem.machine, problem.env, affordable)
     folds = problem.events.every(Fold)
     if row is None or not folds or any(fold.number for fold, _ in folds):
         return row
