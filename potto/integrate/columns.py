@@ -36,16 +36,27 @@ class Columns(Struct):
             return self._with({n: x[..., index] for n, x in self.arrays().items()})
         if index.dtype == bool:
             index = index.nonzero()[0]
+        span = run_of(index)
+        if span is not None:
+            return self._with({n: x[..., span] for n, x in self.arrays().items()})
         return self._with({n: x.take(index, -1) for n, x in self.arrays().items()})
 
     def put(self, index: Any, part: Self) -> None:
         """Replace some members of the batch; of what is not known of the part, nothing is known of the whole."""
-        there = part.arrays()
+        there, where = part.arrays(), run_of(index)
+        where = index if where is None else where
         for name, x in self.arrays().items():
             if name in there:
-                x[..., index] = there[name]
+                x[..., where] = there[name]
             else:
                 setattr(self, name, None)
+
+
+def run_of(index: Any) -> slice | None:
+    """The places that an index has, which come in order and each once, where they are one after the other."""
+    if index.__class__ is slice or index.size < 2 or index[-1] - index[0] + 1 != index.size:
+        return None
+    return slice(int(index[0]), int(index[-1]) + 1)
 
 
 def joined(parts: Sequence[C]) -> C:

@@ -81,9 +81,9 @@ class Sums(Columns):
     @staticmethod
     def zeros(m: int, k: int, batch: int) -> Sums:
         """Integrals over nothing."""
-        v, e = np.zeros((2, m, batch))
-        t, et = np.zeros((2, m, k, batch))
-        return Sums(v, e, t, et, gross=np.zeros((2, batch)))
+        rows = np.zeros((2 * m * (1 + k) + 2, batch))  # in one piece, which a system has ready sooner
+        numbers, errors = rows[:-2].reshape(2, m, 1 + k, batch)
+        return Sums(numbers[:, 0], errors[:, 0], numbers[:, 1:], errors[:, 1:], gross=rows[-2:])
 
     def channels(self) -> tuple[Array, Array]:
         """Values, then tangents, (m, 1 + k, B), and their errors."""
@@ -97,6 +97,12 @@ class Sums(Columns):
             return self
         v, e, t, et = (np.concatenate([x] + [x[:1]] * missing) for x in (self.v, self.e, self.t, self.et))
         return Sums(v, e, t, et, gross=self.gross)
+
+    def with_members(self, members: Any, part: Sums) -> Sums:
+        """These sums with others for some members, in place where there are as many components."""
+        whole = self.widened(part.v.shape[0])
+        whole.put(members, part.widened(whole.v.shape[0]))
+        return whole
 
     def lose(self, members: Any) -> None:
         """Some of the integrals have no value."""

@@ -51,8 +51,8 @@ from potto.core.terms import (
     tuple_,
 )  # fmt: skip
 from potto.integrate.decomposition.vanishing import vanishing_of
+from potto.integrate.fixed.boxes import Box, box_of
 from potto.integrate.fixed.straight import Straight, straight
-from potto.integrate.fixed.tensor_product import Box, box_of
 from potto.integrate.levels import Group, LevelPlan
 from potto.kernels.cells import Mask, Trace
 

@@ -50,7 +50,24 @@ def test_a_picture_is_the_same_without_looking_for_whole_pixels(
     for (v, e), (w, f) in zip(parts(with_boxes), parts(without), strict=True):
         # Two methods, each within its own bound of the same truth; 1e-18 is the rounding of a pixel's area.
         assert (np.abs(v - w) <= e + f + 1e-18).all()
-    assert with_boxes.converged == without.converged
+    # Those that are left by themselves may do better: of a range of length 0 nothing but 0 is left.
+    assert (with_boxes.member_converged | ~without.member_converged).all()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_machine_code_gives_whole_pixels_as_numpy_does(name: str) -> None:
+    pytest.importorskip("llvmlite")
+    found = []
+    for backend in ("numpy", "native"):
+        with potto.settings(backend=backend):
+            found.append(picture(name, 0.7))
+    for (v, e), (w, f) in zip(*map(parts, found), strict=True):
+        most = np.abs(w).max()
+        # A few units in the last place, where sums cancel of what is added up; errors are read off coefficients, which
+        # may be nothing but rounding.
+        assert (np.abs(v - w) <= 8 * np.spacing(np.abs(w)) + 0.01 * np.minimum(e, f)).all()
+        assert (e <= 3 * f + 1e-15 * most).all() and (f <= 3 * e + 1e-15 * most).all()
+    assert (found[0].member_converged == found[1].member_converged).all()
 
 
 def test_whole_pixels_have_the_values_of_a_closed_form() -> None:
@@ -73,8 +90,9 @@ def test_only_pixels_that_are_cut_are_cut() -> None:
     m = potto.compile("def f(a, b, t) integral ([a, a + 1/64], [b, b + 1/64]) [x + y <= t] d(x, y)")
     a, b = np.meshgrid(np.arange(64) / 64, np.arange(64) / 64)
     got = potto.deriv(m.f)((a, 0.0), (b, 0.0), (0.51, 1.0))
-    whole = 64 * 64  # of what is constant one node tells all
-    assert whole * 0.9 < got.evals < whole * 2.0
+    lit, dark = (a + b + 2 / 64 <= 0.51).sum(), (a + b >= 0.51).sum()
+    # Of what is constant one node tells all, of what is 0 nobody has to ask.
+    assert lit <= got.evals <= lit + 4 * (64 * 64 - lit - dark)
     # area of the triangle and the length of its edge along one axis
     assert abs(got.value.sum() - 0.51**2 / 2) <= 1e-14 and abs(got.tangent.sum() - 0.51) <= 1e-13
 

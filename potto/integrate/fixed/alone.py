@@ -16,7 +16,7 @@ from msgspec import Struct
 
 from potto.core.terms import Term
 from potto.integrate.fixed.axes import Axis
-from potto.integrate.fixed.lowered import Lowered, frame_of, lowered
+from potto.integrate.fixed.lowered import LoweredCells, frame_of, lowered_cells
 from potto.integrate.fixed.moving_sums import SUMMED, Totals, summed
 from potto.integrate.fixed.product_rule import ELSEWHERE, TRACKED
 from potto.integrate.fixed.straight import Straight
@@ -37,8 +37,8 @@ Read = tuple[str, int]
 class _Layout(Struct):
     """What one call of the function for some cells reads and writes.
 
-    frame, constants: what it takes; tables: what the frame points to. out: (blocks, rows, LANES), `told` rows of which
-    count, and of the last block as many lanes as there are `cells`.
+    frame, constants: what it takes; tables: what the frame points to. out: (rows, LANES or more), of which `told` rows
+    count, and as many columns as there are `cells`.
     """
 
     reads: tuple[Read, ...]
@@ -53,16 +53,13 @@ class _Layout(Struct):
         """Row by row what the function gives for each of the cells."""
         self.constants[:] = [env[name].v if d < 0 else env[name].t[d] for name, d in self.reads]
         function.call(address(self.frame), address(self.constants))
-        if len(self.out) == 1:
-            return self.out[0, : self.told, : self.cells].tolist()  # type: ignore[no-any-return]
-        rows = self.out[:, : self.told].transpose(1, 0, 2).reshape(self.told, -1)
-        return rows[:, : self.cells].tolist()  # type: ignore[no-any-return]
+        return self.out[: self.told, : self.cells].tolist()  # type: ignore[no-any-return]
 
 
 class Face(Struct, frozen=True):
     """The cells of a region that have one integrand. idle: layouts that no thread uses right now."""
 
-    way: Lowered
+    way: LoweredCells
     cells: tuple[Stretch, ...]
     axes: tuple[Axis, ...]
     k1: int
@@ -71,12 +68,11 @@ class Face(Struct, frozen=True):
 
     def layout(self) -> _Layout:
         count = len(self.cells)
-        blocks = -(-count // LANES)
-        lanes = np.minimum(np.arange(blocks * LANES), count - 1)
+        lanes = np.minimum(np.arange(max(count, LANES)), count - 1)
         rows = np.array([cell.rows for cell in self.cells], dtype=float)[lanes]  # (lanes, variables, 2)
         ends = [np.ascontiguousarray(rows[:, i, side]) for i in range(rows.shape[1]) for side in (0, 1)]
         told = 3 * self.k1 + 3
-        out = np.empty((blocks, told + self.k1 * len(self.axes), LANES))
+        out = np.empty((told + self.k1 * len(self.axes), lanes.size))
         frame = frame_of(out, self.axes, ends)
         reads = tuple(
             (place.name, -1 if place.part.kind == "v" else place.part.direction)
@@ -152,4 +148,4 @@ def _face(plan: Straight, region: Region, machine: Evaluator, env: dict[str, Any
     every = max(orders), *region.inner
     nodes = len(cells) * math.prod(every)
     axes = tuple(Axis.of(order, True, (False, False), nodes > TRACKED) for order in every)
-    return Face(lowered(plan, body, machine.directions, env), cells, axes, 1 + machine.directions, nodes)
+    return Face(lowered_cells(plan, body, machine.directions, env), cells, axes, 1 + machine.directions, nodes)

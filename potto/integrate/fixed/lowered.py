@@ -1,15 +1,15 @@
-"""The product rule for cells of one shape (`alike`) as one function of machine code, for any number of nodes.
+"""Product rules as functions of machine code: for cells of one shape (`alike`), and for boxes (`tensor_product`).
 
-Owns `Lowered`. The function goes through the members eight at a time. In loops over the nodes of the variables, from
-the outermost to the innermost, it works out bounds, cuts, nodes and the integrand, and adds up Legendre coefficients
-on the way back: what `alike.Rule` does to whole arrays, one after the other, is done here to eight numbers that stay in
-registers.
+Owns `LoweredCells` and `LoweredBoxes`. A function goes through the members eight at a time. In loops over the nodes of
+the variables, from the outermost to the innermost, it works out bounds, cuts, nodes and the integrand, and adds up
+Legendre coefficients on the way back: what numpy does to whole arrays, one after the other, is done here to eight
+numbers that stay in registers.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,10 +17,11 @@ from msgspec import Struct, field
 
 from potto.core.terms import Term
 from potto.integrate.fixed.axes import Axis, Raw
+from potto.integrate.fixed.box_text import BoxText, numbers
 from potto.integrate.fixed.rule_text import NAME, ONE, Place, RuleText
 from potto.integrate.fixed.straight import Straight
-from potto.integrate.pieces import Evaluator
-from potto.kernels.cells import Array, Cell, Ints, Value
+from potto.integrate.pieces import Evaluator, Sums
+from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 from potto.kernels.making import counts
 from potto.kernels.native.objects import Loaded
 from potto.kernels.native.points import address
@@ -30,7 +31,7 @@ from potto.kernels.native.vectors import LANES
 
 
 class Lowered(Struct, frozen=True):
-    """The rule for one integrand, for parameters with these parts."""
+    """A function for one integrand, for parameters with these parts."""
 
     plan: Straight
     face: Term
@@ -43,6 +44,40 @@ class Lowered(Struct, frozen=True):
 
     def text(self, machine: Evaluator) -> str:
         """The function. Raises NotStraight."""
+        raise NotImplementedError
+
+    def arrays(self, env: Mapping[str, Value]) -> list[Array]:
+        """The parameters that differ from member to member."""
+        return [_part(env[place.name], place.part) for place in self.places if place.kind == "array"]
+
+    def _run(
+        self, function: Loaded, env: Mapping[str, Value], taken: Sequence[Array], axes: Sequence[Axis], rows: int,
+        given: Sequence[float] = (),
+    ) -> Array:  # fmt: skip
+        """The rows of results, so many for each of the members whose columns these are."""
+        count = taken[0].size
+        least = max(count, LANES)
+        columns = [np.ascontiguousarray(a) if count == least else np.resize(a, least) for a in taken]
+        numbers = [_part(env[place.name], place.part) for place in self.places if place.kind == "number"]
+        constants = np.array([*given, *numbers], dtype=float)
+        out = np.empty((rows, least))
+        table = frame_of(out, axes, columns)
+        function.call(address(table), address(constants))
+        counts.native_points += count * math.prod(len(axis.nodes) for axis in axes)
+        return out[:, :count]
+
+
+def frame_of(out: Array, axes: Sequence[Axis], columns: Sequence[Array]) -> Ints:
+    """What a function is told: of how many members, LANES at least, where the rows of results go, the nodes, and where
+    the columns are that it takes."""
+    told = [out.shape[1], address(out), *(x for axis in axes for x in _told(axis)), *map(address, columns)]
+    return np.array(told, dtype=np.int64)
+
+
+class LoweredCells(Lowered, frozen=True):
+    """The rule for cells of one shape, with any number of nodes."""
+
+    def text(self, machine: Evaluator) -> str:
         return RuleText(self.plan, self.face, machine).text(self.places)
 
     def run(
@@ -50,40 +85,63 @@ class Lowered(Struct, frozen=True):
         directions: int,
     ) -> Raw:  # fmt: skip
         """The sums over cells. members: (M,), whose they are; rows: (variables, 2, M), of the frames, between which."""
-        k1, count = 1 + directions, members.size
-        blocks = -(-count // LANES)
-        index = np.minimum(np.arange(blocks * LANES), count - 1)
-        whose, between = members[index], rows[:, :, index].astype(float, order="C")
-        taken = [_part(env[place.name], place.part)[whose] for place in self.places if place.kind == "array"]
-        taken += [ends for pair in between for ends in pair]
-        numbers = [_part(env[place.name], place.part) for place in self.places if place.kind == "number"]
-        constants = np.array(numbers, dtype=float)
+        k1 = 1 + directions
+        taken = [array[members] for array in self.arrays(env)] + [ends.astype(float) for pair in rows for ends in pair]
         sizes = [3 * k1 + 3, *(axis.transform.shape[1] * k1 for axis in axes)]
-        out = np.empty((blocks, sum(sizes), LANES))
-        table = frame_of(out, axes, taken)
-        function.call(address(table), address(constants))
-        counts.native_points += count * math.prod(len(axis.nodes) for axis in axes)
-        whole = out.transpose(1, 0, 2).reshape(sum(sizes), -1)[:, :count]
-        number, most, off, rest = np.split(whole[: sizes[0]], [k1, 2 * k1, 3 * k1])
-        parts = np.split(whole[sizes[0] :], np.cumsum(sizes[1:])[:-1])
-        found = [part.reshape(-1, k1, count).transpose(1, 2, 0) for part in parts]
-        return Raw(number, found, most, off, rest[0] > 0, rest[1], rest[2])
+        found = self._run(function, env, taken, axes, sum(sizes))
+        number, most, off, rest = np.split(found[: sizes[0]], [k1, 2 * k1, 3 * k1])
+        parts = np.split(found[sizes[0] :], np.cumsum(sizes[1:])[:-1])
+        coefficients = [part.reshape(-1, k1, members.size).transpose(1, 2, 0) for part in parts]
+        return Raw(number, coefficients, most, off, rest[0] > 0, rest[1], rest[2])
 
 
-def frame_of(out: Array, axes: Sequence[Axis], taken: Sequence[Array]) -> Ints:
-    """What the function is told: how many blocks and rows, where they go, the nodes, and where what it takes is."""
-    told = [len(out), out.shape[1], address(out), *(x for axis in axes for x in _told(axis)), *map(address, taken)]
-    return np.array(told, dtype=np.int64)
+class LoweredBoxes(Lowered, frozen=True):
+    """The rule for boxes that nothing cuts, with so many nodes for each variable; exact: for a polynomial."""
+
+    orders: tuple[int, ...] = ()
+    exact: tuple[bool, ...] = ()
+
+    def text(self, machine: Evaluator) -> str:
+        return BoxText(self.plan, self.face, machine, self.orders, self.exact).text(self.places)
+
+    def run(
+        self, function: Loaded, machine: Evaluator, env: Mapping[str, Value], low: Array, high: Array
+    ) -> tuple[Sums, Bools]:
+        """The integrals over boxes, (variables, B), and for which of them the rule does."""
+        m, k1, count = numbers(self.face), 1 + machine.directions, low.shape[1]
+        taken = self.arrays(env) + [ends for pair in zip(low, high, strict=True) for ends in pair]
+        axes = [Axis.of(order, False, (False, False), True) for order in self.orders]
+        asked = 0.5 * machine.rtol, 0.5 * machine.atol
+        found = self._run(function, env, taken, axes, 2 * m * k1 + 3, asked)
+        total, bound = found[: 2 * m * k1].reshape(2, m, k1, count)
+        return Sums(total[:, 0], bound[:, 0], total[:, 1:], bound[:, 1:], gross=found[-3:-1]), found[-1] > 0
 
 
-def lowered(plan: Straight, face: Term, directions: int, env: Mapping[str, Value]) -> Lowered:
-    """The rule for an integrand, in an environment whose numbers have these parts."""
-    places = tuple(Place(name, part, _kind(part, x)) for name in plan.names for part, x in _parts(env[name]))
+def lowered_cells(plan: Straight, face: Term, directions: int, env: Mapping[str, Value]) -> LoweredCells:
+    """The rule for an integrand on cells, in an environment whose numbers have these parts."""
+    places = _places(plan.names, env)
     key = (face, directions, places)
-    found: Lowered | None = plan.lowered.get(key)
+    found: LoweredCells | None = plan.lowered.get(key)
     if found is None:
-        found = plan.lowered[key] = Lowered(plan, face, places)
+        found = plan.lowered[key] = LoweredCells(plan, face, places)
     return found
+
+
+def lowered_boxes(
+    plan: Straight, face: Term, names: Iterable[str], directions: int, env: Mapping[str, Value],
+    orders: tuple[int, ...], exact: tuple[bool, ...],
+) -> LoweredBoxes:  # fmt: skip
+    """The rule for an integrand of these parameters over boxes, in an environment whose numbers have these parts."""
+    places = _places(names, env)
+    key = (face, directions, places, orders, exact)
+    found: LoweredBoxes | None = plan.lowered.get(key)
+    if found is None:
+        found = plan.lowered[key] = LoweredBoxes(plan, face, places, orders=orders, exact=exact)
+    return found
+
+
+def _places(names: Iterable[str], env: Mapping[str, Value]) -> tuple[Place, ...]:
+    return tuple(Place(name, part, _kind(part, x)) for name in names for part, x in _parts(env[name]))
 
 
 def _kind(part: Part, x: Any) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from msgspec import Struct
 
 from potto.integrate.fixed.axes import Axis, Raw
-from potto.integrate.fixed.lowered import Lowered, lowered
+from potto.integrate.fixed.lowered import LoweredCells, lowered_cells
 from potto.integrate.fixed.moving_sums import SUMMED
 from potto.integrate.fixed.nodes import at_once
 from potto.integrate.fixed.straight import Straight
@@ -56,8 +56,8 @@ class Rule(Struct, frozen=True):
     def nodes(self) -> int:
         return math.prod(self.orders)
 
-    def lowered(self, env: dict[str, Value]) -> Lowered:
-        return lowered(self.plan, self.cell.face, self.machine.directions, env)
+    def lowered(self, env: dict[str, Value]) -> LoweredCells:
+        return lowered_cells(self.plan, self.cell.face, self.machine.directions, env)
 
     def span(self, env: dict[str, Value]) -> int:
         """How many numbers of a member are kept at a time: those at all nodes, or of coefficients alone."""

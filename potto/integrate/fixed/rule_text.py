@@ -59,31 +59,31 @@ Env = dict[str, Symbol]
 
 
 class RuleText:
-    """Writes the function. Lists of 1 + k names have a value first, then its tangents."""
+    """Writes the function. Lists of 1 + k names have a value first, then its tangents. reserved: of the constants, how
+    many come before parameters."""
+
+    reserved = 0
 
     def __init__(self, plan: Straight, face: Term, machine: Evaluator) -> None:
         self.plan, self.machine = plan, machine
         self.face, self.edges = function_of(face), [function_of(edge) for edge in edges_of(face)]
         self.at = Vectors()
-        self.k1 = 1 + machine.directions
+        self.channels = self.k1 = 1 + machine.directions
         self.zero, self.one = self.at.number(0.0), self.at.number(1.0)
 
     def text(self, places: Sequence[Place]) -> str:
-        at, k1, count = self.at, self.k1, len(self.plan.variables)
-        blocks, total, out = (at.address("%frame", i) for i in range(3))
-        self.tables = [[at.address("%frame", 3 + PER_AXIS * i + j, "i64" if j < 3 else "ptr")
-                        for j in range(PER_AXIS)] for i in range(count)]  # fmt: skip
-        self.sums = [at.room(at.whole("mul", table[1], k1)) for table in self.tables]
+        at, k1 = self.at, self.k1
+        self.begin(places)
         self.added = [at.room(at.whole("mul", table[1], k1)) for table in self.tables]
         clear, corners, largest = at.room(1), at.room(1), at.room(1)
         self.clear = clear
-        block = at.begin(blocks)
-        here = self.parameters(places, block)
+        here, rows = self.parameters(places, 2 * len(self.plan.variables))
+        self.rows = list(zip(rows[::2], rows[1::2], strict=True))
         at.store(self.one, clear)
         at.store(self.zero, corners)
         at.store(self.zero, largest)
         for i, table in enumerate(self.tables):
-            self.fill(self.added[i], table[1])
+            self.fill(self.added[i], table[1], k1)
         number = self.every(0, here, [self.one, *[None] * (k1 - 1)], largest)
         bounds = [(at.room(1), at.room(1)) for _ in self.edges]
         for least, most in bounds:
@@ -93,48 +93,72 @@ class RuleText:
         for least, most in bounds:
             self.only(at.apply("gt", at.load(least), at.apply("mul", at.number(EDGE), at.load(most))))
         self.ends(0, {name: _still(symbol) for name, symbol in here.items()}, corners)
-        place = at.once(f"inttoptr i64 {out} to ptr", out)
-        base = at.whole("mul", block, total)
-        row = 0
-        for value in (*number, *sizes, *off, at.load(clear), at.load(corners), at.load(largest)):
-            at.store(value or self.zero, at.at(place, at.whole("add", base, row)))
-            row += 1
-        behind = at.whole("add", base, row)
-        for added, table in zip(self.added, self.tables, strict=True):
-            size = at.whole("mul", table[1], k1)
-            own = at.begin(size)
-            at.store(at.load(at.at(added, own)), at.at(place, at.whole("add", behind, own)))
-            at.end()
-            behind = at.whole("add", behind, size)
-        at.end()
-        return module(at, NAME, "ptr %frame, ptr %constants")
+        self.told([*number, *sizes, *off, at.load(clear), at.load(corners), at.load(largest)], k1)
+        return self.end()
 
-    def parameters(self, places: Sequence[Place], block: str) -> Env:
-        """The parameters of the members of a block."""
-        at, start = self.at, 3 + PER_AXIS * len(self.plan.variables)
-        first = at.whole("mul", block, LANES)
+    # Columns of numbers
+
+    def begin(self, places: Sequence[Place]) -> None:
+        """Begin the loop over the members, eight at a time; the last ones are done twice."""
+        at, count = self.at, len(self.plan.variables)
+        self.count, self.out = at.address("%frame", 0), at.address("%frame", 1, "ptr")
+        self.tables = [[at.address("%frame", 2 + PER_AXIS * i + j, "i64" if j < 3 else "ptr")
+                        for j in range(PER_AXIS)] for i in range(count)]  # fmt: skip
+        self.sums = [at.room(at.whole("mul", table[1], self.channels)) for table in self.tables]
+        last = at.whole("sub", self.count, LANES)
+        blocks = at.whole("udiv", at.whole("add", self.count, LANES - 1), LANES)
+        first = at.whole("mul", at.begin(blocks), LANES)
+        self.first = at.once(f"call i64 @llvm.umin.i64(i64 {first}, i64 {last})", first)
+
+    def parameters(self, places: Sequence[Place], more: int) -> tuple[Env, list[str]]:
+        """The parameters of the members of a block, and so many columns more."""
+        at, start = self.at, 2 + PER_AXIS * len(self.plan.variables)
         known: dict[tuple[str, Part], str] = {}
         arrays = [place for place in places if place.kind == "array"]
         numbers = [place for place in places if place.kind == "number"]
-        for i, place in enumerate(arrays):
-            source = at.address("%frame", start + i, "ptr")
-            known[place.name, place.part] = at.load(at.at(source, first, "double"))
+        columns = [at.load(at.at(at.address("%frame", start + i, "ptr"), self.first, "double"))
+                   for i in range(len(arrays) + more)]  # fmt: skip
+        for place, column in zip(arrays, columns, strict=False):
+            known[place.name, place.part] = column
         for i, place in enumerate(numbers):
-            known[place.name, place.part] = at.constant("%constants", i)
-        rows = [at.load(at.at(at.address("%frame", start + len(arrays) + i, "ptr"), first, "double"))
-                for i in range(2 * len(self.plan.variables))]  # fmt: skip
-        self.rows = list(zip(rows[::2], rows[1::2], strict=True))
-        known |= {(place.name, place.part): ONE for place in places if place.kind == ONE}
+            known[place.name, place.part] = at.constant("%constants", self.reserved + i)
+        for place in places:
+            if place.kind == ONE:
+                known[place.name, place.part] = ONE
 
         def parts(name: str, kind: str) -> tuple[str | None, ...]:
             return tuple(known.get((name, Part((), kind, d))) for d in range(self.k1 - 1))
 
+        names = dict.fromkeys(place.name for place in places)
         return {
             name: Symbol(
                 known[name, Part((), "v")], known.get((name, Part((), "e"))), parts(name, "t"), parts(name, "et")
             )
-            for name in self.plan.names
-        }
+            for name in names
+        }, columns[len(arrays) :]
+
+    def told(self, values: Sequence[str | None], each: int) -> None:
+        """Put rows of results: these, then of each variable so many for each of its coefficients."""
+        at, row = self.at, 0
+        for value in values:
+            at.store(value or self.zero, self.place(row))
+            row += 1
+        behind = at.whole("add", row, 0)
+        for added, table in zip(self.added, self.tables, strict=True):
+            size = at.whole("mul", table[1], each)
+            own = at.begin(size)
+            at.store(at.load(at.at(added, own)), self.place(at.whole("add", behind, own)))
+            at.end()
+            behind = at.whole("add", behind, size)
+
+    def place(self, row: int | str) -> str:
+        """Where the results of a block are in a row."""
+        at = self.at
+        return at.at(self.out, at.whole("add", at.whole("mul", row, self.count), self.first), "double")
+
+    def end(self) -> str:
+        self.at.end()
+        return module(self.at, NAME, "ptr %frame, ptr %constants")
 
     # The three ways through the nodes
 
@@ -144,7 +168,7 @@ class RuleText:
         n, rows, _, nodes, speeds, weights, transform, _, _ = self.tables[i]
         low, width, _ = self.stretch(i, env, self.machine)
         volume = self.product(volume, width)
-        self.fill(self.sums[i], rows)
+        self.fill(self.sums[i], rows, k1)
         j = at.begin(n)
         speed, weight = at.constant(speeds, j), at.constant(weights, j)
         inner = {**env, self.plan.variables[i]: self.node(low, width, at.constant(nodes, j))}
@@ -337,8 +361,8 @@ class RuleText:
 
     # Memory
 
-    def fill(self, memory: str, rows: str) -> None:
-        i = self.at.begin(self.at.whole("mul", rows, self.k1))
+    def fill(self, memory: str, rows: str, each: int) -> None:
+        i = self.at.begin(self.at.whole("mul", rows, each))
         self.at.store(self.zero, self.at.at(memory, i))
         self.at.end()
 

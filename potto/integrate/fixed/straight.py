@@ -61,7 +61,7 @@ class Straight(Struct, frozen=True, dict=True, eq=False):
         return tuple(children(frame.body) for frame in self.frames)
 
     def face(self, sides: tuple[bool, ...]) -> Term:
-        """The integrand on one side of each of its surfaces."""
+        """The integrand on one side of each of these surfaces."""
         found = self.faces.get(sides)
         if found is None:
             side = dict(zip(children(self.surfaces.body), sides, strict=True))
@@ -129,7 +129,9 @@ def _on_sides(body: Term, sides: Mapping[Term, bool]) -> Term:
     memo: dict[Term, Term] = {}
     for node in postorder(body):
         if isinstance(node, Branch):
-            memo[node] = memo[node.then if sides[node.surface] else node.orelse]
-        else:
-            memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
+            side = sides.get(node.surface)
+            if side is not None:
+                memo[node] = memo[node.then if side else node.orelse]
+                continue
+        memo[node] = rebuild(node, tuple(memo[c] for c in children(node)))
     return memo[body]

@@ -23,7 +23,7 @@ from potto.runtime.answers.convergence import missing, rounded
 from potto.runtime.integration.choices import orders, preferred
 from potto.runtime.integration.one_sided import one_direction
 from potto.runtime.integration.problem import Problem
-from potto.runtime.integration.quadrature import in_parts, iterated
+from potto.runtime.integration.quadrature import cut_up, iterated, whole_boxes
 
 # Up to how many members are done one by one, to the digits that each has by itself.
 FEW_MEMBERS = 10
@@ -63,7 +63,21 @@ def added_up(sums: Sums) -> Array:
 
 
 def by_members(problem: Problem, settled: Settled) -> Sums:
-    """The sums of a batch."""
+    """The sums of a batch: whole boxes first, which need nothing more, then the others."""
+    plan = problem.plan(next(iter(preferred(problem))))
+    boxes = whole_boxes(plan, problem.machine, problem.env, problem.batch)
+    if boxes is None:
+        return _cut(problem, settled)
+    sums, rest = boxes
+    if rest.size:
+        with problem.among(rest) as part:
+            sums = sums.with_members(rest, _cut(part, settled))
+        problem.events.take(part.events, rest)
+    return sums
+
+
+def _cut(problem: Problem, settled: Settled) -> Sums:
+    """The sums of members whose boxes are cut."""
     found = Whole()
     summed = problem.machine.summed
     few = PROVED * len(problem.term.variables) if summed else FEW_MEMBERS
@@ -109,7 +123,7 @@ def _together(problem: Problem, todo: Ints, settled: Settled, found: Whole) -> l
     for order in preferred(problem):
         with problem.among(todo) as here:
             others = (here.plan(other) for other in orders(problem.term) if other is not order)
-            sums = in_parts(here.plan(order), here.machine, here.env, here.batch, others)
+            sums = cut_up(here.plan(order), here.machine, here.env, here.batch, others)
         kinds = _kinds(here.events, todo.size)
         if kinds is None and todo.size > MOST_UNKNOWN:
             for half in np.array_split(todo, 2):

@@ -1,6 +1,6 @@
 """Iterated quadrature of a batch by one plan: whole boxes first, the rest cut, so many members at a time.
 
-Owns `within`, `in_parts` and `iterated`.
+Owns `within`, `in_parts`, `whole_boxes`, `cut_up` and `iterated`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from msgspec.structs import replace
 
 from potto.integrate.adaptive.iterated import Iteration
 from potto.integrate.fixed.alike import by_shapes
-from potto.integrate.fixed.tensor_product import uncut
+from potto.integrate.fixed.boxes import uncut
 from potto.integrate.pieces import Sums, gather
 from potto.integrate.plan import Plan
 from potto.kernels.cells import Bools, Ints, Value
@@ -45,8 +45,34 @@ def within(most: int | None, plan: Plan, machine: Machine, env: dict[str, Value]
     return sums
 
 
-def in_parts(plan: Plan, machine: Machine, env: dict[str, Value], batch: int, turned: Iterable[Plan] = ()) -> Sums:
-    """Quadrature: what a product rule settles first, then a bounded number of members of the batch at a time.
+def in_parts(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> Sums:
+    """Quadrature: whole boxes first, then what is cut."""
+    found = whole_boxes(plan, machine, env, batch)
+    if found is None:
+        return cut_up(plan, machine, env, batch)
+    sums, rest = found
+    if rest.size:
+        apart = machine.apart()
+        sums = sums.with_members(rest, cut_up(plan, apart, gather(env, rest), rest.size))
+        machine.events.take(apart.events, rest)
+    return sums
+
+
+def whole_boxes(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> tuple[Sums, Ints] | None:
+    """The sums of a batch whose boxes nothing cuts, and the members that are left; None where it is not worth a look,
+    or nothing came of it."""
+    if batch < FEW or plan.box is None:
+        return None
+    with one_thread():
+        found = uncut(plan.box, machine, env, batch)
+    if found is not None and machine.costs is not None:
+        machine.costs.whole += batch - found[1].size
+        machine.costs.looked += batch
+    return found
+
+
+def cut_up(plan: Plan, machine: Machine, env: dict[str, Value], batch: int, turned: Iterable[Plan] = ()) -> Sums:
+    """Quadrature along cuts: what a product rule settles first, then a bounded number of members at a time.
 
     turned: plans with other variables innermost, by which a rule may settle members that it did not, since a surface is
     steep in the one and flat in the other.
@@ -54,11 +80,11 @@ def in_parts(plan: Plan, machine: Machine, env: dict[str, Value], batch: int, tu
     places: list[Ints] = []
     parts: list[Sums] = []
     rest = np.arange(batch)
-    for way, own in chain(((_uncut, plan), (_alike, plan)), ((_alike, other) for other in turned)):
+    for own in chain((plan,), turned):
         if own is not plan and rest.size <= FEW_TURNED:
             break
         with one_thread():
-            found = way(own, machine, gather(env, rest) if parts else env, rest.size)
+            found = _alike(own, machine, gather(env, rest) if parts else env, rest.size)
         if found is not None:
             done, sums = found
             places.append(rest[done])
@@ -74,17 +100,6 @@ def in_parts(plan: Plan, machine: Machine, env: dict[str, Value], batch: int, tu
         places.append(rest)
         machine.events.take(apart.events, rest)
     return Sums.joined(parts).pick(np.argsort(np.concatenate(places)))
-
-
-def _uncut(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> tuple[Bools, Sums] | None:
-    """Whole boxes, where there are many."""
-    if batch < FEW or plan.box is None:
-        return None
-    found = uncut(plan.box, machine, env, batch)
-    if found is not None and machine.costs is not None:
-        machine.costs.whole += int(found[0].sum())
-        machine.costs.looked += batch
-    return found
 
 
 def _alike(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> tuple[Bools, Sums] | None:

@@ -1,0 +1,269 @@
+"""Members of a batch that nothing cuts: which they are, and on which side of every surface they lie.
+
+Owns `Box`, `box_of` and `uncut`. Of a picture's pixels all but a few lie on one side of every surface. Members that
+come one after the other are enclosed together, so that most are settled by the dozen; those whose run a surface may
+cross are looked at one by one. Where a surface is affine in each variable of integration, its extremes over a box are
+at the corners, so that signs there tell whether it crosses; of others an enclosure tells. Such a box needs no cuts and
+has no boundary terms: what is integrated over it is the integrand on those sides, by a product rule (`tensor_product`).
+What is not shown to be smooth and accurate here is left to the ways that cut.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from msgspec import Struct
+
+from potto.calculus.algebra.degree import degree, plane
+from potto.calculus.solving.enclosable import enclosable
+from potto.calculus.surfaces.discontinuities import Finding
+from potto.core.kinds import union_of
+from potto.core.terms import Branch, Const, Integral, Lam, Term, Tuple, children, function_of, postorder, tuple_
+from potto.integrate.columns import distinct
+from potto.integrate.fixed.straight import MOST_TERMS, Straight
+from potto.integrate.fixed.tensor_product import Face, integrated
+from potto.integrate.pieces import Evaluator, Sums, gather, still
+from potto.integrate.rules.intervals import Interval
+from potto.integrate.rules.lowered_intervals import enclosures
+from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays
+
+MOST_VARIABLES = 3
+# Members that are enclosed together; and that are done at once, whose numbers stay in the cache.
+RUN, AT_ONCE = 32, 1 << 15
+# How near to 0, of its size, a surface at a corner may be before it counts as crossing.
+NEAR = 1e-9
+CROSSED = -1
+
+
+class Box(Struct, frozen=True, dict=True, eq=False):
+    """Bounds and surfaces of an integral over a box, as functions of parameters, and of parameters and variables.
+
+    surfaces: first those that are affine in each variable, `flat` of them, then the others. plan: the same as an
+    integral without cuts, with the surfaces on which its integrand depends. places: of these among all surfaces.
+    body: the integrand with calls, where carrying them out makes too much of it. faces: what is integrated, by sides.
+    """
+
+    variables: tuple[str, ...]
+    bounds: Lam
+    surfaces: tuple[Term, ...]
+    flat: int
+    plan: Straight
+    places: tuple[int, ...]
+    body: Lam | None
+    faces: dict[int, Face] = {}
+
+    def face(self, code: int) -> Face:
+        """What is integrated where the surfaces are on these sides, a bit for each of the plan's."""
+        found = self.faces.get(code)
+        if found is None:
+            term = self.plan.face(tuple(bool(code >> bit & 1) for bit in range(len(self.places))))
+            function = function_of(term) if self.body is None else self.body
+            degrees = tuple(degree(term, variable) for variable in self.variables)
+            found = self.faces[code] = Face(self.plan, term, function, degrees)
+        return found
+
+    @cached_property
+    def together(self) -> bool:
+        """Whether surfaces can be enclosed over several boxes."""
+        return all(map(enclosable, self.surfaces))
+
+    @cached_property
+    def corners(self) -> Lam:
+        """The surfaces that are affine in each variable."""
+        return function_of(tuple_(self.surfaces[: self.flat]))
+
+    @cached_property
+    def depends(self) -> frozenset[str]:
+        """The parameters of the surfaces."""
+        return union_of(self.surfaces) - set(self.variables)
+
+    @cached_property
+    def asked(self) -> tuple[str, ...]:
+        """What is asked for to look at one box."""
+        return tuple(sorted(self.depends))
+
+    @cached_property
+    def depends_curved(self) -> frozenset[str]:
+        """The parameters of those surfaces that are not affine in each variable."""
+        return union_of(self.surfaces[self.flat :]) - set(self.variables)
+
+
+def box_of(term: Integral, found: Iterable[Finding], body: Lam, inlined: Term) -> Box | None:
+    """The box of an integral, or None if its bounds depend on its variables or a surface can't be enclosed over it.
+
+    inlined: the integrand with calls carried out.
+    """
+    names = frozenset(term.variables)
+    bounds = tuple(bound for pair in term.bounds for bound in pair)
+    if len(names) > MOST_VARIABLES or any(b.free & names for b in bounds) or any(term.hints):
+        return None
+    if any(isinstance(node, Integral) for node in postorder(term.body)):
+        return None
+    surfaces = tuple(dict.fromkeys(f.surface for f in found if f.surface.free & names))
+    flat = tuple(s for s in surfaces if all(plane(s, (name,)) for name in names))
+    curved = tuple(s for s in surfaces if s not in flat)
+    if not all(map(enclosable, curved)):
+        return None
+    nodes = postorder(inlined)
+    large = len(nodes) > MOST_TERMS
+    sides = () if large else tuple(dict.fromkeys(n.surface for n in nodes if isinstance(n, Branch)))
+    decided = tuple(s for s in sides if s in surfaces)
+    places = tuple((*flat, *curved).index(s) for s in decided)
+    plan = _plan(term, inlined, decided)
+    return Box(term.variables, function_of(tuple_(bounds)), (*flat, *curved), len(flat), plan, places,
+               body if large else None)  # fmt: skip
+
+
+def _plan(term: Integral, inlined: Term, decided: tuple[Term, ...]) -> Straight:
+    frames = tuple(function_of(tuple_(pair)) for pair in term.bounds)
+    free = inlined.free.union(*(frame.body.free for frame in frames)) - set(term.variables)
+    nothing: tuple[Any, ...] = ((),) * len(frames)
+    turning = (frozenset[int](),) * len(frames)
+    surfaces = function_of(tuple_(decided))
+    return Straight(term.variables, frames, nothing, turning, inlined, surfaces, tuple(sorted(free)))
+
+
+def uncut(box: Box, machine: Evaluator, env: dict[str, Value], batch: int) -> tuple[Sums, Ints] | None:
+    """The sums of a batch, and the members that were not integrated here, whose sums are 0; None if none were."""
+    sums: Sums | None = None
+    done: Bools = np.zeros(batch, dtype=bool)
+    for start in range(0, batch, AT_ONCE):
+        part = slice(start, min(start + AT_ONCE, batch))
+        here = env if part.stop - start == batch else gather(env, part)
+        ends = _ends(box, machine, here, part.stop - start)
+        if ends is None:
+            return None
+        codes = _sides(box, machine, here, *ends)
+        for code in distinct(codes):
+            face = None if code == CROSSED else box.face(int(code))
+            if face is None:
+                continue
+            index = np.nonzero(codes == code)[0]
+            if dark(face.term):
+                done[start + index] = True
+                continue
+            for where, found in integrated(face, machine, here, index, *ends):
+                if sums is None:
+                    sums = Sums.zeros(found.v.shape[0], machine.directions, batch)
+                done[start + where] = True
+                sums.put(start + where, found)
+    rest = np.nonzero(~done)[0]
+    if rest.size == batch:
+        return None
+    return Sums.zeros(1, machine.directions, batch) if sums is None else sums, rest
+
+
+def dark(face: Term) -> bool:
+    """Whether an integrand is 0."""
+    return all(map(dark, children(face))) if isinstance(face, Tuple) else isinstance(face, Const) and face.value == 0
+
+
+def _ends(box: Box, machine: Evaluator, env: Mapping[str, Value], batch: int) -> tuple[Array, Array] | None:
+    """The lower and upper bounds of the variables, (variables, B) each; None if one moves, or has an error."""
+    bounds = machine.evaluate(box.bounds, {n: env[n] for n in box.bounds.params}, None)
+    assert isinstance(bounds, tuple)
+    ends = np.empty((2, len(box.variables), batch))
+    for number, cell in enumerate(bounds):
+        assert isinstance(cell, Cell)
+        if cell.e is not None or any(t is not None for t in cell.t):
+            return None  # a bound that moves has boundary terms of its own
+        ends[number % 2, number // 2] = cell.v
+    return ends[0], ends[1]
+
+
+def _sides(box: Box, machine: Evaluator, env: Mapping[str, Value], low: Array, high: Array) -> Ints:
+    """Per member a number whose bits are the sides on which its box lies of the surfaces that the integrand depends on;
+    CROSSED where it is not on one side of every surface, or is not finite, or empty."""
+    size = high - low
+    plain: Bools = np.asarray((np.isfinite(size) & (size > 0)).all(axis=0))
+    codes = np.zeros(plain.size, dtype=np.int64)
+    if box.surfaces:
+        todo = _by_runs(box, machine, env, low, high, codes)
+        some = low[:, todo], high[:, todo]
+        codes[todo] = _one_by_one(box, machine, gather({name: env[name] for name in box.asked}, todo), *some)
+    codes[~plain] = CROSSED
+    return codes
+
+
+def _by_runs(
+    box: Box, machine: Evaluator, env: Mapping[str, Value], low: Array, high: Array, codes: Ints
+) -> Ints:  # fmt: skip
+    """Put the sides of members that lie on them together with their neighbours; those that are left."""
+    count, everybody = codes.size // RUN, np.arange(codes.size)
+    if not count or not box.together:
+        return everybody
+
+    def ends(lower: Any, upper: Any) -> Interval:
+        if not isinstance(lower, np.ndarray):
+            return lower, upper
+        rows = (x[: count * RUN].reshape(count, RUN) for x in (lower, upper))
+        return next(rows).min(axis=1), next(rows).max(axis=1)
+
+    ranges = {name: ends(*own) for name, own in _ranges(box, env, box.depends, low, high).items()}
+    settled = np.ones(count, dtype=bool)
+    found = np.zeros(count, dtype=np.int64)
+    for number, (least, most) in enumerate(enclosures(box.surfaces, ranges, count, machine.backend)):
+        settled &= (least > 0) | (most < 0)
+        if number in box.places:
+            found |= np.asarray(least > 0, dtype=np.int64) << box.places.index(number)
+    codes[: count * RUN] = np.repeat(found, RUN)
+    left = np.ones(codes.size, dtype=bool)
+    left[: count * RUN] = np.repeat(~settled, RUN)
+    return everybody[left]
+
+
+def _ranges(
+    box: Box, env: Mapping[str, Value], names: Iterable[str], low: Array, high: Array
+) -> dict[str, Interval]:  # fmt: skip
+    """What these parameters, and the variables, can be."""
+    found: dict[str, Interval] = {}
+    for name in names:
+        cell = env[name]
+        assert isinstance(cell, Cell)
+        found[name] = (cell.v, cell.v) if cell.e is None else (cell.v - cell.e, cell.v + cell.e)
+    return found | {x: (low[n], high[n]) for n, x in enumerate(box.variables)}
+
+
+def _one_by_one(box: Box, machine: Evaluator, env: dict[str, Value], low: Array, high: Array) -> Ints:
+    """The same as `_sides` for members each by itself, with boxes that are neither empty nor infinite."""
+    count = low.shape[1]
+    codes = np.zeros(count, dtype=np.int64)
+    for number, (above, below) in enumerate(_at_corners(box, machine, env, low, high)):
+        codes[~(above | below)] = CROSSED
+        if number in box.places:
+            codes |= np.asarray(above, dtype=np.int64) << box.places.index(number)
+    index: Ints = np.nonzero(codes != CROSSED)[0]
+    curved = box.surfaces[box.flat :]
+    if curved and index.size:
+        here = {name: map_arrays(env[name], lambda a: a[index]) for name in box.depends_curved}
+        ranges = _ranges(box, here, here, low[:, index], high[:, index])
+        for number, (least, most) in enumerate(enclosures(curved, ranges, index.size, machine.backend), box.flat):
+            codes[index[~((least > 0) | (most < 0))]] = CROSSED
+            if number in box.places:
+                codes[index] |= np.asarray(least > 0, dtype=np.int64) << box.places.index(number)
+    return codes
+
+
+def _at_corners(
+    box: Box, machine: Evaluator, env: Mapping[str, Value], low: Array, high: Array
+) -> Iterator[tuple[Bools, Bools]]:
+    """For each surface that is affine in each variable, which boxes lie above and which below it, clear of it."""
+    if not box.flat:
+        return
+    corners = list(itertools.product((0, 1), repeat=len(box.variables)))
+    function = box.corners
+    here = {name: still(env[name]) for name in function.params if name in env}
+    for n, variable in enumerate(box.variables):
+        here[variable] = Cell(np.stack([(low[n], high[n])[corner[n]] for corner in corners]))
+    values = machine.with_directions(0).evaluate(function, {name: here[name] for name in function.params}, None)
+    assert isinstance(values, tuple)
+    for value in values:
+        assert isinstance(value, Cell)
+        at = np.broadcast_to(value.v, (len(corners), low.shape[1]))
+        least, most = at.min(axis=0), at.max(axis=0)
+        near = NEAR * np.maximum(np.abs(least), np.abs(most))
+        yield np.asarray(least > near), np.asarray(most < -near)
