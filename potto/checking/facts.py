@@ -15,7 +15,7 @@ from potto.calculus.checking.conditions import conditions_of
 from potto.calculus.checking.diffeo import exported
 from potto.calculus.checking.guards import unguarded
 from potto.calculus.explanation.explain import describe
-from potto.calculus.explanation.layout import DerivativeText, IntegralText
+from potto.calculus.explanation.layout import WIDTH, DerivativeText, IntegralText, Show, meets
 from potto.calculus.inlining.expand import expanded
 from potto.calculus.surfaces.branch_cuts import opened
 from potto.core.printer import format_term
@@ -25,6 +25,7 @@ from potto.elaborate import core, elaborate_expression
 from potto.modules import is_recursive
 from potto.query import Database
 from potto.syntax import nodes
+from potto.syntax.typesetting import broken, unicode
 from potto.types import derivative_type, format_type, interface
 
 LONG = 800  # characters that a person still reads
@@ -36,7 +37,8 @@ class PartFacts(Struct, frozen=True):
 
     interior: the integral of the integrand's derivative. boundary: per surface its jump times its speed, at the
     surface. bounds: what bounds that move bring in. reason: why a part has no symbolic form (which is
-    empty then), or nothing.
+    empty then), or nothing. continuous: surfaces that move and on which nothing jumps. each: the indices of what the
+    integral stands in.
     """
 
     value: str
@@ -44,6 +46,8 @@ class PartFacts(Struct, frozen=True):
     boundary: tuple[str, ...]
     bounds: tuple[str, ...]
     reason: str = ""
+    continuous: tuple[str, ...] = ()
+    each: str = ""
 
 
 class DerivativeFacts(Struct, frozen=True):
@@ -57,37 +61,60 @@ class DerivativeFacts(Struct, frozen=True):
     body: PartFacts | None
     derivative: str = ""  # the whole of it, deltas integrated out
     where: tuple[str, ...] = ()  # what the parameters of measures must be
+    tangents: tuple[str, ...] = ()  # the names of tangents in these formulas
 
     @property
     def text(self) -> str:
+        """As Potto writes it."""
+        return self._laid_out(lambda formula: formula)
+
+    @property
+    def typeset(self) -> str:
+        """The same formulas with the signs of mathematics, over several lines where they are long."""
+        return self._laid_out(lambda formula: unicode(formula, self.tangents))
+
+    def _laid_out(self, show: Show) -> str:
         lines = [f"{self.name} : {self.type}", f"deriv({self.name}) : {self.derivative_type}"]
         for number, item in enumerate(self.integrals):
             lines += ["", f"integral {number + 1} of {len(self.integrals)}" if len(self.integrals) > 1 else "integral"]
-            lines += _lines(item)
+            lines += _lines(item, show)
         if self.body is not None:
-            lines += ["", "body" if self.integrals else "function", *_lines(self.body)]
+            lines += ["", "body" if self.integrals else "function", *_lines(self.body, show)]
         said = [part.interior for part in (*self.integrals, self.body) if part is not None and not part.boundary]
         if self.derivative and said != [self.derivative]:
             long = f"left out, {len(self.derivative):,} characters long: --json has it"
-            lines += ["", *_part("whole", (self.derivative if len(self.derivative) <= LONG else long,))]
-        lines += ["", *_part("surfaces", self.surfaces or ("none",)), *_part("where", self.where)]
+            lines += ["", *_part("whole", (show(self.derivative) if len(self.derivative) <= LONG else long,))]
+        surfaces = tuple(map(show_equation(show), self.surfaces)) or ("none",)
+        lines += ["", *_part("surfaces", surfaces), *_part("where", tuple(map(show, self.where)))]
         return "\n".join(lines)
 
 
-def _lines(item: PartFacts) -> list[str]:
+def _lines(item: PartFacts, show: Show) -> list[str]:
     note = (item.reason,) if item.reason else ()
-    boundary = item.boundary or (() if item.reason else ("0",))
+    meeting = tuple(meets(show(where)) for where in item.continuous)
+    boundary = (*map(show, item.boundary), *meeting) or (() if item.reason else ("0",))
     return [
-        *_part("value", (item.value,)),
-        *_part("interior", (item.interior,) if item.interior else ()),
-        *_part("boundary", boundary if item.interior or item.boundary else ()),
-        *_part("bounds", item.bounds),
+        *_part("value", (show(item.value),)),
+        *_part("for each", (show(item.each),) if item.each else ()),
+        *_part("interior", (show(item.interior),) if item.interior else ()),
+        *_part("boundary", boundary if item.interior or item.boundary or item.continuous else ()),
+        *_part("bounds", tuple(map(show, item.bounds))),
         *_part("note", note),
     ]
 
 
+def show_equation(show: Show) -> Show:
+    """An equation, side by side."""
+    return lambda equation: " = ".join(map(show, equation.split(" = ")))
+
+
 def _part(word: str, texts: tuple[str, ...]) -> list[str]:
-    return [f"  {word if not number else '':<9} {text}" for number, text in enumerate(texts)]
+    lines: list[str] = []
+    for number, text in enumerate(texts):
+        first, *more = broken("", text, WIDTH)
+        lines.append(f"  {word if not number else '':<9} {first}")
+        lines += [f"{' ' * 14}{line.strip()}" for line in more]
+    return lines
 
 
 def surfaces(db: Database, file: str, expr: nodes.Expr) -> tuple[str, ...]:
@@ -129,6 +156,7 @@ def derivative_facts(db: Database, file: str, name: str) -> DerivativeFacts | No
         None if found.alone else _body_facts(term, found),
         found.tangent,
         found.conditions,
+        tuple(sorted(found.tangents)),
     )
 
 
@@ -137,12 +165,10 @@ def _unless_recursive(db: Database, target: Global) -> Term | None:
 
 
 def _integral_facts(found: IntegralText) -> PartFacts:
-    def over(body: str) -> str:
-        return f"{found.head} {body} d({found.variables})"
-
-    interior = over(found.interior) if found.interior not in ("", "0") else found.interior
     reason = f"the boundary is found by numbers: {found.reason}" if found.reason else ""
-    return PartFacts(over(found.integrand), interior, tuple(map(over, found.deltas)), found.bounds, reason)
+    deltas = tuple(map(found.over, found.deltas))
+    return PartFacts(found.over(found.integrand), found.over(found.interior) if found.interior else "", deltas,
+                     found.bounds, reason, found.continuous, found.each)  # fmt: skip
 
 
 def _body_facts(term: Term, found: DerivativeText) -> PartFacts:
@@ -150,4 +176,5 @@ def _body_facts(term: Term, found: DerivativeText) -> PartFacts:
     while isinstance(term, Lam):
         term = term.body
     interior = "" if found.integrals else found.smooth
-    return PartFacts(format_term(unguarded(term)[0]), interior, found.deltas, (), "; ".join(found.problems))
+    return PartFacts(format_term(unguarded(term)[0]), interior, found.deltas, (), "; ".join(found.problems),
+                     found.continuous)  # fmt: skip

@@ -33,6 +33,11 @@ class Console(Struct):
     err: TextIO
     color: str = "auto"
 
+    @property
+    def for_a_screen(self) -> bool:
+        """Whether answers go to a terminal that knows Unicode."""
+        return self.out.isatty() and (self.out.encoding or "").lower().replace("-", "") == "utf8"
+
     def answer(self, text: str) -> None:
         """A line of the answer."""
         self.out.write(text + "\n")

@@ -30,6 +30,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--wrt", metavar="A,B", help="the parameters to differentiate by (default: all numbers)")
     parser.add_argument("--along", metavar="NAME=EXPR", action="append", default=[], type=assignment,
                         help="also the Hessian times the vector that has these components")  # fmt: skip
+    parser.add_argument("--typeset", action="store_true", help="formulas with the signs of mathematics, as on a screen "
+                        "that has them; else they are Potto")  # fmt: skip
     add_set(parser)
     add_options(parser)
 
@@ -65,7 +67,7 @@ def _symbols(options: argparse.Namespace, console: Console) -> int:
     if options.json:
         console.answer_json({**to_builtins(facts), **others_json(world, file)})
     else:
-        console.answer(facts.text)
+        console.answer(facts.typeset if options.typeset or console.for_a_screen else facts.text)
     return report_others(world, file, options, console)
 
 

@@ -37,13 +37,24 @@ class Shown:
         type = interface(library.db, self.file, name).type
         self.name, self.groups = name, groups_of(type)
         self.text: DerivativeText = explain_derivative(library.db, self.file, name)
-        self.program = f"{text}\n\n{self._head()}\n    {self.text.tangent}\n"
+        shown = [self.text.tangent, *self._parts()]
+        self.program = text + "".join(f"\n\n{self._head(n)}\n    {part}\n" for n, part in enumerate(shown, 1))
 
-    def _head(self) -> str:
+    def _parts(self) -> list[str]:
+        """The integrals around interior and boundary, and the boundary terms, but what is no program: the derivative of
+        a delta, and what stands in a sum over an index."""
+        found: list[str] = []
+        for item in self.text.integrals:
+            if not item.each:
+                inside = (item.interior, *item.deltas)
+                found += [*(item.over(part) for part in inside if part), *item.boundary, *item.bounds]
+        return [part for part in found if "delta'" not in part]
+
+    def _head(self, number: int) -> str:
         parameters = [p for group in self.groups for p in group]
         values = [f"{p.name}: {_written(p.type)}" for p in parameters]
         tangents = [f"d{p.name}: {_tangent_type(p.type)}" for p in parameters]
-        return f"def {SHOWN}({', '.join(values + tangents)})"
+        return f"def {SHOWN[:-1]}{number}({', '.join(values + tangents)})"
 
     def problems(self) -> list[str]:
         """What the check of the formula says."""

@@ -66,7 +66,7 @@ def test_a_derivative_is_an_integral_of_both_parts_and_integrated() -> None:
     assert text == (
         r"$\begin{aligned}\partial f &= \int_{0}^{1} \underbrace{x \, \delta\left(\theta - x\right) \, \partial \theta"
         + BOUNDARY
-        + r"\, \mathrm{d}x \\  &= \theta \, \partial \theta \, \left[\theta < 1\right] \, \left[\theta > 0\right]"
+        + r"\, \mathrm{d}x \\  &= \theta \, \partial \theta \, \left[\theta > 0 \wedge \theta < 1\right]"
         + r"\end{aligned}$"
     )
     assert potto.deriv(PROGRAM.f)._repr_latex_() == text

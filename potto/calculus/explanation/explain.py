@@ -11,6 +11,7 @@ from collections.abc import Mapping
 
 from msgspec.structs import replace
 
+from potto.calculus.algebra.ranges import range_of
 from potto.calculus.checking.guards import unguarded
 from potto.calculus.differentiation.boundary_terms import at_bounds, at_surfaces, jumps
 from potto.calculus.differentiation.deltas import without_deltas
@@ -18,13 +19,15 @@ from potto.calculus.differentiation.derivative import NotSmooth
 from potto.calculus.differentiation.dual import Differentiator
 from potto.calculus.differentiation.higher_order import moving_deltas
 from potto.calculus.differentiation.level_sets import level_set
+from potto.calculus.explanation.continuity import continuous
 from potto.calculus.explanation.fields import named_fields, parameter_types
 from potto.calculus.explanation.layout import DerivativeText, IntegralText, SurfaceText
+from potto.calculus.explanation.readable import readable
 from potto.calculus.explanation.symbols import NoFormula, Rewrite, Words, over_functions
 from potto.calculus.inlining.expand import Resolve, heads_of
 from potto.calculus.solving.pivots import NoClosedForm, pivots
 from potto.calculus.solving.solve import factors
-from potto.calculus.surfaces.branch_assignment import branches_of
+from potto.calculus.surfaces.branch_assignment import box_of, branches_of
 from potto.calculus.surfaces.branch_cuts import opened
 from potto.calculus.surfaces.case_split import unnested
 from potto.core.printer import format_term
@@ -32,22 +35,28 @@ from potto.core.simplify import normalized_surface, simplify
 from potto.core.terms import (
     ONE,
     ZERO,
+    Array,
     Deriv,
+    Fold,
     Global,
     Integral,
     Lam,
+    Sum,
     Term,
     app,
     branch,
     children,
     integral,
     lam,
+    sub,
     var,
 )
 from potto.diagnostics import PottoError
 from potto.elaborate import core_term
 from potto.query import Database
 from potto.types import Type, derivative_type, format_type, groups_of, interface
+
+Each = tuple[str, Term, Term]  # an index, from, to
 
 
 def explain_derivative(db: Database, file: str, name: str) -> DerivativeText:
@@ -118,7 +127,10 @@ def describe(
         body = body.body
     body, conditions = unguarded(body)
     words = Words(
-        {p: f"d{p}" for p in params if p in heads_of(term)}, fields, frozenset(params) | {f"d{p}" for p in params}
+        {p: f"d{p}" for p in params if p in heads_of(term)},
+        fields,
+        frozenset(params) | {f"d{p}" for p in params},
+        frozenset(f"d{p}" for p in params),
     )
     tangents: dict[str, Term] = {p: var(f"d{p}") for p in params}
     work = Differentiator(resolve, folding=True)
@@ -134,8 +146,10 @@ def describe(
         problems.append(str(problem))
     except PottoError as problem:
         problems.extend(d.message for d in problem.diagnostics)
-    known = [work.carried_out(i) for i in _outermost(body)]
-    integrals = tuple(_integral(unnested(i), work, tangents, words) for i in known if isinstance(i, Integral))
+    known = [(work.carried_out(i), each) for i, each in _outermost(body)]
+    integrals = tuple(
+        _integral(unnested(i), each, work, tangents, words) for i, each in known if isinstance(i, Integral)
+    )
     found = DerivativeText(name, type_text, tangent, isinstance(body, Integral), integrals, conditions)
     found = replace(found, problems=tuple(problems), smooth=tangent, parameters=tuple(params))
     if not integrals and not problems:
@@ -151,16 +165,20 @@ def _tangent(body: Term, work: Differentiator, tangents: Mapping[str, Term]) -> 
     return work.dual(opened(work.carried_out(body)), tangents)[1] if over_functions(found) else found
 
 
-def _outermost(term: Term) -> list[Integral]:
-    found: dict[Integral, None] = {}
-    stack = [term]
+def _outermost(term: Term) -> list[tuple[Integral, tuple[Each, ...]]]:
+    """The integrals that are in no other one, each with the indices of the sums and arrays it stands in."""
+    found: dict[Integral, tuple[Each, ...]] = {}
+    stack: list[tuple[Term, tuple[Each, ...]]] = [(term, ())]
     while stack:
-        node = stack.pop()
+        node, around = stack.pop()
         if isinstance(node, Integral):
-            found[node] = None
-        else:
-            stack.extend(reversed(children(node)))
-    return list(found)
+            found.setdefault(node, around)
+            continue
+        if isinstance(node, Sum | Array | Fold):
+            lo, hi = (ZERO, sub(node.size, ONE)) if isinstance(node, Array) else (node.lo, node.hi)
+            around = (*around, (node.variable, lo, hi))
+        stack.extend((part, around) for part in reversed(children(node)))
+    return [(node, tuple(each for each in around if each[0] in node.free)) for node, around in found.items()]
 
 
 def _with_deltas(
@@ -178,35 +196,47 @@ def _with_deltas(
     if not over:
         return found
     smooth = words.text(work.dual(plain, tangents)[1])  # calls carried out here too: else they count twice
-    deltas = tuple(words.text(item.contribution) for item in over if item.rate is not ZERO)
+    meeting = [item for item in over if continuous(item, tangents)]
+    found = replace(found, continuous=tuple(equation(item.surface) for item in meeting))
+    deltas = tuple(words.text(item.contribution) for item in over if item.rate is not ZERO and item not in meeting)
     first = f"({smooth})" if smooth.startswith("if ") else smooth  # an `else` would take in what is added
-    parts = deltas if smooth == "0" and deltas else (first, *deltas)
+    parts = (smooth,) if not deltas else deltas if smooth == "0" else (first, *deltas)
     return replace(found, tangent=" + ".join(parts), smooth=smooth, deltas=deltas)
 
 
-def _integral(node: Integral, work: Differentiator, tangents: Mapping[str, Term], words: Words) -> IntegralText:
+def _integral(
+    node: Integral, around: tuple[Each, ...], work: Differentiator, tangents: Mapping[str, Term], words: Words
+) -> IntegralText:
     def rate(term: Term) -> Term:
         return work.dual(term, inside)[1]
 
     inside = {n: t for n, t in tangents.items() if n not in node.variables}
+    indices = [name for name, _, _ in around]
+    names, box = (*node.variables, *indices), box_of(node)
     deltas: list[str] = []
+    meeting: list[str] = []
     boundary: list[str] = []
     bounds: list[str] = []
     interior, reason = "", ""
     try:
-        interior = words.text(rate(node.body), *node.variables)
+        interior = words.text(rate(node.body), *names, box=box)
         for item in jumps(opened(node.body), node.variables, rate):
-            deltas.append(words.text(item.contribution, *node.variables))
-        deltas += [words.text(t, *node.variables) for t in moving_deltas(node, rate)]
+            if _outside(item.surface, box):
+                continue
+            if continuous(item, node.variables):
+                meeting.append(equation(item.surface))
+            else:
+                deltas.append(words.text(item.contribution, *names, box=box))
+        deltas += [words.text(t, *names, box=box) for t in moving_deltas(node, rate)]
         whole = opened(node)
         assert isinstance(whole, Integral)
         plain = without_deltas(whole, True)
         if isinstance(plain, Integral):
             reason = _why_searched(plain)
         if isinstance(plain, Integral) and level_set(plain) is None:
-            bounds = [words.text(t) for t in at_bounds(plain, rate)]
+            bounds = [words.text(t, *indices) for t in at_bounds(plain, rate)]
             swept = at_surfaces(plain, frozenset(inside), rate, True)
-            boundary = [words.text(t) for t in swept if not (isinstance(t, Integral) and level_set(t))]
+            boundary = [words.text(t, *indices) for t in swept if not (isinstance(t, Integral) and level_set(t))]
     except (NoClosedForm, NotSmooth, NoFormula) as problem:
         reason = str(problem)
     except PottoError as problem:
@@ -222,7 +252,15 @@ def _integral(node: Integral, work: Differentiator, tangents: Mapping[str, Term]
         tuple(b for b in boundary if b != "0"),
         _surfaces(node, inside),
         reason,
+        tuple(meeting),
+        ", ".join(f"{name} in {format_term(simplify(lo))}..{format_term(simplify(hi))}" for name, lo, hi in around),
     )
+
+
+def _outside(surface: Term, box: Mapping[str, tuple[float, float]]) -> bool:
+    """Whether a surface is nowhere in the domain."""
+    found = range_of(surface, box)
+    return found.positive or found.negative
 
 
 def _why_searched(node: Integral) -> str:
@@ -240,16 +278,18 @@ def _why_searched(node: Integral) -> str:
 
 def _surfaces(node: Integral, tangents: Mapping[str, Term]) -> tuple[SurfaceText, ...]:
     found: dict[Term, SurfaceText] = {}
+    box = box_of(node)
     for item in branches_of(opened(node.body), node.variables):
         for factor in factors(item.surface):
             canonical = normalized_surface(factor)[0]
-            if canonical in found or not factor.free & frozenset(node.variables):
+            if canonical in found or not factor.free & frozenset(node.variables) or _outside(factor, box):
                 continue
             roots: list[str] = []
             try:
                 for root in pivots(node, factor)[0].roots:
                     each = f" for integers {root.index}" if root.index else ""
-                    roots.append(f"{root.variable} = {format_term(simplify(root.at))}{each}")
+                    at = format_term(readable(simplify(root.at), frozenset()))
+                    roots.append(f"{root.variable} = {at}{each}")
             except NoClosedForm:
                 pass
             found[canonical] = SurfaceText(equation(factor), tuple(sorted(factor.free & tangents.keys())), tuple(roots))

@@ -6,9 +6,15 @@ text already.
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable
+
 from msgspec import Struct
 
+from potto.syntax.typesetting import broken, unicode
+
 WIDTH = 100
+Show = Callable[[str], str]
 
 
 class SurfaceText(Struct, frozen=True):
@@ -24,6 +30,8 @@ class IntegralText(Struct, frozen=True):
 
     integrand: what is integrated. interior: its derivative between the surfaces. deltas: its derivative on them.
     bounds: what moving bounds add. boundary: the deltas integrated out; empty where `reason` says why not.
+    continuous: the equations of surfaces that move and on which nothing jumps. each: the indices of what it stands in,
+    `i in 0..n`.
     """
 
     head: str
@@ -35,6 +43,13 @@ class IntegralText(Struct, frozen=True):
     boundary: tuple[str, ...]
     surfaces: tuple[SurfaceText, ...]
     reason: str = ""
+    continuous: tuple[str, ...] = ()
+    each: str = ""
+
+    def over(self, integrand: str) -> str:
+        """The integral of a part, with the same bounds."""
+        nothing = not re.search(r"[^0(), ]", integrand)
+        return integrand if nothing else f"{self.head} {integrand} d({self.variables})"
 
 
 class DerivativeText(Struct, frozen=True):
@@ -42,7 +57,7 @@ class DerivativeText(Struct, frozen=True):
 
     tangent: the whole of it, deltas integrated out. alone: the definition is its one integral and nothing else.
     surfaces: where it jumps as a function of its parameters, if there is no integral; deltas: its derivative there,
-    which `tangent` ends with; smooth: what it is before.
+    which `tangent` ends with; smooth: what it is before; continuous: where nothing jumps at a surface that moves.
     conditions: where it has a value. problems: why there is no whole in symbols.
     by: the name of a definition that is this derivative, if it was asked about that.
     parameters: what it is differentiated by; the tangent of `t` is `dt`.
@@ -60,6 +75,7 @@ class DerivativeText(Struct, frozen=True):
     smooth: str = ""
     deltas: tuple[str, ...] = ()
     parameters: tuple[str, ...] = ()
+    continuous: tuple[str, ...] = ()
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -67,18 +83,44 @@ class DerivativeText(Struct, frozen=True):
 
     @property
     def text(self) -> str:
-        return "\n".join(_lines(self))
+        """As Potto writes it."""
+        return "\n".join(_lines(self, _as_it_is))
+
+    @property
+    def typeset(self) -> str:
+        """The same formulas with the signs of mathematics."""
+        return "\n".join(_lines(self, self.unicode))
+
+    @property
+    def tangents(self) -> frozenset[str]:
+        """The names of tangents in the formulas."""
+        return frozenset(f"d{name}" for name in self.parameters)
+
+    def unicode(self, formula: str) -> str:
+        """A formula of this derivative on a line of Unicode."""
+        return unicode(formula, self.tangents)
 
 
-def _lines(found: DerivativeText) -> list[str]:
+def _as_it_is(formula: str) -> str:
+    return formula
+
+
+def meets(equation: str) -> str:
+    """What a surface adds on which both sides meet."""
+    return f"0: continuous at {equation}"
+
+
+def _lines(found: DerivativeText, show: Show) -> list[str]:
     lines = [f"{found.by or 'd' + found.name} : {found.type}", ""]
+    mark = "D " if show is _as_it_is else "∂"
     if not found.alone and found.tangent:
-        lines += [*_wrapped(f"D {found.name} = ", found.tangent), ""]
+        lines += [*broken(f"{mark}{found.name} = ", show(found.tangent), WIDTH), ""]
+    lines += [f"  + {meets(show(where))}" for where in found.continuous]
     for number, item in enumerate(found.integrals, 1):
         title = found.name if found.alone else f"integral {number}"
-        lines += [*_of_integral(title, item), ""]
+        lines += [*_of_integral(f"{mark}{title}", item, show), ""]
     if found.alone and found.tangent:
-        lines += ["integrated:", *_wrapped(f"  D {found.name} = ", found.tangent), ""]
+        lines += ["integrated:", *broken(f"  {mark}{found.name} = ", show(found.tangent), WIDTH), ""]
     lines += [f"note: `{found.by}` is the derivative of `{found.name}`"] if found.by else []
     lines += [f"note: {note}" for note in found.notes]
     while lines and not lines[-1]:
@@ -86,40 +128,26 @@ def _lines(found: DerivativeText) -> list[str]:
     return lines
 
 
-def _of_integral(title: str, item: IntegralText) -> list[str]:
-    lines = [f"D {title} = {item.head}"]
+def _of_integral(title: str, item: IntegralText, show: Show) -> list[str]:
+    lines = [f"for each {show(item.each)}"] if item.each else []
     parts = [(item.interior, "interior")] if item.interior and (item.interior != "0" or not item.deltas) else []
     parts += [(text, "boundary") for text in item.deltas]
-    width = min(WIDTH, max((len(text) for text, _ in parts), default=0))
+    head = f"{title} = "
     for number, (text, kind) in enumerate(parts):
-        lines.append(f"    {'+ ' if number else '  '}{text.ljust(width)}   # {kind}")
-    lines.append(f"    d({item.variables})")
-    lines += [f"  + {text}   # moving bound" for text in item.bounds]
+        formula = broken("" if number else head, show(item.over(text)), WIDTH)
+        formula = formula if not number else [f"{' ' * (len(head) - 2)}+ {formula[0]}", *formula[1:]]
+        lines += [*formula[:-1], f"{formula[-1]}   # {kind}"]
+    lines += [f"  + {show(text)}   # moving bound" for text in item.bounds]
+    lines += [f"  + {meets(show(where))}" for where in item.continuous]
     if item.surfaces:
         lines += ["", "surfaces:"]
         for surface in item.surfaces:
             moved = f"moved by {', '.join(surface.moved_by)}" if surface.moved_by else "moved by no parameter"
-            where = f"; {', '.join(surface.roots)}" if surface.roots else ""
-            lines.append(f"  {surface.equation}   ({moved}{where})")
+            where = f"; {', '.join(map(show, surface.roots))}" if surface.roots else ""
+            lines.append(f"  {show(surface.equation)}   ({moved}{where})")
     if item.boundary:
         lines += ["", "boundary:"]
-        lines += [line for text in item.boundary for line in _wrapped("  ", text)]
+        lines += [line for text in item.boundary for line in broken("  ", show(text), WIDTH)]
     if item.reason:
         lines += ["", f"boundary: found by numbers, because {item.reason}"]
     return lines
-
-
-def _wrapped(head: str, text: str) -> list[str]:
-    """A long sum over several lines, cut where it is a sum at the outside."""
-    if len(head) + len(text) <= WIDTH:
-        return [head + text]
-    pieces: list[str] = []
-    depth = start = 0
-    for i, char in enumerate(text):
-        depth += (char in "([{") - (char in ")]}")
-        if depth == 0 and text.startswith((" + ", " - "), i) and i > start:
-            pieces.append(text[start:i])
-            start = i + 1
-    pieces.append(text[start:])
-    indent = " " * min(len(head), 8)
-    return [head + pieces[0], *(indent + piece for piece in pieces[1:])]

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from msgspec import Struct
 
 from potto.calculus.algebra.radicals import NAN
+from potto.calculus.explanation.readable import Box, readable
 from potto.calculus.surfaces.trace import spine
 from potto.core.printer import format_term
 from potto.core.simplify import simplify
@@ -57,8 +58,9 @@ class Words(Struct, frozen=True):
     functions: Mapping[str, str]
     fields: Rewrite
     names: frozenset[str]
+    tangents: frozenset[str]
 
-    def text(self, term: Term, *inside: str) -> str:
+    def text(self, term: Term, *inside: str, box: Box | None = None) -> str:
         """A formula that is Potto, in the parameters, their tangents and the variables it is `inside` of. Raises
         NoFormula."""
         plain = symbols(without_guards(simplify(transform(term, _by_formula))), self.functions)
@@ -66,7 +68,7 @@ class Words(Struct, frozen=True):
         strangers = {name for name in plain.free - known if name.rstrip("'") != "delta"}  # `delta'`: its derivative
         if strangers:
             raise NoFormula(f"where it jumps depends on `{min(strangers)}`, over which it is summed")
-        text = format_term(simplify(self.fields(plain)))
+        text = format_term(readable(simplify(self.fields(plain)), self.tangents, box))
         if "..." in text:
             raise NoFormula("the formula is too long to be shown")
         return text

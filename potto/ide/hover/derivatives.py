@@ -15,6 +15,7 @@ from potto.calculus.checking.diffeo import DiffeoInfo, diffeo_info, exported
 from potto.calculus.checking.solvability import Problem, Verdict, judge
 from potto.calculus.explanation.explain import equation, explain_derivative
 from potto.calculus.explanation.layout import DerivativeText, IntegralText
+from potto.calculus.explanation.readable import readable
 from potto.calculus.solving.inverse_map import Inverse, invert
 from potto.checking.check import has_errors
 from potto.core.printer import format_term
@@ -26,9 +27,11 @@ from potto.modules.graph import strongly_connected
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import nodes
+from potto.syntax.typesetting import broken
 from potto.types import check_definition, interface
 
 LONG = 400  # characters of a formula beyond which a hover leaves it out
+WIDTH = 72  # of its lines
 
 
 @query
@@ -126,7 +129,7 @@ def _info(
     if inverse is None and len(completed) == len(variables):
         found = invert(completed, variables)
         inverse = found if isinstance(found, Inverse) else None
-    roots = () if verdict.roots is None else _terms(verdict.roots.roots)
+    roots = () if verdict.roots is None else tuple(map(_readable, verdict.roots.roots))
     return ConditionInfo(
         span,
         variables,
@@ -147,6 +150,10 @@ def _info(
 def _term(term: Term) -> str:
     text = format_term(simplify(term))
     return _plain(text)
+
+
+def _readable(term: Term) -> str:
+    return _plain(format_term(readable(simplify(term), frozenset())))
 
 
 def _terms(terms: Iterable[Term]) -> tuple[str, ...]:
@@ -180,43 +187,64 @@ def derivative_markdown(db: Database, file: str, name: str) -> str | None:
 
 
 def derivative_parts(found: DerivativeText, conditions: Iterable[ConditionInfo] = ()) -> list[str]:
-    """The interior and boundary terms, and the surfaces with what moves each: those of its own integrals, or of
-    `conditions`, which it leaves to others."""
+    """The interior and boundary terms as they are typeset, and the surfaces with what moves each: those of its own
+    integrals, or of `conditions`, which it leaves to others."""
     lines = [f"the derivative of {code(found.name)}"] if found.by else []
     for number, item in enumerate(found.integrals, 1):
         title = f"of integral {number}" if len(found.integrals) > 1 else ""
-        lines.append(_integral(item, title))
+        lines.append(_integral(found, item, title))
     if not found.integrals and found.tangent:
-        lines.append(f"**derivative** {code(f'd{found.name} = {found.tangent}')}")
+        lines.append(f"**derivative**\n\n{typeset(f'∂{found.name} = ', found.unicode(found.tangent))}")
+        lines += [
+            f"nothing jumps at {code(found.unicode(where))}: it is continuous there" for where in found.continuous
+        ]
         moved = {surface.equation: surface.moved_by for surface in found.surfaces}
         moved.update({info.equation: info.moved_by for info in conditions if not info.problem})
         if moved:
-            listed = [f"- {code(where)} {_moved(by)}" for where, by in moved.items()]
+            listed = [f"- {code(found.unicode(where))} {_moved(by)}" for where, by in moved.items()]
             lines.append("\n".join(["**surfaces**", "", *listed]))
     told = [item.reason for item in found.integrals if item.reason]
     lines += [f"*{note}*" for note in found.notes if not any(reason in note for reason in told)]
     return lines
 
 
+def typeset(head: str, formula: str) -> str:
+    """A formula in a block of its own, its lines cut where it is a sum; one that nobody would read is left out."""
+    lines = broken(head, formula, WIDTH) if len(formula) <= LONG else [f"{head}…"]
+    return "\n".join(["```text", *lines, "```"])
+
+
 def _moved(by: tuple[str, ...]) -> str:
     return f"moved by {', '.join(map(code, by))}" if by else "moved by no parameter"
 
 
-def _integral(item: IntegralText, title: str) -> str:
-    head = f"**derivative** {title}".rstrip()
-    lines = [f"{head}", "", f"- interior: {code(item.interior)}"]
-    boundary = list(item.deltas) or ["0"]
-    lines += [f"- boundary: {code(text)}" for text in boundary]
-    lines += [f"- moving bound: {code(text)}" for text in item.bounds]
+def _integral(found: DerivativeText, item: IntegralText, title: str) -> str:
+    """The integrals around interior and boundary, and where the surfaces are."""
+    parts = [("interior", item.over(item.interior))] if item.interior else []
+    parts += [("boundary", item.over(text)) for text in item.deltas]
+    parts += [("moving bound", text) for text in item.bounds]
+    parts += [("integrated", text) for text in item.boundary if len(text) <= LONG]
+    lines = [f"**derivative** {title}".rstrip(), ""]
+    lines += [f"for each {code(found.unicode(item.each))}", ""] if item.each else []
+    widest = max((len(kind) for kind, _ in parts), default=0)
+    blocks = [line for kind, text in parts for line in _part(kind.ljust(widest), found.unicode(text))]
+    if not item.deltas and not item.reason:
+        meeting = [f"0: continuous at {found.unicode(where)}" for where in item.continuous]
+        blocks += [f"{'boundary'.ljust(widest)}  {text}" for text in meeting or ["0"]]
+    lines += ["```text", *blocks, "```"]
     if item.reason:
-        lines.append(f"- the boundary is found by numbers, because {item.reason}")
-    lines += [f"- integrated: {code(text)}" for text in item.boundary if len(text) <= LONG]
+        lines += ["", f"the boundary is found by numbers, because {item.reason}"]
     if item.surfaces:
         lines += ["", "**surfaces**", ""]
     for surface in item.surfaces:
-        where = "; at " + ", ".join(code(root) for root in surface.roots) if surface.roots else ""
-        lines.append(f"- {code(surface.equation)} {_moved(surface.moved_by)}{where}")
+        where = "; at " + ", ".join(code(found.unicode(root)) for root in surface.roots) if surface.roots else ""
+        lines.append(f"- {code(found.unicode(surface.equation))} {_moved(surface.moved_by)}{where}")
     return "\n".join(lines)
+
+
+def _part(kind: str, formula: str) -> list[str]:
+    first, *more = broken("", formula, WIDTH) if len(formula) <= LONG else ["…"]
+    return [f"{kind}  {first}", *(f"{' ' * (len(kind) + 2)}{line}" for line in more)]
 
 
 def condition_markdown(info: ConditionInfo) -> str:

@@ -49,10 +49,13 @@ def show_derivative(session: Conversation, text: str) -> Part:
     if not isinstance(asked.type, Function | Diffeo):
         raise Refusal(f"`{text.strip()}` is no function, so there is nothing to differentiate by")
     found = derivative_text(session, asked)
-    shown = found.text.replace(f"d{UNNAMED} :", "its derivative :", 1) if found.name == UNNAMED else found.text
-    data = {"name": found.name, "type": found.type, "tangent": found.tangent, "text": shown,
+
+    def named(text: str) -> str:
+        return text.replace(f"d{UNNAMED} :", "its derivative :", 1) if found.name == UNNAMED else text
+
+    data = {"name": found.name, "type": found.type, "tangent": found.tangent, "text": named(found.text),
             "_latex": lambda: derivative_latex(found, "f" if found.name == UNNAMED else found.name)}  # fmt: skip
-    return Part("answer", pretty(shown, session.options.unicode), data)
+    return Part("answer", named(found.typeset if session.options.unicode else found.text), data)
 
 
 def derivative_text(session: Conversation, asked: Asked) -> DerivativeText:

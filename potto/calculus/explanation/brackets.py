@@ -1,0 +1,155 @@
+"""Iverson brackets as conditions, in as few and as plain comparisons as they can be told.
+
+Owns `Condition`, `conditions`, `fewer` and `bracket`. A root is compared by squares, factors that do not change a sign
+are left out, and so is what another condition implies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
+
+from msgspec import Struct
+
+from potto.calculus.algebra.ranges import range_of
+from potto.calculus.algebra.rational_form import as_term, normal
+from potto.core.polynomials import Polynomial
+from potto.core.terms import (
+    ONE,
+    ZERO,
+    Branch,
+    Const,
+    Prim,
+    Term,
+    add,
+    branch,
+    mul,
+    neg,
+    sub,
+)
+
+
+class Condition(Struct, frozen=True):
+    """surface > 0, or >= 0."""
+
+    surface: Term
+    strict: bool
+
+
+def conditions(term: Term) -> list[Condition] | None:
+    """The conditions under all of which a term is 1, if it is 0 elsewhere."""
+    found: list[Condition] = []
+    while term is not ONE:
+        if not isinstance(term, Branch) or (len(term.coordinates) > 1 and not term.strict):
+            return None
+        if term.orelse is ZERO:
+            found.append(Condition(term.surface, term.strict))
+            term = term.then
+        elif term.then is ZERO:
+            found.append(Condition(neg(term.surface), not term.strict))
+            term = term.orelse
+        else:
+            return None
+    return found
+
+
+def fewer(known: Iterable[Condition]) -> list[Condition]:
+    """The same conditions without what is said twice or follows from another one."""
+    found: list[Condition] = []
+    for item in known:
+        for plain in _plain(item):
+            if not any(_implies(other, plain) for other in found):
+                found = [other for other in found if not _implies(plain, other)]
+                found.append(plain)
+    return found
+
+
+def bracket(known: Sequence[Condition]) -> Term:
+    """1 where all conditions hold, else 0."""
+    whole: Term = ONE
+    for item in known:  # the last one is the first that is asked
+        whole = branch((sided(item.surface),), item.strict, whole, ZERO)
+    return whole
+
+
+def opposite(first: Condition, second: Condition) -> bool:
+    """Whether one surface is the other with its sign turned."""
+    found = normal(add(first.surface, second.surface))
+    return first.strict and second.strict and found is not None and not found.top
+
+
+def sided(surface: Term) -> Term:
+    """What is added less what is taken away, so that it reads as a comparison of the two."""
+    parts = surface.args if isinstance(surface, Prim) and surface.op == "add" else (surface,)
+    taken = [p.args[0] for p in parts if isinstance(p, Prim) and p.op == "neg"]
+    added = [p for p in parts if not (isinstance(p, Prim) and p.op == "neg")]
+    numbers = [p for p in added if isinstance(p, Const) and p.name is None]
+    if added == numbers and taken and numbers and numbers[0].value > 0:
+        return sub(add(*added), add(*taken))
+    return sub(add(*added), add(*taken)) if taken and added else surface
+
+
+def _plain(item: Condition) -> list[Condition]:
+    """A condition as conditions without roots, and without factors whose sign is known."""
+    found = normal(item.surface)
+    if found is None or not found.top:
+        return [item]
+    if found.whole:
+        without_root = _squared(found.top, item.strict)
+        if without_root is not None:
+            return [each for one in without_root for each in _plain(one)]
+    if len(found.top) == 1:
+        return _without_even(item, found.top, found.below)
+    return [item]
+
+
+def _squared(form: Polynomial, strict: bool) -> list[Condition] | None:
+    """k*sqrt(u) + rest > 0 by squares, where the sign of the rest is known."""
+    roots = [(m, c) for m, c in form.items() if any(isinstance(a, Prim) and a.op == "sqrt" for a, _ in m)]
+    if len(roots) != 1:
+        return None
+    ((monomial, scale),) = roots
+    if len(monomial) != 1 or monomial[0][1] != 1:
+        return None
+    root = monomial[0][0]
+    assert isinstance(root, Prim)
+    (inside,) = root.args
+    rest = as_term({m: c / abs(scale) for m, c in form.items() if m != monomial})
+    if rest is None:
+        return None
+    exists = Condition(inside, False)
+    if scale < 0:  # sqrt(u) < rest
+        return [exists, Condition(sub(inside_square(rest), inside), strict)] if range_of(rest).lo >= 0 else None
+    if rest is ZERO:
+        return [Condition(inside, strict)]
+    if range_of(rest).lo >= 0:
+        return [exists]
+    return [Condition(sub(inside, inside_square(rest)), strict)] if range_of(rest).hi <= 0 else None
+
+
+def inside_square(term: Term) -> Term:
+    """Its square, written out."""
+    found = normal(mul(term, term))
+    written = None if found is None else as_term(found.top)
+    return mul(term, term) if written is None else written
+
+
+def _without_even(item: Condition, top: Polynomial, below: Polynomial) -> list[Condition]:
+    """Of a product only the factors that change its sign."""
+    if len(below) != 1 or not item.strict:
+        return [item]
+    ((monomial, scale),), ((under, _),) = top.items(), below.items()
+    odd = [a for a, n in (*monomial, *under) if n % 2 and not range_of(a).positive]
+    if not odd:
+        return [item]
+    whole = mul(*odd)
+    return [Condition(whole if scale > 0 else neg(whole), item.strict)]
+
+
+def _implies(first: Condition, second: Condition) -> bool:
+    """Whether the second holds wherever the first does: its surface is the other's and a number that is not below 0."""
+    found = normal(sub(second.surface, first.surface))
+    if found is None or not found.whole or set(found.top) - {()}:
+        return False
+    offset = found.top.get((), Fraction(0))
+    return offset > 0 or (offset == 0 and (first.strict or not second.strict))

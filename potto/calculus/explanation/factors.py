@@ -1,0 +1,234 @@
+"""Products as factors with exponents, and how a product is written to be read.
+
+Owns `Factors`, `factored` and `written`. Roots are powers of a half, brackets are conditions, exponentials are joined.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from fractions import Fraction
+
+from msgspec import Struct
+
+from potto.calculus.algebra.ranges import range_of
+from potto.calculus.explanation.brackets import Condition, bracket, conditions, fewer
+from potto.core.polynomials import number
+from potto.core.printer import format_term
+from potto.core.terms import (
+    ONE,
+    ZERO,
+    App,
+    Const,
+    Delta,
+    Index,
+    Prim,
+    Proj,
+    Term,
+    Var,
+    add,
+    const,
+    div,
+    mul,
+    neg,
+    pow_,
+    prim,
+)
+
+_HALF = Fraction(1, 2)
+_PLAIN, _TANGENT, _DELTA = range(3)
+_DIGITS = 15
+_LARGEST = 64  # of an exponent
+
+
+class Factors(Struct):
+    """coefficient * the product of base^exponent * exp(the sum of `exponents`), where all conditions hold."""
+
+    coefficient: Fraction = Fraction(1)
+    powers: dict[Term, Fraction] = {}
+    exponents: list[Term] = []
+    conditions: list[Condition] = []
+
+    def times(self, base: Term, exponent: Fraction) -> None:
+        """One more factor."""
+        if exponent:
+            self.powers[base] = self.powers.get(base, Fraction(0)) + exponent
+            if not self.powers[base]:
+                del self.powers[base]
+
+
+def factored(term: Term) -> Factors:
+    """The factors of a term; one that is no product is its own."""
+    found = Factors()
+    _collect(term, Fraction(1), found)
+    return found
+
+
+def _collect(term: Term, exponent: Fraction, into: Factors) -> None:
+    match term:
+        case Const(name=None, value=value) if math.isfinite(value) and value and exponent.denominator == 1:
+            into.coefficient *= Fraction(_short(value)) ** int(exponent)
+        case Prim(op="neg", args=(inner,)) if exponent.denominator == 1:
+            into.coefficient *= (-1) ** int(exponent)
+            _collect(inner, exponent, into)
+        case Prim(op="mul", args=args) if exponent.denominator == 1 or all(range_of(a).lo >= 0 for a in args):
+            for arg in args:
+                _collect(arg, exponent, into)
+        case Prim(op="div", args=(top, below)) if exponent.denominator == 1:
+            _collect(top, exponent, into)
+            _collect(below, -exponent, into)
+        case Prim(op="pow", args=(base, Const(name=None, value=value))) if (
+            value.is_integer() and abs(value) <= _LARGEST and exponent.denominator == 1
+        ):
+            _collect(base, exponent * int(value), into)
+        case Prim(op="sqrt", args=(inner,)) if exponent.denominator == 1:
+            _collect(inner, exponent / 2, into)
+        case Prim(op="add", args=args) if exponent.denominator == 1 and all(map(_negative, args)):
+            into.coefficient *= (-1) ** int(exponent)
+            into.times(add(*map(neg, args)), exponent)
+        case Prim(op="add") if exponent.denominator == 1 and (found := _cosine(term)) is not None:
+            into.coefficient *= found[1] ** int(exponent)
+            into.times(found[0], 2 * exponent)
+        case Prim(op="exp", args=(inner,)):
+            into.exponents.append(inner if exponent == 1 else mul(_number(exponent), inner))
+        case _:
+            known = conditions(term) if exponent > 0 else None
+            if known is not None:
+                into.conditions += known
+            else:
+                into.times(term, exponent)
+
+
+def _negative(term: Term) -> bool:
+    return (isinstance(term, Prim) and term.op == "neg") or (isinstance(term, Const) and term.value < 0)
+
+
+def _cosine(term: Prim) -> tuple[Term, int] | None:
+    """cos(u) and -1 for sin(u)^2 - 1, of which it is the square: +1 with the signs turned."""
+    match term.args:
+        case (Prim(op="pow", args=(Prim(op="sin", args=(u,)), Const(value=2.0))), Const(value=-1.0)):
+            return prim("cos", u), -1
+        case (Prim(op="neg", args=(Prim(op="pow", args=(Prim(op="sin", args=(u,)), Const(value=2.0))),)),
+              Const(value=1.0)):  # fmt: skip
+            return prim("cos", u), 1
+        case _:
+            return None
+
+
+def _tidied(known: Factors) -> Factors:
+    found = Factors(known.coefficient, dict(known.powers), known.exponents, fewer(known.conditions))
+    for base, exponent in list(found.powers.items()):
+        if isinstance(base, Const) and base.name is None and exponent.denominator == 2:
+            value = Fraction(base.value)  # sqrt(2)/2 is 1/sqrt(2)
+            other = any(n == -_HALF for n in found.powers.values())
+            if exponent > 0 and value > 1 and (other or found.coefficient.denominator % value.numerator == 0):
+                found.coefficient *= value
+                found.powers[base] = exponent - 1
+        if isinstance(base, Prim) and base.op == "sign":
+            _signed(found, base)
+    return found
+
+
+def _signed(found: Factors, sign: Prim) -> None:
+    """sign(v) v is abs(v), and the square of a sign is 1."""
+    (inner,) = sign.args
+    odd = found.powers.pop(sign).numerator % 2
+    own = found.powers.get(inner, Fraction(0))
+    if not odd:
+        return
+    if not own or own.denominator != 1:
+        found.powers[sign] = Fraction(1)
+        return
+    found.times(inner, Fraction(-1 if own > 0 else 1))
+    found.times(prim("abs", inner), Fraction(1 if own > 0 else -1))
+
+
+# Writing
+
+
+def written(found: Factors, tangents: frozenset[str]) -> Term:
+    """The product: numbers, factors, tangents, brackets, deltas, over what it is divided by."""
+    if not found.coefficient:
+        return ZERO
+    found = _tidied(found)
+    top = sorted((b for b, n in found.powers.items() if n > 0), key=lambda b: (_place(b, tangents), _order(b)))
+    below = sorted((b for b, n in found.powers.items() if n < 0), key=_order)
+    scale, divisor = _scale(abs(found.coefficient), bool(below))
+    exponent = [prim("exp", add(*found.exponents))] if found.exponents else []
+    plain = [b for b in top if _place(b, tangents) == _PLAIN]
+    names = [b for b in plain if _order(b)[0] == 0 and found.powers[b].denominator == 1]
+    above = [*_powers(found, names, 1), *exponent, *_powers(found, [b for b in plain if b not in names], 1)]
+    tail = [_raised(b, found.powers[b]) for b in top if _place(b, tangents) != _PLAIN]
+    held = [bracket(found.conditions)] if found.conditions else []
+    deltas = [b for b in tail if _place(b, tangents) == _DELTA]
+    moving = [b for b in tail if b not in deltas]
+    under = [divisor, *_powers(found, below, -1)]
+    fraction = div(mul(scale, *above, *moving), mul(*under))
+    whole = mul(fraction, *held, *deltas)
+    return neg(whole) if found.coefficient < 0 else whole
+
+
+def _powers(found: Factors, bases: Iterable[Term], sign: int) -> list[Term]:
+    """Bases with their exponents, all square roots as one."""
+    roots: list[Term] = []
+    out: list[Term] = []
+    for base in bases:
+        exponent = sign * found.powers[base]
+        if exponent == _HALF:
+            roots.append(base)
+        else:
+            out.append(_raised(base, exponent))
+    return [*out, prim("sqrt", mul(*roots))] if roots else out
+
+
+def _raised(base: Term, exponent: Fraction) -> Term:
+    if exponent == _HALF:
+        return prim("sqrt", base)
+    if exponent.denominator == 2:
+        return mul(*([_raised(base, exponent - _HALF)] if exponent > _HALF else []), prim("sqrt", base))
+    return base if exponent == 1 else pow_(base, const(float(exponent)))
+
+
+def _place(base: Term, tangents: frozenset[str]) -> int:
+    if isinstance(base, Delta) or (isinstance(base, App) and isinstance(base.function, Var)
+                                   and base.function.name.startswith("delta'")):  # fmt: skip
+        return _DELTA
+    moves = is_tangent(base, tangents) or (isinstance(base, Prim) and base.op == "add" and base.free & tangents)
+    return _TANGENT if moves else _PLAIN
+
+
+def _order(base: Term) -> tuple[int, str]:
+    """Names first, in the order of the alphabet, then calls, then sums."""
+    if isinstance(base, Var | Const):
+        return 0, format_term(base)
+    return (2 if isinstance(base, Prim) and base.op == "add" else 1), ""
+
+
+def is_tangent(base: Term, tangents: frozenset[str]) -> bool:
+    """Whether a factor is a tangent, a part of one, or that of a call."""
+    while isinstance(base, Proj | Index):
+        base = base.term if isinstance(base, Proj) else base.array
+    if isinstance(base, App):
+        return isinstance(base.function, Var) and base.function.name == "snd"
+    return isinstance(base, Var) and (base.name in tangents or base.name.partition(".")[0] in tangents)
+
+
+def _scale(value: Fraction, divided: bool) -> tuple[Term, Term]:
+    """A coefficient as a factor and a divisor: r/2 rather than 0.5*r, and 0.45 as it is."""
+    small = value.denominator <= 12 and value.numerator < 100
+    if value.denominator == 1 or (small and (divided or value.denominator < 10)):
+        return const(float(value.numerator)), const(float(value.denominator))
+    return _number(value), ONE
+
+
+def _number(value: Fraction) -> Term:
+    nearest = _short(float(value))
+    if abs(Fraction(nearest) - value) <= abs(value) / 2**50:
+        return const(nearest)
+    return number(value) or const(float(value))
+
+
+def _short(value: float) -> float:
+    """0.45 for what rounding has made 0.44999999999999996."""
+    short = float(f"{value:.{_DIGITS}g}")
+    return short if abs(short - value) <= 4 * math.ulp(value) else value

@@ -1,0 +1,245 @@
+"""The shortest way to write a derivative that is found: like terms collected, fractions joined, brackets made plain.
+
+Owns `readable`, the one home of what a shown formula is simplified by; `core.simplify` keeps values everywhere and
+rewrites little. Here values are the same wherever both forms are defined, up to rounding. A sum is written around its
+tangents, in which it is linear, and a product in the order of a textbook: numbers, factors, tangents, brackets, deltas.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+from math import gcd, lcm
+
+from potto.calculus.algebra.ranges import range_of
+from potto.calculus.algebra.rational_form import Rational, normal
+from potto.calculus.explanation.brackets import bracket as bracket_of
+from potto.calculus.explanation.brackets import conditions, fewer, opposite, sided
+from potto.calculus.explanation.factors import Factors, factored, is_tangent, written
+from potto.calculus.surfaces.branch_assignment import box_of
+from potto.core.polynomials import Monomial, Polynomial, shared_by, without
+from potto.core.printer import format_term
+from potto.core.terms import (
+    ZERO,
+    Branch,
+    Integral,
+    Prim,
+    Term,
+    add,
+    branch,
+    children,
+    const,
+    mul,
+    neg,
+    postorder,
+    pow_,
+    prim,
+    rebuild,
+    substitute,
+    transform,
+    var,
+    with_integrand,
+)
+
+Box = Mapping[str, tuple[float, float]]
+_ARITHMETIC = ("add", "neg", "mul", "div", "pow", "sqrt", "exp")
+_LONG = 4000  # characters of a formula that nobody reads, beyond which nothing is tried
+_MANY = 60  # nodes of what is expanded
+_SUMMANDS = 24
+_TANGENT = 4  # how much longer a formula seems for each tangent that it names
+_SUM = "sum'"  # the name of a sum while it is not taken apart: one that nobody can write
+
+
+def readable(term: Term, tangents: frozenset[str], box: Box | None = None) -> Term:
+    """The same value, written to be read; `tangents`: the names by which it is linear, `box`: the ranges of its
+    variables."""
+    if len(format_term(term)) > _LONG:
+        return term
+    work = _Work(tangents)
+    return _decided(transform(term, lambda _, new: work.node(new)), box or {}, work)
+
+
+def _decided(term: Term, box: Box, work: _Work) -> Term:
+    """Without the brackets that are the same everywhere in the domain of the integral that they stand in."""
+    if isinstance(term, Integral):
+        inner = {**box, **box_of(term)}
+        parts = children(term)
+        return rebuild(term, tuple(_decided(part, inner if part is term.body else box, work) for part in parts))
+    new = rebuild(term, tuple(_decided(part, box, work) for part in children(term))) if children(term) else term
+    if isinstance(new, Branch):
+        bounds = range_of(new.surface, box)
+        if bounds.positive or (not new.strict and bounds.lo >= 0):
+            return new.then
+        if bounds.negative or (new.strict and bounds.hi <= 0):
+            return new.orelse
+    return new if new is term else work.node(new)
+
+
+class _Work:
+    def __init__(self, tangents: frozenset[str]) -> None:
+        self.tangents = tangents
+
+    def node(self, node: Term) -> Term:
+        match node:
+            case Prim(op=op) if op in _ARITHMETIC:
+                return self._shortest(node)
+            case Branch():
+                known = conditions(node)
+                if known is not None:
+                    return bracket_of(fewer(known))
+                if len(node.coordinates) == 1:
+                    return branch((sided(node.surface),), node.strict, node.then, node.orelse)
+                return node
+            case Prim(op="hypot"):
+                return _length(node)
+            case Integral(body=Prim(op="neg", args=(inner,))):
+                return neg(with_integrand(node, inner))
+            case _:
+                return node
+
+    def _shortest(self, node: Prim) -> Term:
+        """The shortest of: the product of its factors, and the node expanded, with the sums in it or around them."""
+        forms = [node, *self._signs(node)] if node.op == "add" else [written(factored(node), self.tangents)]
+        if sum(1 for _ in postorder(node)) <= _MANY:
+            whole, sums = self._with_sums_named(node)
+            for form, named in ((node, []), (whole, sums)) if sums else ((node, sums),):
+                found = normal(form)
+                if found is not None and len(found.top) <= _SUMMANDS:
+                    forms += [self._put_back(each, named) for each in self._expanded(found)]
+        return min(forms, key=self._cost)
+
+    def _with_sums_named(self, node: Term) -> tuple[Term, list[tuple[str, Term]]]:
+        """The node with a name for each sum that is a factor in it: (x - m)^2 is not taken apart then."""
+        names: list[tuple[str, Term]] = []
+
+        def named(part: Term) -> Term:
+            if not isinstance(part, Prim) or part.op != "add" or not part.free.isdisjoint(self.tangents):
+                return part
+            for name, known in names:
+                if _sums_to_zero(part, neg(known)):
+                    return var(name)
+                if _sums_to_zero(part, known):
+                    return neg(var(name))
+            names.append((f"{_SUM}{len(names)}", part))
+            return var(names[-1][0])
+
+        def change(old: Term, new: Term) -> Term:
+            if not isinstance(old, Prim) or old.op not in ("mul", "div", "pow") or not isinstance(new, Prim):
+                return new
+            return rebuild(new, tuple(map(named, new.args)))
+
+        return transform(node, change, below=lambda n: children(n) if isinstance(n, Prim) else ()), names
+
+    def _put_back(self, term: Term, named: list[tuple[str, Term]]) -> Term:
+        for name, meant in reversed(named):
+            term = substitute(term, {name: meant})
+        return term
+
+    def _cost(self, form: Term) -> int:
+        text = format_term(form)
+        return len(text) + _TANGENT * sum(text.count(name) for name in self.tangents)
+
+    def _product(self, coefficient: Fraction, *monomials: tuple[Monomial, int]) -> Term:
+        found = Factors(coefficient, {}, [], [])
+        for monomial, sign in monomials:
+            for base, n in monomial:
+                part = factored(base)
+                for inner, power in part.powers.items():
+                    found.times(inner, power * n * sign)
+                found.coefficient *= part.coefficient ** (n * sign)
+                found.exponents += [mul(const(float(n * sign)), e) for e in part.exponents]
+                found.conditions += part.conditions
+        return written(found, self.tangents)
+
+    def _expanded(self, found: Rational) -> list[Term]:
+        """Written out, around what all summands share and around each tangent."""
+        if not found.top:
+            return [ZERO]
+        shared = shared_by(list(found.top))
+        rest = {without(m, shared): c for m, c in found.top.items()}
+        scale = _content(rest)
+        rest = {m: c / scale for m, c in rest.items()}
+        below = self._sum(found.below)
+        under = ((below, 1),) if found.below != {(): Fraction(1)} else ()
+        inner = self._around_tangents(rest)
+        common = tuple(shared.items())
+        whole = self._product(scale, (common, 1), *([(((inner, 1),), 1)]), (under, -1))
+        apart = [self._product(c * scale, (m, 1), (common, 1), (under, -1)) for m, c in rest.items()]
+        return [whole, _added(apart)]
+
+    def _around_tangents(self, form: Polynomial) -> Term:
+        """A polynomial as a sum over its tangents, each with all that it is multiplied by."""
+        groups: dict[Monomial, dict[Monomial, Fraction]] = {}
+        for monomial, c in form.items():
+            moving = tuple((a, n) for a, n in monomial if is_tangent(a, self.tangents))
+            groups.setdefault(moving, {})[tuple(p for p in monomial if p not in moving)] = c
+        parts: list[Term] = []
+        for moving, coefficient in groups.items():
+            shared = shared_by(list(coefficient))
+            rest = {without(m, shared): c for m, c in coefficient.items()}
+            scale = _content(rest)
+            inner = self._sum({m: c / scale for m, c in rest.items()})
+            parts.append(self._product(scale, (tuple(shared.items()), 1), (((inner, 1),), 1), (moving, 1)))
+        return _added(parts)
+
+    def _sum(self, form: Polynomial) -> Term:
+        return _added([self._product(c, (m, 1)) for m, c in form.items()])
+
+    def _signs(self, node: Prim) -> list[Term]:
+        """[u > 0] - [u < 0] as the sign of u."""
+        parts = [factored(arg) for arg in node.args]
+        for i, first in enumerate(parts):
+            for j in range(i + 1, len(parts)):
+                found = self._sign(first, parts[j])
+                if found is not None:
+                    return [_added([found, *(a for k, a in enumerate(node.args) if k not in (i, j))])]
+        return []
+
+    def _sign(self, first: Factors, second: Factors) -> Term | None:
+        same = first.powers == second.powers and first.exponents == second.exponents
+        if not same or first.coefficient != -second.coefficient:
+            return None
+        one = [c for c in first.conditions if c not in second.conditions]
+        other = [c for c in second.conditions if c not in first.conditions]
+        if len(one) != 1 or len(other) != 1 or not opposite(one[0], other[0]):
+            return None
+        kept = [c for c in first.conditions if c is not one[0]]
+        found = Factors(first.coefficient, dict(first.powers), list(first.exponents), kept)
+        positive, turned = (one[0].surface, 1) if not _is_negative(one[0].surface) else (other[0].surface, -1)
+        found.coefficient *= turned
+        found.times(prim("sign", positive), Fraction(1))
+        return written(factored(written(found, self.tangents)), self.tangents)
+
+
+def _sums_to_zero(first: Term, second: Term) -> bool:
+    found = normal(add(first, second))
+    return found is not None and not found.top
+
+
+def _length(node: Prim) -> Term:
+    """hypot(x, -y) as hypot(x, y), and the length of (x, sqrt(r^2 - x^2)) as abs(r)."""
+    sides = tuple(a.args[0] if isinstance(a, Prim) and a.op == "neg" else a for a in node.args)
+    found = normal(add(*(mul(a, a) for a in sides)))
+    if found is not None and found.whole and len(found.top) == 1:
+        ((monomial, scale),) = found.top.items()
+        if scale == 1 and monomial and all(n % 2 == 0 for _, n in monomial):
+            return prim("abs", mul(*(pow_(a, const(n / 2)) for a, n in monomial)))
+    return prim("hypot", *sides)
+
+
+def _is_negative(term: Term) -> bool:
+    return isinstance(term, Prim) and term.op == "neg"
+
+
+def _content(form: Polynomial) -> Fraction:
+    """What the coefficients of a polynomial share, and the sign of all if they are one."""
+    top = gcd(*(c.numerator for c in form.values()))
+    below = lcm(*(c.denominator for c in form.values()))
+    if below > 1000 or top > 1000:
+        return Fraction(1)
+    return Fraction(-top if all(c < 0 for c in form.values()) else top, below)
+
+
+def _added(parts: list[Term]) -> Term:
+    """A sum, what is taken away last."""
+    return add(*(p for p in parts if not _is_negative(p)), *(p for p in parts if _is_negative(p)))

@@ -1,0 +1,60 @@
+"""Long formulas over several lines.
+
+Owns `broken`. A line breaks before the signs of a sum, the outermost one or that between the farthest parentheses;
+where there is no long one, before a factor.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+_SIGNS = (" + ", " - ", " − ")
+_FACTORS = ("·", "*")
+_OUTSIDE = -1
+_SHORT = 40  # characters between parentheses that stay together
+_DEEPEST = 6
+
+
+def broken(head: str, text: str, width: int) -> list[str]:
+    """A formula behind a head, cut where it is a sum; lines are filled as far as they go."""
+    return _broken(head + text, len(head), min(len(head), 8), width, 0)
+
+
+def _broken(line: str, start: int, indent: int, width: int, deep: int) -> list[str]:
+    """A line that may be cut behind `start`; what goes on is indented."""
+    places = [] if len(line) <= width or deep >= _DEEPEST else _places(line[start:])
+    if not places:
+        return [line]
+    ends = [*(start + place for place in places), len(line)]
+    lines: list[str] = []
+    now, begun = line[: ends[0]], start
+    for a, b in pairwise(ends):
+        piece = line[a:b]
+        if len(now) + len(piece) <= width:
+            now += piece
+        else:
+            lines += _broken(now, begun, indent + 2, width, deep + 1)
+            now, begun = " " * indent + piece.lstrip(), indent
+    return [*lines, *_broken(now, begun, indent + 2, width, deep + 1)]
+
+
+def _places(text: str) -> list[int]:
+    """Where to break: before the signs of one sum, or before factors."""
+    sums: dict[int, list[int]] = {}
+    factors: dict[int, list[int]] = {}
+    ends: dict[int, int] = {}
+    around = [_OUTSIDE]
+    for i, char in enumerate(text):
+        if char in "([{":
+            around.append(i)
+        elif char in ")]}" and len(around) > 1:
+            ends[around.pop()] = i
+        elif i and text.startswith(_SIGNS, i):
+            sums.setdefault(around[-1], []).append(i)
+        elif i and char in _FACTORS:
+            factors.setdefault(len(around), []).append(i)
+    if _OUTSIDE in sums:
+        return sums[_OUTSIDE]
+    long = [(ends.get(at, len(text)) - at, places) for at, places in sums.items()]
+    length, places = max(long, default=(0, []))
+    return places if length > _SHORT else factors[min(factors)] if factors else places

@@ -1,0 +1,57 @@
+"""Formulas as they are displayed: the signs of mathematics for what Potto writes, and nothing else."""
+
+from __future__ import annotations
+
+import re
+from xml.etree import ElementTree
+
+import pytest
+
+from potto.syntax.typesetting import broken, mathml, unicode
+
+SHOWN = [
+    ("integral [0, 1] r*dr/sqrt(r^2 - x^2)*[x < r] d(x)", "∫₀¹ r·∂r/√(r² − x²)·[x < r] dx"),
+    ("dt*[t > 0 and t < 1]", "∂t·[0 < t < 1]"),
+    ("[a <= b and b != c]", "[a ≤ b ∧ b ≠ c]"),
+    ("-2*theta^n*delta(x - t)", "−2·θ^n·δ(x − t)"),
+    ("-dt*delta'(x - t)", "−∂t·δ′(x − t)"),
+    ("integral [-inf, inf] a + b d(time)", "∫[−∞, ∞] (a + b) d time"),
+    ("integral ([0, 1], [0, x]) y d(x, y)", "∫[x = 0, 1]∫[y = 0, x] y dx dy"),
+    ("sum i in 0..n (a[i]^2)", "∑[i = 0, n] a[i]²"),
+    ("2^(a + b)", "2^(a + b)"),
+    ("abs(x)/(2*y)", "|x|/(2·y)"),
+    ("a/b*c", "a/b·c"),
+    ("if [x < t] then 1 else x", "if x < t then 1 else x"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("formula", "shown"), SHOWN)
+def test_what_is_displayed(formula: str, shown: str) -> None:
+    assert unicode(formula, frozenset({"dr", "dt"})) == shown
+
+
+@pytest.mark.parametrize("formula", [formula for formula, _ in SHOWN])
+def test_pages_get_xml_with_every_name_and_number(formula: str) -> None:
+    tree = ElementTree.fromstring(mathml(formula))
+    words = re.findall(r"[A-Za-z]+|\d+", formula)
+    told = "".join(tree.itertext())
+    signs = {"integral", "sum", "in", "and", "sqrt", "abs", "if", "then", "else", "d", "theta", "delta", "inf"}
+    assert all(word in told for word in words if word not in signs)
+
+
+def test_what_is_no_formula_is_shown_as_it_is() -> None:
+    assert unicode("integral [0, ") == "integral [0, "
+    assert "<mtext>a &lt;</mtext>" in mathml("a <")
+
+
+def test_lines_break_before_the_signs_of_the_outermost_sum() -> None:
+    text = " + ".join(f"integral [0, 1] term{n}*(u + v) d(x)" for n in range(4))
+    lines = broken("D f = ", text, 60)
+    assert lines[0].startswith("D f = integral") and all(line.lstrip().startswith("+ integral") for line in lines[1:])
+    assert "".join(lines).replace(" ", "") == f"D f = {text}".replace(" ", "")
+    assert all(len(line) <= 60 for line in lines)
+
+
+def test_a_product_without_a_long_sum_breaks_before_a_factor() -> None:
+    first, second = broken("", "a" * 30 + "·(x − y)²·" + "b" * 30, 50)
+    assert first.endswith("(x − y)²") and second.strip() == "·" + "b" * 30
