@@ -64,7 +64,7 @@ def test_a_derivative_is_an_integral_of_both_parts_and_integrated() -> None:
     r"""d/dθ of the integral of [x < θ] x: nothing inside, and θ where x reaches it."""
     text = potto.grad(PROGRAM.f)._repr_latex_()
     assert text == (
-        r"$\begin{aligned}\partial f &= \int_{0}^{1} \underbrace{x \, \delta\left(\theta - x\right) \, \partial \theta"
+        r"$\begin{aligned}\partial f &= \int_{0}^{1} \underbrace{x \, \partial \theta \, \delta\left(\theta - x\right)"
         + BOUNDARY
         + r"\, \mathrm{d}x \\  &= \theta \, \partial \theta \, \left[\theta > 0 \wedge \theta < 1\right]"
         + r"\end{aligned}$"

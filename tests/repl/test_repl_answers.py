@@ -109,15 +109,15 @@ def test_parts_of_a_moving_delta(talk):
     data = talk.data("deriv(h)((0.3, 1))")
     assert data["interior"] == pytest.approx(0.09, rel=1e-12) and data["boundary"] == pytest.approx(0.18, rel=1e-12)
     text = talk(":deriv h").text
-    assert "delta(x - t)*x^2*dt       # interior" in text and "-t*x^2*dt*delta'(x - t)   # boundary" in text
+    assert "x²·∂t·δ(x − t) dx   # interior" in text and "−t·x²·∂t·δ′(x − t) dx   # boundary" in text
     assert talk.data(":check h(0.3)")["check"]["agree"]
 
 
 def test_a_second_derivative_in_symbols(talk):
     talk.all(WEIGHTED, "second = deriv(deriv(g))")
-    assert "cos(t)*ddt - dt^2*sin(t)" in talk(":deriv deriv(\\t . sin(t))").text
+    assert "cos(t)·∂∂t − sin(t)·(∂t)²" in talk(":deriv deriv(\\t . sin(t))").text
     for text in (":deriv deriv(g)", ":deriv second"):
-        assert "delta(t - x)" in talk(text).text and "D it = 0" not in talk(text).text
+        assert "δ(t − x)" in talk(text).text and "∂it = 0" not in talk(text).text
     talk("def h(t, u) integral [0, 1] u(x)*[x < t] d(x)")
     assert "no parameter is a function" in talk(":deriv deriv(h)").text
 
@@ -260,7 +260,7 @@ def test_functions_show_their_types(talk):
 
 def test_a_distribution_shows_its_deltas(talk):
     text = talk("deriv(\\t . \\x . [x < t])((0.3, 1))").text
-    assert "Dist[dx]" in text and "tangent     delta(t - x)*(dt - dx)" in text
+    assert "Dist[dx]" in text and "tangent     (dt - dx)*delta(t - x)" in text
 
 
 def test_infinite_values_have_no_error_bar(talk):

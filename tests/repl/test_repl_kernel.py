@@ -82,7 +82,7 @@ def test_a_derivative_in_symbols_is_typeset(client):
     found = [text for text in texts if text]
     assert len(found) == 2
     assert all(
-        r"\delta\left(\theta - x\right) \, \partial \theta" in text and r"\int_{0}^{1}" in text for text in found
+        r"\partial \theta \, \delta\left(\theta - x\right)" in text and r"\int_{0}^{1}" in text for text in found
     )
 
 

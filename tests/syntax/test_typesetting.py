@@ -19,6 +19,7 @@ SHOWN = [
     ("integral ([0, 1], [0, x]) y d(x, y)", "∫[x = 0, 1]∫[y = 0, x] y dx dy"),
     ("sum i in 0..n (a[i]^2)", "∑[i = 0, n] a[i]²"),
     ("2^(a + b)", "2^(a + b)"),
+    ("dt^2*ddr", "(∂t)²·ddr"),
     ("abs(x)/(2*y)", "|x|/(2·y)"),
     ("a/b*c", "a/b·c"),
     ("if [x < t] then 1 else x", "if x < t then 1 else x"),

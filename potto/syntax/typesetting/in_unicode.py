@@ -33,10 +33,11 @@ def _text(box: Box) -> str:
         case Fraction(inline=inline):
             return _text(inline)
         case Raised(base=base, exponent=exponent):
+            below = f"({_text(base)})" if isinstance(base, Row) and base.items[0] == Word("∂", "sign") else _text(base)
             power = _text(exponent)
             if _SMALL.fullmatch(power):
-                return f"{_text(base)}{power.translate(_ABOVE)}"
-            return f"{_text(base)}^{power}" if isinstance(exponent, Word) else f"{_text(base)}^({power})"
+                return f"{below}{power.translate(_ABOVE)}"
+            return f"{below}^{power}" if isinstance(exponent, Word) else f"{below}^({power})"
         case Root(inner=inner):
             text = _text(inner)
             return f"√{text}" if isinstance(inner, Word) else f"√({text})"
