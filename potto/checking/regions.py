@@ -7,6 +7,7 @@ positive side, times its rate: how fast its condition grows as the chosen parame
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 from msgspec import Struct
@@ -14,6 +15,7 @@ from msgspec import Struct
 from potto.calculus.differentiation.boundary_terms import jumps
 from potto.calculus.differentiation.dual import Differentiator
 from potto.calculus.explanation.explain import equation
+from potto.calculus.explanation.plain_names import plainly_named
 from potto.checking.written_out import written_out
 from potto.core.printer import format_term
 from potto.core.simplify import simplify
@@ -25,12 +27,12 @@ from potto.core.terms import (
     children,
     integral,
     postorder,
-    substitute,
-    var,
 )
 from potto.elaborate import core
 from potto.query import Database
 from potto.syntax import nodes
+
+_COPY = re.compile(r"'\d+")  # the mark of a copy of a bound variable
 
 
 class RegionSurface(Struct, frozen=True):
@@ -88,7 +90,7 @@ def _outermost(whole: Term) -> Iterator[Integral]:
 
 
 def _region(node: Integral, params: tuple[str, ...], work: Differentiator, wrt: str) -> Region:
-    node = _plainly_named(node, params)
+    node = plainly_named(node, params)
     names = (*params, *node.variables)
 
     def text(term: Term, over: tuple[str, ...] = names) -> str:
@@ -105,8 +107,9 @@ def _region(node: Integral, params: tuple[str, ...], work: Differentiator, wrt: 
         if item.sums or any(isinstance(inner, App) for inner in postorder(item.surface)):
             continue
         slopes = tuple(along(item.surface, name) for name in node.variables)
-        found.append(RegionSurface(equation(item.surface), text(item.surface), along(item.surface, wrt), slopes,
-                                   text(item.jump)))  # fmt: skip
+        where = _COPY.sub("", equation(simplify(item.surface)))
+        rate = along(item.surface, wrt)
+        found.append(RegionSurface(where, text(item.surface), rate, slopes, text(item.jump)))
     return Region(
         names,
         node.variables,
@@ -117,20 +120,3 @@ def _region(node: Integral, params: tuple[str, ...], work: Differentiator, wrt: 
         text(interior(), params),
         tuple(found),
     )
-
-
-def _plainly_named(node: Integral, params: tuple[str, ...]) -> Integral:
-    """The same integral over variables that a program can write: copies, as `x'1`, are told apart by marks."""
-    taken = {*params, *(name for name in node.variables if "'" not in name)}
-    new: dict[str, str] = {}
-    for name in node.variables:
-        base = name.partition("'")[0]
-        if base != name:
-            while base in taken:
-                base += "_"
-            taken.add(base)
-        new[name] = base
-    terms = {name: var(plain) for name, plain in new.items()}
-    bounds = tuple((substitute(low, terms), substitute(high, terms)) for low, high in node.bounds)
-    found = integral(tuple(new.values()), bounds, substitute(node.body, terms))
-    return found if isinstance(found, Integral) else node

@@ -23,6 +23,7 @@ from potto.core.terms import (
     Term,
     add,
     branch,
+    const,
     mul,
     neg,
     sub,
@@ -34,6 +35,9 @@ class Condition(Struct, frozen=True):
 
     surface: Term
     strict: bool
+
+
+NEVER = Condition(const(-1.0), True)
 
 
 def conditions(term: Term) -> list[Condition] | None:
@@ -114,7 +118,8 @@ def _squared(form: Polynomial, strict: bool) -> list[Condition] | None:
     root = monomial[0][0]
     assert isinstance(root, Prim)
     (inside,) = root.args
-    rest = as_term({m: c / abs(scale) for m, c in form.items() if m != monomial})
+    size = scale if scale > 0 else -scale
+    rest = as_term({m: Fraction(c / size) for m, c in form.items() if m != monomial})
     if rest is None:
         return None
     exists = Condition(inside, False)
@@ -141,7 +146,7 @@ def _without_even(item: Condition, top: Polynomial, below: Polynomial) -> list[C
     ((monomial, scale),), ((under, _),) = top.items(), below.items()
     odd = [a for a, n in (*monomial, *under) if n % 2 and not range_of(a).positive]
     if not odd:
-        return [item]
+        return [] if scale > 0 else [NEVER]
     whole = mul(*odd)
     return [Condition(whole if scale > 0 else neg(whole), item.strict)]
 

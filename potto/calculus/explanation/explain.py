@@ -22,6 +22,7 @@ from potto.calculus.differentiation.level_sets import level_set
 from potto.calculus.explanation.continuity import continuous
 from potto.calculus.explanation.fields import named_fields, parameter_types
 from potto.calculus.explanation.layout import DerivativeText, IntegralText, SurfaceText
+from potto.calculus.explanation.plain_names import plainly_named
 from potto.calculus.explanation.readable import readable
 from potto.calculus.explanation.symbols import NoFormula, Rewrite, Words, over_functions
 from potto.calculus.inlining.expand import Resolve, heads_of
@@ -210,6 +211,9 @@ def _integral(
     def rate(term: Term) -> Term:
         return work.dual(term, inside)[1]
 
+    node = plainly_named(
+        node, (*tangents, *(tangent.name for tangent in tangents.values() if isinstance(tangent, Var)))
+    )
     inside = {n: t for n, t in tangents.items() if n not in node.variables}
     indices = [name for name, _, _ in around]
     names, box = (*node.variables, *indices), box_of(node)

@@ -12,7 +12,7 @@ from fractions import Fraction
 from msgspec import Struct
 
 from potto.calculus.algebra.ranges import range_of
-from potto.calculus.explanation.brackets import Condition, bracket, conditions, fewer
+from potto.calculus.explanation.brackets import NEVER, Condition, bracket, conditions, fewer
 from potto.core.polynomials import number
 from potto.core.printer import format_term
 from potto.core.terms import (
@@ -151,6 +151,8 @@ def written(found: Factors, tangents: frozenset[str]) -> Term:
     if not found.coefficient:
         return ZERO
     found = _tidied(found)
+    if NEVER in found.conditions:
+        return ZERO
     top = sorted((b for b, n in found.powers.items() if n > 0), key=lambda b: (_place(b, tangents), _order(b)))
     below = sorted((b for b, n in found.powers.items() if n < 0), key=_order)
     scale, divisor = _scale(abs(found.coefficient), bool(below))

@@ -158,7 +158,7 @@ class _Work:
         shared = shared_by(list(found.top))
         rest = {without(m, shared): c for m, c in found.top.items()}
         scale = _content(rest)
-        rest = {m: c / scale for m, c in rest.items()}
+        rest = {m: Fraction(c / scale) for m, c in rest.items()}
         below = self._sum(found.below)
         under = ((below, 1),) if found.below != {(): Fraction(1)} else ()
         inner = self._around_tangents(rest)
@@ -172,7 +172,7 @@ class _Work:
         groups: dict[Monomial, dict[Monomial, Fraction]] = {}
         for monomial, c in form.items():
             moving = tuple((a, n) for a, n in monomial if is_tangent(a, self.tangents))
-            groups.setdefault(moving, {})[tuple(p for p in monomial if p not in moving)] = c
+            groups.setdefault(moving, {})[tuple(p for p in monomial if p not in moving)] = Fraction(c)
         parts: list[Term] = []
         for moving, coefficient in groups.items():
             shared = shared_by(list(coefficient))
@@ -183,7 +183,7 @@ class _Work:
         return _added(parts)
 
     def _sum(self, form: Polynomial) -> Term:
-        return _added([self._product(c, (m, 1)) for m, c in form.items()])
+        return _added([self._product(Fraction(c), (m, 1)) for m, c in form.items()])
 
     def _signs(self, node: Prim) -> list[Term]:
         """[u > 0] - [u < 0] as the sign of u."""
