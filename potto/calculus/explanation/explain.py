@@ -211,9 +211,7 @@ def _integral(
     def rate(term: Term) -> Term:
         return work.dual(term, inside)[1]
 
-    node = plainly_named(
-        node, (*tangents, *(tangent.name for tangent in tangents.values() if isinstance(tangent, Var)))
-    )
+    node = plainly_named(node, words.names)
     inside = {n: t for n, t in tangents.items() if n not in node.variables}
     indices = [name for name, _, _ in around]
     names, box = (*node.variables, *indices), box_of(node)
