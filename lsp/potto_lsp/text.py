@@ -19,6 +19,7 @@ from msgspec import Struct
 Encoding = Literal["utf-8", "utf-16", "utf-32"]
 ENCODINGS: tuple[Encoding, ...] = ("utf-8", "utf-16", "utf-32")
 _LINE_END = re.compile(r"\r\n?|\n")
+BLOCK = 256  # lines
 _BEYOND_ASCII, _ASTRAL = "[^\x00-\x7f]", "[\U00010000-\U0010ffff]"  # for `re` to compile where there are any
 
 
@@ -31,6 +32,52 @@ def line_starts(text: str) -> list[int]:
         starts.append(at)
         at = find("\n", at) + 1
     return starts
+
+
+class Lines(Struct, frozen=True):
+    """Where the lines of a text start, in blocks: an edit makes one or two of them anew and moves the others.
+
+    offsets: where each block starts; numbers: of its first line; blocks: the starts of its lines, relative to it.
+    """
+
+    offsets: list[int]
+    numbers: list[int]
+    blocks: list[list[int]]
+    count: int
+
+    def start(self, number: int) -> int:
+        """Where a line starts."""
+        block = bisect_right(self.numbers, number) - 1
+        return self.offsets[block] + self.blocks[block][number - self.numbers[block]]
+
+    def line_of(self, offset: int) -> int:
+        """The line that an offset is in."""
+        block = bisect_right(self.offsets, offset) - 1
+        return self.numbers[block] + bisect_right(self.blocks[block], offset - self.offsets[block]) - 1
+
+    def replaced(self, text: str, start: int, end: int, shift: int) -> Lines:
+        """The lines of `text`, in which something else stands between two offsets of the text before; what follows has
+        moved by `shift`."""
+        # A CR or LF at the border may join or leave the line end before it: begin one line above.
+        first = bisect_right(self.numbers, max(self.line_of(start) - 1, 0)) - 1
+        last = bisect_right(self.offsets, end)
+        stop = self.offsets[last] + shift if last < len(self.offsets) else len(text)
+        begin = self.offsets[first]
+        found = line_starts(text[begin:stop])
+        if last < len(self.offsets):
+            found.pop()  # the end of what was looked at, where the next block starts
+        blocks = [found[at : at + BLOCK] for at in range(0, len(found), BLOCK)]
+        fresh = [[at - block[0] for at in block] for block in blocks]
+        offsets = [*self.offsets[:first], *(begin + block[0] for block in blocks)]
+        offsets += [offset + shift for offset in self.offsets[last:]]
+        all_blocks = [*self.blocks[:first], *fresh, *self.blocks[last:]]
+        *numbers, count = accumulate(map(len, all_blocks), initial=0)
+        return Lines(offsets, numbers, all_blocks, count)
+
+
+def lines_of(text: str) -> Lines:
+    """The lines of a text."""
+    return Lines([0], [0], [[0]], 1).replaced(text, 0, 0, len(text))
 
 
 def units(text: str, encoding: Encoding) -> int:
@@ -61,32 +108,33 @@ class Text(Struct, frozen=True, dict=True):
     encoding: Encoding = "utf-16"
 
     @cached_property
-    def starts(self) -> list[int]:
-        return line_starts(self.text)
+    def lines(self) -> Lines:
+        return lines_of(self.text)
 
     def line(self, number: int) -> str:
         """A line without its end."""
-        starts = self.starts
-        if number + 1 >= len(starts):
-            return self.text[starts[number] :]
-        stop = starts[number + 1] - 1
-        if stop > starts[number] and self.text[stop] == "\n" and self.text[stop - 1] == "\r":
+        lines = self.lines
+        start = lines.start(number)
+        if number + 1 >= lines.count:
+            return self.text[start:]
+        stop = lines.start(number + 1) - 1
+        if stop > start and self.text[stop] == "\n" and self.text[stop - 1] == "\r":
             stop -= 1
-        return self.text[starts[number] : stop]
+        return self.text[start:stop]
 
     def offset(self, line: int, column: int) -> int:
         """The offset of a position."""
-        if line >= len(self.starts):
+        if line >= self.lines.count:
             return len(self.text)
         if line < 0:
             return 0
-        return self.starts[line] + code_points(self.line(line), max(column, 0), self.encoding)
+        return self.lines.start(line) + code_points(self.line(line), max(column, 0), self.encoding)
 
     def position(self, offset: int) -> tuple[int, int]:
         """The line and the column of an offset; one inside of a CRLF is the end of its line."""
         offset = min(max(offset, 0), len(self.text))
-        number = bisect_right(self.starts, offset) - 1
-        start = self.starts[number]
+        number = self.lines.line_of(offset)
+        start = self.lines.start(number)
         if offset > start and self.text[offset - 1] == "\r" and self.text.startswith("\n", offset):
             offset -= 1
         wide, extra = self._wide
@@ -106,17 +154,7 @@ class Text(Struct, frozen=True, dict=True):
     def replaced(self, start: int, end: int, inserted: str) -> Text:
         """The text with another one between two offsets; only the lines nearby are looked at again."""
         start, end = min(start, end), max(start, end)
-        old, starts = self.text, self.starts
-        text = old[:start] + inserted + old[end:]
-        # A CR or LF at the border may join or leave the line end before it: begin one line above, end with the line.
-        first = max(bisect_right(starts, start) - 2, 0)
-        after = bisect_right(starts, end)
-        region_end = (starts[after] if after < len(starts) else len(old)) + len(inserted) - (end - start)
-        found = [match.end() for match in _LINE_END.finditer(text, starts[first], region_end)]
-        if after < len(starts) and found:
-            found.pop()  # the end of the region, which is where line `after` starts
-        shift = len(inserted) - (end - start)
-        tail = [at + shift for at in starts[after:]] if shift else starts[after:]
+        text = self.text[:start] + inserted + self.text[end:]
         new = Text(text, self.encoding)
-        new.__dict__["starts"] = [*starts[: first + 1], *found, *tail]
+        new.__dict__["lines"] = self.lines.replaced(text, start, end, len(inserted) - (end - start))
         return new

@@ -10,8 +10,8 @@ from collections.abc import Iterable
 
 from potto.calculus.checking.diffeo import check_conditions
 from potto.diagnostics import Diagnostic, Related
-from potto.modules import chunk_start, module_diagnostics, names, statements
-from potto.modules.graph import runs
+from potto.modules import chunk_start, module_diagnostics, statements
+from potto.modules.graph import name_runs
 from potto.modules.texts import moved, syntax_diagnostics
 from potto.query import Database, query
 from potto.quick import replace
@@ -26,7 +26,7 @@ def diagnostics(db: Database, file: str) -> tuple[Located, ...]:
     """Everything about a file, in the order of its text. As one memo, so that a file that an edit does not reach costs
     nothing."""
     found = [*syntax_diagnostics(db, file), *module_diagnostics(db, file)]
-    for run in runs(names(db, file)):
+    for run in name_runs(db, file):
         for name, said in run_diagnostics(db, file, run):
             start = chunk_start(db, file, name)
             found += [absolute(db, file, d, start) for d in said]

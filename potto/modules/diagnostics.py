@@ -13,7 +13,17 @@ from potto.modules.builtins import is_builtin
 from potto.modules.import_checks import import_diagnostics, unreadable
 from potto.modules.kinds import DEFINED_TWICE, HIDES_BUILTIN, HIDES_IMPORT, UNREADABLE
 from potto.modules.lookup import bindings
-from potto.modules.texts import Place, Unreadable, content, import_starts, imports, layout, shift
+from potto.modules.texts import (
+    Place,
+    Unreadable,
+    content,
+    defined_twice,
+    import_starts,
+    imports,
+    names,
+    places,
+    shift,
+)
 from potto.query import Database, query
 from potto.source import Span
 
@@ -39,13 +49,11 @@ def _no_text(problem: Unreadable | None, file: str) -> Diagnostic:
 
 def _definitions(db: Database, file: str) -> Iterator[Diagnostic]:
     imported = _imported(db, file)
-    for name, places in layout(db, file).places.items():
-        if len(places) == 1 and name not in imported and not is_builtin(name):
-            continue
-        first = _span(places[0])
-        for place in places[1:]:
+    for name in dict.fromkeys((*defined_twice(db, file), *_hiding(db, file))):
+        first, *others = [_span(place) for place in places(db, file, name)]
+        for other in others:
             yield DEFINED_TWICE(
-                _span(place),
+                other,
                 f"`{name}` is defined twice in this file",
                 label="defined again",
                 related=(Related(first, f"`{name}` is defined here first", owner=""),),
@@ -66,6 +74,13 @@ def _definitions(db: Database, file: str) -> Iterator[Diagnostic]:
                 label="a builtin in other files",
                 help="give it another name",
             )
+
+
+@query
+def _hiding(db: Database, file: str) -> tuple[str, ...]:
+    """The definitions that are called like an import or a builtin."""
+    imported = {name for item in imports(db, file) for name, _ in bindings(item)}
+    return tuple([name for name in names(db, file) if name in imported or is_builtin(name)])
 
 
 def _imported(db: Database, file: str) -> dict[str, Span]:

@@ -154,6 +154,12 @@ def _names_in(db: Database, file: str) -> frozenset[str]:
     return frozenset(names(db, file))
 
 
+@query(cuts=True)
+def name_runs(db: Database, file: str) -> tuple[tuple[str, ...], ...]:
+    """The names of a file in runs."""
+    return tuple(runs(names(db, file)))
+
+
 def runs(names: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
     """Names in runs of a few; where one ends hangs on its names alone, so that a new definition changes one or two.
 

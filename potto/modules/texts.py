@@ -3,21 +3,24 @@
 Inputs: `("file", key)`, the text on disk (None: no such file; an `Unreadable` otherwise), and `("overlay", key)`, the
 text of an open editor, which wins. A key is a normalized absolute path or a pseudo name such as `<In 3>`.
 
-`layout` runs at every edit of its file; what others read are projections of it that stand still: the tables `texts`
-and `starts`, read by entry, so that an edit of one definition is no change to what is read of another, and `outline`.
+A file is read in pieces of some dozens of chunks; an edit changes one or two of them. `layout`, which puts them
+together, runs at every edit of its file; what others read are projections of it that stand still: the table `texts`,
+read by entry, so that an edit of one definition is no change to what is read of another, and `outline`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import accumulate
 from typing import Literal
 
 from potto.diagnostics import Diagnostic
 from potto.modules.free import Reference, references_in
-from potto.query import Database, query
+from potto.query import Database, Parted, query
 from potto.quick import quick, replace, value
 from potto.source import SourceText, Span
 from potto.syntax import Chunk, ParsedChunk, defined_name, nodes, parse_chunk, split
+from potto.syntax import pieces as cut
 
 Importing = nodes.FromImport | nodes.Import
 
@@ -60,6 +63,30 @@ class Place:
     span: Span
 
 
+@value
+class Piece:
+    """Some neighbouring chunks by what they are; all positions are relative to the piece. The last place of a name is
+    that of the chunk in `texts`."""
+
+    text: str
+    chunks: tuple[ChunkRef, ...]
+    texts: Mapping[str, str]
+    places: Mapping[str, tuple[Place, ...]]
+    imports: tuple[ChunkRef, ...]
+    statements: tuple[ChunkRef, ...]
+    definitions: int
+    nameless: bool
+
+
+@value
+class Layout:
+    """A file in pieces, the place where each starts, and the piece that has the definition of a name which counts."""
+
+    pieces: tuple[Piece, ...]
+    starts: tuple[int, ...]
+    place: Mapping[str, int]
+
+
 def is_diffeo(file: str) -> bool:
     """Whether the file's definitions are diffeomorphisms."""
     return file.endswith(".diffeo")
@@ -97,10 +124,23 @@ def exists(db: Database, file: str) -> bool:
 
 
 @query
-def chunks(db: Database, file: str) -> tuple[ChunkRef, ...]:
-    """The chunks of a file, in order, with their absolute starts."""
+def pieces(db: Database, file: str) -> tuple[str, ...]:
+    """The text of a file in pieces, mostly the same ones as before an edit."""
     text = content(db, file)
-    return split(text) if isinstance(text, str) else ()
+    return cut(text, db.former(pieces, (file,)) or ()) if isinstance(text, str) else ()
+
+
+@query
+def chunks(db: Database, file: str) -> tuple[ChunkRef, ...]:
+    """The chunks of a file, in order, with their absolute starts. They move at every edit: what looks at all of a file
+    after each key goes piece by piece instead."""
+    found = layout(db, file)
+    return tuple([at(chunk, start) for piece, start in zip(found.pieces, found.starts) for chunk in piece.chunks])
+
+
+def at(chunk: ChunkRef, start: int) -> ChunkRef:
+    """A chunk of a piece that starts somewhere in a file."""
+    return Chunk(start + chunk.start, chunk.text)
 
 
 @query(keep=512)
@@ -137,18 +177,6 @@ def chunk_references(db: Database, text: str, diffeo: bool) -> tuple[Reference, 
 
 
 @value
-class Layout:
-    """A file cut into chunks by what they are; all positions are absolute. Runs again at every edit."""
-
-    texts: Mapping[str, str]
-    starts: Mapping[str, int]
-    places: Mapping[str, tuple[Place, ...]]
-    imports: tuple[ChunkRef, ...]
-    statements: tuple[ChunkRef, ...]
-    nameless: bool
-
-
-@value
 class Outline:
     """What of a file's layout no body edit and no move changes. `nameless`: a broken chunk might define anything."""
 
@@ -157,20 +185,21 @@ class Outline:
     nameless: bool
 
 
-@query
-def layout(db: Database, file: str) -> Layout:
-    """The chunks of a file by kind and by name. Read the projections below instead, they stand still."""
-    diffeo, nameless = is_diffeo(file), False
+@query(keep=512)
+def piece(db: Database, text: str, diffeo: bool) -> Piece:
+    """What a piece of a file holds."""
+    definitions, nameless = 0, False
     texts: dict[str, str] = {}
-    starts: dict[str, int] = {}
     places: dict[str, tuple[Place, ...]] = {}
     imports: list[ChunkRef] = []
     statements: list[ChunkRef] = []
-    for chunk in chunks(db, file):
+    found = split(text)
+    for chunk in found:
         described = head(db, chunk.text, diffeo)
         if described.name is not None and described.name_span is not None:
             name = described.name
-            texts[name], starts[name] = chunk.text, chunk.start
+            texts[name] = chunk.text
+            definitions += 1
             places[name] = (*places.get(name, ()), Place(chunk.start, described.name_span))
         elif described.kind == "import":
             imports.append(chunk)
@@ -178,26 +207,34 @@ def layout(db: Database, file: str) -> Layout:
             statements.append(chunk)
         elif described.kind == "broken":
             nameless = True
-    return Layout(texts, starts, places, tuple(imports), tuple(statements), nameless)
-
-
-@query(travels=True)
-def texts(db: Database, file: str) -> Mapping[str, str]:
-    """The chunk that defines each name; a table, to be read by entry."""
-    return layout(db, file).texts
+    return Piece(text, found, texts, places, tuple(imports), tuple(statements), definitions, nameless)
 
 
 @query
-def starts(db: Database, file: str) -> Mapping[str, int]:
-    """The start of the chunk that defines each name; a table, to be read by entry."""
-    return layout(db, file).starts
+def layout(db: Database, file: str) -> Layout:
+    """What is where in a file. Read the projections below instead, they stand still."""
+    diffeo = is_diffeo(file)
+    found = tuple([piece(db, text, diffeo) for text in pieces(db, file)])
+    place: dict[str, int] = {}
+    for number, one in enumerate(found):
+        place.update(dict.fromkeys(one.texts, number))
+    starts = accumulate([len(one.text) for one in found[:-1]], initial=0) if found else ()
+    return Layout(found, tuple(starts), place)
+
+
+@query(travels=True)
+def texts(db: Database, file: str) -> Parted:
+    """The chunk that defines each name; a table, to be read by entry."""
+    found = layout(db, file)
+    return Parted(tuple([one.texts for one in found.pieces]), found.place)
 
 
 @query(travels=True, cuts=True)
 def outline(db: Database, file: str) -> Outline:
     """What a file defines and imports, without places."""
     found = layout(db, file)
-    return Outline(tuple(found.texts), tuple(chunk.text for chunk in found.imports), found.nameless)
+    importing = tuple([chunk.text for piece in found.pieces for chunk in piece.imports])
+    return Outline(tuple(found.place), importing, any([piece.nameless for piece in found.pieces]))
 
 
 @query(travels=True)
@@ -208,12 +245,36 @@ def names(db: Database, file: str) -> tuple[str, ...]:
 
 def chunk_text(db: Database, file: str, name: str) -> str | None:
     """The text of the chunk that defines `name`; the last one if there are several."""
-    return db.entry(texts, (file,), name)
+    found: str | None = db.entry(texts, (file,), name)
+    return found
 
 
 def chunk_start(db: Database, file: str, name: str) -> int:
     """Where the chunk that defines `name` starts. Whoever shows spans adds it; no memoized value should read it."""
-    return db.entry(starts, (file,), name) or 0
+    found = layout(db, file)
+    place = found.place.get(name)
+    return 0 if place is None else found.starts[place] + found.pieces[place].places[name][-1].start
+
+
+def places(db: Database, file: str, name: str) -> tuple[Place, ...]:
+    """Where a name is defined in a file, each time; absolute."""
+    found = layout(db, file)
+    return tuple(
+        [
+            Place(start + place.start, place.span)
+            for piece, start in zip(found.pieces, found.starts)
+            for place in piece.places.get(name, ())
+        ]
+    )
+
+
+def defined_twice(db: Database, file: str) -> tuple[str, ...]:
+    """The names that a file defines more than once, in order."""
+    found = layout(db, file)
+    defined = sum([piece.definitions for piece in found.pieces])
+    return () if defined == len(found.place) else tuple([n for n in found.place if len(places(db, file, n)) > 1])
+
+
 
 
 @query
@@ -256,10 +317,12 @@ def _starred(annotation: nodes.TypeExpr) -> nodes.TypeExpr:
 def statements(db: Database, file: str) -> tuple[StatementRef, ...]:
     """The top-level statements of a script, in order."""
     found: list[StatementRef] = []
-    for chunk in layout(db, file).statements:
-        item = parsed(db, chunk.text, is_diffeo(file)).item
-        if isinstance(item, (nodes.Print, nodes.For, nodes.ExpressionStatement)):
-            found.append(StatementRef(chunk.start, item))
+    whole = layout(db, file)
+    for piece, start in zip(whole.pieces, whole.starts):
+        for chunk in piece.statements:
+            item = parsed(db, chunk.text, is_diffeo(file)).item
+            if isinstance(item, (nodes.Print, nodes.For, nodes.ExpressionStatement)):
+                found.append(StatementRef(start + chunk.start, item))
     return tuple(found)
 
 
@@ -272,17 +335,29 @@ def imports(db: Database, file: str) -> tuple[Importing, ...]:
 
 def import_starts(db: Database, file: str) -> tuple[int, ...]:
     """Where the chunks of `imports` start."""
-    return tuple(chunk.start for chunk in layout(db, file).imports)
+    found = layout(db, file)
+    return tuple([start + one.start for piece, start in zip(found.pieces, found.starts) for one in piece.imports])
 
 
 @query(travels=True)
 def syntax_diagnostics(db: Database, file: str) -> tuple[Diagnostic, ...]:
     """What the parser has to say about a file, with absolute spans."""
-    diffeo = is_diffeo(file)
+    diffeo, start, found = is_diffeo(file), 0, list[Diagnostic]()
+    for text in pieces(db, file):
+        found += [shift(diagnostic, start) for diagnostic in _piece_diagnostics(db, text, diffeo)]
+        start += len(text)
+    return tuple(found)
+
+
+@query(keep=512)
+def _piece_diagnostics(db: Database, text: str, diffeo: bool) -> tuple[Diagnostic, ...]:
+    """What it has to say about a piece, relative to it."""
     return tuple(
-        shift(diagnostic, chunk.start)
-        for chunk in chunks(db, file)
-        for diagnostic in parsed(db, chunk.text, diffeo).diagnostics
+        [
+            shift(diagnostic, chunk.start, None)
+            for chunk in piece(db, text, diffeo).chunks
+            for diagnostic in parsed(db, chunk.text, diffeo).diagnostics
+        ]
     )
 
 
@@ -292,13 +367,16 @@ def moved(diagnostic: Diagnostic, start: int) -> Diagnostic:
     return replace(diagnostic, span=diagnostic.span.shift(start), suggestions=suggestions)
 
 
-def shift(diagnostic: Diagnostic, start: int) -> Diagnostic:
-    """A diagnostic of a chunk with absolute spans. Related places in other chunks are left to who knows them."""
+def shift(diagnostic: Diagnostic, start: int, owner: str | None = "") -> Diagnostic:
+    """A diagnostic of a chunk with absolute spans; with no `owner`, of a piece, with spans relative to that. Related
+    places in other chunks are left to who knows them."""
     related = tuple(
-        replace(place, span=place.span.shift(start), owner="") if place.file is None and place.owner is None else place
+        replace(place, span=place.span.shift(start), owner=owner)
+        if place.file is None and place.owner is None
+        else place
         for place in diagnostic.related
     )
     return replace(moved(diagnostic, start), related=related)
 
 
-quick(Head, Place, Unreadable, StatementRef, Layout, Outline)
+quick(Head, Place, Piece, Unreadable, StatementRef, Layout, Outline)

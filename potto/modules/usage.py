@@ -10,7 +10,7 @@ import re
 
 from potto.modules.free import Reference, references_in
 from potto.modules.lookup import bindings
-from potto.modules.texts import chunk_references, chunks, imports, is_diffeo, layout, parsed
+from potto.modules.texts import chunk_references, imports, is_diffeo, layout, parsed, piece, pieces
 from potto.modules.workspace import is_reexported
 from potto.query import Database, query
 from potto.syntax import live_expressions, parse_expression
@@ -32,12 +32,17 @@ def used_imports(db: Database, file: str) -> frozenset[str]:
     """The imported names that occur in a file, also as the module in front of a member."""
     imported = {name for item in imports(db, file) for name, _ in bindings(item)}
     found: set[str] = set()
-    for chunk in chunks(db, file):
+    for text in pieces(db, file):
         if len(found) == len(imported):
             break
-        occurring = occurring_names(db, chunk.text, is_diffeo(file))
-        found.update(name for name in imported if name in occurring)
+        found |= imported & occurring_in_piece(db, text, is_diffeo(file))
     return frozenset(found)
+
+
+@query(keep=512)
+def occurring_in_piece(db: Database, text: str, diffeo: bool) -> frozenset[str]:
+    """The same as `occurring_names`, of all chunks of a piece."""
+    return frozenset().union(*[occurring_names(db, chunk.text, diffeo) for chunk in piece(db, text, diffeo).chunks])
 
 
 @query(keep=2048)
@@ -69,5 +74,4 @@ def _heads(path: str) -> list[str]:
 
 
 def _has_content(db: Database, file: str) -> bool:
-    found = layout(db, file)
-    return bool(found.texts or found.statements or found.nameless)
+    return any(piece.texts or piece.statements or piece.nameless for piece in layout(db, file).pieces)

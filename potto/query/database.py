@@ -8,7 +8,7 @@ from threading import get_ident
 from typing import Any, TypeVar, cast
 
 from potto.query.engine import Engine, drop
-from potto.query.nodes import FOREVER, MISSING, Cancelled, Event, Input, Memo, Node, Query, entry_of, same
+from potto.query.nodes import FOREVER, GONE, MISSING, Cancelled, Event, Input, Memo, Node, Parted, Query, entry_of, same
 
 K = TypeVar("K")
 V = TypeVar("V")
@@ -127,7 +127,7 @@ class Database(Engine):
 
     # Reading
 
-    def entry(self, table: Callable[..., Mapping[K, V]], args: tuple[Hashable, ...], key: K) -> V | None:
+    def entry(self, table: Callable[..., Mapping[K, V] | Parted], args: tuple[Hashable, ...], key: K) -> V | None:
         """What the mapping `table(db, *args)` has under `key`, reading (and depending on) that alone."""
         if self._owner != get_ident():
             with self.evaluating():
@@ -140,6 +140,13 @@ class Database(Engine):
         if self._frame is not None:
             self._frame[node] = None
         return cast("V | None", node.value)
+
+    def former(self, table: Callable[..., V], args: tuple[Hashable, ...]) -> V | None:
+        """The last answer of a query, current or not; None if there is none. Not noted as read: what is made of it must
+        mean the same without it."""
+        query: Query = table.query  # type: ignore[attr-defined]
+        memo = self._memos[query].get(args)
+        return None if memo is None or memo.value is GONE else cast("V", memo.value)
 
     def _demand_unread(self, query: Query, args: tuple[Hashable, ...]) -> Memo:
         """The memo of a query, up to date, without noting that it was read, unless it fails."""

@@ -11,7 +11,7 @@ import os
 import sys
 import threading
 from collections import defaultdict
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Container, Hashable
 from itertools import chain
 from threading import get_ident
 from typing import Any, Final, Literal
@@ -354,14 +354,23 @@ def leaves_of(deps: tuple[Node, ...]) -> tuple[Leaf, ...] | None:
             others.append(dep.leaves)
             if len(dep.leaves) > len(widest):
                 widest = dep.leaves
-    if len(others) <= 1 and all(dep in widest for dep in own):
+    if len(others) <= 1 and all([dep in widest or _is_covered(dep, widest) for dep in own]):
         return widest
-    count = len(set(own).union(*others))
-    if count > LEAVES:
+    union = set(own).union(*others)
+    if len(union) > LEAVES:
         return None
-    if count == len(widest):
+    if len(union) == len(widest):
         return widest  # most chains are straight: they share one
-    return tuple(dict.fromkeys(chain(*others, own)))  # in the order of reading: in a set's they are verified at random
+    found = dict.fromkeys(chain(*others, own))  # in the order of reading: in a set's they are verified at random
+    return tuple([leaf for leaf in found if not _is_covered(leaf, union)])
+
+
+def _is_covered(leaf: Leaf, others: Container[Leaf]) -> bool:
+    """Whether a memo that cuts edits off hangs on one of the others alone, which says all that it could say: if that
+    has not changed it has not either, and if that has there is no more to ask."""
+    if not isinstance(leaf, Memo) or leaf.leaves is None or len(leaf.leaves) != 1 or leaf.durability:
+        return False
+    return leaf.leaves[0] in others
 
 
 def drop(table: dict[tuple[Hashable, ...], Memo], memos: list[Memo]) -> int:

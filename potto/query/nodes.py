@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from typing import Any, Final, Literal
 
 from potto.quick import quick, value
@@ -29,6 +29,26 @@ class Event:
     kind: Literal["executed", "reused", "input"]
     query: str
     args: tuple[Hashable, ...]
+
+
+@value
+class Parted:
+    """A table made of parts, for the answer of a query that runs at every edit: parts that it has in common with the
+    answer before are not looked at. `place` has the part that counts for each key."""
+
+    parts: tuple[Mapping[Any, Any], ...]
+    place: Mapping[Any, int]
+
+    def get(self, key: Any) -> Any:
+        """What is under a key, or None."""
+        place = self.place.get(key)
+        return None if place is None else self.parts[place][key]
+
+    def may_differ(self, old: Parted) -> set[Any]:
+        """The keys under which it may have something else than another table."""
+        here, there = set(map(id, self.parts)), set(map(id, old.parts))
+        own = [part for part in self.parts if id(part) not in there]
+        return {key for part in (*own, *(part for part in old.parts if id(part) not in here)) for key in part}
 
 
 class Query:
@@ -99,9 +119,13 @@ class Memo:
         """Give it a value. An equal one is no change, and the old object stays."""
         if self.value is not GONE and same(self.value, value):
             return
+        old, entries = self.value, self.entries or {}
         self.value, self.changed_at = value, revision
-        for key, entry in (self.entries or {}).items():
-            new = value.get(key)
+        changed: Iterable[Any] = entries
+        if isinstance(value, Parted) and isinstance(old, Parted):
+            changed = value.may_differ(old) & entries.keys()
+        for key in changed:
+            entry, new = entries[key], value.get(key)
             if not same(entry.value, new):
                 entry.value, entry.changed_at = new, revision
 
@@ -156,4 +180,4 @@ def short(value: object) -> str:
     return text if len(text) <= 60 else f"{text[:40]}...{text[-16:]}"
 
 
-quick(Event)
+quick(Event, Parted)

@@ -4,7 +4,7 @@ Owns the grammar, chunks, parsing with repair, printing and formatting. Knows no
 of lark.
 """
 
-from potto.syntax.chunks import Chunk, split
+from potto.syntax.chunks import Chunk, pieces, split
 from potto.syntax.dump import dump_tree
 from potto.syntax.formatter import format_source
 from potto.syntax.live import Live, live_expressions
@@ -35,6 +35,7 @@ __all__ = [
     "print_expression",
     "print_item",
     "print_type",
+    "pieces",
     "split",
     "tokenize",
     "walk",

@@ -1,16 +1,20 @@
 """A file cut into chunks: one for each top-level definition or statement.
 
-Owns `Chunk` and `split`. A chunk starts at each line with code in its first column, also while a bracket is open that
+Owns `Chunk`, `split` and `pieces`. A chunk starts at each line with code in its first column, also while a bracket is open that
 nothing closes before the next definition: so that a stray bracket can't swallow it. Some things go with the chunk above
 or below: a line that starts with a closing bracket, which can start nothing, the lines within brackets that are closed,
 and the body of a `let` whose `in` ends the line before belong to the chunk above them; comment lines directly above a
 definition belong to the definition. Other comments in the first column are chunks of their own, unless an indented line
 follows.
+
+A piece is some neighbouring chunks. It begins where one begins whatever stands above it, at a definition, so that each
+can be split by itself: after an edit all but one are what they were.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 from potto.quick import quick, value
 from potto.syntax.tokens import FIRST_NAME, normalized
@@ -26,8 +30,11 @@ _ITEM = re.compile(
 """The start of a line in the first column that is no part of an expression."""
 _LET, _IN = re.compile(r"\blet\b"), re.compile(r"(?<![\w.])in\Z")
 _INDENTED = re.compile(r"\n[^\S\n]+[^\s]")
+_PIECE = re.compile(rf"\n((?:#.*\n)*)(?={_ITEM.pattern})")
+"""The line's end before a piece, and the comment lines that belong to its first definition."""
 
-MOST_WASTED = 200_000
+MOST_IN_VAIN = 100  # searches for closing brackets that end at the same item, which none of them reaches
+PIECE = 4_000  # characters, beyond which the next piece begins as soon as it can
 
 
 @value
@@ -36,6 +43,56 @@ class Chunk:
 
     start: int
     text: str
+
+
+def pieces(text: str, former: Sequence[str] = ()) -> tuple[str, ...]:
+    """A file in pieces. Those of `former`, of an earlier text, that it begins and ends with are taken over; where it is
+    cut depends on them, what the chunks in the pieces are does not."""
+    lines, first, start = normalized(text), 0, 0
+    while first < len(former) and text.startswith(former[first], start):
+        start += len(former[first])
+        first += 1
+    last, end = len(former), len(text)
+    while last > first and end - len(former[last - 1]) >= start and text.endswith(former[last - 1], start, end):
+        last -= 1
+        end -= len(former[last])
+    while first and (start == len(text) or not _begins(lines, start)):  # what was edited belongs to what is above it
+        first -= 1
+        start -= len(former[first])
+    while last < len(former) and (end - start < PIECE // 2 or not _begins(lines, end)):
+        end += len(former[last])
+        last += 1
+    return (*former[:first], *_cut(text, start, end), *former[last:])
+
+
+def _begins(lines: str, at: int) -> bool:
+    """Whether a piece can begin at a place. The comment lines directly above it would be part of it."""
+    if not at:
+        return True
+    above = lines.rfind("\n", 0, at - 1) + 1
+    if lines[at - 1] != "\n" or lines[above:at].lstrip("\f").startswith("#"):
+        return False
+    while lines.startswith("#", at):
+        at = lines.find("\n", at) + 1
+        if not at:
+            return False
+    return _ITEM.match(lines, at) is not None
+
+
+def _cut(text: str, start: int, end: int) -> list[str]:
+    """What stands between two places, in pieces."""
+    found: list[str] = []
+    lines, at = normalized(text[start:end]), 0
+    after = _PIECE.search(lines, PIECE)
+    while after is not None:
+        begin, next = after.start(1), after.end()
+        if begin > at and _begins(lines, begin):
+            found.append(text[start + at : start + begin])
+            at, next = begin, begin + PIECE
+        after = _PIECE.search(lines, next)
+    if start + at < end:
+        found.append(text[start + at : end])
+    return found
 
 
 def split(text: str) -> tuple[Chunk, ...]:
@@ -98,20 +155,24 @@ def _is_body(text: str, chunk: int, end: int, line: int) -> bool:
 
 
 class _Lookahead:
-    """Finds what goes on with the chunk above it. What it reads in vain is bounded, so that a file of nothing but
-    opening brackets costs no more than its length."""
+    """Finds what goes on with the chunk above it. How often it reads the same in vain is bounded, so that a file of
+    nothing but opening brackets costs no more than its length."""
 
     def __init__(self, text: str) -> None:
         self.text = text
         self.lets = "let" in text
-        self.wasted = 0
+        self.in_vain, self.seen = 0, 0  # searches in vain, and up to where the last one went
 
     def goes_on(self, start: int, end: int, line: int) -> int:
         """Up to where goes on what a chunk has begun that ends above a line; 0 if that is complete, as mostly."""
         above = self.text[start:line]
         if self.lets and "let" in above and _is_body(self.text, start, end, line):
             return line
-        if above.count("(") + above.count("[") <= above.count(")") + above.count("]") or self.wasted > MOST_WASTED:
+        if above.count("(") + above.count("[") <= above.count(")") + above.count("]"):
+            return 0
+        if line >= self.seen:
+            self.in_vain = 0
+        elif self.in_vain >= MOST_IN_VAIN:
             return 0
         return self.closes(start, line)
 
@@ -128,7 +189,7 @@ class _Lookahead:
                     return at
             elif char == "\n" and at >= line and (depth <= 0 or _ITEM.match(text, at)):
                 break
-        self.wasted += at - start
+        self.in_vain, self.seen = self.in_vain + 1, at
         return 0
 
 

@@ -88,7 +88,7 @@ def put(session: Session, text: str, version: int = 1) -> Text:
 
 
 def ask(session: Session, method: str, text: Text) -> Any:
-    whole = {"start": {"line": 0, "character": 0}, "end": {"line": len(text.starts), "character": 0}}
+    whole = {"start": {"line": 0, "character": 0}, "end": {"line": text.lines.count, "character": 0}}
     line, column = text.position(text.text.index("f") if "f" in text.text else 0)
     place = {"line": line, "character": column}
     params = {

@@ -56,7 +56,8 @@ def check_edits(seed: int, edits: int) -> None:
         text = text.replaced(start, end, inserted)
         expected = expected[:start] + inserted + expected[end:]
         assert text.text == expected
-        assert text.starts == line_starts(expected), (expected, text.starts)
+        starts = [text.lines.start(number) for number in range(text.lines.count)]
+        assert starts == line_starts(expected), (expected, starts)
         offset = rng.randrange(len(expected) + 1)
         line, column = text.position(offset)
         back = reference_offset(expected, line, column, encoding)

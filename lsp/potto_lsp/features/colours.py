@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from bisect import bisect_right
 from collections.abc import Iterable
 from typing import Any
 
@@ -73,8 +72,8 @@ def _whole(ask: Ask) -> list[int]:
     found: list[int] = []
     before, text = 0, ask.text
     for chunk in all_chunks(ask.db, ask.file):
-        name, line = owner(ask.db, chunk), bisect_right(text.starts, chunk.start) - 1
-        if text.starts[line] != chunk.start:  # behind a byte order mark, or blanks
+        name, line = owner(ask.db, chunk), text.lines.line_of(chunk.start)
+        if text.lines.start(line) != chunk.start:  # behind a byte order mark, or blanks
             words = loose_words(ask.db, ask.file, chunk.text)
             (last, numbers), line = _numbers(text, words, chunk.start), 0
         elif name is None:

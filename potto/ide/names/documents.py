@@ -7,7 +7,7 @@ from typing import Literal
 from potto.ide.names.index import call_head
 from potto.ide.names.symbols import home
 from potto.modules import chunk_text, chunks, is_diffeo, parsed
-from potto.modules.texts import layout
+from potto.modules.texts import piece, pieces
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import ParsedChunk, nodes
@@ -87,8 +87,16 @@ def chunk_kind(db: Database, text: str, diffeo: bool) -> Kind:
 @query
 def written_kinds(db: Database, file: str) -> tuple[tuple[str, Kind], ...]:
     """The definitions of a file with their kinds. Runs at every edit: what it asks of a text stands for ever."""
-    diffeo = is_diffeo(file)
-    return tuple((name, chunk_kind(db, text, diffeo)) for name, text in layout(db, file).texts.items())
+    found: dict[str, Kind] = {}
+    for text in pieces(db, file):
+        found.update(_piece_kinds(db, text, is_diffeo(file)))
+    return tuple(found.items())
+
+
+@query(keep=512)
+def _piece_kinds(db: Database, text: str, diffeo: bool) -> tuple[tuple[str, Kind], ...]:
+    """Those of a piece."""
+    return tuple((name, chunk_kind(db, chunk, diffeo)) for name, chunk in piece(db, text, diffeo).texts.items())
 
 
 @query
