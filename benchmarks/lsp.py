@@ -1,8 +1,11 @@
 """The language server against its goals: a real client over standard streams, 200 modules, 42,000 lines.
 
-Run: `python benchmarks/lsp.py [--json] [--quick]`. Times are of the wall clock between a message sent and the answer
-read; on a busy machine they are those of the machine, so the load is shown before and after, and beside the times how
-much of a processor the server has used for one such thing, in the mean.
+Run: `python benchmarks/lsp.py [--json] [--quick] [--peers FOLDER] [--plot FILE]`. Times are of the wall clock between a
+message sent and the answer read; on a busy machine they are those of the machine, so the load is shown before and
+after, and beside the times how much of a processor the server has used for one such thing, in the mean.
+
+Then files of 100 to 20,000 lines (`lsp_whole`), drawn with `--plot`; and with `--peers`, type checkers of Python from a
+folder of programs (`lsp_peers`).
 """
 
 from __future__ import annotations
@@ -12,120 +15,20 @@ import json
 import os
 import random
 import statistics
-import subprocess
 import sys
 import tempfile
-import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from queue import Empty, SimpleQueue
 from typing import Any
 
 from installed import as_installed, front_end
+from lsp_client import PUSHED, Client
+from lsp_peers import COLUMNS, compare
+from lsp_typing import type_like_a_person
+from lsp_whole import drawn, sizes_measured, table
 from lsp_workspace import workspace
 
-PUSHED = "textDocument/publishDiagnostics"
 Row = tuple[str, str, float, str, float, float]  # gate, what, value, unit, goal, stretch
-
-
-class Client:
-    """A raw client; everything that arrives is kept with the time of its arrival."""
-
-    def __init__(self, folder: Path) -> None:
-        self.started = time.perf_counter()
-        pipe = subprocess.PIPE
-        self.process = subprocess.Popen([sys.executable, "-P", "-m", "potto", "lsp"], stdin=pipe, stdout=pipe)
-        self.inbox: SimpleQueue[tuple[float, dict[str, Any]]] = SimpleQueue()
-        threading.Thread(target=self._read, daemon=True).start()
-        self.folder, self._last, self.versions = folder, 0, dict[str, int]()
-        folders = [{"uri": folder.as_uri(), "name": "bench"}]
-        id = self.begin(
-            "initialize", {"capabilities": {"window": {"workDoneProgress": True}}, "workspaceFolders": folders}
-        )
-        self.greeted = self.until(lambda m: m.get("id") == id)[0] - self.started
-        self.tell("initialized", {})
-
-    def send(self, message: dict[str, Any]) -> float:
-        body = json.dumps({"jsonrpc": "2.0", **message}).encode()
-        assert self.process.stdin is not None
-        sent = time.perf_counter()
-        self.process.stdin.write(b"Content-Length: %d\r\n\r\n%b" % (len(body), body))
-        self.process.stdin.flush()
-        return sent
-
-    def tell(self, method: str, params: Any) -> float:
-        return self.send({"method": method, "params": params})
-
-    def begin(self, method: str, params: Any) -> int:
-        self._last += 1
-        self.send({"id": self._last, "method": method, "params": params})
-        return self._last
-
-    def ask(self, method: str, params: Any) -> tuple[float, dict[str, Any]]:
-        """Seconds to the answer, and the answer."""
-        sent = time.perf_counter()
-        id = self.begin(method, params)
-        arrived, message = self.until(lambda m: m.get("id") == id and "method" not in m)
-        return arrived - sent, message
-
-    def until(self, wanted: Callable[[dict[str, Any]], bool], seconds: float = 120) -> tuple[float, dict[str, Any]]:
-        end = time.perf_counter() + seconds
-        while True:
-            arrived, message = self.inbox.get(timeout=max(end - time.perf_counter(), 0.01))
-            if wanted(message):
-                return arrived, message
-
-    def quiet(self, seconds: float = 0.3) -> float:
-        """Wait until nothing has come for so long; when the last thing came."""
-        last = time.perf_counter()
-        while True:
-            try:
-                last, _ = self.inbox.get(timeout=seconds)
-            except Empty:
-                return last
-
-    def uri(self, module: str) -> str:
-        return (self.folder / f"{module}.po").as_uri()
-
-    def open(self, module: str, text: str) -> float:
-        self.versions[module] = 1
-        item = {"uri": self.uri(module), "languageId": "potto", "version": 1, "text": text}
-        return self.tell("textDocument/didOpen", {"textDocument": item})
-
-    def change(self, module: str, *changes: dict[str, Any]) -> float:
-        self.versions[module] += 1
-        document = {"uri": self.uri(module), "version": self.versions[module]}
-        return self.tell("textDocument/didChange", {"textDocument": document, "contentChanges": list(changes)})
-
-    def diagnosed(self, module: str) -> float:
-        """When the diagnostics of the present version came."""
-        uri, version = self.uri(module), self.versions[module]
-        return self.until(lambda m: m.get("method") == PUSHED and m["params"]["uri"] == uri
-                          and m["params"].get("version") == version)[0]  # fmt: skip
-
-    def memory(self) -> float:
-        """The resident memory in MB, as Linux tells it."""
-        status = Path(f"/proc/{self.process.pid}/status").read_text()
-        return int(status.partition("VmRSS:")[2].split()[0]) / 1024
-
-    def processor(self, helpers: bool = False) -> float:
-        """The seconds of processor time that the server has used so far, or its helpers that have ended, as Linux tells
-        it."""
-        stat = Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()
-        first = 13 if helpers else 11
-        return (int(stat[first]) + int(stat[first + 1])) / os.sysconf("SC_CLK_TCK")
-
-    def _read(self) -> None:
-        stream = self.process.stdout
-        assert stream is not None
-        while line := stream.readline():
-            stream.readline()
-            body = stream.read(int(line.split(b":")[1]))
-            message = json.loads(body)
-            self.inbox.put((time.perf_counter(), message))
-            if "method" in message and "id" in message:
-                self.send({"id": message["id"], "result": None})
 
 
 def replace(line: int, start: int, end: int, text: str) -> dict[str, Any]:
@@ -151,9 +54,10 @@ def measure(folder: Path, texts: dict[str, str], rounds: int) -> Iterator[Row]:
     yield "", "- processor time", used * 1e3, "ms", 700, 450
     yield "G9", "whole workspace checked cold", checked(client), "s", 2.5, 1.2
     yield "", "- processor time of the server", client.processor(), "s", 2.5, 1.2
-    yield "", "- processor time of its helpers, each on a processor of its own", client.processor(True), "s", 2.5, 1.2
+    yield "", "- processor time of its helpers, each on a processor of its own", client.ended(), "s", 2.5, 1.2
     yield "G10", "memory then", client.memory(), "MB", 120, 90
     yield from typing(client, large, rounds)
+    yield from by_a_person(client, large, max(rounds // 10, 2))
     yield from signatures(client, texts, rounds)
     yield from questions(client, large, rounds)
     yield "G10", "memory with the whole workspace checked, and after all this", client.memory(), "MB", 120, 90
@@ -200,6 +104,24 @@ def typing(client: Client, large: str, rounds: int) -> Iterator[Row]:
     yield "", "- processor time of one, mean, with all that follows in idle time", used * 1e3, "ms", 5, 2.5
     yield "G2", "the same while the text is broken, p95", quantile(broken, 0.95), "ms", 5, 2.5
     yield "G2", "the same with a line inserted at the top, p95", quantile(top, 0.95), "ms", 5, 2.5
+
+
+def by_a_person(client: Client, large: str, rounds: int) -> Iterator[Row]:
+    client.quiet()
+    used = client.processor()
+    told, answered = type_like_a_person(client, "large", large, rounds)
+    used = (client.processor() - used) / len(told)
+    yield (
+        "G1",
+        "a person types, errors made and mended: to diagnostics, median",
+        statistics.median(told) * 1e3,
+        "ms",
+        5,
+        2.5,
+    )
+    yield "G1", "- p95", quantile(told, 0.95), "ms", 5, 2.5
+    yield "", "- to the last answer of what VS Code asks then, median", statistics.median(answered) * 1e3, "ms", 50, 16
+    yield "", "- processor time of a key, mean, with all of that and idle time", used * 1e3, "ms", 50, 16
 
 
 def signatures(client: Client, texts: dict[str, str], rounds: int) -> Iterator[Row]:
@@ -282,6 +204,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--json", action="store_true", help="one object a row instead of a table")
     parser.add_argument("--quick", action="store_true", help="fewer rounds")
+    parser.add_argument(
+        "--peers", type=Path, metavar="FOLDER", help="where the programs of type checkers of Python are"
+    )
+    parser.add_argument("--plot", type=Path, metavar="FILE", help="draw what a key costs against the lines of the file")
     arguments = parser.parse_args()
     texts = workspace()
     with tempfile.TemporaryDirectory(prefix="potto-bench-") as name, tempfile.TemporaryDirectory() as cache:
@@ -295,6 +221,15 @@ def main() -> None:
         print(f"load {os.getloadavg()[0]:.1f} of {os.cpu_count()} processors", file=sys.stderr)
         for row in measure(Path(name), texts, 20 if arguments.quick else 200):
             show(row, arguments.json)
+        if not arguments.json:
+            rows = sizes_measured()
+            print(table(rows))
+            if arguments.plot is not None:
+                drawn(rows, arguments.plot)
+        if arguments.peers is not None:
+            print(f"{'ms, MB':<14}" + "".join(f"{column:>12}" for column in COLUMNS))
+            for server, found in compare(Path(name), texts, arguments.peers, 3 if arguments.quick else 10):
+                print(f"{server:<14}" + "".join(f"{value:12.1f}" for value in found), flush=True)
         print(f"load {os.getloadavg()[0]:.1f}", file=sys.stderr)
 
 

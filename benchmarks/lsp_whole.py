@@ -1,8 +1,7 @@
-"""What editors ask about whole files, at 250, 1,000 and 5,000 definitions: cold, and after a key.
+"""What a key costs in files of 100 to 20,000 lines, and what editors ask about whole files: cold, and after a key.
 
-Run: `python benchmarks/lsp_whole.py [SIZE ...]`. Milliseconds of processor time of the server, for a request by itself;
-and, for a key after which all are asked at once, as editors do, the time of the wall clock until diagnostics came and
-until the last answer did. All should grow as the file does.
+Run: `python benchmarks/lsp_whole.py [LINES ...]`. Milliseconds of processor time of the server, which other work on the
+machine lengthens by half and not tenfold. Cold it should grow as the file does, and after a key hardly at all.
 """
 
 from __future__ import annotations
@@ -12,102 +11,122 @@ import os
 import statistics
 import sys
 import tempfile
-import time
 from pathlib import Path
 from typing import Any
 
 from installed import as_installed
+from lsp_client import Client
+from lsp_typing import place_of
 from lsp_workspace import definition
 
-from lsp import Client, replace
-
-KEYS = 5
+SIZES = (100, 1_000, 2_000, 20_000)
+KEYS = 9
 METHODS = (
     "codeLens", "semanticTokens/full", "documentSymbol", "inlayHint", "foldingRange", "documentLink", "formatting",
 )  # fmt: skip
+Rows = dict[str, dict[int, float]]  # ms of each thing by lines
 
 
-def program(definitions: int) -> str:
-    """Every tenth definition is looked at by a live expression."""
+def program(lines: int) -> str:
+    """A file of so many lines; every tenth definition is looked at by a live expression."""
     written: list[str] = []
-    for number in range(definitions):
-        lines = definition(0, number, [])
+    for number in itertools.count():
+        if len(written) >= lines:
+            return "\n".join(written) + "\n"
+        one = definition(0, number, [])
         if number % 10 == 0:
-            lines.insert(-1, f"#> f{number}(0.5, 1)")
-        written += lines
-    return "\n".join(written) + "\n"
+            one.insert(-1, f"#> f{number}(0.5, 1)")
+        written += one
 
 
 class Whole:
-    """A server with one large file open."""
+    """A server with one file open."""
 
     def __init__(self, folder: Path, text: str) -> None:
-        self.client, self.text = Client(folder), text
-        self.lines = text.split("\n")
+        self.client, self.lines, self.tokens = Client(folder), text.count("\n"), ""
+        self.line, self.column = place_of(text)
         self.client.open("large", text)
         self.client.diagnosed("large")
         self.client.quiet(1.0)
-
-    def params(self) -> dict[str, Any]:
-        whole = {"start": {"line": 0, "character": 0}, "end": {"line": len(self.lines), "character": 0}}
-        options = {"tabSize": 4, "insertSpaces": True}
-        return {"textDocument": {"uri": self.client.uri("large")}, "range": whole, "options": options}
+        self.opened = self.client.processor() * 1e3
 
     def cost(self, method: str) -> float:
         """Milliseconds of processor time for a request."""
+        whole = {"start": {"line": 0, "character": 0}, "end": {"line": self.lines, "character": 0}}
+        options = {"tabSize": 4, "insertSpaces": True}
+        params: dict[str, Any] = {"range": whole, "options": options}
+        if method == "semanticTokens/full" and self.tokens:
+            method, params = "semanticTokens/full/delta", {"previousResultId": self.tokens}
         before = self.client.processor()
-        _, answer = self.client.ask(f"textDocument/{method}", self.params())
+        document = {"textDocument": {"uri": self.client.uri("large")}}
+        _, answer = self.client.ask(f"textDocument/{method}", {**document, **params})
         assert "result" in answer, answer
+        if method.startswith("semanticTokens"):
+            self.tokens = answer["result"]["resultId"]
         return (self.client.processor() - before) * 1e3
 
     def key(self, turn: int) -> float:
-        """Type a character in the middle; when it was sent."""
-        line = next(n for n in range(len(self.lines) // 2, len(self.lines)) if "sqrt(" in self.lines[n])
-        column = self.lines[line].index("sqrt(")
-        return self.client.change("large", replace(line, column, column + (2 if turn else 0), f"{turn % 8 + 2}*"))
-
-    def cost_after_a_key(self, method: str, turn: int) -> float:
-        """The same when the diagnostics after a key have come."""
-        self.key(turn)
+        """Milliseconds of processor time for a key, until there is no more to do."""
+        before = self.client.processor()
+        start, end = ({"line": self.line, "character": self.column + more} for more in (0, 2 if turn else 0))
+        self.client.change("large", {"range": {"start": start, "end": end}, "text": f"{turn % 8 + 2}*"})
         self.client.diagnosed("large")
-        self.client.quiet(0.3)
-        return self.cost(method)
+        self.client.quiet(0.15)
+        return (self.client.processor() - before) * 1e3
 
-    def after_a_key(self, turn: int) -> tuple[float, float]:
-        """Milliseconds until the diagnostics, and until the last answer to what is asked together."""
-        sent = self.key(turn)
-        waiting = {self.client.begin(f"textDocument/{method}", self.params()) for method in METHODS}
-        told = 0.0
-        while waiting or not told:
-            arrived, message = self.client.until(lambda message: True)
-            waiting.discard(message.get("id", 0) if "method" not in message else 0)
-            version = message.get("params", {}).get("version") if "method" in message else None
-            told = told or (arrived if version == self.client.versions["large"] else 0.0)
-        return (told - sent) * 1e3, (time.perf_counter() - sent) * 1e3
+
+def sizes_measured(sizes: tuple[int, ...] = SIZES) -> Rows:
+    """What is measured, for files of some sizes."""
+    rows: Rows = {}
+    for size in sizes:
+        with tempfile.TemporaryDirectory(prefix="potto-bench-") as name:
+            whole = Whole(Path(name), program(size))
+            rows.setdefault("opened and checked, cold", {})[size] = whole.opened
+            for method in METHODS:
+                rows.setdefault(f"{method}, cold", {})[size] = whole.cost(method)
+            costs: dict[str, list[float]] = {}
+            for turn in range(KEYS):
+                costs.setdefault("a key, with all that follows it", []).append(whole.key(turn))
+                for method in METHODS:
+                    costs.setdefault(f"{method}, after a key", []).append(whole.cost(method))
+            for what, found in costs.items():
+                rows.setdefault(what, {})[size] = statistics.median(found)
+            whole.client.process.kill()
+    return rows
+
+
+def table(rows: Rows) -> str:
+    """The rows as text."""
+    sizes = next(iter(rows.values()))
+    lines = [f"{'lines, ms of processor time':<40}" + "".join(f"{size:>10,}" for size in sizes)]
+    lines += [f"{what:<40}" + "".join(f"{cost:10.2f}" for cost in costs.values()) for what, costs in rows.items()]
+    return "\n".join(lines)
+
+
+def drawn(rows: Rows, file: Path) -> None:
+    """A picture of what is asked after a key against the lines of the file."""
+    import matplotlib
+
+    matplotlib.use("agg")
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(figsize=(7, 4.5), layout="constrained")
+    for what, costs in rows.items():
+        if "cold" not in what:
+            axes.loglog(list(costs), list(costs.values()), marker="o", markersize=3, label=what)
+    axes.set_xlabel("lines of the file")
+    axes.set_ylabel("ms of processor time")
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=7)
+    figure.savefig(file)
 
 
 def main() -> None:
-    sizes = [int(size) for size in sys.argv[1:]] or [250, 1_000, 5_000]
-    rows: dict[str, list[float]] = {}
-    with tempfile.TemporaryDirectory(prefix="potto-bench-") as name, tempfile.TemporaryDirectory() as cache:
+    sizes = tuple(int(size) for size in sys.argv[1:]) or SIZES
+    with tempfile.TemporaryDirectory() as cache:
         os.environ["POTTO_CACHE"] = cache
         as_installed()
-        for size in sizes:
-            whole = Whole(Path(name), program(size))
-            for method in METHODS:
-                rows.setdefault(f"{method}, cold", []).append(whole.cost(method))
-            keys = itertools.count()
-            for method in METHODS:
-                costs = [whole.cost_after_a_key(method, next(keys)) for _ in range(KEYS)]
-                rows.setdefault(f"{method}, after a key", []).append(statistics.mean(costs))
-            found = [whole.after_a_key(next(keys)) for _ in range(KEYS)]
-            told, answered = (statistics.median(times) for times in zip(*found))
-            rows.setdefault("all at once after a key: to the diagnostics (wall)", []).append(told)
-            rows.setdefault("- to the last answer (wall)", []).append(answered)
-            whole.client.process.kill()
-    print(f"{'ms':<52}" + "".join(f"{size:>10,}" for size in sizes))
-    for what, costs in rows.items():
-        print(f"{what:<52}" + "".join(f"{cost:10.1f}" for cost in costs))
+        print(table(sizes_measured(sizes)))
 
 
 if __name__ == "__main__":

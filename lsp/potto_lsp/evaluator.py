@@ -103,8 +103,11 @@ def _loaded() -> World:
 
 
 def _say(stream: TextIO, message: Mapping[str, Any]) -> None:
-    stream.write(json.dumps(message) + "\n")
-    stream.flush()
+    try:
+        stream.write(json.dumps(message) + "\n")
+        stream.flush()
+    except BrokenPipeError:  # the server is gone, and with it whoever would read what we have to say about that
+        os._exit(0)
 
 
 def _end_with(parent: int) -> None:

@@ -8,6 +8,7 @@ that an edit elsewhere evaluates nothing.
 from __future__ import annotations
 
 import hashlib
+import itertools
 import time
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
@@ -111,7 +112,7 @@ class LiveValues:
         self._shown: set[str] = set()
         self._asked: dict[tuple[str, str], None] = {}
         self._wrong: set[str] = set()  # files in which something was to be said about a value
-        self._told = 0.0
+        self._told: dict[str, float] = {}
 
     # What is known
 
@@ -184,8 +185,8 @@ class LiveValues:
         those that were asked about."""
         live = {key: None for file in self._shown for _, key in self._live(file)}
         db = self._session.analysis.db
-        asked = [*self._asked, *((file, name) for file in self._shown for name in names(db, file))]
-        return live, {key: None for each in asked for _, key in self._points(*each)}
+        looked_at = (each for file in self._shown for each in itertools.islice(ide.looked_at(db, file), MOST))
+        return live, {key: None for each in (*self._asked, *looked_at) for _, key in self._points(*each)}
 
     def refresh(self) -> None:
         """Evaluate what is shown and not known; forget what nobody shows any more."""
@@ -213,6 +214,7 @@ class LiveValues:
             return
         self._values[key] = value = Value(answer)
         if key.do != "live":
+            self._tell("codeLens", "point")
             return
         if value.result.get("said"):
             self._wrong.add(key.file)
@@ -220,11 +222,16 @@ class LiveValues:
         self._session.publisher.push(key.file)
         if self._session.publisher.known(key.file) != before:
             self._session.diagnostics_changed()
+        self._tell("inlayHint", "live")
+
+    def _tell(self, what: str, do: str) -> None:
+        """Let the client ask anew for what shows values of some kind: when the last one has come, and not often."""
         now = time.monotonic()
-        last = not any(waiting.do == "live" for waiting in self._waiting)
-        if (last or now - self._told > PAUSE) and self._session.client.can("workspace.inlayHint.refreshSupport"):
-            self._told = now
-            self._session.request("workspace/inlayHint/refresh", None, None)
+        last = not any(waiting.do == do for waiting in self._waiting)
+        due = last or now - self._told.get(what, 0.0) > PAUSE
+        if due and self._session.client.can(f"workspace.{what}.refreshSupport"):
+            self._told[what] = now
+            self._session.request(f"workspace/{what}/refresh", None, None)
 
 
 def _said(live: Live, value: Value) -> Iterator[Diagnostic]:

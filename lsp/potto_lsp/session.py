@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from potto.reports.render import Located
     from potto_lsp.analysis import Analysis
     from potto_lsp.evaluation import Evaluator
+    from potto_lsp.features.colours import Colours
     from potto_lsp.live import LiveValues
     from potto_lsp.publishing import Publisher
 
@@ -46,7 +47,7 @@ class Session:
         self.later = later  # do something on the thread that owns the database
         self.cancels: dict[int | str, Callable[[], None]] = {}  # what a user can stop, by the token of its progress
         self.presenter = Presenter(self)
-        self.tokens: dict[str, tuple[str, list[int]]] = {}
+        self.tokens: dict[str, Colours] = {}
         self.checked = False
         self.to_prepare: set[str] = set()  # files that were opened
         self.to_keep: set[str] = set()  # saved files, of which it is to be kept what was found out about them

@@ -7,7 +7,7 @@ question takes the database first and answers also on broken text.
 from potto.ide.actions.code_actions import code_actions, resolve_code_action
 from potto.ide.completion.completing import completions, completions_after, resolve_completion
 from potto.ide.completion.signature_help import signature_help
-from potto.ide.display.code_lenses import code_lenses, resolve_code_lens
+from potto.ide.display.code_lenses import code_lenses, offered, resolve_code_lens
 from potto.ide.display.folding_ranges import folding_ranges
 from potto.ide.display.formatting import format_document, format_on_type, format_range
 from potto.ide.display.inlay_hints import inlay_hints, resolve_inlay_hint
@@ -39,6 +39,7 @@ from potto.ide.model import (
     InlineValue,
     Links,
     Location,
+    Offer,
     ParameterText,
     Refused,
     Renaming,
@@ -49,7 +50,7 @@ from potto.ide.model import (
 )
 from potto.ide.names.documents import kind_of
 from potto.ide.names.live_expressions import live_diagnostics, live_in
-from potto.ide.names.points import Point, point_of, points
+from potto.ide.names.points import Point, looked_at, point_of, points
 from potto.ide.names.symbols import definition_at
 from potto.ide.navigation.call_hierarchy import incoming_calls, outgoing_calls, prepare_call_hierarchy
 from potto.ide.navigation.links import document_links, linked_editing
@@ -82,6 +83,7 @@ __all__ = [
     "InlineValue",
     "Links",
     "Location",
+    "Offer",
     "ParameterText",
     "Point",
     "Refused",
@@ -118,6 +120,8 @@ __all__ = [
     "linked_editing",
     "live_diagnostics",
     "live_in",
+    "looked_at",
+    "offered",
     "outgoing_calls",
     "point_of",
     "points",

@@ -221,9 +221,17 @@ class CodeLens(Struct, frozen=True):
     """A line above a definition that can be clicked. `command` is run with `arguments`; no title: ask to resolve."""
 
     span: Span
-    command: Literal["evaluate", "differentiate", "showDerivative", "showReferences", "run"]
+    command: Literal["value", "more", "run"]
     arguments: tuple[str, ...]
     title: str = ""
+
+
+class Offer(Struct, frozen=True):
+    """Something that can be done with a definition: a command, what it is called, and its arguments."""
+
+    command: Literal["evaluate", "differentiate", "showDerivative", "showReferences"]
+    title: str
+    arguments: tuple[str, ...]
 
 
 class InlayHint(Struct, frozen=True):

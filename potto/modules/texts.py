@@ -234,7 +234,7 @@ def outline(db: Database, file: str) -> Outline:
     """What a file defines and imports, without places."""
     found = layout(db, file)
     importing = tuple([chunk.text for piece in found.pieces for chunk in piece.imports])
-    return Outline(tuple(found.place), importing, any([piece.nameless for piece in found.pieces]))
+    return Outline(tuple(found.place), importing, any(piece.nameless for piece in found.pieces))
 
 
 @query(travels=True)
@@ -273,8 +273,6 @@ def defined_twice(db: Database, file: str) -> tuple[str, ...]:
     found = layout(db, file)
     defined = sum([piece.definitions for piece in found.pieces])
     return () if defined == len(found.place) else tuple([n for n in found.place if len(places(db, file, n)) > 1])
-
-
 
 
 @query

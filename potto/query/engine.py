@@ -354,15 +354,15 @@ def leaves_of(deps: tuple[Node, ...]) -> tuple[Leaf, ...] | None:
             others.append(dep.leaves)
             if len(dep.leaves) > len(widest):
                 widest = dep.leaves
-    if len(others) <= 1 and all([dep in widest or _is_covered(dep, widest) for dep in own]):
+    if len(others) <= 1 and all(dep in widest or _is_covered(dep, widest) for dep in own):
         return widest
     union = set(own).union(*others)
     if len(union) > LEAVES:
         return None
     if len(union) == len(widest):
         return widest  # most chains are straight: they share one
-    found = dict.fromkeys(chain(*others, own))  # in the order of reading: in a set's they are verified at random
-    return tuple([leaf for leaf in found if not _is_covered(leaf, union)])
+    own = [dep for dep in own if not _is_covered(dep, union)]
+    return tuple(dict.fromkeys(chain(*others, own)))  # in the order of reading: in a set's they are verified at random
 
 
 def _is_covered(leaf: Leaf, others: Container[Leaf]) -> bool:

@@ -1,11 +1,11 @@
 """A file cut into chunks: one for each top-level definition or statement.
 
-Owns `Chunk`, `split` and `pieces`. A chunk starts at each line with code in its first column, also while a bracket is open that
-nothing closes before the next definition: so that a stray bracket can't swallow it. Some things go with the chunk above
-or below: a line that starts with a closing bracket, which can start nothing, the lines within brackets that are closed,
-and the body of a `let` whose `in` ends the line before belong to the chunk above them; comment lines directly above a
-definition belong to the definition. Other comments in the first column are chunks of their own, unless an indented line
-follows.
+Owns `Chunk`, `split` and `pieces`. A chunk starts at each line with code in its first column, also while a bracket is
+open that nothing closes before the next definition: so that a stray bracket can't swallow it. Some things go with the
+chunk above or below: a line that starts with a closing bracket, which can start nothing, the lines within brackets that
+are closed, and the body of a `let` whose `in` ends the line before belong to the chunk above them; comment lines
+directly above a definition belong to the definition. Other comments in the first column are chunks of their own, unless
+an indented line follows.
 
 A piece is some neighbouring chunks. It begins where one begins whatever stands above it, at a definition, so that each
 can be split by itself: after an edit all but one are what they were.
@@ -34,7 +34,7 @@ _PIECE = re.compile(rf"\n((?:#.*\n)*)(?={_ITEM.pattern})")
 """The line's end before a piece, and the comment lines that belong to its first definition."""
 
 MOST_IN_VAIN = 100  # searches for closing brackets that end at the same item, which none of them reaches
-PIECE = 4_000  # characters, beyond which the next piece begins as soon as it can
+PIECE = 2_000  # characters, beyond which the next piece begins as soon as it can
 
 
 @value
@@ -59,7 +59,7 @@ def pieces(text: str, former: Sequence[str] = ()) -> tuple[str, ...]:
     while first and (start == len(text) or not _begins(lines, start)):  # what was edited belongs to what is above it
         first -= 1
         start -= len(former[first])
-    while last < len(former) and (end - start < PIECE // 2 or not _begins(lines, end)):
+    while last < len(former) and (end - start < PIECE // 2 or text[start:end].isspace() or not _begins(lines, end)):
         end += len(former[last])
         last += 1
     return (*former[:first], *_cut(text, start, end), *former[last:])
@@ -86,7 +86,7 @@ def _cut(text: str, start: int, end: int) -> list[str]:
     after = _PIECE.search(lines, PIECE)
     while after is not None:
         begin, next = after.start(1), after.end()
-        if begin > at and _begins(lines, begin):
+        if begin > at and _begins(lines, begin) and not lines[at:begin].isspace():
             found.append(text[start + at : start + begin])
             at, next = begin, begin + PIECE
         after = _PIECE.search(lines, next)

@@ -108,11 +108,36 @@ def lenses(client: Client, uri: str) -> list[dict[str, Any]]:
 def test_the_lenses_of_a_function_do_what_they_say(server: Server, uri: Uri) -> None:
     client = server()
     client.open(uri("main"), TEXT)
-    by_title = {lens["title"]: lens for lens in lenses(client, uri("main"))}
+    value, more, *_ = lenses(client, uri("main"))
+    assert (value["title"], more["title"]) == ("evaluate f(0.5)", "more")
+    assert "0.125" in run(client, value["command"], *value["arguments"])["result"]["text"]
+    offers = run(client, more["command"], *more["arguments"])["result"]["offers"]
+    by_title = {offer["title"]: offer for offer in offers}
     shown = "show derivative (1 surface)"
     for title, expected in (("evaluate f(0.5)", "0.125"), ("differentiate f(0.5)", "by t: 0.5"), (shown, "boundary")):
-        lens = by_title[title]
-        assert expected in run(client, lens["command"], *lens["arguments"])["result"]["text"]
+        offer = by_title[title]
+        assert expected in run(client, offer["command"], *offer["arguments"])["result"]["text"]
+
+
+def test_a_lens_shows_the_value_where_a_live_expression_looks(server: Server, uri: Uri) -> None:
+    client = server({"workspace": {"codeLens": {"refreshSupport": True}}})
+    client.open(uri("main"), "def f(t) integral [0, 1] [x < t] d(x)\n#> f(0.25)\n")
+    assert lenses(client, uri("main"))[0]["title"] == "evaluate f(0.25)"
+    while client.asked.get(timeout=20)["method"] != "workspace/codeLens/refresh":
+        pass
+    assert lenses(client, uri("main"))[0]["title"].startswith("= 0.2500000000000000")
+
+
+def test_a_client_without_a_menu_of_its_own_is_asked_what_to_do(server: Server, uri: Uri) -> None:
+    client = server(SHOWS)
+    client.replies["window/showMessageRequest"] = {"title": "evaluate f(0.5)"}
+    client.open(uri("main"), TEXT)
+    run(client, "potto.more", uri("main"), "f")
+    while (asked := client.asked.get(timeout=10))["method"] != "window/showMessageRequest":
+        pass
+    titles = [action["title"] for action in asked["params"]["actions"]]
+    assert titles == ["evaluate f(0.5)", "differentiate f(0.5)", "show derivative (1 surface)", "preview"]
+    assert "0.125" in client.note("window/showMessage")["message"]
 
 
 SHOWS = {"window": {"showDocument": {"support": True}, "workDoneProgress": True}}

@@ -66,9 +66,8 @@ def test_the_papers_renderer_is_drawn(server: Server, uri: Uri, tmp_path: Path) 
     assert values == pytest.approx(area, abs=1e-9) or values == pytest.approx(area[::-1], abs=1e-9)
     (slopes,) = curve(client, where, "renderer", "c", -1.5, -1, -0.5, wrt="c")  # as wide as the square is there
     assert [abs(slope) for slope in slopes] == pytest.approx([0.5, 1, 0.5], abs=1e-9)
-    lenses = client.ask("textDocument/codeLens", {"textDocument": {"uri": where}})
-    titled = [each["command"] for each in lenses if each.get("command", {}).get("title") == "preview"]
-    assert [each["arguments"][1] for each in titled] == ["renderer"]
+    offers = command(client, "potto.more", where, "renderer")["result"]["offers"]
+    assert [each["arguments"][1] for each in offers if each["title"] == "preview"] == ["renderer"]
 
 
 @pytest.mark.parametrize(
@@ -184,9 +183,8 @@ def test_the_picture_of_the_server(server: Server, uri: Uri, program: str, kind:
     client.open(uri("main"), program)
     found = command(client, "potto.preview", uri("main"), "f")["result"]
     assert found["kind"] == kind and found["text"] == said and found["image"].startswith("data:image/png")
-    lenses = client.ask("textDocument/codeLens", {"textDocument": {"uri": uri("main")}})
-    previews = [each["command"]["arguments"][1] for each in lenses if each.get("command", {}).get("title") == "preview"]
-    assert "f" in previews
+    offers = command(client, "potto.more", uri("main"), "f")["result"]["offers"]
+    assert [each["arguments"][1] for each in offers if each["title"] == "preview"] == ["f"]
 
 
 @pytest.mark.parametrize(
@@ -209,7 +207,7 @@ def test_a_lens_evaluates_and_differentiates(
     client = server()
     client.open(uri("main"), program)
     lenses = client.ask("textDocument/codeLens", {"textDocument": {"uri": uri("main")}})
-    lens = next(each for each in lenses if each.get("data", [""])[0] == "evaluate" and each["data"][2] == "f")
+    lens = next(each for each in lenses if each.get("data", [""])[0] == "value" and each["data"][2] == "f")
     resolved = client.ask("codeLens/resolve", lens)["command"]
     assert resolved["title"] == f"evaluate {call}" and resolved["arguments"][1] == call
     assert command(client, "potto.evaluate", uri("main"), "f")["result"]["value"] == pytest.approx(value, abs=1e-12)

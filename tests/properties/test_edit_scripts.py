@@ -81,8 +81,11 @@ BODY_EDITS = [
     ("main.po", "(x, y)(c) d(x, y)", "(x, y)(c)*x d(x, y)", "render"),
     ("main.po", "v + 1", "v + 2", "both"),
 ]
+OF_TEXTS = {
+    "parsed", "head", "chunk_references", "occurring_names", "piece", "_piece_diagnostics", "occurring_in_piece",
+}  # fmt: skip
 OF_FILES = {
-    "content", "source", "chunks", "layout", "outline", "texts", "starts", "syntax_diagnostics", "module_diagnostics",
+    "content", "source", "pieces", "chunks", "layout", "outline", "texts", "syntax_diagnostics", "module_diagnostics",
     "statements", "used_imports", "unused_imports", "_words_at", "exists", "problem", "diagnostics",
 }  # fmt: skip
 
@@ -113,4 +116,4 @@ def test_a_body_edit_runs_no_interface_of_another_and_nothing_of_other_modules(
             case (tuple(group),):
                 assert [(target.file, target.name) for target in group] == [(file, defined)], (query, args)
             case _:
-                assert query in ("parsed", "head", "chunk_references", "occurring_names"), (query, args)
+                assert query in OF_TEXTS, (query, args)

@@ -54,7 +54,7 @@ class QuietClient extends LanguageClient {
 /** Commands are ours: what the server answers is shown, and what only an editor can do is offered to it. */
 class OwnCommands implements StaticFeature {
   fillClientCapabilities(capabilities: ClientCapabilities): void {
-    capabilities.experimental = { commands: { commands: ["potto.preview", "potto.showReferences", "potto.rename"] } };
+    capabilities.experimental = { commands: { commands: ["potto.preview", "potto.more", "potto.showReferences", "potto.rename"] } };
   }
   preInitialize(capabilities: ServerCapabilities): void {
     delete capabilities.executeCommandProvider;

@@ -86,6 +86,7 @@ function registerCommands(context: vscode.ExtensionContext, server: Server, deri
     const shown = typeof name === "string" ? name : await definitionAtCursor();
     if (document && shown) await derivatives.show(document.uri, shown);
   });
+  command("more", (uri: string, name: string) => chooseOffer(server, uri, name));
   command("showReferences", (uri: string, position: Position, locations: Location[]) => {
     const range = ({ start, end }: Location["range"]): vscode.Range =>
       new vscode.Range(start.line, start.character, end.line, end.character);
@@ -151,6 +152,22 @@ async function documentOf(uri: vscode.Uri | string | undefined): Promise<vscode.
   if (document?.languageId === "potto") return document;
   void vscode.window.showInformationMessage("Open a Potto file first.");
   return undefined;
+}
+
+interface Offer {
+  readonly title: string;
+  readonly command: string;
+  readonly arguments: readonly unknown[];
+}
+
+/** Let the user choose from what the server can do with a definition, and do it. */
+async function chooseOffer(server: Server, uri: string, name: string): Promise<void> {
+  const client = await server.ready();
+  const asked = { command: "potto.more", arguments: [uri, name] };
+  const found = await client?.sendRequest<{ offers: Offer[] }>("workspace/executeCommand", asked);
+  const items = (found?.offers ?? []).map((offer) => ({ label: offer.title, offer }));
+  const picked = items.length ? await vscode.window.showQuickPick(items, { title: name }) : undefined;
+  if (picked) await vscode.commands.executeCommand(picked.offer.command, ...picked.offer.arguments);
 }
 
 /** Without an expression: the file runs if it was named (that is what its lens asks for), else one is asked for. */

@@ -17,7 +17,7 @@ from msgspec import Struct
 if TYPE_CHECKING:
     from potto_lsp.asking import Ask
 
-COMMANDS = ("potto.evaluate", "potto.differentiate", "potto.preview")
+COMMANDS = ("potto.evaluate", "potto.differentiate", "potto.preview", "potto.more")
 # The legend of semantic tokens, which the greeting announces; a test holds it against that of `potto.ide`.
 TOKEN_TYPES = (
     "namespace", "type", "parameter", "variable", "property", "function", "keyword", "comment", "number", "operator",
@@ -54,7 +54,7 @@ _ALL = (
     Feature(
         _DOCUMENT + "completion",
         "completing.complete",
-        {"completionProvider": {"triggerCharacters": [".", "\\", "(", "~"], "resolveProvider": True,
+        {"completionProvider": {"triggerCharacters": [".", "\\", "~"], "resolveProvider": True,
                                 "completionItem": {"labelDetailsSupport": True}}},
     ),
     Feature("completionItem/resolve", "completing.resolve"),

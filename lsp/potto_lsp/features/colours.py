@@ -6,16 +6,18 @@ import itertools
 from collections.abc import Iterable
 from typing import Any
 
+from msgspec import Struct
+
 from potto import ide
 from potto.ide.display.semantic_tokens import Word, definition_words, loose_words
-from potto.ide.names.places import all_chunks, owner
+from potto.ide.names.places import PieceAt
 from potto.modules import chunk_text
 from potto.query import Database, query
 from potto_lsp.asking import Ask
 from potto_lsp.features import TOKEN_MODIFIERS, TOKEN_TYPES
+from potto_lsp.features.whole import lined
 from potto_lsp.text import Encoding, Text
 
-STRIDE = 4096  # numbers that are compared at once
 Numbers = tuple[int, tuple[int, ...]]  # the line of the last word, and five for each word
 
 _TYPES = {name: number for number, name in enumerate(TOKEN_TYPES)}
@@ -23,17 +25,79 @@ _MODIFIERS = {name: 1 << number for number, name in enumerate(TOKEN_MODIFIERS)}
 _ids = itertools.count(1)
 
 
+class Colours(Struct, frozen=True):
+    """The colours of a file: those of its pieces, and how many lines below the last word of the piece before each
+    begins."""
+
+    id: str
+    parts: list[Numbers]
+    below: list[int]
+
+    def data(self, first: int, last: int) -> list[int]:
+        """The numbers of some pieces. Each word says where it stands by the word before, so those of a piece are the
+        same wherever it stands, but for the first."""
+        found: list[int] = []
+        for (_, numbers), below in zip(self.parts[first:last], self.below[first:last]):
+            found.append(below)
+            found += numbers[1:]
+        return found
+
+
 def full(ask: Ask) -> dict[str, Any]:
-    return {"resultId": _remember(ask, data := _whole(ask)), "data": data}
+    new = _remember(ask)
+    return {"resultId": new.id, "data": new.data(0, len(new.parts))}
 
 
 def delta(ask: Ask) -> dict[str, Any]:
     """What changed since the answer that the client has; all of it if we do not know that one any more."""
-    known = ask.session.tokens.get(ask.file)
-    if known is None or known[0] != ask.optional("previousResultId"):
+    old = ask.session.tokens.get(ask.file)
+    if old is None or old.id != ask.optional("previousResultId"):
         return full(ask)
-    old, new = known[1], _whole(ask)
-    return {"resultId": _remember(ask, new), "edits": edits(old, new)}
+    new = _remember(ask)
+    return {"resultId": new.id, "edits": edits(old, new)}
+
+
+def edits(old: Colours, new: Colours) -> list[dict[str, Any]]:
+    """One edit that makes `new` of `old`: all between what they begin and end with in common. Most of that are pieces,
+    which are told to be the same without being looked at."""
+    least, head, tail = min(len(old.parts), len(new.parts)), 0, 0
+    while head < least and _same(old, head, new, head):
+        head += 1
+    while tail < least - head and _same(old, len(old.parts) - 1 - tail, new, len(new.parts) - 1 - tail):
+        tail += 1
+    before, after = old.data(head, len(old.parts) - tail), new.data(head, len(new.parts) - tail)
+    if before == after:
+        return []
+    start = sum([len(numbers) for _, numbers in old.parts[:head]])
+    shortest = min(len(before), len(after))
+    first = _in_common(before, after, shortest)
+    last = _in_common(before[::-1], after[::-1], shortest - first)
+    changed = after[first : len(after) - last]
+    return [{"start": start + first, "deleteCount": len(before) - first - last, "data": changed}]
+
+
+def _same(old: Colours, mine: int, new: Colours, other: int) -> bool:
+    return old.parts[mine] is new.parts[other] and old.below[mine] == new.below[other]
+
+
+def _in_common(old: list[int], new: list[int], most: int) -> int:
+    """How much two lists begin with in common, at most so much."""
+    return next((place for place in range(most) if old[place] != new[place]), most)
+
+
+def _remember(ask: Ask) -> Colours:
+    """The colours of a file, from what is kept for each of its pieces."""
+    parts: list[Numbers] = []
+    below: list[int] = []
+    before, encoding = 0, ask.text.encoding
+    for at, line in lined(ask):
+        found = last, numbers = _of_piece(ask.db, ask.file, at.text, at.hidden, encoding)
+        if numbers:
+            parts.append(found)
+            below.append(line + numbers[0] - before)
+            before = line + last
+    made = ask.session.tokens[ask.file] = Colours(f"tokens-{next(_ids)}", parts, below)
+    return made
 
 
 def in_range(ask: Ask) -> dict[str, Any]:
@@ -42,49 +106,26 @@ def in_range(ask: Ask) -> dict[str, Any]:
     return {"data": list(_numbers(ask.text, words)[1])}
 
 
-def edits(old: list[int], new: list[int]) -> list[dict[str, Any]]:
-    """One edit that makes `new` of `old`: all between what they begin and end with in common."""
-    if old == new:
-        return []
-    least = min(len(old), len(new))
-    head = _in_common(old, new, least)
-    tail = _in_common(old[: head - len(old) - 1 : -1], new[: head - len(new) - 1 : -1], least - head)
-    return [{"start": head, "deleteCount": len(old) - head - tail, "data": new[head : len(new) - tail]}]
-
-
-def _in_common(old: list[int], new: list[int], most: int) -> int:
-    """How much two lists begin with in common; equal parts are passed over as fast as memory is read."""
-    at = 0
-    while at < most and old[at : at + STRIDE] == new[at : at + STRIDE]:
-        at += STRIDE
-    return next((place for place in range(at, most) if old[place] != new[place]), most) if at < most else most
-
-
-def _remember(ask: Ask, data: list[int]) -> str:
-    id = f"tokens-{next(_ids)}"
-    ask.session.tokens[ask.file] = (id, data)
-    return id
-
-
-def _whole(ask: Ask) -> list[int]:
-    """The words of a file as numbers. Each says where it stands by the word before, so those of a chunk are the same
-    wherever it stands, but for the first: they are kept, and a file is put together from its chunks."""
+@query(keep=1024)
+def _of_piece(db: Database, file: str, text: str, hidden: tuple[str, ...], encoding: Encoding) -> Numbers:
+    """The words of a piece as numbers, as if it stood at the head of its file: those of its chunks, one behind the
+    other."""
     found: list[int] = []
-    before, text = 0, ask.text
-    for chunk in all_chunks(ask.db, ask.file):
-        name, line = owner(ask.db, chunk), text.lines.line_of(chunk.start)
-        if text.lines.start(line) != chunk.start:  # behind a byte order mark, or blanks
-            words = loose_words(ask.db, ask.file, chunk.text)
-            (last, numbers), line = _numbers(text, words, chunk.start), 0
+    before, place = 0, Text(text, encoding)
+    for chunk, name in PieceAt(file, 0, text, hidden).chunks(db):
+        line = place.lines.line_of(chunk.start)
+        if place.lines.start(line) != chunk.start:  # behind a byte order mark, or blanks
+            words = loose_words(db, file, chunk.text)
+            (last, numbers), line = _numbers(place, words, chunk.start), 0
         elif name is None:
-            last, numbers = _of_the_rest(ask.db, ask.file, chunk.text, text.encoding)
+            last, numbers = _of_the_rest(db, file, chunk.text, encoding)
         else:
-            last, numbers = _of_definition(ask.db, ask.file, name, text.encoding)
+            last, numbers = _of_definition(db, file, name, encoding)
         if numbers:
             found.append(line + numbers[0] - before)
             found += numbers[1:]
             before = line + last
-    return found
+    return before, tuple(found)
 
 
 @query
@@ -108,7 +149,7 @@ def _numbers(text: Text, words: Iterable[Word], start: int = 0) -> Numbers:
         length = text.position(start + last)[1] - column
         if line != before_line:
             before_column = 0
-        bits = sum(_MODIFIERS[name] for name in modifiers)
+        bits = sum([_MODIFIERS[name] for name in modifiers])
         found += (line - before_line, column - before_column, length, _TYPES[type], bits)
         before_line, before_column = line, column
     return before_line, tuple(found)

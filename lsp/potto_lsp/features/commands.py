@@ -1,4 +1,4 @@
-"""`workspace/executeCommand`: `potto.evaluate`, `potto.differentiate`, `potto.preview`.
+"""`workspace/executeCommand`: `potto.evaluate`, `potto.differentiate`, `potto.preview`, `potto.more`.
 
 Each takes the URI of a document and an expression or a name; `potto.evaluate` with the URI alone runs the script. The
 answer is an object with a `text` to show; a picture is a data URI in `image`.
@@ -12,10 +12,13 @@ from typing import Any
 
 from potto import ide
 from potto.modules import names
+from potto_lsp import protocol
 from potto_lsp.asking import Ask
 from potto_lsp.deferred import Deferred
 from potto_lsp.errors import InvalidParams, Refusal, RequestError
 from potto_lsp.evaluation import Task
+from potto_lsp.features.lenses import offers
+from potto_lsp.presenting import INFO
 from potto_lsp.progress import Working
 from potto_lsp.uris import to_key
 
@@ -102,6 +105,39 @@ def _preview(ask: Ask, file: str, arguments: list[Any]) -> Deferred:
     return _shown(ask, text, task(ask, "preview", file, text, more))
 
 
+def _more(ask: Ask, file: str, arguments: list[Any]) -> Any:
+    """What can be done with a definition. A client that has no such command of its own is shown a choice of it."""
+    name = _text(arguments)
+    found = list(offers(ask, file, name))
+    if not found:
+        raise Refusal(f"there is no definition of `{name}` in this file")
+    if not ask.client.lists("experimental.commands.commands", "potto.more"):
+        _choose(ask, name, [offer for offer in found if offer["command"] in _COMMANDS])
+    return {"offers": found}
+
+
+def _choose(ask: Ask, name: str, offers: list[protocol.Command]) -> None:
+    """Let the user choose from some commands, and do what was chosen."""
+
+    def chosen(answer: Any, error: Any) -> None:
+        title = answer.get("title") if isinstance(answer, Mapping) else None
+        for offer in offers:
+            if offer["title"] == title:
+                ask.session.later(lambda offer=offer: _do(offer))  # type: ignore[misc]
+
+    def _do(offer: protocol.Command) -> None:
+        try:
+            result = execute(Ask(ask.session, offer))
+        except RequestError as refused:
+            ask.session.notify("window/showMessage", {"type": INFO, "message": refused.message})
+            return
+        if isinstance(result, Deferred):
+            result.start(lambda _: None)
+
+    actions = [{"title": offer["title"]} for offer in offers]
+    ask.session.request("window/showMessageRequest", {"type": INFO, "message": name, "actions": actions}, chosen)
+
+
 def _text(arguments: list[Any]) -> str:
     if not arguments or not isinstance(arguments[0], str):
         raise InvalidParams("the second argument is an expression or a name")
@@ -159,4 +195,5 @@ _COMMANDS: Mapping[str, Callable[[Ask, str, list[Any]], Any]] = {
     "potto.evaluate": _evaluate,
     "potto.differentiate": _differentiate,
     "potto.preview": _preview,
+    "potto.more": _more,
 }

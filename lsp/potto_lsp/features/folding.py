@@ -3,20 +3,35 @@
 from __future__ import annotations
 
 from potto import ide
+from potto.ide.display.folding_ranges import import_folds, piece_folds
+from potto.modules import is_diffeo
+from potto.query import Database, query
 from potto.source import Span
 from potto_lsp import protocol
 from potto_lsp.asking import Ask
+from potto_lsp.features.whole import Part, part_of, whole
+from potto_lsp.text import Text
+from potto_lsp.wire import Encoded
 
 KINDS = {"comment": "comment", "imports": "imports", "region": "region"}
 
 
-def folding_ranges(ask: Ask) -> list[protocol.FoldingRange]:
-    found: list[protocol.FoldingRange] = []
-    for fold in ide.folding_ranges(ask.db, ask.file):
-        first, last = ask.position(fold.span.start)["line"], ask.position(fold.span.end)["line"]
-        if last > first:
-            found.append({"startLine": first, "endLine": last, "kind": KINDS[fold.kind]})
-    return found
+def folding_ranges(ask: Ask) -> Encoded:
+    imports = [_lines(ask.text, fold) for fold in import_folds(ask.db, ask.file)]
+    return whole(ask, lambda at: _part(ask.db, at.text, is_diffeo(at.file)), imports)
+
+
+@query(keep=1024)
+def _part(db: Database, text: str, diffeo: bool) -> Part:
+    """The folds of a piece."""
+    place = Text(text)
+    found = [_lines(place, fold) for fold in piece_folds(db, text, diffeo)]
+    return part_of(fold for fold in found if fold["endLine"] > fold["startLine"])
+
+
+def _lines(text: Text, fold: ide.Fold) -> protocol.FoldingRange:
+    first, last = text.position(fold.span.start)[0], text.position(fold.span.end)[0]
+    return {"startLine": first, "endLine": last, "kind": KINDS[fold.kind]}
 
 
 def selection_ranges(ask: Ask) -> list[protocol.SelectionRange]:

@@ -3,13 +3,29 @@
 from __future__ import annotations
 
 from potto import ide
+from potto.ide.display.formatting import format_at_once, piece_edits
+from potto.modules import is_diffeo
+from potto.query import Database, query
 from potto_lsp import convert, protocol
 from potto_lsp.asking import Ask
+from potto_lsp.features.whole import Part, part_of, whole
+from potto_lsp.text import Encoding, Text
+from potto_lsp.wire import Encoded
 
 
-def document(ask: Ask) -> list[protocol.TextEdit]:
-    edits = ide.format_document(ask.db, ask.file)
-    return [{"range": ask.range(edit.span), "newText": edit.text} for edit in edits]
+def document(ask: Ask) -> list[protocol.TextEdit] | Encoded:
+    at_once = format_at_once(ask.db, ask.file)
+    if at_once is not None:
+        return convert.text_edits(ask.text, at_once)
+    db, encoding, diffeo = ask.db, ask.text.encoding, is_diffeo(ask.file)
+    ends = len(ask.text.text)
+    return whole(ask, lambda at: _part(db, at.text, encoding, diffeo, at.start == 0, at.start + len(at.text) == ends))
+
+
+@query(keep=1024)
+def _part(db: Database, text: str, encoding: Encoding, diffeo: bool, first: bool, last: bool) -> Part:
+    """The edits of a piece."""
+    return part_of(convert.text_edits(Text(text, encoding), piece_edits(db, text, diffeo, first, last)))
 
 
 def in_range(ask: Ask) -> list[protocol.TextEdit]:

@@ -6,25 +6,43 @@ from collections.abc import Mapping
 from typing import Any
 
 from potto import ide
+from potto.ide.display.inlay_hints import piece_hints
+from potto.query import Database, query
 from potto.source import Span
 from potto_lsp import convert, protocol
 from potto_lsp.asking import Ask
+from potto_lsp.features.whole import Part, lined, part_of
+from potto_lsp.text import Encoding, Text
+from potto_lsp.wire import Encoded
 
 KINDS = {"type": 1, "parameter": 2}
 SETTINGS = {"type": "hints.types", "parameter": "hints.coordinates"}
 
 
-def inlay_hints(ask: Ask) -> list[protocol.InlayHint]:
-    span = ask.span
-    off = {kind for kind, setting in SETTINGS.items() if ask.analysis.settings.get(setting) is False}
-    hints = ide.inlay_hints(ask.db, ask.file, span)
-    found = [_hint(ask, hint) for hint in hints if hint.kind not in off]
-    return found + _live(ask, span)
+def inlay_hints(ask: Ask) -> Encoded:
+    span, text, found = ask.span, ask.text, list[str]()
+    off = frozenset(kind for kind, setting in SETTINGS.items() if ask.analysis.settings.get(setting) is False)
+    for at, line in lined(ask):
+        if span.start <= at.start and at.start + len(at.text) <= span.end:
+            found.append(_part(ask.db, ask.file, at.text, at.hidden, text.encoding, off).placed(line))
+        elif at.start <= span.end and span.start <= at.start + len(at.text):
+            hints = piece_hints(ask.db, ask.file, at.text, at.hidden)
+            near = [hint for hint in hints if span.start <= at.start + hint.offset <= span.end and hint.kind not in off]
+            found.append(part_of(_hint(Text(at.text, text.encoding), hint) for hint in near).placed(line))
+    found.append(part_of(_live(ask, span)).placed(0))
+    return Encoded(f"[{','.join([each for each in found if each])}]")
 
 
-def _hint(ask: Ask, hint: ide.InlayHint) -> protocol.InlayHint:
+@query(keep=1024)
+def _part(db: Database, file: str, text: str, hidden: tuple[str, ...], encoding: Encoding, off: frozenset[str]) -> Part:
+    """The hints of a piece."""
+    place, hints = Text(text, encoding), piece_hints(db, file, text, hidden)
+    return part_of(_hint(place, hint) for hint in hints if hint.kind not in off)
+
+
+def _hint(text: Text, hint: ide.InlayHint) -> protocol.InlayHint:
     found: protocol.InlayHint = {
-        "position": ask.position(hint.offset),
+        "position": convert.position(text, hint.offset),
         "label": hint.label,
         "kind": KINDS[hint.kind],
         "paddingLeft": hint.pad_left,
@@ -33,7 +51,7 @@ def _hint(ask: Ask, hint: ide.InlayHint) -> protocol.InlayHint:
     if hint.tooltip:
         found["tooltip"] = convert.markdown(hint.tooltip)
     if hint.edits:
-        found["textEdits"] = convert.text_edits(ask.text, hint.edits)
+        found["textEdits"] = convert.text_edits(text, hint.edits)
     if hint.data:
         found["data"] = list(hint.data)
     return found

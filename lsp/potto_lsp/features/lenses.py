@@ -1,93 +1,109 @@
-"""`textDocument/codeLens`: what can be done with a definition, above it."""
+"""`textDocument/codeLens`: the value of a definition and what more can be done with it, above it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, cast
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 from potto import ide
+from potto.ide.display.code_lenses import piece_lenses
+from potto.modules import names
+from potto.query import Database, query
 from potto.source import Span
 from potto_lsp import convert, protocol
 from potto_lsp.asking import Ask
 from potto_lsp.errors import InvalidParams
+from potto_lsp.features.whole import Part, lined, part_of
+from potto_lsp.text import Encoding, Text
+from potto_lsp.wire import Encoded
 
 COMMANDS = {
-    "evaluate": "potto.evaluate", "run": "potto.evaluate", "differentiate": "potto.differentiate",
-    "showDerivative": "potto.differentiate", "preview": "potto.preview",
+    "value": "potto.evaluate", "more": "potto.more", "run": "potto.evaluate", "evaluate": "potto.evaluate",
+    "differentiate": "potto.differentiate", "showDerivative": "potto.differentiate",
 }  # fmt: skip
-SETTINGS = {
-    "evaluate": "lenses.evaluate", "run": "lenses.run", "differentiate": "lenses.differentiate",
-    "showDerivative": "lenses.derivative", "showReferences": "lenses.references",
-}  # fmt: skip
+SETTINGS = {"value": "lenses.value", "more": "lenses.more", "run": "lenses.run"}
 REFERENCES = "potto.showReferences"  # of the client; only one that says that it has it is given it
+LONG = 40  # characters of a value beyond which a lens does not show it
 
 
-def code_lenses(ask: Ask) -> list[protocol.CodeLens]:
+def code_lenses(ask: Ask) -> Encoded:
     """The lenses of a file, but for the kinds that are turned off."""
-    found: list[protocol.CodeLens] = []
-    settings = ask.analysis.settings
-    previews = settings.get("lenses.preview") is not False
-    scenes = {scene.name: scene for scene in ide.scenes(ask.db, ask.file)} if previews else {}
-    off = {kind for kind, setting in SETTINGS.items() if settings.get(setting) is False}
-    for lens in ide.code_lenses(ask.db, ask.file):
-        if lens.command == "showDerivative":
-            found += _previews(ask, lens, scenes.get(lens.arguments[1]))
-        if lens.command in off or (_is_live(ask, lens) and settings.get("lenses.live") is False):
-            continue
-        made: protocol.CodeLens = {"range": ask.range(lens.span)}
-        if lens.title:
-            made["command"] = _command(ask, lens)
-        else:
-            made["data"] = [lens.command, *lens.arguments]
-        found.append(made)
-    return found
+    off = {kind for kind, setting in SETTINGS.items() if ask.analysis.settings.get(setting) is False}
+    found, encoding = list[str](), ask.text.encoding
+    for at, line in lined(ask):
+        part = _part(ask.db, ask.file, at.text, at.hidden, encoding, ask.uri, frozenset(off))
+        found.append(part.placed(line))
+        if "run" not in off and any(
+            lens.command == "run" for lens in piece_lenses(ask.db, ask.file, at.text, at.hidden)
+        ):
+            off.add("run")
+    return Encoded(f"[{','.join([text for text in found if text])}]")
 
 
-def _is_live(ask: Ask, lens: ide.CodeLens) -> bool:
-    """Whether it stands above a live expression."""
-    return ask.analysis.text(ask.file).text.startswith("#", lens.span.start)
-
-
-def _previews(ask: Ask, lens: ide.CodeLens, scene: ide.Scene | None) -> list[protocol.CodeLens]:
-    """A function of one or two numbers has a picture, also beside functions that are known; a client that draws for
-    itself shows what has more, too."""
-    if scene is None:
-        return []
-    numbers = [p for p in scene.parameters if p.kind == "number"]
-    known = all(p.kind == "number" or p.fits for p in scene.parameters)
-    simple = known and len(numbers) <= 2 and scene.components == 1
-    if not simple and not ask.client.lists("experimental.commands.commands", "potto.preview"):
-        return []
-    arguments = [ask.analysis.uri(lens.arguments[0]), lens.arguments[1]]
-    command: protocol.Command = {"title": "preview", "command": "potto.preview", "arguments": arguments}
-    return [{"range": ask.range(lens.span), "command": command}]
+@query(keep=1024)
+def _part(
+    db: Database, file: str, text: str, hidden: tuple[str, ...], encoding: Encoding, uri: str, off: frozenset[str]
+) -> Part:
+    """The lenses of a piece. Of values the titles are found when they are shown."""
+    place = Text(text, encoding)
+    return part_of(
+        {"range": convert.range_of(place, lens.span), "data": [lens.command, *lens.arguments]}
+        if lens.command == "value"
+        else {"range": convert.range_of(place, lens.span), "command": _command(lens, uri)}
+        for lens in piece_lenses(db, file, text, hidden)
+        if lens.command not in off
+    )
 
 
 def resolve(ask: Ask) -> Any:
     data = ask.optional("data")
     if ask.optional("command") is not None:  # nothing is missing
         return ask.params
-    if not isinstance(ask.params, Mapping) or not isinstance(data, list) or len(data) < 2:
+    if not isinstance(ask.params, Mapping) or not isinstance(data, list) or len(data) != 3 or data[0] != "value":
         raise InvalidParams("`data` is not as it was given")
-    command, *arguments = map(str, data)
-    whole = len(arguments) == 3 and arguments[2].isdecimal() if command == "showReferences" else command in COMMANDS
-    if not whole:
-        raise InvalidParams("`data` is not as it was given")
-    lens = ide.CodeLens(Span(0, 0), cast(Any, command), tuple(arguments))
-    return {**ask.params, "command": _command(ask, ide.resolve_code_lens(ask.db, lens))}
+    _, file, name = map(str, data)
+    lens = ide.resolve_code_lens(ask.db, ide.CodeLens(Span(0, 0), "value", (file, name)))
+    known = next((value.result.get("shown") for _, value in ask.session.live.at_points(file, name)), None)
+    command = _command(lens, ask.analysis.uri(file))
+    if isinstance(known, str) and len(known) <= LONG:
+        command["title"] = f"= {known}"
+    return {**ask.params, "command": command}
 
 
-def _command(ask: Ask, lens: ide.CodeLens) -> protocol.Command:
-    file, *rest = lens.arguments
-    if lens.command == "showReferences":
-        return _references(ask, lens, file, int(rest[1]))
-    return {"title": lens.title, "command": COMMANDS[lens.command], "arguments": [ask.analysis.uri(file), *rest]}
+def _command(lens: ide.CodeLens, uri: str) -> protocol.Command:
+    return {"title": lens.title, "command": COMMANDS[lens.command], "arguments": [uri, *lens.arguments[1:]]}
 
 
-def _references(ask: Ask, lens: ide.CodeLens, file: str, offset: int) -> protocol.Command:
-    """A count to be clicked if the client can show places; else just a count."""
+def offers(ask: Ask, file: str, name: str) -> Iterator[protocol.Command]:
+    """What can be done with a definition, for a client to choose from."""
+    if name not in names(ask.db, file):
+        return
+    uri = ask.analysis.uri(file)
+    for offer in ide.offered(ask.db, file, name):
+        if offer.command == "showReferences":
+            yield from _references(ask, offer, file)
+        else:
+            yield {"title": offer.title, "command": COMMANDS[offer.command], "arguments": [uri, *offer.arguments[1:]]}
+        if offer.command == "showDerivative" and _has_picture(ask, ide.scene(ask.db, file, name)):
+            yield {"title": "preview", "command": "potto.preview", "arguments": [uri, name]}
+
+
+def _has_picture(ask: Ask, scene: ide.Scene | None) -> bool:
+    """A function of one or two numbers has a picture, also beside functions that are known; a client that draws for
+    itself shows what has more, too."""
+    if scene is None:
+        return False
+    numbers = [p for p in scene.parameters if p.kind == "number"]
+    known = all(p.kind == "number" or p.fits for p in scene.parameters)
+    simple = known and len(numbers) <= 2 and scene.components == 1
+    return simple or ask.client.lists("experimental.commands.commands", "potto.preview")
+
+
+def _references(ask: Ask, offer: ide.Offer, file: str) -> Iterator[protocol.Command]:
+    """The places where it is used, if the client can show them."""
     if not ask.client.lists("experimental.commands.commands", REFERENCES):
-        return {"title": lens.title, "command": ""}
-    places = [convert.place(ask.analysis, place) for place in ide.references(ask.db, file, offset, False)]
-    position = convert.position(ask.analysis.text(file), offset)
-    return {"title": lens.title, "command": REFERENCES, "arguments": [ask.analysis.uri(file), position, places]}
+        return
+    _, _, offset = offer.arguments
+    places = [convert.place(ask.analysis, place) for place in ide.references(ask.db, file, int(offset), False)]
+    position = convert.position(ask.analysis.text(file), int(offset))
+    yield {"title": offer.title, "command": REFERENCES, "arguments": [ask.analysis.uri(file), position, places]}

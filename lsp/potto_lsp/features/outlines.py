@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 from potto import ide
+from potto.ide.navigation.outlines import piece_symbols
+from potto.query import Database, query
 from potto_lsp import convert, protocol
 from potto_lsp.asking import Ask
+from potto_lsp.features.whole import Part, part_of, whole
+from potto_lsp.text import Encoding, Text
+from potto_lsp.wire import Encoded
 
 KINDS = {
     "function": 12, "constant": 14, "diffeo": 12, "module": 2, "variable": 13, "parameter": 13, "local": 13,
@@ -12,26 +17,32 @@ KINDS = {
 }  # fmt: skip
 
 
-def document_symbols(ask: Ask) -> list[protocol.DocumentSymbol] | list[protocol.SymbolInformation]:
-    found = ide.document_symbols(ask.db, ask.file)
-    if ask.client.can("textDocument.documentSymbol.hierarchicalDocumentSymbolSupport"):
-        return [_tree(ask, symbol) for symbol in found]
-    return [_flat(ask, symbol) for symbol in found]
+def document_symbols(ask: Ask) -> Encoded:
+    tree = ask.client.can("textDocument.documentSymbol.hierarchicalDocumentSymbolSupport")
+    file, uri, encoding = ask.file, "" if tree else ask.uri, ask.text.encoding
+    return whole(ask, lambda at: _part(ask.db, file, at.text, at.hidden, uri, encoding))
 
 
-def _flat(ask: Ask, symbol: ide.DocumentSymbol) -> protocol.SymbolInformation:
-    place: protocol.Location = {"uri": ask.uri, "range": ask.range(symbol.span)}
+@query(keep=1024)
+def _part(db: Database, file: str, text: str, hidden: tuple[str, ...], uri: str, encoding: Encoding) -> Part:
+    """Those of a piece: a list with places in the document of a URI, or a tree."""
+    found, place = piece_symbols(db, file, text, hidden), Text(text, encoding)
+    return part_of(_flat(place, symbol, uri) if uri else _tree(place, symbol) for symbol in found)
+
+
+def _flat(text: Text, symbol: ide.DocumentSymbol, uri: str) -> protocol.SymbolInformation:
+    place: protocol.Location = {"uri": uri, "range": convert.range_of(text, symbol.span)}
     return {"name": symbol.name, "kind": KINDS[symbol.kind], "location": place}
 
 
-def _tree(ask: Ask, symbol: ide.DocumentSymbol) -> protocol.DocumentSymbol:
+def _tree(text: Text, symbol: ide.DocumentSymbol) -> protocol.DocumentSymbol:
     return {
         "name": symbol.name,
         "detail": symbol.detail,
         "kind": KINDS[symbol.kind],
-        "range": ask.range(symbol.span),
-        "selectionRange": ask.range(symbol.selection),
-        "children": [_tree(ask, child) for child in symbol.children],
+        "range": convert.range_of(text, symbol.span),
+        "selectionRange": convert.range_of(text, symbol.selection),
+        "children": [_tree(text, child) for child in symbol.children],
     }
 
 

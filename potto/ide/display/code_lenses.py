@@ -1,71 +1,85 @@
-"""Code lenses: what can be done with a definition, above it. Owns `code_lenses` and `resolve_code_lens`."""
+"""Code lenses: what can be done with a definition, above it.
+
+Owns `code_lenses`, `resolve_code_lens` and `offered`. A definition has two at most: its value, and all the rest.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Literal
 
 from msgspec.structs import replace
 
 from potto.ide.hover.derivatives import derivative_text
-from potto.ide.model import CodeLens
-from potto.ide.names.documents import kind_of
-from potto.ide.names.live_expressions import lives
-from potto.ide.names.places import all_chunks, owner
+from potto.ide.model import CodeLens, Offer
+from potto.ide.names.documents import kind_of, name_span
+from potto.ide.names.places import PieceAt, pieces_of
 from potto.ide.names.points import points
 from potto.ide.names.symbols import DefinitionSymbol
 from potto.ide.navigation.references import occurrences_of
-from potto.query import Database
-from potto.source import Span
+from potto.query import Database, query
 
 LONG_CALL = 40  # characters of a call beyond which a title does not show it
 
 
 def code_lenses(db: Database, file: str) -> tuple[CodeLens, ...]:
-    """For each definition: evaluate or differentiate it, show its derivative, and who uses it; for scripts: run."""
+    """For each definition its value and what more can be done with it; for scripts: run."""
+    found: list[CodeLens] = []
+    for at in pieces_of(db, file):
+        for lens in piece_lenses(db, file, at.text, at.hidden):
+            if lens.command != "run" or not any(other.command == "run" for other in found):
+                found.append(replace(lens, span=lens.span.shift(at.start)))
+    return tuple(found)
+
+
+@query(keep=1024)
+def piece_lenses(db: Database, file: str, text: str, hidden: tuple[str, ...]) -> tuple[CodeLens, ...]:
+    """Those of a piece of a file, relative to it. Of statements the first one can be run."""
     found: list[CodeLens] = []
     running = False
-    for chunk in all_chunks(db, file):
-        sketch, name = chunk.sketch(db), owner(db, chunk)
+    for chunk, name in PieceAt(file, 0, text, hidden).chunks(db):
+        sketch = chunk.sketch(db)
         if name is not None:
-            found += _of_definition(db, file, name, chunk.absolute(sketch.name_span))
+            span = chunk.absolute(sketch.name_span)
+            if kind_of(db, file, name) in ("constant", "function"):
+                found.append(CodeLens(span, "value", (file, name)))
+            found.append(CodeLens(span, "more", (file, name), "more"))
         elif sketch.kind == "statement" and not running:
             running = True
             found.append(CodeLens(chunk.absolute(sketch.span), "run", (file,), "run"))
-        for live in lives(db, chunk.text) if "#>" in chunk.text else ():
-            found.append(CodeLens(chunk.absolute(live.span), "evaluate", (file, live.text), "evaluate"))
-    return tuple(sorted(found, key=lambda lens: lens.span.start))
-
-
-def _of_definition(db: Database, file: str, name: str, span: Span) -> Iterator[CodeLens]:
-    match kind_of(db, file, name):
-        case "constant":
-            yield CodeLens(span, "evaluate", (file, name), "evaluate")
-        case "function":
-            yield CodeLens(span, "evaluate", (file, name))
-            yield CodeLens(span, "differentiate", (file, name))
-            yield CodeLens(span, "showDerivative", (file, name))
-        case _:
-            yield CodeLens(span, "showDerivative", (file, name), "show derivative")
-    yield CodeLens(span, "showReferences", (file, name, str(span.start)))
+    return tuple(found)
 
 
 def resolve_code_lens(db: Database, lens: CodeLens) -> CodeLens:
-    """A lens with its title: where a function is evaluated, how many surfaces it has, how often it is used."""
-    match lens.command, lens.arguments:
-        case "evaluate" | "differentiate", (file, name) if not lens.title:
-            point = next(iter(points(db, file, name)), None)
-            if point is None:
-                return replace(lens, title=lens.command)
-            titled = f"{lens.command} {point.text}" if len(point.text) <= LONG_CALL else lens.command
-            return replace(lens, arguments=(file, point.text), title=titled)
-        case "showDerivative", (file, name):
-            return replace(lens, title=_derivative_title(db, file, name))
-        case "showReferences", (file, name, _):
-            symbol = DefinitionSymbol(file, name)
-            count = sum(1 for _, o in occurrences_of(db, file, symbol) if o.role != "define")
-            return replace(lens, title="1 reference" if count == 1 else f"{count} references")
-        case _:
-            return lens
+    """A lens with its title: where a function is evaluated."""
+    if lens.command != "value" or lens.title:
+        return lens
+    file, name = lens.arguments
+    text, title = _call(db, file, name, "evaluate")
+    return replace(lens, arguments=(file, text), title=title)
+
+
+def _call(db: Database, file: str, name: str, do: Literal["evaluate", "differentiate"]) -> tuple[str, str]:
+    """What is evaluated of a definition, and how that is called."""
+    point = next(iter(points(db, file, name)), None)
+    text = name if point is None else point.text
+    return text, do if point is None or text == name or len(text) > LONG_CALL else f"{do} {text}"
+
+
+def offered(db: Database, file: str, name: str) -> Iterator[Offer]:
+    """What can be done with a definition."""
+    kind = kind_of(db, file, name)
+    if kind in ("constant", "function"):
+        text, title = _call(db, file, name, "evaluate")
+        yield Offer("evaluate", title, (file, text))
+    if kind == "function":
+        text, title = _call(db, file, name, "differentiate")
+        yield Offer("differentiate", title, (file, text))
+    if kind in ("function", "diffeo"):
+        yield Offer("showDerivative", _derivative_title(db, file, name), (file, name))
+    count = sum(1 for _, o in occurrences_of(db, file, DefinitionSymbol(file, name)) if o.role != "define")
+    title = "1 reference" if count == 1 else f"{count} references"
+    yield Offer("showReferences", title, (file, name, str(name_span(db, file, name).start)))
 
 
 def _derivative_title(db: Database, file: str, name: str) -> str:

@@ -3,29 +3,39 @@
 from __future__ import annotations
 
 from potto.ide.model import Fold
-from potto.ide.names.places import ChunkAt, all_chunks, line_start, text_of
+from potto.ide.names.places import NOWHERE, ChunkAt, line_start, pieces_of, text_of
+from potto.modules import is_diffeo
+from potto.modules.texts import import_starts, imports, piece
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import nodes, walk
 
-_IMPORTS = ("from", "import", "#", "\ufeff")
 _FOLDED = (nodes.Integral, nodes.Let, nodes.Lambda, nodes.If, nodes.ListLiteral, nodes.Tuple, nodes.Apply, nodes.Paren)
 
 
 def folding_ranges(db: Database, file: str) -> tuple[Fold, ...]:
     """The folds of a file, in order; each covers two lines or more, and no two begin on the same line."""
+    found = list(import_folds(db, file))
+    for at in pieces_of(db, file):
+        found += [Fold(fold.span.shift(at.start), fold.kind) for fold in piece_folds(db, at.text, is_diffeo(file))]
+    return tuple(sorted(found, key=lambda fold: fold.span.start))
+
+
+def import_folds(db: Database, file: str) -> tuple[Fold, ...]:
+    """The fold of the imports, if they are on several lines."""
+    spans = [item.span.shift(start) for start, item in zip(import_starts(db, file), imports(db, file))]
+    whole = spans[0].cover(spans[-1]) if spans else NOWHERE
     text = text_of(db, file)
+    return (Fold(whole, "imports"),) if "\n" in text[whole.start : whole.end] else ()
+
+
+@query(keep=1024)
+def piece_folds(db: Database, text: str, diffeo: bool) -> tuple[Fold, ...]:
+    """The folds of a piece of a file, relative to it."""
     found: list[Fold] = []
-    imports: list[Span] = []
-    for chunk in all_chunks(db, file):
+    for chunk in piece(db, text, diffeo).chunks:
         if "\n" in chunk.text:
-            found += (Fold(chunk.absolute(f.span), f.kind) for f in chunk_folds(db, chunk.text, chunk.diffeo))
-        if chunk.text.startswith(_IMPORTS):
-            sketch = chunk.sketch(db)
-            if sketch.kind == "import":
-                imports.append(chunk.absolute(sketch.span))
-    if imports:
-        found.append(Fold(imports[0].cover(imports[-1]), "imports"))
+            found += [Fold(f.span.shift(chunk.start), f.kind) for f in chunk_folds(db, chunk.text, diffeo)]
     kept: dict[int, Fold] = {}
     for fold in sorted(found, key=lambda f: (f.span.start, -f.span.end)):
         line = line_start(text, fold.span.start)

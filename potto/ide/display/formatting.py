@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from potto.ide.actions.edits import minimal
 from potto.ide.model import Edit
-from potto.ide.names.places import ChunkAt, all_chunks, chunk_at, line_end, line_start, text_of
+from potto.ide.names.places import ChunkAt, all_chunks, chunk_at, line_end, line_start, pieces_of, text_of
 from potto.modules import is_diffeo
+from potto.modules.texts import piece
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import format_source, nodes
@@ -19,19 +20,42 @@ _MOST_BLANK_LINES = 2
 
 def format_document(db: Database, file: str) -> tuple[Edit, ...]:
     """The edits that lay out a file."""
+    whole = format_at_once(db, file)
+    if whole is not None:
+        return whole
+    found: list[Edit] = []
+    for number, at in enumerate(pieces := pieces_of(db, file), 1):
+        edits = piece_edits(db, at.text, is_diffeo(file), number == 1, number == len(pieces))
+        found += [Edit(edit.span.shift(at.start), edit.text) for edit in edits]
+    return tuple(found)
+
+
+def format_at_once(db: Database, file: str) -> tuple[Edit, ...] | None:
+    """The edits of a file in which all places move, or that is blank; None of any other."""
     text = text_of(db, file)
-    chunks = all_chunks(db, file)
-    if "\r" in text or text.startswith("\ufeff") or not chunks:  # rare, and then all places move
-        mark = len(text) - len(text.removeprefix("\ufeff"))
-        return minimal(text[mark:], format_source(text, is_diffeo(file)), mark)
-    edits, end = list(_gap(text, 0, chunks[0].start, "")), 0
-    for number, chunk in enumerate(chunks):
-        if number:
-            blank_lines = text.count("\n", end, chunk.start) - 1
-            edits += _gap(text, end, chunk.start, "\n" * (1 + min(max(blank_lines, 0), _MOST_BLANK_LINES)))
-        edits += _chunk(db, chunk)
-        end = chunk.start + len(chunk.text)
-    return (*edits, *_gap(text, end, len(text), "\n"))
+    if "\r" not in text and not text.startswith("\ufeff") and not text.isspace():
+        return None
+    mark = len(text) - len(text.removeprefix("\ufeff"))
+    return minimal(text[mark:], format_source(text, is_diffeo(file)), mark)
+
+
+@query(keep=1024)
+def piece_edits(db: Database, text: str, diffeo: bool, first: bool, last: bool) -> tuple[Edit, ...]:
+    """The edits that lay out a piece of a file, relative to it: its chunks, and the blank lines behind each."""
+    edits: list[Edit] = []
+    chunks = piece(db, text, diffeo).chunks
+    if first and chunks:
+        edits += _gap(text, 0, chunks[0].start, "")
+    for number, chunk in enumerate(chunks, 1):
+        found, end = chunk_edits(db, chunk.text, diffeo), chunk.start + len(chunk.text)
+        edits += [Edit(edit.span.shift(chunk.start), edit.text) for edit in found]
+        if last and number == len(chunks):
+            edits += _gap(text, end, len(text), "\n")
+        else:
+            after = chunks[number].start if number < len(chunks) else len(text)
+            blank_lines = text.count("\n", end, after) - 1
+            edits += _gap(text, end, after, "\n" * (1 + min(max(blank_lines, 0), _MOST_BLANK_LINES)))
+    return tuple(edits)
 
 
 def _gap(text: str, start: int, end: int, wanted: str) -> tuple[Edit, ...]:

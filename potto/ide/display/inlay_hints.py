@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from potto.ide.hover.derivatives import ConditionInfo, condition_infos, condition_markdown, fence
 from potto.ide.model import Edit, InlayHint
-from potto.ide.names.places import ChunkAt, all_chunks, owner
+from potto.ide.names.places import ChunkAt, PieceAt, pieces_of
 from potto.ide.names.symbols import parameters, placeless
 from potto.modules import DefinitionTarget
 from potto.modules import resolve as target_of
@@ -39,18 +39,31 @@ LONG = 60  # characters of a type beyond which a hint shows its beginning
 
 
 def inlay_hints(db: Database, file: str, span: Span) -> tuple[InlayHint, ...]:
-    """The hints of the chunks that touch a span, in order."""
+    """The hints of the places in a span, in order."""
     found: list[InlayHint] = []
-    for chunk in all_chunks(db, file, span):
-        name = owner(db, chunk)
-        if name is None:
-            continue
-        for hint in definition_hints(db, file, name):
-            offset = hint.offset + chunk.start
-            if span.start <= offset <= span.end:
-                edits = tuple(Edit(chunk.absolute(edit.span), edit.text) for edit in hint.edits)
-                found.append(replace(hint, offset=offset, edits=edits))
+    for at in pieces_of(db, file):
+        if at.start <= span.end and span.start <= at.start + len(at.text):
+            moved = (_moved(hint, at.start) for hint in piece_hints(db, file, at.text, at.hidden))
+            found += [hint for hint in moved if span.start <= hint.offset <= span.end]
     return tuple(found)
+
+
+@query(keep=1024)
+def piece_hints(db: Database, file: str, text: str, hidden: tuple[str, ...]) -> tuple[InlayHint, ...]:
+    """The hints of a piece of a file, relative to it."""
+    return tuple(
+        [
+            _moved(hint, chunk.start)
+            for chunk, name in PieceAt(file, 0, text, hidden).chunks(db)
+            if name is not None
+            for hint in definition_hints(db, file, name)
+        ]
+    )
+
+
+def _moved(hint: InlayHint, start: int) -> InlayHint:
+    edits = tuple([Edit(edit.span.shift(start), edit.text) for edit in hint.edits])
+    return replace(hint, offset=hint.offset + start, edits=edits)
 
 
 @query

@@ -14,8 +14,9 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from potto.ide.names.function_arguments import fits, numbers, of_numbers
-from potto.ide.names.live_expressions import lives, wrong_with
-from potto.ide.names.places import NOWHERE, all_chunks, owner
+from potto.ide.names.live_expressions import piece_lives, wrong_with
+from potto.ide.names.places import NOWHERE, PieceAt, pieces_of
+from potto.modules.texts import pieces
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import nodes, parse_expression
@@ -60,9 +61,20 @@ class Scene(Struct, frozen=True):
 
 def scenes(db: Database, file: str) -> tuple[Scene, ...]:
     """The functions of a file that can be drawn, in order."""
+    return tuple(
+        [
+            replace(drawn, span=drawn.span.shift(at.start))
+            for at in pieces_of(db, file)
+            for drawn in piece_scenes(db, file, at.text, at.hidden)
+        ]
+    )
+
+
+@query(keep=1024)
+def piece_scenes(db: Database, file: str, text: str, hidden: tuple[str, ...]) -> tuple[Scene, ...]:
+    """Those of a piece of a file, relative to it."""
     found: list[Scene] = []
-    for chunk in all_chunks(db, file):
-        name = owner(db, chunk)
+    for chunk, name in PieceAt(file, 0, text, hidden).chunks(db):
         drawn = None if name is None else scene(db, file, name)
         if drawn is not None:
             found.append(replace(drawn, span=chunk.absolute(chunk.sketch(db).name_span)))
@@ -115,8 +127,8 @@ def _given(db: Database, file: str) -> Mapping[str, Arguments]:
     """What live expressions give to each function, by name and by place; the first call counts. A table, to be read
     by entry."""
     table: dict[str, Arguments] = {}
-    for chunk in all_chunks(db, file):
-        for live in lives(db, chunk.text) if "#>" in chunk.text else ():
+    for text in pieces(db, file):
+        for live in piece_lives(db, text):
             for called, arguments in _calls(db, live.text):
                 table.setdefault(called, arguments)
     return table

@@ -8,38 +8,45 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from potto.diagnostics import Diagnostic
-from potto.ide.names.places import ChunkAt, all_chunks
+from potto.ide.names.places import pieces_of
 from potto.modules.texts import moved
 from potto.query import Database, query
 from potto.quick import replace
 from potto.source import Span
-from potto.syntax import live_expressions, parse_expression
+from potto.syntax import live_expressions, parse_expression, split
 from potto.syntax.live import Live
 from potto.types import infer_expression
 
 
 def live_in(db: Database, file: str) -> tuple[Live, ...]:
     """The live expressions of a file, in order."""
-    found: list[Live] = []
-    for chunk in all_chunks(db, file):
-        for live in lives(db, chunk.text) if "#>" in chunk.text else ():
-            span, text_span = live.span.shift(chunk.start), live.text_span.shift(chunk.start)
-            expected = None if live.expected_span is None else live.expected_span.shift(chunk.start)
-            found.append(replace(live, span=span, text_span=text_span, expected_span=expected))
-    return tuple(found)
+    return tuple([_moved(live, at.start) for at in pieces_of(db, file) for live in piece_lives(db, at.text)])
+
+
+@query(keep=1024)
+def piece_lives(db: Database, text: str) -> tuple[Live, ...]:
+    """Those of a piece of a file, relative to it."""
+    if "#>" not in text:
+        return ()
+    chunks = (chunk for chunk in split(text) if "#>" in chunk.text)
+    return tuple([_moved(live, chunk.start) for chunk in chunks for live in lives(db, chunk.text)])
+
+
+def _moved(live: Live, start: int) -> Live:
+    expected = None if live.expected_span is None else live.expected_span.shift(start)
+    return replace(live, span=live.span.shift(start), text_span=live.text_span.shift(start), expected_span=expected)
 
 
 def live_diagnostics(db: Database, file: str) -> tuple[Diagnostic, ...]:
     """What is wrong with the live expressions of a file, and with what they are expected to give."""
-    return tuple(said for chunk in all_chunks(db, file) if "#>" in chunk.text for said in _of_chunk(db, chunk))
+    found = ((at, live) for at in pieces_of(db, file) for live in piece_lives(db, at.text))
+    return tuple(said for at, live in found for said in _of_one(db, file, live, at.start))
 
 
-def _of_chunk(db: Database, chunk: ChunkAt) -> Iterator[Diagnostic]:
-    for live in lives(db, chunk.text):
-        yield from (_placed(said, chunk.start, live.text_span) for said in wrong_with(db, chunk.file, live.text))
-        if live.expected is not None and live.expected_span is not None:
-            found = wrong_with(db, chunk.file, live.expected)
-            yield from (_placed(said, chunk.start, live.expected_span) for said in found)
+def _of_one(db: Database, file: str, live: Live, start: int) -> Iterator[Diagnostic]:
+    yield from (_placed(said, start, live.text_span) for said in wrong_with(db, file, live.text))
+    if live.expected is not None and live.expected_span is not None:
+        yield from (_placed(said, start, live.expected_span) for said in wrong_with(db, file, live.expected))
 
 
 @query(keep=8192)

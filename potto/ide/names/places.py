@@ -6,12 +6,14 @@ Owns the way from absolute offsets to what is memoized relative to chunks, and b
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Iterator
 from typing import Literal
 
 from msgspec import Struct
 
 from potto.ide.names.index import Index, index
 from potto.modules import ChunkRef, chunk_start, chunks, is_diffeo, parsed, source
+from potto.modules.texts import defined_twice, layout, piece
 from potto.query import Database, query
 from potto.source import Span
 from potto.syntax import ParsedChunk, nodes
@@ -151,6 +153,39 @@ def all_chunks(db: Database, file: str, span: Span | None = None) -> tuple[Chunk
         first = max(bisect_right(starts, span.start) - 1, 0)
         found = found[first : bisect_right(starts, span.end)]
     return tuple(chunk_of(file, chunk) for chunk in found)
+
+
+class PieceAt(Struct, frozen=True):
+    """A piece of a file, see `potto.syntax.chunks`; `start` is its place in the file.
+
+    `hidden`: what it defines that does not count, as the name is defined again further on. Questions about whole files
+    are asked piece by piece, with all but the place: after a key all but one are answered from memory.
+    """
+
+    file: str
+    start: int
+    text: str
+    hidden: tuple[str, ...] = ()
+
+    def chunks(self, db: Database) -> Iterator[tuple[ChunkAt, str | None]]:
+        """Its chunks, seen from its start, each with the name that it defines."""
+        found = piece(db, self.text, is_diffeo(self.file))
+        for chunk in found.chunks:
+            at = ChunkAt(self.file, chunk.start, chunk.text, is_diffeo(self.file))
+            name = at.sketch(db).name
+            counts = name is not None and name not in self.hidden and found.places[name][-1].start == chunk.start
+            yield at, name if counts else None
+
+
+def pieces_of(db: Database, file: str) -> tuple[PieceAt, ...]:
+    """The pieces of a file, in order."""
+    found = layout(db, file)
+    again = defined_twice(db, file)
+    made = []
+    for number, (one, start) in enumerate(zip(found.pieces, found.starts)):
+        hidden = tuple([name for name in again if name in one.texts and found.place[name] != number])
+        made.append(PieceAt(file, start, one.text, hidden))
+    return tuple(made)
 
 
 def word_at(text: str, offset: int) -> Span:

@@ -11,9 +11,9 @@ from msgspec import Struct
 
 from potto.ide.names.documents import kind_of
 from potto.ide.names.function_arguments import fits, numbers
-from potto.ide.names.places import all_chunks
 from potto.ide.names.symbols import callee
-from potto.modules import names, parsed
+from potto.modules import is_diffeo, names, parsed
+from potto.modules.texts import piece, pieces
 from potto.query import Database, query
 from potto.syntax import children, live_expressions, nodes, parse_expression
 from potto.syntax.written import without_parentheses
@@ -47,10 +47,22 @@ def points(db: Database, file: str, name: str) -> tuple[Point, ...]:
     return tuple(found.values()) or _chosen(db, file, name)
 
 
+def looked_at(db: Database, file: str) -> Iterator[tuple[str, str]]:
+    """The definitions that the expressions of a file look at."""
+    found = (target for text in looking(db, file) for target, _ in points_in(db, file, text))
+    yield from dict.fromkeys(found)
+
+
 @query
 def looking(db: Database, file: str) -> tuple[str, ...]:
     """The expressions of a file that look at its definitions: those of live expressions and of statements."""
-    return tuple(text for chunk in all_chunks(db, file) for text in _looking(db, chunk.text, chunk.diffeo))
+    return tuple([text for piece in pieces(db, file) for text in _piece_looking(db, piece, is_diffeo(file))])
+
+
+@query(keep=512)
+def _piece_looking(db: Database, text: str, diffeo: bool) -> tuple[str, ...]:
+    """Those of a piece of the file."""
+    return tuple([found for chunk in piece(db, text, diffeo).chunks for found in _looking(db, chunk.text, diffeo)])
 
 
 @query(keep=8192)

@@ -8,9 +8,9 @@ from __future__ import annotations
 import os.path
 
 from potto.ide.model import DocumentLink
-from potto.ide.names.places import all_chunks
+from potto.ide.names.places import chunk_of
 from potto.ide.names.symbols import LocalSymbol, ModuleSymbol, meaning_of, symbol_at
-from potto.modules.texts import exists
+from potto.modules.texts import at, exists, layout
 from potto.query import Database
 from potto.source import Span
 
@@ -18,9 +18,9 @@ from potto.source import Span
 def document_links(db: Database, file: str) -> tuple[DocumentLink, ...]:
     """The modules of imports, with the files that they mean."""
     links: list[DocumentLink] = []
-    for chunk in all_chunks(db, file):
-        if chunk.sketch(db).kind != "import":
-            continue
+    found = layout(db, file)
+    chunks = (at(one, start) for piece, start in zip(found.pieces, found.starts) for one in piece.imports)
+    for chunk in [chunk_of(file, one) for one in chunks]:
         for occurrence in chunk.index(db).occurrences:
             if occurrence.role not in ("module", "import"):
                 continue

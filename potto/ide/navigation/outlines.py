@@ -11,7 +11,7 @@ from potto.ide.actions.imports import exports
 from potto.ide.model import DocumentSymbol, Location, SymbolKind, WorkspaceSymbol
 from potto.ide.names.documents import item_span, name_span, type_text, written_kind
 from potto.ide.names.index import Binder
-from potto.ide.names.places import ChunkAt, all_chunks, owner
+from potto.ide.names.places import ChunkAt, PieceAt, pieces_of
 from potto.ide.names.symbols import placeless
 from potto.query import Database, query
 from potto.source import Span
@@ -23,9 +23,20 @@ LONG_LABEL = 60
 
 def document_symbols(db: Database, file: str) -> tuple[DocumentSymbol, ...]:
     """The definitions of a file in order, each with its parameters and local names; statements of scripts as well."""
+    return tuple(
+        [
+            _shifted(symbol, at.start)
+            for at in pieces_of(db, file)
+            for symbol in piece_symbols(db, file, at.text, at.hidden)
+        ]
+    )
+
+
+@query(keep=1024)
+def piece_symbols(db: Database, file: str, text: str, hidden: tuple[str, ...]) -> tuple[DocumentSymbol, ...]:
+    """Those of a piece of a file, relative to it."""
     found: list[DocumentSymbol] = []
-    for chunk in all_chunks(db, file):
-        name = owner(db, chunk)
+    for chunk, name in PieceAt(file, 0, text, hidden).chunks(db):
         symbol = _symbol(db, chunk, None) if name is None else definition_symbol(db, file, name)
         if symbol is not None:
             found.append(symbol if name is None else _shifted(symbol, chunk.start))
