@@ -86,7 +86,11 @@ function registerCommands(context: vscode.ExtensionContext, server: Server, deri
     const shown = typeof name === "string" ? name : await definitionAtCursor();
     if (document && shown) await derivatives.show(document.uri, shown);
   });
-  command("more", (uri: string, name: string) => chooseOffer(server, uri, name));
+  command("more", async (uri?: vscode.Uri | string, name?: unknown) => {
+    const document = await documentOf(uri);
+    const asked = typeof name === "string" ? name : await definitionAtCursor();
+    if (document && asked) await chooseOffer(server, document.uri.toString(), asked);
+  });
   command("showReferences", (uri: string, position: Position, locations: Location[]) => {
     const range = ({ start, end }: Location["range"]): vscode.Range =>
       new vscode.Range(start.line, start.character, end.line, end.character);
