@@ -53,8 +53,11 @@ class Columns(Struct):
 
 
 def run_of(index: Any) -> slice | None:
-    """The places that an index has, which come in order and each once, where they are one after the other."""
+    """The places that an index has, where they are one after the other in order; None for all others, also for places
+    that are in another order or come several times."""
     if index.__class__ is slice or index.size < 2 or index[-1] - index[0] + 1 != index.size:
+        return None
+    if (np.diff(index) != 1).any():
         return None
     return slice(int(index[0]), int(index[-1]) + 1)
 

@@ -1,0 +1,34 @@
+"""Batches as columns: members picked and put back, whatever order they come in."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from potto.integrate.columns import run_of
+from potto.integrate.pieces import Sums
+
+
+def numbered(count: int) -> Sums:
+    """Sums whose values are the numbers of their members."""
+    sums = Sums.zeros(1, 0, count)
+    sums.v[0] = np.arange(count)
+    return sums
+
+
+@pytest.mark.parametrize("index", [[2, 3, 4], [2, 4, 3, 5], [0, 0, 2], [3], [4, 3, 2], [1, 1, 1], [0, 5]])
+def test_members_are_those_that_were_asked_for(index: list[int]) -> None:
+    places = np.array(index)
+    assert numbered(6).pick(places).v[0].tolist() == index
+    whole = numbered(6)
+    part = numbered(len(index))
+    whole.put(places, part)
+    expected = np.arange(6.0)
+    expected[places] = np.arange(len(index))
+    assert whole.v[0].tolist() == expected.tolist()
+
+
+def test_only_what_is_in_order_is_a_run() -> None:
+    assert run_of(np.array([2, 3, 4])) == slice(2, 5)
+    assert run_of(np.array([2, 4, 3, 5])) is None
+    assert run_of(np.array([0, 2, 2])) is None
