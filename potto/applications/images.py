@@ -24,7 +24,7 @@ BAND = 1 << 18  # pixels of one array call, which is evaluated in blocks
 
 
 class Grid(Struct, frozen=True):
-    """Pixels over a box of the plane; the first row is the top one."""
+    """Pixels over a box of the plane; the first row is the top one, which is y1, whether that is the larger or not."""
 
     width: int
     height: int

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import time
 from typing import TYPE_CHECKING, Any
 
@@ -53,7 +54,7 @@ def _add_what_is_seen(parser: argparse.ArgumentParser) -> None:
                       "square")  # fmt: skip
     seen.add_argument("--height", metavar="N", type=_side, help="pixels down; the width follows")
     seen.add_argument("--box", "--viewport", metavar="X0,X1,Y0,Y1", type=_box, default=(0.0, 1.0, 0.0, 1.0),
-                      help="what of the plane is seen (default 0,1,0,1)")  # fmt: skip
+                      help="what of the plane is seen (default 0,1,0,1); where Y0 > Y1, y grows downwards")  # fmt: skip
     seen.add_argument("--axes", metavar="X,Y", help="the parameters that are the axes (default: the two not given)")
     seen.add_argument("--wrt", metavar="NAME,…", action="append", default=[], type=_names,
                       help="draw also the derivatives by these")  # fmt: skip
@@ -69,8 +70,9 @@ def _add_colours(parser: argparse.ArgumentParser) -> None:
     colours.add_argument("--scale", action="store_true", help="one figure with axes, colour bars and a caption: value "
                          "and derivatives beside each other (.png, .jpg, .pdf, .svg)")  # fmt: skip
     colours.add_argument("--surfaces", action="store_true", help="draw in the figure of --scale where surfaces are")
-    colours.add_argument("--tone", choices=TONES, default="linear", help="srgb: the numbers are light; log: what is "
-                         "weak can be seen (default linear)")  # fmt: skip
+    colours.add_argument("--tone", metavar="VALUE[,DERIVATIVE]", type=_tones, default=("linear", "linear"),
+                         help="linear; srgb: the numbers are light; log: what is weak can be seen; `linear,log`: one "
+                         "for the value, one for derivatives (default linear)")  # fmt: skip
 
 
 def _pixels(width: int, height: int, text: str) -> tuple[int, int]:
@@ -123,23 +125,34 @@ def _over(text: str) -> tuple[str, str, str]:
     return name.strip(), low.strip(), high.strip()
 
 
-def _numbers(text: str, count: int, form: str) -> tuple[float, ...]:
+def _numbers(text: str, count: int) -> tuple[float, ...]:
+    """So many finite numbers, or none."""
     try:
         found = tuple(map(float, text.replace(",", " ").split()))
     except ValueError:
         found = ()
-    pairs = list(zip(found[::2], found[1::2], strict=False))
-    if len(found) != count or not all(-float("inf") < a < b < float("inf") for a, b in pairs):
-        raise argparse.ArgumentTypeError(f"{text!r} is not {form}, from less to more")
-    return found
+    return found if len(found) == count and all(map(math.isfinite, found)) else ()
 
 
 def _box(text: str) -> tuple[float, ...]:
-    return _numbers(text, 4, "X0,X1,Y0,Y1")
+    found = _numbers(text, 4)
+    if not found or not (found[0] < found[1] and found[2] != found[3]):
+        raise argparse.ArgumentTypeError(f"{text!r} is not X0,X1,Y0,Y1, with X0 < X1; with Y0 > Y1 it is upside down")
+    return found
 
 
 def _range(text: str) -> tuple[float, ...]:
-    return _numbers(text, 2, "LO,HI")
+    found = _numbers(text, 2)
+    if not found or not found[0] < found[1]:
+        raise argparse.ArgumentTypeError(f"{text!r} is not LO,HI, from less to more")
+    return found
+
+
+def _tones(text: str) -> tuple[str, str]:
+    value, comma, slope = text.partition(",")
+    if value not in TONES or (comma and slope not in TONES):
+        raise argparse.ArgumentTypeError(f"{text!r} is none of {', '.join(TONES)}, or two of them as `linear,log`")
+    return value, slope or value
 
 
 def prepare(arguments: list[str]) -> list[str]:
@@ -215,7 +228,7 @@ def _shape(options: argparse.Namespace) -> tuple[int, int]:
         width, height = options.size
         return width, height
     x0, x1, y0, y1 = options.box
-    ratio = (y1 - y0) / (x1 - x0)
+    ratio = abs(y1 - y0) / (x1 - x0)
     width, height = options.width, options.height
     if width is None and height is None:
         return SIDE, SIDE

@@ -287,11 +287,11 @@ def layers(picture: Picture, found: Drawn, options: argparse.Namespace, target: 
         return min(low for low, _ in each), max(high for _, high in each)
 
     low, high = options.range or ends(part(0), False)
-    layers = [Layer(target, "value", part(0), Paint(low, high, options.map, options.tone), low, high)]
+    layers = [Layer(target, "value", part(0), Paint(low, high, options.map, options.tone[0]), low, high)]
     for number, name in enumerate(picture.wrt):
         here = part(width * (1 + number))
         low, high = ends(here, True)
-        paint = Paint(low, high, options.diverging, options.tone, even=True)
+        paint = Paint(low, high, options.diverging, options.tone[1], even=True)
         layers.append(Layer(f"{stem}-d{name}{ending}", f"derivative by {name}", here, paint, low, high))
     if options.error:
         most = max(limits(errors)[1] for errors in found.errors)

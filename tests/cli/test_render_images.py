@@ -47,6 +47,8 @@ def test_rows_go_down_and_the_box_is_the_box(potto: Potto, tmp_path) -> None:
     assert np.load(tmp_path / "c.npy").tolist() == [[5, 5], [3, 3], [1, 1]]
     potto("render", "s.po", "curried", "c=1", "--size", "2x1", "--box", "-1,1,-1,1", "-o", "c.npy")
     assert np.load(tmp_path / "c.npy").tolist() == [[-0.5, 0.5]]
+    potto("render", "s.po", "curried", "c=0", "--width", "2", "--box", "-2,2,6,0", "-o", "c.npy")  # upside down
+    assert np.load(tmp_path / "c.npy").tolist() == [[1, 1], [3, 3], [5, 5]]
 
 
 def test_axes_by_name(potto: Potto, tmp_path) -> None:
@@ -101,6 +103,9 @@ def test_for_machines(potto: Potto) -> None:
     (["pixle"], "not defined", 1),
     (["pixel", "c=1", "--size", "0x3"], "no size", 2),
     (["pixel", "c=1", "--box", "1,0,0,1"], "not X0,X1,Y0,Y1", 2),
+    (["pixel", "c=1", "--box", "0,1,1,1"], "not X0,X1,Y0,Y1", 2),
+    (["pixel", "c=1", "--range", "1,0"], "not LO,HI", 2),
+    (["pixel", "c=1", "--tone", "linear,loud"], "none of linear, srgb, log", 2),
     (["pixel", "c=1", "--axes", "px"], "two axes", 1),
     (["pixel", "c"], "which parameter is what", 2),
     (["pixel", "c=1", "-o", "no/such/folder.png"], "there is no folder `no/such`", 2),

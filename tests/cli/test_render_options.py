@@ -186,6 +186,18 @@ def test_a_tone_can_be_read_back(tone: str, even: bool) -> None:
     assert np.all(np.diff(paint.level(numbers)) > 0)
 
 
+def test_a_tone_for_values_and_one_for_derivatives(potto: Potto, tmp_path: Path) -> None:
+    """Of a x + b y by b it is y: the value is as without a tone, the derivative as under `log`."""
+    Image = pytest.importorskip("PIL.Image")
+
+    def shown(*words: str) -> list[object]:
+        assert potto("render", "s.po", "plane", "a=1", "b=1", "--wrt", "b", "--size", "4", *words, s=SCENE).status == 0
+        return [np.asarray(Image.open(tmp_path / name)).tolist() for name in ("plane.png", "plane-db.png")]
+
+    plain, log, both = shown(), shown("--tone", "log"), shown("--tone", "linear,log")
+    assert both == [plain[0], log[1]] and plain[0] != log[0] and plain[1] != log[1]
+
+
 def test_tones(potto: Potto, tmp_path: Path) -> None:
     """sRGB has 0.2140 of the light at level 1/2; the log shows a thousandth as log(1.999)/log(1000) of the whole."""
     paint = Paint(0.0, 1.0, tone="srgb")

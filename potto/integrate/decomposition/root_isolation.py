@@ -171,52 +171,60 @@ class _Cells(Struct, dict=True):
     def judged(self, owner: Ints, s0: Array, s1: Array) -> tuple[Ints, Bools, Ints, Ints]:
         """The cells with at most one root, whether they have one, the cells that are to be halved, and those on all of
         which the surface is 0 to rounding."""
-        a, b = self.x(owner, s0), self.x(owner, s1)
+        middle, a, b = (self.x(owner, s) for s in (0.5 * (s0 + s1), s0, s1))
         box = {**self.at(owner), self.variable: (a, b)}
-        (lo, hi), (least, most) = (
-            tuple(np.broadcast_to(end, a.shape) for end in ends) for ends in enclosure((self.surface, self.slope), box)
-        )
-        middle = self.x(owner, 0.5 * (s0 + s1))
-        here = enclosure((self.surface,), {**self.at(owner), self.variable: (middle, middle)})[0]
+        (lo, hi), (least, most), *branches = self.enclosed((self.surface, self.slope, *self.branches), box, a.shape)
+        # A slope says nothing across the edge of where the surface has a value, which is looked for at the ends.
+        here, *ends = self.at_points(owner, (middle, a, b) if not self.total else (middle,))
         reach = np.maximum(b - middle, middle - a)
         with np.errstate(invalid="ignore", over="ignore"):  # mean values: closer than the enclosure in small cells
             far = np.maximum(np.abs(least), np.abs(most)) * reach
             apart = (here[0] - far > 0) | (here[1] + far < 0)
             steady = (least >= 0) | (most <= 0)
             shallow = ~steady & (here[0] <= 0) & (here[1] >= 0) & (far <= SHALLOW * (here[1] - here[0]))
-        if not self.total:  # a slope says nothing across the edge of where the surface has a value
-            whole = ~(self.nowhere(owner, a) | self.nowhere(owner, b))
-            apart, steady = apart & whole, steady & whole
-        for low, high in enclosure(self.branches, box):  # nor across a jump
+        for end in ends:
+            known = ~np.isnan(end[0])
+            apart, steady = apart & known, steady & known
+        for low, high in branches:  # nor does it across a jump
             one = (low > 0) | (high < 0)
             apart, steady = apart & one, steady & one
         free = (lo > 0) | (hi < 0) | np.isnan(lo) | apart
         settled, shallow = ~free & steady, ~free & shallow
         index = np.nonzero(settled)[0]
-        crossed = self.crossed(owner[index], s0[index], s1[index])
+        known_ends = tuple((low[index], high[index]) for low, high in ends)
+        crossed = self.crossed(owner[index], s0[index], s1[index], known_ends)
         return index, crossed, np.nonzero(~free & ~settled & ~shallow)[0], np.nonzero(shallow)[0]
 
-    def nowhere(self, owner: Ints, x: Array) -> Bools:
-        lo, _ = enclosure((self.surface,), {**self.at(owner), self.variable: (x, x)})[0]
-        return np.broadcast_to(np.isnan(lo), x.shape)
+    def enclosed(self, terms: tuple[Term, ...], box: dict[str, Interval], shape: tuple[int, ...]) -> list[Interval]:
+        return [(np.broadcast_to(lo, shape), np.broadcast_to(hi, shape)) for lo, hi in enclosure(terms, box)]
 
-    def value(self, owner: Ints, x: Array) -> Array:
-        """The surface at places, nan where nothing is known of it."""
-        lo, hi = enclosure((self.surface,), {**self.at(owner), self.variable: (x, x)})[0]
-        with np.errstate(invalid="ignore"):
-            return np.broadcast_to(np.where((lo == -np.inf) & (hi == np.inf), np.nan, 0.5 * (lo + hi)), x.shape)
+    def at_points(self, owner: Ints, places: tuple[Array, ...]) -> list[Interval]:
+        """The surface at several places of each cell, all by one enclosure: most batches are small."""
+        x = np.concatenate(places)
+        box = {**self.at(np.tile(owner, len(places))), self.variable: (x, x)}
+        (low, high), parts = self.enclosed((self.surface,), box, x.shape)[0], len(places)
+        return list(zip(np.split(low, parts), np.split(high, parts), strict=True))
 
-    def crossed(self, owner: Ints, s0: Array, s1: Array) -> Bools:
-        """Whether the surface's sign changes over cells. A root on an end belongs to the cell on its right."""
-        values = []
-        for s in (s0, s1):
-            x = self.x(owner, s)
-            value = self.value(owner, x)
+    def crossed(self, owner: Ints, s0: Array, s1: Array, known: tuple[Interval, ...] = ()) -> Bools:
+        """Whether the surface's sign changes over cells. A root on an end belongs to the cell on its right.
+
+        known: the surface at both ends, where that has been found out already.
+        """
+        ends = self.x(owner, s0), self.x(owner, s1)
+        values = [_middle_of(at) for at in known or self.at_points(owner, ends)]
+        for number, x in enumerate(ends):
             for size in FAR:  # at infinity the terms of a sum may have no sum
-                lost = np.isnan(value) & np.isinf(x)
+                lost = np.isnan(values[number]) & np.isinf(x)
                 if not lost.any():
                     break
-                value = np.where(lost, self.value(owner, np.where(lost, np.copysign(size, x), x)), value)
-            values.append(value)
+                again = self.at_points(owner, (np.where(lost, np.copysign(size, x), x),))[0]
+                values[number] = np.where(lost, _middle_of(again), values[number])
         left, right = values
         return np.asarray((left * np.sign(right) < 0) | ((left == 0) & (right != 0)) | ((right == 0) & (s1 == 1)))
+
+
+def _middle_of(value: Interval) -> Array:
+    """nan where nothing is known."""
+    lo, hi = value
+    with np.errstate(invalid="ignore"):
+        return np.where((lo == -np.inf) & (hi == np.inf), np.nan, 0.5 * (lo + hi))
