@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -52,10 +53,29 @@ def grid(side: int, kind: str) -> Mesh:
     return Mesh(np.stack([x.ravel(), y.ravel()], axis=1), faces, colours)
 
 
-def fitted(kind: str, photo: np.ndarray, side: int, steps: int) -> Mesh:
-    """The mesh after so many steps down. photo: (h, w, 3) from 0 to 1. The outer corners stay."""
-    module = potto.load(HERE / "stylize.po")
-    gradient = potto.grad(getattr(module, f"by_{kind}"), ["corners", "colours"])
+Slopes = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], tuple[float, np.ndarray, np.ndarray]]
+
+
+def slopes_by_potto(kind: str) -> Slopes:
+    """The loss and its slopes by corners and by colours, of corners, faces, colours and a photo."""
+    gradient = potto.grad(getattr(potto.load(HERE / "stylize.po"), f"by_{kind}"), ["corners", "colours"])
+
+    def slopes(
+        corners: np.ndarray, faces: np.ndarray, colours: np.ndarray, photo: np.ndarray
+    ) -> tuple[float, np.ndarray, np.ndarray]:
+        found = gradient(corners, faces.astype(float), colours, photo)
+        by_corner, by_colour = (np.asarray(part) for part in found.tangent)
+        return float(found.value), by_corner, by_colour
+
+    return slopes
+
+
+def fitted(kind: str, photo: np.ndarray, side: int, steps: int, slopes: Slopes | None = None) -> Mesh:
+    """The mesh after so many steps down. photo: (h, w, 3) from 0 to 1. The outer corners stay.
+
+    slopes: the loss and its slopes, if they are not to be Potto's.
+    """
+    slopes = slopes or slopes_by_potto(kind)
     mesh = grid(side, kind)
     free = ((mesh.corners > 0) & (mesh.corners < 1)).all(axis=1)
     first, count = mesh.areas(), 2 * int(free.sum())
@@ -70,12 +90,10 @@ def fitted(kind: str, photo: np.ndarray, side: int, steps: int) -> Mesh:
         left = mesh.areas(corners) - LEAST * first
         if (left <= 0).any():
             return 1e3, np.zeros_like(x)
-        found = gradient(corners, mesh.faces.astype(float), colours, photo)
-        by_corner, by_colour = (np.asarray(part) for part in found.tangent)
+        loss, by_corner, by_colour = slopes(corners, mesh.faces, colours, photo)
         by_corner = by_corner + _barrier_slopes(mesh.faces, corners, left)
-        value = float(found.value) - BARRIER * np.log(left / first).sum()
-        reached.append(float(found.value))
-        return value, np.concatenate([by_corner[free].ravel(), by_colour.ravel()])
+        reached.append(loss)
+        return loss - BARRIER * np.log(left / first).sum(), np.concatenate([by_corner[free].ravel(), by_colour.ravel()])
 
     reached: list[float] = []
     start = time.perf_counter()

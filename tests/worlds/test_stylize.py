@@ -15,17 +15,27 @@ import pytest
 import potto
 
 FOLDER = Path(__file__).parents[2] / "examples" / "stylize"
+BY_HAND = Path(__file__).parents[2] / "benchmarks" / "mesh_by_hand.py"
 Points = list[tuple[mp.mpf, mp.mpf]]
+
+
+def loaded(name: str, file: Path) -> Any:
+    spec = importlib.util.spec_from_file_location(name, file)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
 
 
 @pytest.fixture(scope="module")
 def fit() -> Any:
-    spec = importlib.util.spec_from_file_location("stylize_fit", FOLDER / "fit.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["stylize_fit"] = module
-    spec.loader.exec_module(module)
-    return module
+    return loaded("stylize_fit", FOLDER / "fit.py")
+
+
+@pytest.fixture(scope="module")
+def by_hand() -> Any:
+    return loaded("mesh_by_hand", BY_HAND).loss_and_gradient
 
 
 def clipped(polygon: Points, x: mp.mpf, y: mp.mpf, h: mp.mpf) -> Points:
@@ -100,6 +110,26 @@ def test_the_loss_and_its_gradient(fit: Any, kind: str) -> None:
             assert by_corners[4, k] == pytest.approx(slope(corners[4], k), abs=1e-12)
         for face, term in ((0, 0), (5, len(colours[0]) - 1)):
             assert by_colours[face, term, 1] == pytest.approx(slope(colours[face][term], 1), abs=1e-12)
+
+
+@pytest.mark.parametrize("moved", [0.0, 1e-17, 1e-15, 1e-9, 0.02])
+def test_a_mesh_by_hand_has_the_same_gradient(fit: Any, by_hand: Any, moved: float) -> None:
+    """Also where the edges of a grid have been moved by some doubles only, as the first step of a fit does."""
+    random, photo = np.random.default_rng(3), fit.target().reshape(16, 3, 16, 3, 3).mean(axis=(1, 3))
+    mesh = fit.grid(5, "constant")
+    mesh.corners += random.uniform(-moved, moved, mesh.corners.shape)
+    mesh.colours += random.uniform(-0.3, 0.3, mesh.colours.shape)
+    place = mesh.corners, mesh.faces, mesh.colours, photo
+    for ours, theirs in zip(fit.slopes_by_potto("constant")(*place), by_hand(*place), strict=True):
+        assert np.abs(np.asarray(ours) - theirs).max() < 1e-14
+
+
+def test_a_fit_goes_as_far_as_one_by_hand(fit: Any, by_hand: Any) -> None:
+    """The same optimizer along both. Its second step is by a small difference, and the paths part: both go down."""
+    photo = fit.target().reshape(16, 3, 16, 3, 3).mean(axis=(1, 3))
+    ours, theirs = (fit.fitted("constant", photo, 4, 40, slopes) for slopes in (None, by_hand))
+    assert np.allclose(ours.losses[:5], theirs.losses[:5], rtol=1e-9, atol=0)
+    assert ours.losses[-1] < 1.05 * theirs.losses[-1] < 0.2 * ours.losses[0]
 
 
 def test_a_fit_goes_down_and_turns_no_triangle_over(fit: Any) -> None:

@@ -10,17 +10,22 @@ from __future__ import annotations
 import numpy as np
 
 from potto.integrate.columns import distinct
-from potto.integrate.decomposition.cuts import NARROW, Cuts
+from potto.integrate.decomposition.cuts import Cuts
 from potto.integrate.degenerate.coincidences import Scene, around, placed
 from potto.integrate.degenerate.faces import THIN, Place, crossing, several
 from potto.integrate.events import Degenerate
 from potto.integrate.panels.panel_batch import PanelBatch
 from potto.integrate.pieces import Crossing, Pieces, take
+from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.substitution import Segments
 from potto.kernels.cells import Array, Bools, Cell, Ints, Mask
 
 # How far beside a place it is looked at (beside a bound twice), and what part may be lost across it.
 BESIDE, DISCONTINUITY = (1e-7, 1e-9), 1e-6
+# How long a stretch is, in the size of the place, beside which a step can be seen: shorter ones, as of an edge that leans
+# by some doubles, are all within rounding.
+SLIM = 1024 * EPS
+HARMLESS = 1e-12  # the part of a derivative up to which cuts of a step may move apart, as a part of its error
 # How far sections may have come at the nearer of these places, in their size, that don't run along the bound.
 SLOW = 1e-3
 
@@ -58,8 +63,7 @@ def steps_at_cuts(work: PanelBatch, whole: Pieces) -> Crossing | None:
     off = np.maximum(np.minimum(seg.ea[right], THIN * width[jumps]), x[jumps] - seg.b[left])
     sides = {g: take(m, left) for g, m in work.sides.items()}
     place = Place(owner[jumps], x[jumps], off, seg.ta[:, right], sides, (before - after)[:, 1, jumps])
-    as_one = all((seg.tb[:, i:j] == seg.ta[:, j, None]).all() and (seg.ta[:, i + 1 : j] == seg.ta[:, j, None]).all()
-                 for i, j in zip(left, right, strict=True))  # fmt: skip
+    as_one = _move_as_one(work, whole, left, right, place.jump)
     found = crossing(scene, place, DISCONTINUITY * size[:, jumps]) if as_one else None
     if found is None:
         work.machine.note(Degenerate(work.level.variable), scene.below(distinct(owner[jumps])))
@@ -68,6 +72,20 @@ def steps_at_cuts(work: PanelBatch, whole: Pieces) -> Crossing | None:
         for part in (whole.integral, whole.error, whole.floor):
             part.reshape(work.width, -1, seg.a.size)[:, 1:, i + 1 : j] = 0.0
     return found
+
+
+def _move_as_one(work: PanelBatch, whole: Pieces, left: Ints, right: Ints, jump: Array) -> bool:
+    """Whether all cuts between two segments move in one way, but for what is next to nothing for the jump (m, P) there
+    and counts as its error: an edge that leans by some doubles moves by as little at its other end."""
+    seg = work.seg
+    t, error = (part.reshape(work.width, -1, seg.a.size)[:, 1 : 1 + work.k] for part in (whole.integral, whole.error))
+    for number, (i, j) in enumerate(zip(left, right, strict=True)):
+        speeds = np.concatenate((seg.tb[:, i:j], seg.ta[:, i + 1 : j]), axis=1) - seg.ta[:, j, None]
+        lost = np.abs(jump[:, number, None]) * np.abs(speeds).max(axis=1)
+        if not (lost <= HARMLESS * np.abs(t[:, :, seg.owner == seg.owner[j]]).sum(axis=-1)).all():
+            return False
+        error[:, :, j] += lost
+    return True
 
 
 def _between(scene: Scene, seg: Segments, left: Ints, right: Ints) -> Ints:
@@ -81,7 +99,7 @@ def _between(scene: Scene, seg: Segments, left: Ints, right: Ints) -> Ints:
 def _neighbours(seg: Segments) -> tuple[Ints, Ints]:
     """The segments between which nothing lies but kinks, and what is too narrow to tell them apart."""
     width = seg.b - seg.a
-    wide = np.nonzero(width > NARROW * np.abs(seg.b))[0]
+    wide = np.nonzero(width > SLIM * np.abs(seg.b))[0]
     expected = np.ones(width.size, dtype=bool)
     expected[1:] = (seg.owner[1:] != seg.owner[:-1]) | (seg.a[1:] != seg.b[:-1]) | (seg.rank[1:] != 1)
     stretch = np.cumsum(expected)
