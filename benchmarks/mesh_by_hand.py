@@ -1,8 +1,8 @@
-"""The loss of a mesh of triangles of one colour each, and its gradient, by numpy and by hand: clip, walk the edges.
+"""The loss of a mesh of triangles of one colour each, and its gradient, by numpy: clip, and walk along the edges.
 
-Owns `loss_and_gradient`. What `examples/stylize` is held against: it knows nothing of Potto. Areas are boundary integrals
-of x dy with x held between the sides of the pixel (Green); the gradient by a corner is the integral of the squared
-difference over the two edges that it moves, each edge clipped to the pixel (Liang and Barsky, 1984).
+Owns `loss_and_gradient`. What `examples/stylize` is held against: it knows nothing of Potto. Areas are boundary
+integrals of x dy with x held between the sides of the pixel (Green); the gradient by a corner is the integral of the
+squared difference over the two edges that it moves, each edge clipped to the pixel (Liang and Barsky, 1984).
 """
 
 from __future__ import annotations

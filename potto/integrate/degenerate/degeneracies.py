@@ -22,8 +22,8 @@ from potto.kernels.cells import Array, Bools, Cell, Ints, Mask
 
 # How far beside a place it is looked at (beside a bound twice), and what part may be lost across it.
 BESIDE, DISCONTINUITY = (1e-7, 1e-9), 1e-6
-# How long a stretch is, in the size of the place, beside which a step can be seen: shorter ones, as of an edge that leans
-# by some doubles, are all within rounding.
+# How long a stretch is, in the size of the place, beside which a step can be seen. Shorter ones, as of an edge that
+# leans by some doubles, are all within rounding.
 SLIM = 1024 * EPS
 HARMLESS = 1e-12  # the part of a derivative up to which cuts of a step may move apart, as a part of its error
 # How far sections may have come at the nearer of these places, in their size, that don't run along the bound.
