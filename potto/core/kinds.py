@@ -8,7 +8,7 @@ a shared term once. A term knows its free variables (`.free`) and a digest of it
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -319,6 +319,17 @@ def integral(
     for name, (lo, hi), points in reversed(list(zip(variables, bounds, hints, strict=True))):
         free = free.difference((name,)) | lo.free | hi.free | union_of(points)
     return make(Integral, free, variables, bounds, body, hints)
+
+
+def reordered(term: Integral, order: Sequence[int]) -> Integral:
+    """The integral with its variables in another order, which their bounds have to allow. Hints that depend on what is
+    further in now are left out."""
+    variables = tuple(term.variables[i] for i in order)
+    hints = []
+    for number, i in enumerate(order):
+        further = frozenset(variables[number + 1 :])
+        hints.append(tuple(hint for hint in term.hints[i] if not hint.free & further))
+    return integral(variables, tuple(term.bounds[i] for i in order), term.body, tuple(hints))
 
 
 def with_integrand(term: Integral, body: Term) -> Integral:

@@ -56,6 +56,7 @@ from potto.core.kinds import length as length
 from potto.core.kinds import list_of as list_of
 from potto.core.kinds import prim as prim
 from potto.core.kinds import proj as proj
+from potto.core.kinds import reordered as reordered
 from potto.core.kinds import sum_ as sum_
 from potto.core.kinds import tuple_ as tuple_
 from potto.core.kinds import var as var

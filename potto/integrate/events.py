@@ -44,12 +44,14 @@ class TwoSided(Event, frozen=True):
     """Why derivatives on the two sides differ: a surface lies on a bound of a variable, or on another surface.
 
     fold: or its sections along the variable appear or merge just here. Without a surface: some run along the variable.
+    kink: the integrand has a kink where the surface is, all along the variable; without one, it is a number's.
     """
 
     variable: str
     surface: Term | None = None
     other: Term | None = None
     fold: bool = False
+    kink: bool = False
 
 
 class Fold(Event, frozen=True):

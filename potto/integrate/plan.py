@@ -7,7 +7,7 @@ those decisions come out the same.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -56,6 +56,8 @@ from potto.integrate.fixed.straight import Straight, straight
 from potto.integrate.levels import Group, LevelPlan
 from potto.kernels.cells import Mask, Trace
 
+NO_KINKS = function_of(tuple_(()))
+
 
 class Plan(Struct, frozen=True, dict=True):
     """An integral, ready to be evaluated for any parameters.
@@ -71,6 +73,7 @@ class Plan(Struct, frozen=True, dict=True):
     folds: whether a surface that is searched for may have folds where the variables further out can't be cut.
     degrees: of what is integrated over each variable between its cuts, where it is a polynomial in it.
     over: a level set, over whose roots the innermost variable is summed.
+    kinks: what is 0 where builtins have kinks, as one tuple, without what is known to be 0 at single places alone.
     """
 
     term: Integral
@@ -89,6 +92,7 @@ class Plan(Struct, frozen=True, dict=True):
     folds: bool = False
     degrees: tuple[int | None, ...] = ()
     over: LevelSet | None = None
+    kinks: Lam = NO_KINKS
 
     @cached_property
     def searches(self) -> int:
@@ -143,10 +147,10 @@ class _Asked:
             self.decisions[plain] = self.decide(plain)
         return self.decisions[plain]
 
-    def findings(self, term: Integral) -> Sequence[Finding]:
-        """What an integral jumps at, and where it bends; what is not known is what is met on the way."""
+    def findings(self, term: Term) -> Sequence[Finding]:
+        """What an integrand jumps at, and where it bends; what is not known is what is met on the way."""
         self.unknown.clear()
-        return findings(term.body, self.known, self.remember)
+        return findings(term, self.known, self.remember)
 
 
 def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve, number: Number) -> Plan:
@@ -158,19 +162,19 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve, numb
     asked = _Asked(resolve, decide)
     over = placed_along(term)
     term = cased(term if over is None else integral(term.variables, term.bounds, over.weight, term.hints))
-    found = asked.findings(term)
+    found = asked.findings(term.body)
     premises: tuple[Term, ...] = ()
     confused = False
     if any(map(_may_be_mixed, found)):
         apart = _apart(term, inline, asked.remember, number)
         if apart is not None:
             term, premises = apart.term, apart.premises
-            found = asked.findings(term)
+            found = asked.findings(term.body)
         confused = apart is None or any(nested(f.surface) for f in found if f.kind == "jump")
     hides = hidden(term, found, resolve)
     if asked.unknown or hides:
         term = hoisted(term, inline)
-        found = asked.findings(term)
+        found = asked.findings(term.body)
         hides = hidden(term, found, resolve)
     reaches = not asked.unknown
     levels, groups = group_levels(sweep(term, found, resolve, asked.remember, True, over).levels)
@@ -195,7 +199,16 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve, numb
         _may_fold(term, levels),
         () if inlined is None else _degrees(inlined, levels),
         over,
+        _kinks(term, found, asked),
     )
+
+
+def _kinks(term: Integral, found: Iterable[Finding], asked: _Asked) -> Lam:
+    """Where an integrand, and what it is integrated over, have kinks that may lie along a stretch."""
+    box = extents(term)
+    inside = (*found, *(f for pair in term.bounds for bound in pair for f in asked.findings(bound)))
+    kinks = dict.fromkeys(f.surface for f in inside if f.kind == "kink")
+    return function_of(tuple_(tuple(k for k in kinks if not any(monotone(k, v, box) for v in term.variables))))
 
 
 def _degrees(body: Term, levels: Sequence[LevelPlan]) -> tuple[int | None, ...]:

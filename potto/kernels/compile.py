@@ -45,8 +45,9 @@ from potto.core.terms import (
     postorder,
     postorder_by,
 )  # fmt: skip
-from potto.kernels.cells import Pattern, Trace, Value
+from potto.kernels.cells import Cell, Pattern, Trace, Value
 from potto.kernels.emit import Lines, Scalar
+from potto.kernels.kinks import bends, watched
 from potto.kernels.making import counts, making
 from potto.kernels.taping import TapeLines
 from potto.kernels.written import Kernel, Written
@@ -59,6 +60,10 @@ class Runtime(Protocol):
 
     @property
     def taping(self) -> bool: ...
+    @property
+    def side(self) -> int: ...
+    @property
+    def root(self) -> bool: ...
     def global_value(self, module: str, name: str) -> Value: ...
     def inexact(self, term: Term) -> bool: ...
     def closure(self, lam: Lam, captured: dict[str, Value]) -> Value: ...
@@ -74,6 +79,7 @@ class Runtime(Protocol):
     def data(self, term: Data) -> Value: ...
     def lazy(self, mask: Any, term: If | Branch, env: dict[str, Value], traces: tuple[Any, Any]) -> Value: ...
     def falls(self, surface: Any, strict: bool) -> Any: ...
+    def kink(self, term: Prim, kinks: tuple[tuple[Any, Any], ...], args: tuple[Cell, ...]) -> None: ...
     def project(self, value: Value, index: int) -> Value: ...
     def term(self, term: Term, env: dict[str, Value]) -> Value: ...
     def fail(self, term: Hole | Delta) -> Value: ...
@@ -91,7 +97,8 @@ def references(term: Term) -> tuple[Global, ...]:
 def kernel(lam: Lam, patterns: tuple[Pattern, ...], directions: int, rounding: bool, rt: Runtime) -> Kernel:
     """The kernel of a function for arguments of these patterns; from the cache where it is known."""
     callees = tuple(rt.inexact(g) for g in references(lam.body))
-    key = (lam.digest, patterns, directions, rounding, rt.taping, callees)
+    kinks = (rt.side, rt.root) if directions and bends(lam.body) else None
+    key = (lam.digest, patterns, directions, rounding, rt.taping, callees, kinks)
     with _cache_lock:
         found = _cache.get(key)
         if found is not None:
@@ -144,7 +151,7 @@ class _Compiler:
 
     def __init__(self, lam: Lam, patterns: tuple[Pattern, ...], directions: int, rounding: bool, rt: Runtime) -> None:
         self.lam, self.rt, self.directions = lam, rt, directions
-        self.out = TapeLines(rounding) if rt.taping else Lines(directions, rounding)
+        self.out = TapeLines(rounding) if rt.taping else Lines(directions, rounding, rt.side)
         self.layout: Layout = layout(lam.body)
         self.values: dict[Term, Known] = {}
         self.env: dict[str, Known] = {}
@@ -258,6 +265,9 @@ class _Compiler:
                 args = [self.number(a) for a in term.args if a not in together]
                 if together:
                     args.append(self.scalar(self.added(tuple(a for a in term.args if a in together))))
+                if self.directions and self.rt.root and not self.rt.side and (kinks := watched(self.out, term, args)):
+                    found = "".join(f"{self.pack(arg)}, " for arg in args)
+                    self.out.lines.append(f"rt.kink({self.keep(term)}, {kinks}, ({found}))")
                 return self.out.apply(term.op, args)
             case If() | Branch():
                 return self.conditional(term)

@@ -76,11 +76,15 @@ def second_partial(op: str, arity: int, i: int, j: int) -> Term:
 
 
 class Lines:
-    """Generated lines in order, with fresh names and the numpy functions that they use."""
+    """Generated lines in order, with fresh names and the numpy functions that they use.
 
-    def __init__(self, directions: int, rounding: bool) -> None:
+    side: -1 or 1 where what stands at a kink moves, in each direction, as it does before it or behind it.
+    """
+
+    def __init__(self, directions: int, rounding: bool, side: int = 0) -> None:
         self.directions = directions
         self.rounding = rounding
+        self.side = side
         self.lines: list[str] = []
         self.functions: dict[str, str] = {}
         self.count = 0
@@ -214,7 +218,24 @@ class Lines:
             return None if curve == ZERO else curve
 
         e = self.total([f"abs({self.product(slope[i], x)})" for i in moving if (x := args[i].e)])
+        if self.side and self.directions and PRIMITIVES[op].kinks(*map(var, names)):
+            return self.rounded(Scalar(v, e, *self.on_one_side(op, args, bend)), op, args)
         return self.rounded(Scalar(v, e, *self.tangents(args, slope, bend)), op, args)
+
+    def on_one_side(self, op: str, args: Sequence[Scalar], bend: Bend) -> Tangents:
+        """The tangents of a builtin with kinks: where it is at one its slopes are not the same in every direction."""
+        names, first = partials(op, len(args))
+        found = []
+        for d in range(self.directions):
+            rows = [tuple(t if n == d else None for n, t in enumerate(a.t)) for a in args]
+            local = {n: Scalar(a.v, None, row, self.none) for n, a, row in zip(names, args, rows, strict=True)}
+            memo: dict[Term, Scalar] = {}
+            self.side, side = 0, self.side
+            slopes = {i: self.smooth(first[i], local, memo, (d, side)).v for i, a in enumerate(args) if not a.plain}
+            self.side = side
+            t, et = self.tangents(args, slopes, bend)
+            found.append((t[d], et[d]))
+        return tuple(t for t, _ in found), tuple(et for _, et in found)
 
     def tangents(self, args: Sequence[Scalar], slopes: Mapping[int, str], bend: Bend) -> Tangents:
         """The tangents of a builtin with these slopes by those of its arguments that move or are not exact."""
@@ -250,8 +271,14 @@ class Lines:
         )
         return Scalar(x.v, e, x.t, et)
 
-    def smooth(self, term: Term, local: dict[str, Scalar], memo: dict[Term, Scalar]) -> Scalar:
-        """A term made of builtins and selections only, such as a partial derivative; values only."""
+    def smooth(
+        self, term: Term, local: dict[str, Scalar], memo: dict[Term, Scalar],
+        along: tuple[int, int] | None = None,
+    ) -> Scalar:  # fmt: skip
+        """A term made of builtins and selections only, such as a partial derivative; values only.
+
+        along: the direction, and the side, by which it is told where what is 0 lies.
+        """
         rounding, self.rounding = self.rounding, False
         for node in postorder(term):
             if node in memo:
@@ -264,7 +291,7 @@ class Lines:
                 case Prim():
                     memo[node] = self.apply(node.op, [memo[a] for a in node.args])
                 case Branch():
-                    mask = self.let(f"{memo[node.surface].v} {'>' if node.strict else '>='} 0.0", "m")
+                    mask = self.falls(memo[node.surface], node.strict, along)
                     memo[node] = self.select(mask, memo[node.then], memo[node.orelse])
                 case If():
                     memo[node] = self.select(memo[node.condition].v, memo[node.then], memo[node.orelse])
@@ -272,6 +299,13 @@ class Lines:
                     raise TypeError(f"{type(node).__name__} in a partial derivative")
         self.rounding = rounding
         return memo[term]
+
+    def falls(self, surface: Scalar, strict: bool, along: tuple[int, int] | None) -> str:
+        """The mask of a branch of a partial derivative."""
+        tangent = None if along is None else surface.t[along[0]]
+        if along is None or tangent is None:
+            return self.let(f"{surface.v} {'>' if strict else '>='} 0.0", "m")
+        return self.let(f"{self.ufunc('support.beside')}({surface.v}, {tangent}, {float(along[1])!r})", "m")
 
     def select(self, mask: str, a: Scalar, b: Scalar) -> Scalar:
         if mask in ("True", "False"):

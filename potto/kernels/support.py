@@ -112,6 +112,11 @@ def select(mask: Mask, a: Number, b: Number) -> Number:
     return a if mask else b
 
 
+def beside(surface: Number, tangent: Number, side: float) -> Mask:
+    """On which side of 0 a number is; where it is 0, on which it comes to be, or from which it comes (side = -1)."""
+    return (surface > 0) | ((surface == 0) & (side * tangent > 0))
+
+
 def select_value(mask: Mask, a: Value, b: Value) -> Value:
     """`select` for values of any kind; both must have the same structure."""
     if not isinstance(mask, np.ndarray):

@@ -56,7 +56,7 @@ binomial = register(
         valid=lambda n, p: (
             (prim("le", ONE, n), "there must be a trial"),
             (prim("eq", n, prim("floor", n)), "the number of trials must be whole"),
-            (prim("and", prim("lt", ZERO, p), prim("lt", p, ONE)), "the chance must lie between 0 and 1"),
+            (prim("and", prim("lt", ZERO, p), prim("lt", p, ONE)), "the chance must be more than 0 and less than 1"),
         ),
         domain=((1.0, 30.0), (0.05, 0.95)),
         doc="How many of n trials succeed, each with the chance p.",

@@ -190,7 +190,8 @@ atan2 = register(
         doc="The angle of the point (x, y), between -pi and pi. Its arguments are y, then x.",
         partials=_angle_partials,
         domain=((-1e3, 1e3), (-1e3, 1e3)),
-        kinks=lambda y, x: (y,),  # the cut along the negative x-axis; its jump is `calculus.branch_cuts`
+        # the cut along the negative x-axis; its jump is `calculus.branch_cuts`; and the origin, where y is 0 throughout
+        kinks=lambda y, x: (y, add(mul(x, x), mul(y, y))),
         example="atan2(1, -1)",
     )
 )

@@ -29,6 +29,7 @@ from potto.python.functions import Function, bound, must_be_function
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.evaluate import Clock, number, report, told
 from potto.runtime.evaluation.machine import Machine
+from potto.runtime.evaluation.sides import as_a_whole
 
 # Parameters, from which on a tape is swept back instead of carrying a tangent for each: it costs 2.5 to 3.4 values
 # whatever their number, tangents 1.6 at 4 and, where all depends on all, 2.7 at 12 and 4.8 at 64; the first call costs
@@ -295,7 +296,7 @@ class _Run:
         k = machine.directions
         values = [moving[name] if name in moving else pad(value, k) for name, value in self.arguments]
         with self.clock:
-            value = in_lists(self.call.value(values, machine))
+            value = in_lists(as_a_whole(machine, lambda own: self.call.value(values, own), kinks=True))
             if not _numbers(value):
                 raise wrong_call("only a number or a tuple of numbers has a gradient")
             with np.errstate(all="ignore"):

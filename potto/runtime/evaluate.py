@@ -29,6 +29,7 @@ from potto.runtime.evaluation.arrays import array, element, length
 from potto.runtime.evaluation.duals import call_derivative, call_paired
 from potto.runtime.evaluation.folds import fold
 from potto.runtime.evaluation.functions import Closure, Derivative
+from potto.runtime.evaluation.kinks import note_kink
 from potto.runtime.evaluation.loading import loaded
 from potto.runtime.evaluation.machine import Linker, Machine, Record, Semantics
 from potto.runtime.evaluation.selection import chosen, lazy
@@ -60,7 +61,8 @@ def _added(machine: Machine, terms: tuple[Term, ...], env: dict[str, Value]) -> 
 
 
 SEMANTICS = Semantics(
-    call_derivative, call_paired, chosen, lazy, _added, total, _culled, array, element, length, loaded, fold, _integral
+    call_derivative, call_paired, chosen, lazy, _added, total, _culled, array, element, length, loaded, fold, _integral,
+    note_kink,
 )  # fmt: skip
 
 
@@ -236,8 +238,8 @@ def _notes(record: Record) -> list[OneSided]:
         what = edge.cause
         other = None if what.other is None else f"{format_term(what.other)} = 0"
         surface = None if what.surface is None else f"{format_term(what.surface)} = 0"
-        backward, forward, *off = map(np.squeeze, edge.sides)
-        note = OneSided(what.variable, surface, backward, forward, other, what.fold, *off)
+        backward, forward, before, beyond = map(np.squeeze, edge.sides)
+        note = OneSided(what.variable, surface, backward, forward, other, what.fold, before, beyond, what.kink)
         if not any((o.surface, o.variable, o.other) == (surface, what.variable, other) for o in out):
             out.append(note)
     return out

@@ -208,6 +208,21 @@ def test_an_angle_jumps_where_it_passes_the_negative_axis() -> None:
     assert close(r.tangent, -2 * (2 * math.pi - 2 * math.atan(0.5) - math.log(5) / 2), 1e-9)
 
 
+@pytest.mark.parametrize(("condition", "value", "tangent"), [
+    ("atan2(0, x) > 0.7", 2.0, 0.0),  # pi left of the origin, else 0
+    ("atan2(0, x + t) < 0.7", 3.3, 1.0),
+    ("atan2(t - 0.3, x) < 0.7", 3.0, None),
+    ("atan2(0, x - t) > 0.7 or x > 1", 4.3, 1.0),
+])  # fmt: skip
+def test_an_angle_jumps_at_the_origin(condition: str, value: float, tangent: float | None) -> None:
+    answer = derivative(f"def f(t) integral [-2, 3] [{condition}] d(x)", (0.3, 1.0))
+    assert abs(answer.value - value) <= answer.error + 1e-15 < 1e-12
+    if tangent is None:  # before it the angle is negative to the left, and behind it positive
+        assert not answer.converged or answer.notes
+    else:
+        assert abs(answer.tangent - tangent) <= answer.tangent_error + 1e-15 < 1e-12
+
+
 def test_a_second_derivative_does_not_meet_the_jump_of_an_angle_again() -> None:
     # f'' = A'(1 - t) - A'(-1 - t) with A'(u) = -1/(1 + u^2).
     program = """def g(t) integral [-1, 1] atan2(x - t, -1) d(x)

@@ -41,11 +41,12 @@ COARSE = np.where((np.arange(SIDE.size) - SIDE.size // 2) % 2 == 0, 2 * WEIGHTS,
 
 
 class Books:
-    """How many points were looked at, and how far the rule with half of the nodes was off."""
+    """How many points were looked at, and how far the rule with half of the nodes was off. grid: of how many points."""
 
-    def __init__(self) -> None:
+    def __init__(self, grid: int = GRID) -> None:
         self.points = 0
         self.off = 0.0
+        self.grid = grid
 
     def count(self, points: int) -> None:
         self.points += points
@@ -56,9 +57,9 @@ class Books:
 books = Books()
 
 
-def estimate(program: Program, **parameters: float) -> tuple[float, float]:
+def estimate(program: Program, grid: int = GRID, **parameters: float) -> tuple[float, float]:
     """The value of a program, and how much worse half of the nodes would have done. Raises TooHard."""
-    books.__init__()  # type: ignore[misc]
+    books.__init__(grid)  # type: ignore[misc]
     with np.errstate(all="ignore"):
         value = program({name: np.array([x]) for name, x in parameters.items()}, None, 1)
     return float(np.broadcast_to(value, (1,))[0]), books.off
@@ -144,7 +145,7 @@ class _Cuts:
 
     def __init__(self, name: str, a: Array, b: Array, body: Program, env: Environment, n: int) -> None:
         self.name, self.body, self.env, self.n = name, body, env, n
-        self.x = a[:, None] + (b - a)[:, None] * (np.linspace(0, 1, GRID) * 0.999998 + 1e-6)
+        self.x = a[:, None] + (b - a)[:, None] * (np.linspace(0, 1, books.grid) * 0.999998 + 1e-6)
 
     def look(self, row: Array, x: Array) -> tuple[Array, Record]:
         books.count(x.size)
@@ -153,8 +154,8 @@ class _Cuts:
         return _label(record, x.size), record
 
     def found(self) -> tuple[Array, Array]:
-        labels, record = self.look(np.repeat(np.arange(self.n), GRID), self.x.ravel())
-        labels = labels.reshape(self.n, GRID)
+        labels, record = self.look(np.repeat(np.arange(self.n), books.grid), self.x.ravel())
+        labels = labels.reshape(self.n, books.grid)
         row, at = np.nonzero(labels[:, :-1] != labels[:, 1:])
         brackets = [(row, self.x[row, at], self.x[row, at + 1], labels[row, at], labels[row, at + 1])]
         for number, (kind, entry) in enumerate(record):

@@ -11,6 +11,16 @@ from collections.abc import Callable
 
 import numpy as np
 from plain_quadrature import Array, Environment, Program, Record
+from program_kinds import (
+    around,
+    chosen_plainly,
+    declared,
+    delta_of_a_function,
+    differentiated,
+    endless,
+    guarded,
+    rendered,
+)
 from program_measures import measures
 from program_nodes import (
     Binder,
@@ -103,7 +113,8 @@ class Source(Terms):
                             times(number(0.7), p))),
             (0.81, lambda: (self.searched(some), p)),
             (0.84, lambda: (call(lambda x, y: x / (1 + y * y), "%s/(1 + (%s)^2)", self.name(some[0]), second), p)),
-            (0.87, lambda: (call(np.hypot, "hypot(%s, %s)", self.name(some[0]), minus(second, p)), self.constant())),
+            (0.86, lambda: (call(np.hypot, "hypot(%s, %s)", self.name(some[0]), minus(second, p)), self.constant())),
+            (0.87, lambda: (around(self.name(some[0]), minus(second, p)), times(number(0.7), p))),
             (0.91, lambda: (bent("abs", minus(self.affine(some), p)), number(0.4))),
             (0.94, lambda: (bent(self.pick("min", "max"), self.name(some[0]), times(number(0.7), second)), p)),
             (0.97, lambda: (plus(self.name(some[0]), times(self.constant(), self.bracket(self.comparison(names)))), p)),
@@ -143,8 +154,14 @@ class Source(Terms):
     def jump(self, names: list[str]) -> Node:
         every = names + PARAMETERS
         at = self.random.random()
-        if at < 0.55:
+        if at < 0.47:
             return self.behind(self.bracket(self.condition(names)), names, "bracket")
+        if at < 0.50:
+            return self.behind(guarded(self, names), names, "guarded")
+        if at < 0.53:
+            return declared(self, names)
+        if at < 0.55:
+            return chosen_plainly(self, self.bracket(self.comparison(names)), self.smooth(every, 1))
         if at < 0.75:
             shape = self.pick("(if [%s] then %s else %s)", "([%s] ? %s : %s)")
             return chosen(shape, self.condition(names), self.smooth(every, 1), self.smooth(every, 1))
@@ -249,7 +266,10 @@ class Source(Terms):
     def bounds(self, outer: list[str]) -> tuple[Node, Node, bool]:
         """Both, and whether they follow no other variable."""
         at, fixed = self.random.random(), True
-        if at < 0.40:
+        if at < 0.03 and outer:
+            step = times(number(0.5), self.bracket(self.comparison(outer)))
+            lo, hi, fixed = self.parameter(), plus(number(1.0), step), False
+        elif at < 0.40:
             low, high = self.pick((0.0, 1.0), (-1.0, 1.0), (0.0, 2.0), (-0.5, 1.5))
             lo, hi = number(low), number(high)
         elif at < 0.75:
@@ -279,7 +299,7 @@ class Source(Terms):
     def binder(self, v: str, outer: list[str], drawn: bool) -> Binder:
         if drawn:
             return measures(self.random, v, [name(p) for p in PARAMETERS], [self.name(x) for x in outer])
-        return self.range(v, outer)
+        return endless(self, v, outer) if self.likely(0.05) else self.range(v, outer)
 
     def integral(self, outer: list[str], new: list[str]) -> Node:
         binders, names, drawn = [], list(outer), self.likely(0.2)
@@ -299,6 +319,16 @@ class Source(Terms):
         names = self.pick(["x"], ["x", "y"])
         outer = [self.range(v, []) for v in names[:-1]]
         lo, hi, _ = self.bounds(names[:-1])
+        kind, v = self.random.random(), names[-1]
+        if kind < 0.5:
+            place = plus(self.parameter(), self.affine(names[:-1])) if outer else self.parameter()
+            body = self.smooth(names + PARAMETERS, 1)
+            if kind < 0.25:
+                whole = delta_of_a_function(self, v, lo, hi, place, body)
+            else:
+                whole = differentiated(self, v, lo, hi, place)
+            inner = Binder(v, f"[{lo.text}, {hi.text}]", lambda body: body, True)
+            return integrals([*outer, inner], whole, nested=self.styled(0.3))
         slope, v = self.pick(1.0, -1.0, 2.0, 0.5), names[-1]
         place = plus(self.parameter(), self.affine(names[:-1])) if outer else self.parameter()
         body = self.smooth(names + PARAMETERS, 1) if self.likely(0.5) else self.jump(names)
@@ -323,8 +353,9 @@ class Source(Terms):
     def program(self, flat: bool) -> Node:
         whole = self.one_of((
             (0.40, lambda: self.integral([], ["x"])),
-            (0.46, lambda: times(self.integral([], ["x"]), self.integral([], ["z"]))),
+            (0.44, lambda: times(self.integral([], ["x"]), self.integral([], ["z"]))),
             (0.50, self.spiked),
+            (0.52, lambda: self.integral([], ["x"]) if flat else rendered(self)),
             (0.76, lambda: self.integral([], ["x"] if flat else ["x", "y"])),
             (0.80, lambda: self.integral([], ["x"] if flat else ["x", "y", "z"])),
             (1.01, lambda: self.integral([], ["x"]) if flat else self.nested()),

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any
 
+import mpmath as mp
 import numpy as np
 import pytest
 
@@ -134,6 +137,26 @@ def f(ax, ay, bx, by, cx, cy, u, v, h) integral ([u, u + h], [v, v + h])
     answer = f(*corners, 0.140625, 0.78125, 1 / 64)
     assert 0 <= answer.value < 1e-22
     assert answer.error < 1e-22
+
+
+def test_a_density_around_another_variable_in_another_order_of_the_variables() -> None:
+    """The hints where y is concentrated depend on x, which comes to be innermost: it crashed. Given x, what is left is
+    a logistic distribution's cdf; in x the places are roots of gamma(2 + sin x) = 2 (x - s) and of that with x + 3."""
+    s = 0.3
+
+    def gap(shift: float) -> Callable[[Any], Any]:
+        return lambda x: mp.gamma(2 + mp.sin(x)) - 2 * (x + shift - s)
+
+    def integrand(x: Any) -> Any:
+        above = 1 / (1 + mp.exp((mp.mpf("0.25") - x) / 3 - x))
+        return (above * (gap(3)(x) > 0) + (1 - above) * (gap(0)(x) > 0)) * mp.npdf(x)
+
+    # each falls where it is 0, so that there is one root
+    roots = [mp.findroot(gap(shift), (near - 1, near + 1), solver="anderson") for shift, near in ((3, -2.2), (0, 1.2))]
+    exact = mp.quad(integrand, [-12, -5, *roots, 5])
+    f = potto.compile(r"""def f(s) integral (x ~ normal(0, 1)) (integral (y ~ logistic(x, 1))
+        [2*(x + 3*[3*y + x >= 0.25] - s) < gamma(2 + sin(x))] d(y)) d(x)""").f
+    assert abs(f(s).value - exact) <= f(s).error < 1e-9
 
 
 def test_samples_of_a_surface_across_a_variable_whose_range_follows_another() -> None:

@@ -45,6 +45,7 @@ from potto.core.terms import (
     postorder,
     pow_,
     prim,
+    reordered,
     replaced,
     sub,
     substitute,
@@ -159,8 +160,7 @@ def _along(node: Integral, known: LevelSet, name: str) -> Iterator[Integral]:
     position = node.variables.index(name)
     order = [*range(position), *range(position + 1, len(node.variables)), position]
     if not any(name in bound.free for pair in node.bounds[position + 1 :] for bound in pair):
-        variables, bounds = tuple(node.variables[i] for i in order), tuple(node.bounds[i] for i in order)
-        yield integral(variables, bounds, node.body, tuple(node.hints[i] for i in order))
+        yield reordered(node, order)
     elif not known.surface.free & frozenset(node.variables[position + 1 :]):
         later, here = slice(position + 1, None), slice(position + 1)
         inner = integral(node.variables[later], node.bounds[later], known.factor, node.hints[later])

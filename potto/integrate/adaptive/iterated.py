@@ -21,7 +21,7 @@ from potto.integrate.decomposition.meetings import Row
 from potto.integrate.decomposition.sections import searched_rows
 from potto.integrate.decomposition.vanishing import vanishes
 from potto.integrate.degenerate.coincidences import Scene, count_places, count_slivers, note_folds
-from potto.integrate.degenerate.degeneracies import brush
+from potto.integrate.degenerate.degeneracies import beneath, brush
 from potto.integrate.degenerate.empty_ranges import Collapsed, collapsed_ranges, count_collapsed
 from potto.integrate.degenerate.faces import Face
 from potto.integrate.degenerate.narrow_panels import count_narrow
@@ -149,6 +149,8 @@ class Iteration(Struct):
                 count_places(scene, cuts, sums)
         if machine.directions and cuts.brushes and scene.number + 1 < len(self.plan.levels):
             brush(scene, cuts)
+        if machine.directions and cuts.conflict and scene.number + 1 < len(self.plan.levels):
+            beneath(scene, cuts)
         if cuts.slivers and not machine.frozen and not self.plan.hides:
             count_slivers(scene, cuts, sums)
         if machine.directions and cuts.folds:

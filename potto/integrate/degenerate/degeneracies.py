@@ -1,8 +1,8 @@
 """Steps where only bends are expected: a surface that runs along a variable further in has no section there.
 
-Owns `steps_at_cuts` and `brush` (at bounds). What is further in is integrated on both sides of the place. If it jumps,
-and it is one surface that makes it jump, what crosses that face is known (`faces`); else another variable must go
-innermost.
+Owns `steps_at_cuts`, `brush` (at bounds), `beneath` (where another surface is) and `does_jump`. What is further in is
+integrated on both sides of the place. If it jumps, and it is one surface that makes it jump, what crosses that face is
+known (`faces`); else another variable must go innermost.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 from potto.integrate.columns import distinct
 from potto.integrate.decomposition.cuts import Cuts
 from potto.integrate.degenerate.coincidences import Scene, around, placed
-from potto.integrate.degenerate.faces import THIN, Place, crossing, several
+from potto.integrate.degenerate.faces import THIN, Place, crossing, running_along, several
 from potto.integrate.events import Degenerate
 from potto.integrate.panels.panel_batch import PanelBatch
 from potto.integrate.pieces import Crossing, Pieces, take
@@ -56,7 +56,7 @@ def steps_at_cuts(work: PanelBatch, whole: Pieces) -> Crossing | None:
     after, before = values[:, 0::2], values[:, 1::2]
     mean = whole.size.reshape(work.width, -1, seg.a.size)[:, 0] / (seg.b - seg.a)
     size = np.abs(after[:, 1]) + np.abs(before[:, 1]) + mean[:, right] + mean[:, left]
-    jumps = np.nonzero(_jumps(np.abs(after - before), size))[0]
+    jumps = np.nonzero(does_jump(np.abs(after - before), size))[0]
     if not jumps.size:
         return None
     left, right = left[jumps], right[jumps]
@@ -107,6 +107,18 @@ def _neighbours(seg: Segments) -> tuple[Ints, Ints]:
     return wide[together], wide[together + 1]
 
 
+def beneath(scene: Scene, cuts: Cuts) -> None:
+    """Whether a surface runs along what is further in just where one of this variable is, and moves otherwise: in
+    another order of the variables both have sections."""
+    seg = cuts.segments
+    inner = np.zeros(seg.a.size, dtype=bool)
+    inner[1:] = (seg.owner[1:] == seg.owner[:-1]) & (seg.a[1:] == seg.b[:-1]) & (seg.rank[1:] > 1)
+    places = np.nonzero(inner & scene.counted(seg.owner))[0]
+    members = running_along(scene, seg.owner[places], seg.a[places], seg.ea[places]) if places.size else places
+    if members.size:
+        scene.machine.note(Degenerate(scene.level.variable), scene.below(members))
+
+
 def brush(scene: Scene, cuts: Cuts) -> None:
     """Whether what is further in jumps at a bound on which it should only bend: a surface runs along the bound.
 
@@ -129,7 +141,7 @@ def brush(scene: Scene, cuts: Cuts) -> None:
         sides: dict[int, Mask] = {g: np.tile(np.broadcast_to(m, owner.shape), many) for g, m in inner.items()}
         values = _inside(scene, owner, places, sides)
         above, below = values[:, 0::2], values[:, 1::2]
-        jumps = _jumps(np.abs(above - below), np.abs(above[:, 1]) + np.abs(below[:, 1]))
+        jumps = does_jump(np.abs(above - below), np.abs(above[:, 1]) + np.abs(below[:, 1]))
         if jumps.any():
             scene.machine.note(Degenerate(scene.level.variable), scene.below(owner[jumps]))
 
@@ -141,7 +153,7 @@ def _inside(scene: Scene, owner: Ints, x: Array, sides: dict[int, Mask]) -> Arra
     return values.reshape(values.shape[0], -1, owner.size)
 
 
-def _jumps(steps: Array, size: Array) -> Bools:
+def does_jump(steps: Array, size: Array) -> Bools:
     """Where values on the two sides of a place differ, and no less so nearer to it: what bends would shrink."""
     far, near = steps[:, 0], steps[:, 1]
     return np.asarray(((near > 0.5 * far) & (near > DISCONTINUITY * size)).any(axis=0))

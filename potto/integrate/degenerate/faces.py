@@ -1,8 +1,8 @@
 """Faces of surfaces that run along all variables further in: what crosses them, integrated over these variables.
 
-Owns `crossing`, `several` and `Face`. Where a surface psi = 0 is a place of one variable x, whatever the variables y
-further in are, it has no section in y. Its boundary term is then an integral over y, in which F stands with the surface
-on either side and everything else as it falls at the place:
+Owns `crossing`, `several`, `running_along` and `Face`. Where a surface psi = 0 is a place of one variable x, whatever
+the variables y further in are, it has no section in y. Its boundary term is then an integral over y, in which F stands
+with the surface on either side and everything else as it falls at the place:
 
     int (F before - F after) dx/dtheta dy,  dx/dtheta = - psi_theta / psi_x  on psi(x, y) = 0
 
@@ -127,6 +127,13 @@ def several(scene: Scene, owner: Ints, x: Array, off: Array) -> Bools:
     them may be seen from neither side."""
     along = _running_along(scene, owner, x, off)
     return np.zeros(owner.size, dtype=bool) if along is None else along.sum(axis=0) > 1
+
+
+def running_along(scene: Scene, owner: Ints, x: Array, off: Array) -> Ints:
+    """The members that have places at which a surface runs along the variables further in."""
+    along = _running_along(scene, owner, x, off)
+    members: Ints = distinct(owner[:0] if along is None else owner[along.any(axis=0)])
+    return members
 
 
 def _the_only_one(scene: Scene, along: Bools) -> Ints:

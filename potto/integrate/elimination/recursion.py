@@ -7,7 +7,7 @@ its table, and the cuts of the next step.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -40,7 +40,9 @@ from potto.core.terms import (
     var,
 )
 from potto.integrate.adaptive.iterated import Iteration
+from potto.integrate.decomposition.cuts import Cuts
 from potto.integrate.decomposition.vanishing import vanishing_of
+from potto.integrate.degenerate.degeneracies import BESIDE, does_jump
 from potto.integrate.elimination.interpolants import Table, tabulated
 from potto.integrate.events import Fold, TwoSided
 from potto.integrate.levels import LevelPlan
@@ -225,9 +227,23 @@ def _table(
         machine.events.take(apart.events, None)
         return sums
 
-    if found.conflict or not segments.a.size:
+    if found.conflict or not segments.a.size or (machine.directions and _jumps_at_an_end(found, function)):
         return None
     return tabulated(segments, machine.directions, function, machine.rtol, machine.exhausted)
+
+
+def _jumps_at_an_end(found: Cuts, function: Callable[[Array, Array], Sums]) -> bool:
+    """Whether what is further in jumps at an end of its range, where something moves past it: what comes in there has
+    no place in a table."""
+    ends = np.unique(np.concatenate([np.zeros(0), *(edge.x for edge in (*found.edges, *found.brushes))]))
+    if not ends.size:
+        return False
+    aside = np.array(BESIDE)[:, None] * (1 + np.abs(ends))
+    places = np.concatenate([ends + sign * a for a in aside for sign in (1.0, -1.0)])
+    values = function(places, np.zeros((0, places.size))).v
+    values = values.reshape(values.shape[0], -1, ends.size)
+    above, below = values[:, 0::2], values[:, 1::2]
+    return bool(does_jump(np.abs(above - below), np.abs(above[:, 1]) + np.abs(below[:, 1])).any())
 
 
 def _spans(steps: Sequence[Step], env: dict[str, Value]) -> list[tuple[float, float]]:

@@ -18,6 +18,7 @@ from potto.runtime.evaluation.compared import compared, held
 from potto.runtime.evaluation.functions import Closure, Derivative, Paired, holds_functions
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.second_derivatives import dual_function
+from potto.runtime.evaluation.sides import as_a_whole
 
 
 def call_derivative(
@@ -37,7 +38,7 @@ def call_derivative(
     dual_groups = tuple(
         tuple(merge(arg) for arg in fit(group, arity)) for group, arity in zip(groups, arities, strict=False)
     )
-    value = split(carrying.call(primal.padded(1), dual_groups, trace))
+    value = split(as_a_whole(carrying, lambda own: own.call(primal.padded(1), dual_groups, trace), kinks=True))
     return compared(machine, function.primal, groups, value) if isinstance(function.primal, Derivative) else value
 
 

@@ -29,6 +29,7 @@ from potto.core.terms import (
     If,
     Integral,
     Lam,
+    Prim,
     Sum,
     Term,
     function_of,
@@ -80,6 +81,7 @@ class Semantics:
     data: Callable[[Data], Value]
     fold: Callable[[Machine, Fold, Value, Value, Value, dict[str, Value]], Value]
     integral: Callable[[Machine, Integral, dict[str, Value]], Value]
+    kink: Callable[[Machine, Prim, tuple[tuple[Any, Any], ...], tuple[Cell, ...]], None]
 
 
 class Linker:
@@ -106,7 +108,7 @@ class Linker:
         self.duals: dict[tuple[Lam, bool], Lam] = {}
         self.reaches: dict[tuple[Term, ...], tuple[tuple[str, str, bytes], ...]] = {}
         # the ones met, without a lookup
-        self.kernels: dict[tuple[Lam, tuple[Pattern, ...], int, bool, bool], Kernel] = {}
+        self.kernels: dict[tuple[Lam, tuple[Pattern, ...], int, bool, bool, int, bool], Kernel] = {}
 
     def term(self, module: str, name: str) -> Term:
         key = (module, name)
@@ -290,7 +292,7 @@ class Machine:
 
     def kernel(self, function: Lam, patterns: tuple[Pattern, ...]) -> Kernel:
         """The kernel of a function for arguments of these patterns."""
-        key = (function, patterns, self.directions, self.rounding, self.taping)
+        key = (function, patterns, self.directions, self.rounding, self.taping, self.side, self.root)
         found = self.linker.kernels.get(key)
         if found is None:
             found = self.linker.kernels[key] = kernel(function, patterns, self.directions, self.rounding, self)
@@ -394,6 +396,12 @@ class Machine:
             return mask, (surface if surface != surface else None)
         bad = np.isnan(surface)
         return mask, (np.where(bad, np.nan, 0.0) if bad.any() else None)
+
+    def kink(self, term: Prim, kinks: tuple[tuple[Any, Any], ...], args: tuple[Cell, ...]) -> None:
+        """Note that a builtin stands at one of its kinks, if it does. kinks: what is 0 there, with errors."""
+        for u, e in kinks:
+            if np.any(np.abs(u) <= e):
+                return self.linker.semantics.kink(self, term, kinks, args)
 
     def lazy(self, mask: Any, term: If | Branch, env: dict[str, Value], traces: tuple[Any, Any]) -> Value:
         return self.linker.semantics.conditional(self, mask, term, env, traces)

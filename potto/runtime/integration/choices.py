@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 
 from potto.calculus.decomposition.elimination import eliminate
 from potto.calculus.differentiation.level_sets import placed_along
-from potto.core.terms import Integral, integral
+from potto.core.terms import Integral, reordered
 from potto.runtime.integration.problem import Problem
 
 # Up to how many variables iterated quadrature is never in question; what it takes beyond them, in evaluations, and how
@@ -67,13 +67,7 @@ def orders(term: Integral) -> Iterator[Integral]:
         return
     count = len(term.variables)
     for last in range(count - 1):
-        index = [i for i in range(count) if i != last] + [last]
-        yield integral(
-            tuple(term.variables[i] for i in index),
-            tuple(term.bounds[i] for i in index),
-            term.body,
-            tuple(term.hints[i] for i in index),
-        )
+        yield reordered(term, [*(i for i in range(count) if i != last), last])
 
 
 def trials(problem: Problem) -> Iterator[tuple[Integral, int | None]]:

@@ -1,6 +1,6 @@
 """Derivatives that are not the same on the two sides of the parameters.
 
-Owns `on_both_sides`, `at_folds`, `beside_folds`, `beside_axes`, `one_direction`, `moving` and `moved`. What surfaces on
+Owns `on_both_sides`, `at_folds`, `beside_folds`, `beside_axes`, `beside` and `moved`. What surfaces on
 bounds and on one another contribute is known on either side (`integrate/degenerate/coincidences`). Where sections of a
 surface appear or merge just at the parameters they move infinitely fast, and nothing at this place tells the
 derivative: of [x^2 < t] at t = 0 it is 0 on one side and infinite on the other, of [x^2 + y^2 < t] 0 and pi. It is then
@@ -167,18 +167,19 @@ def _sides(problem: Problem, plan: Plan, members: Sequence[int], where: Fold | N
         for d in range(problem.machine.directions):
             step = _step(one, plan, d, where)
             if step is not None:
-                (backward, before), (forward, behind) = (_side(one, d, sign * step) for sign in (-1.0, 1.0))
-                yield member, d, backward, forward, (before, behind)
+                (backward, before), (forward, behind) = (beside(one, d, sign * step) for sign in (-1.0, 1.0))
+                yield member, d, backward[:, 0], forward[:, 0], (before[:, 0], behind[:, 0])
 
 
-def _side(problem: Problem, d: int, step: float) -> tuple[Array, Array]:
-    """The derivative on the side of the parameters on which a step is, of all components, and how far off it may be."""
+def beside(problem: Problem, d: int, step: float) -> tuple[Array, Array]:
+    """The derivatives on the side of the parameters on which a step is, and how far off they may be, (m, B) each."""
     steps = [step * CLOSER**i for i in range(3)]
     found = [problem.beside({n: moved(v, h, d) for n, v in problem.env.items()}) for h in steps]
-    values = [np.where(np.isfinite(part.et[:, d, 0]), part.t[:, d, 0], np.nan) for part in found]
-    noise = np.sum([part.et[:, d, 0] for part in found], axis=0)
-    limits, missed = np.array([_limit(*three) for three in zip(*values, noise, strict=True)]).T
-    return limits, np.where(np.isfinite(limits), missed + found[2].et[:, d, 0], 0.0)
+    values = [np.where(np.isfinite(part.et[:, d]), part.t[:, d], np.nan) for part in found]
+    noise = np.sum([part.et[:, d] for part in found], axis=0)
+    flat = zip(*(x.ravel() for x in (*values, noise)), strict=True)
+    limits, missed = (np.reshape(x, noise.shape) for x in zip(*(_limit(*four) for four in flat), strict=True))
+    return limits, np.where(np.isfinite(limits), missed + found[2].et[:, d], 0.0)
 
 
 def _step(problem: Problem, plan: Plan, d: int, where: Fold | None) -> float | None:
@@ -189,8 +190,7 @@ def _step(problem: Problem, plan: Plan, d: int, where: Fold | None) -> float | N
     """
     env, quiet = problem.env, problem.machine.with_directions(0)
     if where is not None and (where.number == INNER or _searched(plan, where)):
-        sizes = [float(np.abs(cell.v)) for value in env.values() for cell in moving(value, d)]
-        return APART**2 * max([1.0, *sizes]) if sizes else None
+        return parameter_step(problem, d)
     both = np.concatenate(([0.0], STEPS, -STEPS))
     here = {n: still(moved(v, both, d)) for n, v in env.items()}
     size = both.size
@@ -215,6 +215,12 @@ def _step(problem: Problem, plan: Plan, d: int, where: Fold | None) -> float | N
     moves = (off > 0)[1:].reshape(2, -1).any(axis=0)
     fits = np.logical_and.accumulate(fits) & moves
     return float(STEPS[np.nonzero(fits)[0][-1]]) if fits.any() else None
+
+
+def parameter_step(problem: Problem, d: int) -> float | None:
+    """A small part of the parameters that move in a direction; None where none does."""
+    sizes = [float(np.max(np.abs(cell.v))) for value in problem.env.values() for cell in moving(value, d)]
+    return APART**2 * max([1.0, *sizes]) if sizes else None
 
 
 def _searched(plan: Plan, where: Fold) -> bool:

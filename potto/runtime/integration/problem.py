@@ -163,8 +163,8 @@ class Problem:
         return self.picked(np.array([number])).apart()
 
     def beside(self, env: dict[str, Value]) -> Sums:
-        """What one member comes to at other parameters; what is met there is forgotten."""
-        return self.solver(self.at(env, machine=self.machine.apart(), batch=1, outermost=False))
+        """What members come to at other parameters; what is met there is forgotten."""
+        return self.solver(self.at(env, machine=self.machine.apart(), outermost=False))
 
     # What is known before any number
 

@@ -24,6 +24,7 @@ from potto.integrate.fixed.a_priori import certain
 from potto.integrate.pieces import Sums, still
 from potto.integrate.plan import Plan
 from potto.kernels.cells import Ints
+from potto.runtime.integration.at_kinks import at_kinks
 from potto.runtime.integration.choices import many, passes_on, too_many, trials
 from potto.runtime.integration.differences import by_differences
 from potto.runtime.integration.elimination import ACCURATE, WORTH, step_by_step
@@ -47,7 +48,7 @@ def solve(problem: Problem) -> Sums:
     for method in METHODS if problem.outermost else (along_cuts,):
         found = method(problem)
         if found is not None:
-            return found
+            return at_kinks(problem, found)
     raise AssertionError("cuts are for every integral")
 
 

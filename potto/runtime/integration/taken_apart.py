@@ -5,59 +5,12 @@ Owns `summed`. A surface on the bound of one part lies inside of the whole where
 
 from __future__ import annotations
 
-from typing import Any
-
-import numpy as np
-
 from potto.core.terms import Term, function_of
-from potto.integrate.events import OneSidedDerivatives, TwoSided
-from potto.kernels.cells import Array, Cell, Value, all_cells, map_cells
+from potto.kernels.cells import Value
 from potto.runtime.evaluation.machine import Machine
-
-SAME = 1e-12  # how far apart the derivatives on both sides may be beside their errors, as a part of them
-
-Env = dict[str, Value]
+from potto.runtime.evaluation.sides import as_a_whole
 
 
-def summed(machine: Machine, term: Term, env: Env) -> Value:
-    """The value of the sum that an integral is equal to. Where parts have two derivatives, those of the whole on both
-    sides are found: if they are the same, that is the derivative, else the nearer one is, and a note tells them."""
-    record = machine.record
-    known = len(record.edges)
-    value = machine.evaluate(function_of(term), env, None)
-    met = record.edges[known:]
-    if not met or machine.side or machine.taping:
-        return value
-    kept = dict(record.shortfalls), record.edges[:known], record.within
-    sides = [_numbers(machine.apart().changed(side=side).evaluate(function_of(term), env, None)) for side in (-1, 1)]
-    record.shortfalls, record.edges, record.within = kept
-    (backward, before), (forward, beyond) = sides
-    with np.errstate(invalid="ignore"):
-        same = np.abs(forward - backward) <= SAME * (np.abs(forward) + np.abs(backward)) + before + beyond
-        if not same.all():
-            where = same.all(axis=(0, 1)) if same.ndim > 2 else np.zeros((), dtype=bool)
-            record.edges.append(_note(met[0].cause, where, backward, forward, before, beyond))
-        slopes, _ = _numbers(value)
-        nearer = np.abs(slopes - backward) < np.abs(slopes - forward)
-        t = np.where(same, forward, np.where(nearer, backward, forward))
-        et = np.where(same, np.maximum(before, beyond), np.where(nearer, before, beyond))
-    rows = iter(zip(t, et, strict=True))
-    return map_cells(value, lambda cell: Cell(cell.v, cell.e, *map(tuple, next(rows))))
-
-
-def _note(cause: TwoSided, left_out: Any, *sides: Array) -> OneSidedDerivatives:
-    """The derivatives on both sides, of those members for which they differ."""
-    flat = (np.where(left_out, np.nan, side) for side in sides)
-    return OneSidedDerivatives(cause, *(side.reshape(-1, *side.shape[2:]) for side in flat))
-
-
-def _numbers(value: Value) -> tuple[Array, Array]:
-    """The tangents of all numbers of a value, (numbers, directions, …), and how far off they are."""
-    cells = all_cells(value)
-    shape = np.broadcast_shapes(*(np.shape(cell.v) for cell in cells))
-
-    def rows(part: str) -> Array:
-        found = [[np.broadcast_to(0.0 if x is None else x, shape) for x in getattr(cell, part)] for cell in cells]
-        return np.array(found, dtype=float)
-
-    return rows("t"), rows("et")
+def summed(machine: Machine, term: Term, env: dict[str, Value]) -> Value:
+    """The value of the sum that an integral is equal to, with the derivatives of the whole."""
+    return as_a_whole(machine, lambda own: own.evaluate(function_of(term), env, None))

@@ -1,0 +1,53 @@
+"""Kinks that lie all along a stretch of the domain: |x*t| at t = 0, max(x + t*y, x). There is no place to cut at.
+
+Owns `lying_along`. Where such a kink moves, the integrand has two derivatives throughout the stretch.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from potto.integrate.degenerate.coincidences import CLEAR
+from potto.integrate.pieces import Evaluator, components, gather, still
+from potto.integrate.plan import Plan
+from potto.kernels.cells import Array, Cell, Ints, Value, pad
+
+# At how many places each of a few members is looked at, and each of many: what takes up less of the domain is missed.
+PLACES, FEW_PLACES, MANY = 16, 4, 64
+# Multiples of these, modulo 1, fill a box evenly: the powers of the root of z^4 = z + 1, as Kronecker's sequences have.
+STEPS = 1.2207440846057596 ** -np.arange(1.0, 9.0)
+
+
+def lying_along(plan: Plan, env: dict[str, Value], batch: int, machine: Evaluator) -> list[tuple[int, Ints]]:
+    """The numbers of the kinks of a plan that are 0 at places of the domain which no program would choose, and move
+    there; with the members for which they do."""
+    count = PLACES if batch <= MANY else FEW_PLACES
+    owner = np.repeat(np.arange(batch), count)
+    here = gather({name: pad(value, machine.directions) for name, value in env.items()}, owner) if batch > 1 else env
+    quiet = machine.apart().tracking()
+    for number, level in enumerate(plan.levels):
+        ends = components(quiet.evaluate(level.bounds, {n: still(here[n]) for n in level.bounds.params}, None))
+        lo, hi = (np.broadcast_to(end.v, owner.shape) for end in ends)
+        part = (0.5 + np.arange(1, count + 1) * STEPS[number % STEPS.size]) % 1.0
+        x = _between(lo, hi, np.tile(part, batch))
+        here = {**here, level.variable: Cell(x, None, (None,) * machine.directions)}
+    found = quiet.evaluate(plan.kinks, {n: here[n] for n in plan.kinks.params}, None)
+    met = []
+    for number, kink in enumerate(components(found)):
+        moves = np.any([np.abs(t) > CLEAR * (0.0 if et is None else et)
+                        for t, et in zip(kink.t, kink.et or kink.t) if t is not None], axis=0)  # fmt: skip
+        there = (np.abs(kink.v) <= CLEAR * (0.0 if kink.e is None else kink.e)) & moves
+        members = np.unique(owner[np.broadcast_to(there, owner.shape)])
+        if members.size:
+            met.append((number, members))
+    return met
+
+
+def _between(lo: Array, hi: Array, part: Array) -> Array:
+    """Places between bounds, which may be infinite."""
+    wide = part / (1 - part)
+    with np.errstate(invalid="ignore"):
+        plain = lo + part * (hi - lo)
+    both = np.isinf(lo) & np.isinf(hi)
+    x = np.where(np.isinf(hi), lo + wide, np.where(np.isinf(lo), hi - wide, plain))
+    return np.asarray(np.where(both, np.log(wide), x))

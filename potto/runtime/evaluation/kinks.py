@@ -1,0 +1,51 @@
+"""Kinks of builtins, outside of integrals, just at the parameters: both derivatives are told.
+
+Owns `note_kink`. What an answer has is the derivative to one side, as the partial derivatives of the builtin choose it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from potto.core.terms import Prim, function_of, prim, var
+from potto.integrate.events import OneSidedDerivatives, TwoSided
+from potto.kernels.cells import Array, Cell
+from potto.primitives import PRIMITIVES
+from potto.runtime.evaluation.machine import Machine
+
+ROUNDING = 1e-12  # what errors are taken for rounding, in the size of the arguments
+
+
+def note_kink(machine: Machine, term: Prim, kinks: tuple[tuple[Any, Any], ...], args: tuple[Cell, ...]) -> None:
+    """Note the derivatives of a builtin to both sides where one of its kinks is at 0, to rounding."""
+    near = [np.abs(u) <= np.minimum(e, ROUNDING * sum(np.abs(arg.v) for arg in args)) for u, e in kinks]
+    number = next((i for i, there in enumerate(near) if np.any(there)), None)
+    if number is None or machine.frozen:
+        return
+    cause = TwoSided("", PRIMITIVES[term.op].kinks(*term.args)[number], kink=True)
+    if any(edge.cause == cause for edge in machine.record.edges):
+        return
+    (backward, before), (forward, beyond) = (_on_side(machine, term, args, side) for side in (-1, 1))
+    differ = np.any(near, axis=0) & (backward != forward) & ~(np.isnan(backward) & np.isnan(forward))
+    if differ.any():
+        sides = (np.where(differ.any(axis=0), side, np.nan) for side in (backward, forward, before, beyond))
+        machine.record.edges.append(OneSidedDerivatives(cause, *sides))
+
+
+def _on_side(machine: Machine, term: Prim, args: tuple[Cell, ...], side: int) -> tuple[Array, Array]:
+    """The tangents of a builtin on one side of its kinks and their errors, (directions, ...): by each argument that
+    moves where tangents are written on a tape."""
+    moving = [i for i, arg in enumerate(args) if arg.t and arg.t[0] is not None] if machine.taping else []
+    directions = len(moving) if machine.taping else machine.directions
+    if machine.taping:
+        units = [tuple(1.0 if i == j else None for j in moving) for i in range(len(args))]
+        args = tuple(Cell(arg.v, arg.e, row) for arg, row in zip(args, units, strict=True))
+    names = [f"#{i:04}" for i in range(len(args))]
+    beside = machine.changed(side=side, root=False, taping=False, directions=directions)
+    value = beside.run(function_of(prim(term.op, *map(var, names))), list(args), None)
+    assert isinstance(value, Cell)
+    shape = np.shape(value.v)
+    found = [[np.broadcast_to(0.0 if x is None else x, shape) for x in part] for part in (value.t, value.et)]
+    return np.array(found[0]), np.array(found[1] or np.zeros((directions, *shape)))

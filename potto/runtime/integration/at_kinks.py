@@ -1,0 +1,63 @@
+"""Derivatives of integrals whose integrand has a kink all along a stretch, just at the parameters: those to both sides.
+
+Owns `at_kinks`. They are what the derivatives beside the parameters lead to, where there is a place to cut at.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from msgspec.structs import replace
+
+from potto.core.terms import children
+from potto.integrate.degenerate.kinks import lying_along
+from potto.integrate.events import INNER, Fold, OneSidedDerivatives, TwoSided
+from potto.integrate.pieces import Sums
+from potto.kernels.cells import Ints
+from potto.runtime.integration.one_sided import beside, parameter_step
+from potto.runtime.integration.problem import Problem
+
+SAME = 1e-6  # how far apart both derivatives may be beside their errors, as a part of them, if there is but one
+MOST_VARIABLES = 3  # with more, what is found beside the parameters takes too long
+
+
+def at_kinks(problem: Problem, sums: Sums) -> Sums:
+    """Sums, with a note of both derivatives where they differ, and the one that there is where they are the same.
+    Integrals further out are told that there may be two."""
+    machine = problem.machine
+    if not machine.directions or machine.side or machine.frozen:
+        return sums
+    plan = problem.plan()
+    if not children(plan.kinks.body) or machine.exhausted():
+        return sums
+    for number, members in lying_along(plan, problem.env, problem.batch, machine):
+        kink = children(plan.kinks.body)[number]
+        variable = next((v for v in reversed(problem.term.variables) if v in kink.free), problem.term.variables[-1])
+        cause = TwoSided(variable, kink, kink=True)
+        if problem.outermost:
+            sums = _noted(problem, sums, cause, members)
+        else:
+            machine.note(Fold(cause, INNER, 0, 0.0, None), members)
+    return sums
+
+
+def _noted(problem: Problem, sums: Sums, cause: TwoSided, members: Ints) -> Sums:
+    t, et = sums.t.copy(), sums.et.copy()
+    sides = np.full((4, sums.t.shape[0], sums.t.shape[1], members.size), np.nan)
+    for d in range(problem.machine.directions):
+        with problem.among(members) as some:
+            step = parameter_step(some, d)
+            if step is None or len(problem.term.variables) > MOST_VARIABLES:
+                sides[:, :, d] = 0.0 if step is None else np.nan
+                continue
+            (backward, before), (forward, beyond) = (beside(some, d, sign * step) for sign in (-1.0, 1.0))
+        sides[:, :, d] = backward, forward, before, beyond
+    backward, forward, before, beyond = sides
+    with np.errstate(invalid="ignore"):
+        same = np.abs(forward - backward) <= SAME * (np.abs(forward) + np.abs(backward)) + before + beyond
+        wrong = same & ~(np.abs(t[..., members] - forward) <= SAME * np.abs(forward) + beyond + et[..., members])
+    differ = np.nonzero(~same.all(axis=(0, 1)))[0]
+    if differ.size:
+        problem.events.note(OneSidedDerivatives(cause, *sides[..., differ]), members[differ])
+    t[..., members] = np.where(wrong, forward, t[..., members])
+    et[..., members] = np.where(wrong, before + beyond, et[..., members])
+    return replace(sums, t=t, et=et)

@@ -1,0 +1,150 @@
+"""Kinks just at the parameters: both derivatives are told, in every number of variables and whichever way they lie.
+
+The derivatives backward and forward are worked out by hand; where there is but one, nothing is noted.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import potto
+
+PI = math.pi
+SQUARE, BOX = "integral ([-1, 1], [-1, 1])", "integral ([-1, 1], [-1, 1], [-1, 1])"
+UNIT, CUBE = "integral ([0, 1], [0, 1])", "integral ([0, 1], [0, 1], [0, 1])"
+PLANE, SPACE = "integral ([-2, 2], [-2, 2])", "integral ([-2, 2], [-2, 2], [-2, 2])"
+DISC, BALL = "[x^2 + y^2 < 1]", "[x^2 + y^2 + z^2 < 1]"
+
+# program, where, the derivatives backward and forward
+KINKS = [
+    # numbers
+    ("abs(t)", 0.0, -1, 1),
+    ("3*max(t, 0)", 0.0, 0, 3),
+    ("min(t, 1) + t", 1.0, 2, 1),
+    ("clamp(t, 0, 1)", 1.0, 1, 0),
+    ("max(t, 1/2, 1 - t)", 0.5, -1, 1),
+    ("exp(abs(t))", 0.0, -1, 1),
+    ("abs(integral [-1, 1] [x < t] d(x) - 1)", 0.0, -1, 1),
+    ("max(integral [0, 1] [x < t] d(x), 0.5)", 0.5, 0, 1),
+    ("integral [0, 1] delta(x - 0.5)*max(x, t) d(x)", 0.5, 0, 1),
+    ("integral [0, 1] abs(x - t)*delta(x - 0.5) d(x)", 0.5, -1, 1),
+    # integrands: all along the domain
+    ("integral [0, 1] abs(x*t) d(x)", 0.0, -0.5, 0.5),
+    ("integral [-1, 1] abs(x*t) d(x)", 0.0, -1, 1),
+    ("integral [0, 1] max(x*t, 0) d(x)", 0.0, 0, 0.5),
+    ("integral [0, 1] abs(t)*x d(x)", 0.0, -0.5, 0.5),
+    ("integral [0, 1] max(clamp(x - 0.7, 0, 1)*t, 0) d(x)", 0.0, 0, 0.045),
+    ("integral [0, 1] (integral [0, 1] max(y*t, 0) d(y)) d(x)", 0.0, 0, 0.5),
+    ("integral [0, 1] exp(integral [0, 1] max(y*t, 0) d(y)) d(x)", 0.0, 0, 0.5),
+    ("integral [0, 1] max(integral [0, 1] [y < t]*x d(y), 0.5*x) d(x)", 0.5, 0, 0.5),
+    (f"{UNIT} abs(x*y*t) d(x, y)", 0.0, -0.25, 0.25),
+    (f"{UNIT} max(x*t, y*t) d(x, y)", 0.0, 1 / 3, 2 / 3),
+    (f"{SQUARE} max(x + t*y, x) d(x, y)", 0.0, -1, 1),
+    (f"{SQUARE} max(y + t*x, y) d(x, y)", 0.0, -1, 1),
+    (f"{SQUARE} abs(t*x + t*y) d(x, y)", 0.0, -8 / 3, 8 / 3),
+    (f"{BOX} max(x + t*y, x) d(x, y, z)", 0.0, -2, 2),
+    ("integral (x ~ normal(0, 1)) max(t*x, 0) d(x)", 0.0, -1 / math.sqrt(2 * PI), 1 / math.sqrt(2 * PI)),
+    # bounds
+    ("integral [0, min(t, 1)] x d(x)", 1.0, 1, 0),
+    ("integral [0, abs(t)] exp(x) d(x)", 0.0, -1, 1),
+    ("integral [0, max(t, 0)] (integral [0, 1] exp(x*y) d(y)) d(x)", 0.0, 0, 1),
+    ("integral [t, 1] [x < 0.5] d(x)", 0.5, -1, 0),
+    ("integral ([0, 1], [0, t]) [y < 0.5]*x d(x, y)", 0.5, 0.5, 0),
+    ("integral ([0, 1], [0, t*x]) [y < x/2] d(x, y)", 0.5, 0.5, 0),
+    ("integral (x ~ uniform(0, 1), y ~ uniform(0, 1)) [y < t] d(x, y)", 1.0, 1, 0),
+    # surfaces that coincide, or run along a bound, an axis or another one
+    (f"{CUBE} [max(x, y, z) < t] d(x, y, z)", 1.0, 3, 0),
+    (f"{UNIT} [x < t*y] d(x, y)", 0.0, 0, 0.5),
+    (f"{UNIT} [y < t*x] d(x, y)", 0.0, 0, 0.5),
+    (f"{CUBE} [x < t*y] d(x, y, z)", 0.0, 0, 0.5),
+    (f"{CUBE} [z < t*y] d(x, y, z)", 0.0, 0, 0.5),
+    (f"{SQUARE} [x < 0]*[x < t*y] d(x, y)", 0.0, 0.5, -0.5),
+    (f"{SQUARE} [y < 0]*[y < t*x] d(x, y)", 0.0, 0.5, -0.5),
+    (f"{SQUARE} [x + y < 0]*[x + y < t*x] d(x, y)", 0.0, 0.5, -0.5),
+    (f"{BOX} [abs(x) < t] d(x, y, z)", 0.0, 0, 8),
+    (f"{BOX} [abs(z) < t] d(x, y, z)", 0.0, 0, 8),
+    (f"{CUBE} [x + y + z < 1]*[x + y + z < t] d(x, y, z)", 1.0, 0.5, 0),
+    (f"{UNIT} [sin(3*x) + y < 1]*[sin(3*x) + y < t] d(x, y)", 1.0, 1, 0),
+    (f"{PLANE} {DISC}*[(x - t)^2 + y^2 < 1] d(x, y)", 0.0, 2, -2),
+    (f"{PLANE} {DISC}*[x^2 + (y - t)^2 < 1] d(x, y)", 0.0, 2, -2),
+    (f"{PLANE} {DISC}*[x^2 + t*y^2 < 1] d(x, y)", 1.0, 0, -PI / 2),
+    (f"{SPACE} {BALL}*[x^2 + (y - t)^2 + z^2 < 1] d(x, y, z)", 0.0, PI, -PI),
+    (f"{SPACE} {BALL}*[x^2 + y^2 + (z - t)^2 < 1] d(x, y, z)", 0.0, PI, -PI),
+]  # fmt: skip
+
+
+def rate(program: str, t: Any, dt: Any = 1.0) -> potto.Estimate:
+    return potto.deriv(potto.compile(f"def f(t)\n    {program}").f)((t, dt))
+
+
+@pytest.mark.parametrize(("program", "t", "backward", "forward"), KINKS, ids=[row[0] for row in KINKS])
+def test_both_derivatives_are_told(program: str, t: float, backward: float, forward: float) -> None:
+    answer = rate(program, t)
+    assert answer.notes, answer
+    # those beside the parameters are good for 6 digits and more (docs/numerics.md)
+    told = [(float(note.backward), float(note.forward)) for note in answer.notes]
+    assert any(np.allclose(sides, (backward, forward), rtol=1e-6, atol=1e-6) for sides in told), told
+    low, high = sorted((backward, forward))
+    assert low - 1e-9 <= answer.tangent <= high + 1e-9  # one of them, or what lies between, as conditions fall
+
+
+@pytest.mark.parametrize("program", ["abs(t)", "integral [0, 1] abs(x*t) d(x)", f"{SQUARE} max(x + t*y, x) d(x, y)"])
+def test_the_other_way_the_sides_are_turned_round(program: str) -> None:
+    there, back = (rate(program, 0.0, dt).notes[0] for dt in (1.0, -1.0))
+    assert float(back.backward) == pytest.approx(-float(there.forward), abs=1e-9)
+    assert float(back.forward) == pytest.approx(-float(there.backward), abs=1e-9)
+
+
+@pytest.mark.parametrize(("program", "t", "exact"), [
+    ("abs(t - 1)^3", 1.0, 0.0),
+    ("abs(t) + abs(t - 1)", 0.3, 0.0),
+    ("max(t, 0) - max(0, -t)", 0.0, 1.0),  # max(t, 0) + min(t, 0) = t
+    ("max(t, 0) + min(t, 0)", 0.0, 1.0),
+    ("abs(0*t) + t", 0.0, 1.0),
+    ("integral [0, 1] (max(x*t, 0) + min(x*t, 0)) d(x)", 0.0, 0.5),
+    ("integral [0, 1] abs(x - t) d(x)", 0.25, -0.5),
+    (f"{SQUARE} abs(x + y - t)*[x < 0] d(x, y)", 0.0, 1.0),
+])  # fmt: skip
+def test_where_the_whole_has_one_derivative_nothing_is_noted(program: str, t: float, exact: float) -> None:
+    answer = rate(program, t)
+    assert not answer.notes and answer.converged
+    assert abs(answer.tangent - exact) <= answer.tangent_error + 1e-15
+
+
+def test_members_of_an_array_are_told_apart() -> None:
+    for program in ("abs(t)", "integral [0, 1] abs(x*t) d(x)"):
+        answer = rate(program, np.array([0.5, 0.0, -0.5]), np.ones(3))
+        scale = 1.0 if program == "abs(t)" else 0.5
+        assert answer.tangent[[0, 2]] == pytest.approx([scale, -scale], abs=1e-12)
+        (note,) = answer.notes
+        assert np.isnan(note.backward[[0, 2]]).all()
+        assert (note.backward[1], note.forward[1]) == pytest.approx((-scale, scale), abs=1e-6)
+
+
+@pytest.mark.parametrize("method", ["mc", "qmc"])
+def test_samples_have_kinks_as_well(method: Any) -> None:
+    with potto.settings(method=method, samples=1024):
+        answer = rate(f"{UNIT} max(x*t, y*t) d(x, y)", 0.0)
+    assert (float(answer.notes[0].backward), float(answer.notes[0].forward)) == pytest.approx((1 / 3, 2 / 3), abs=1e-6)
+
+
+def test_gradients_tell_kinks_forward_and_in_reverse() -> None:
+    f = potto.compile("def f(xs: [n] Real) sum i in 0..n-1 (max(xs[i], 0))").f
+    for count in (2, 60):
+        xs = np.ones(count)
+        xs[1] = 0.0
+        assert potto.grad(f)(xs).notes
+        assert not potto.grad(f)(xs + 1).notes
+
+
+def test_the_message_says_where() -> None:
+    assert str(rate("abs(t)", 0.0).notes[0]) == (
+        "the kink t = 0 is just here: the one-sided derivatives differ (-1 backward, 1 forward)"
+    )
+    assert str(rate("integral [0, 1] abs(x*t) d(x)", 0.0).notes[0]) == (
+        "the kink x*t = 0 lies all along `x`: the one-sided derivatives differ (-0.5 backward, 0.5 forward)"
+    )
