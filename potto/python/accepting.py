@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from potto.kernels.cells import Rows
+from potto.python.arrays import axes_of
 from potto.runtime.answers.estimate import Estimate
 from potto.types.still import values_of
 from potto.types.types import ArrayOf, Dist, Real, RecordName, TupleOf, Type, resolve
@@ -27,14 +28,23 @@ def accepted(argument: Any, type: Type | None) -> Any:
     """An argument for a parameter of this type, if that is known, without what only Python knows about it."""
     if argument.__class__ is float or argument.__class__ is int:
         return argument
+    found = None if type is None else resolve(type)
+    record = record_in(found)
+    if record is not None and hasattr(argument, "columns") and hasattr(argument, "to_numpy"):  # a table of pandas
+        return {str(name): argument[name].to_numpy() for name in argument.columns}
     if not isinstance(argument, PLAIN):
         argument = _standard(argument)
-    found = None if type is None else resolve(type)
     if isinstance(found, Real | Dist) and isinstance(argument, list):
         return _batch(argument)
     if isinstance(found, TupleOf):
         return _tuple(argument, found)
     return argument
+
+
+def record_in(type: Type | None) -> RecordName | None:
+    """Which records an array has as elements, if it has any."""
+    item = resolve(type.item) if isinstance(type, ArrayOf) else None
+    return item.record if isinstance(item, TupleOf) else None
 
 
 def with_tangents(argument: Any, type: Type | None) -> Any:
@@ -113,8 +123,12 @@ def as_given(argument: Any, part: Any, type: Type | None) -> Any:
     """A derivative in the form of the argument: a dict by a record that was given as a dict, an array by a tuple
     that was given as an array."""
     found = None if type is None else resolve(type)
+    if isinstance(found, ArrayOf):
+        return _elements(argument, part, found)
+    if isinstance(part, np.ndarray) and isinstance(found, TupleOf) and isinstance(argument, Mapping | tuple):
+        part = tuple(part)  # of an array of records that has one axis more for their fields
     if not isinstance(found, TupleOf) or not isinstance(part, tuple):
-        return part
+        return float(part) if isinstance(part, np.generic) else part
     if isinstance(argument, np.ndarray):
         return np.stack(part, axis=-1)
     if isinstance(argument, Mapping) and found.record is not None:
@@ -123,3 +137,22 @@ def as_given(argument: Any, part: Any, type: Type | None) -> Any:
     if isinstance(argument, tuple | list) and len(argument) == len(part):
         return tuple(as_given(*three) for three in zip(argument, part, found.items, strict=True))
     return part
+
+
+def _elements(argument: Any, part: Any, type: ArrayOf) -> Any:
+    """Derivatives by an array of records in the form of dicts, or of the columns that it was given as."""
+    record, axes = record_in(type), axes_of(type)
+    if record is None or not isinstance(argument, Mapping | list):
+        return part
+    if isinstance(part, np.ndarray) and axes is not None:  # the axes of a batch are in front
+        part = np.moveaxis(part, range(part.ndim - axes), range(axes - part.ndim, 0))
+    if isinstance(argument, Mapping):
+        columns = zip(*part, strict=True) if isinstance(part, list) else np.moveaxis(part, 1, 0)
+        return {name: _column(list(column)) for name, column in zip(record.fields, columns, strict=True)}
+    if not any(isinstance(item, Mapping) for item in argument):
+        return part
+    return [as_given(*both, type.item) for both in zip(argument, part, strict=True)]
+
+
+def _column(items: list[Any]) -> Any:
+    return items if any(isinstance(item, tuple) for item in items) else np.stack(items, axis=-1)

@@ -16,6 +16,7 @@ import numpy as np
 
 from potto.kernels.cells import Cell, Rows, Value, all_cells, listed, map_cells, parts_of
 from potto.kernels.errors import wrong_call
+from potto.modules.hints import near_names
 from potto.runtime.answers.estimate import Estimate
 from potto.types import format_type
 from potto.types.types import ArrayOf, Count, Dist, Real, RecordName, Shifted, SizeVar, TupleOf, Type, resolve
@@ -42,12 +43,22 @@ def _fields(name: str, argument: Any, record: RecordName) -> Any:
     given = argument if isinstance(argument, Mapping) else getattr(argument, "__dict__", None)
     if given is None:
         return argument
-    missing = [f"`{field}`" for field in record.fields if field not in given]
-    unknown = [f"`{field}`" for field in given if field not in record.fields]
-    if missing or (unknown and isinstance(argument, Mapping)):
-        what = f"has no {', '.join(missing)}" if missing else f"has {', '.join(unknown)}, which it does not know"
-        raise wrong_call(f"`{name}` is {record.name}, and what is given {what}")
+    _must_have(name, argument, given, record)
     return tuple(given[field] for field in record.fields)
+
+
+def _must_have(name: str, argument: Any, given: Mapping[str, Any], record: RecordName) -> None:
+    """Raise PottoError where a record is given too few fields, or others."""
+    missing = [field for field in record.fields if field not in given]
+    unknown = [str(field) for field in given if field not in record.fields] if isinstance(argument, Mapping) else []
+    if not missing and not unknown:
+        return
+    told = [f"has no {', '.join(f'`{field}`' for field in missing)}"] if missing else []
+    if unknown:
+        told.append(f"has {', '.join(f'`{field}`' for field in unknown)}, which it does not know")
+    near = next((close for field in unknown for close in near_names(field, missing)), None)
+    hint = f"did you mean `{near}`?" if near else f"its fields are {', '.join(f'`{f}`' for f in record.fields)}"
+    raise wrong_call(f"`{name}` is {record.name}, and what is given {' and '.join(told)}", hint)
 
 
 def has_arrays(type: Type) -> bool:
@@ -63,6 +74,9 @@ def _array(name: str, argument: Any, type: ArrayOf, sizes: Sizes) -> Any:
         return _answer(name, argument, type, sizes)
     if hasattr(argument, "to_numpy"):
         argument = argument.to_numpy()
+    item = resolve(type.item)
+    if isinstance(argument, Mapping) and isinstance(item, TupleOf) and item.record is not None:
+        return _columns(name, argument, type.size, item, item.record, sizes)
     if isinstance(argument, list) and _of_numbers(type):
         with contextlib.suppress(TypeError, ValueError):  # of answers, or not of one shape
             axes = axes_of(type) or 0
@@ -75,6 +89,22 @@ def _array(name: str, argument: Any, type: ArrayOf, sizes: Sizes) -> Any:
         items = [with_arrays(name, item, type.item, sizes) for item in argument]
         return listed(items) if items and all(isinstance(item, Rows) for item in items) else items
     return argument
+
+
+def _columns(
+    name: str, argument: Mapping[str, Any], size: Type, item: TupleOf, record: RecordName, sizes: Sizes
+) -> Rows:
+    """An array of records that is given as a dict of columns, one for each field."""
+    _must_have(name, argument, argument, record)
+    found: list[Rows] = []
+    for field, type in zip(record.fields, item.items, strict=True):
+        column = _array(f"{name}.{field}", argument[field], ArrayOf(size, type), sizes)
+        if not isinstance(column, Rows):
+            raise wrong_call(f"`{name}.{field}` is a column of `[n] {record.name}`: an array of numbers is needed")
+        if found and column.size != found[0].size:
+            raise wrong_call(f"`{name}.{record.fields[0]}` has {found[0].size} elements, and `{field}` {column.size}")
+        found.append(column)
+    return Rows(tuple([column.item for column in found]), found[0].size)
 
 
 def _answer(name: str, answer: Estimate, type: ArrayOf, sizes: Sizes) -> Any:

@@ -191,7 +191,7 @@ def in_given_form(found: Gradient, function: Function, args: tuple[Any, ...], kw
     """The gradient in the form of what was given: by a record that is a dict a dict, by a tuple that is an array an
     array."""
     given = dict(bound(function, args, kwargs))
-    if not any(isinstance(argument, Mapping | tuple | np.ndarray) for argument in given.values()):
+    if not any(isinstance(argument, Mapping | tuple | list | np.ndarray) for argument in given.values()):
         return found
 
     def form(parts: Any) -> Any:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Set
 
-from potto.diagnostics import Diagnostic
+from potto.diagnostics import Diagnostic, Related
 from potto.modules.lookup import DefinitionTarget
 from potto.quick import quick, replace, value
 from potto.source import Span
@@ -159,7 +159,9 @@ def _infer_body(inference: Inference, item: nodes.Definition, result: Type) -> N
     elif item.result is not None:
         written = written_type(inference, item.result)
         if not unify(body, written):
-            inference.report(mismatch(body, written, item.body, f"the result of `{item.name}`"))
+            inference.report(mismatch(
+                body, written, item.body, f"the result of `{item.name}`", (Related(item.result.span, "declared here"),)
+            ))  # fmt: skip
     if isinstance(resolve(body), Unknown) and isinstance(result, Meta):
         result.found = UNKNOWN  # else it would be taken to hold for all types
     elif not unify(result, body):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from potto.diagnostics import Suggestion, shortened, suggest
+from potto.diagnostics import Related, Suggestion, shortened, suggest
 from potto.source import Span
 from potto.syntax import nodes
 from potto.syntax.printer import print_expression
@@ -39,7 +39,7 @@ def _index(inference: Inference, node: nodes.Index) -> Type:
         array = resolve(type)
         inference.number(index, "an index")
         what = "only an array has elements" if not place else f"this array has no {_ordinal(place)} index"
-        type = expect_array(inference, array, node.array, what, _not_indexed(array, node))
+        type = expect_array(inference, array, node.array, what, _not_indexed(array, node), index=True)
         if isinstance(array, ArrayOf):
             _in_range(inference, shifted(array.size, 0), node, place)
     return type
@@ -222,7 +222,10 @@ def _fold(inference: Inference, node: nodes.Fold) -> Type:
     if not fits:
         return UNKNOWN
     if not unify(body, state):
-        inference.report(mismatch(body, state, node.body, "each step of a fold gives a state like the first one: this"))
+        inference.report(mismatch(
+            body, state, node.body, "each step of a fold gives a state like the first one: this",
+            (Related(node.start.span, "the state at first"),),
+        ))  # fmt: skip
     return state
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from potto.diagnostics import Diagnostic, Suggestion, shortened
+from potto.diagnostics import Diagnostic, Related, Suggestion, shortened
 from potto.modules.builtins import DERIVATIVES
 from potto.modules.hints import did_you_mean, instead, near_names
 from potto.primitives import PRIMITIVES
@@ -21,9 +21,10 @@ from potto.syntax.printer import print_expression
 from potto.syntax.written import without_parentheses
 from potto.types import kinds
 from potto.types.context import Inference, Plan, rule
+from potto.types.forms import delta, deriv
 from potto.types.infer import is_known, special
 from potto.types.loading import loaded
-from potto.types.mismatches import between, comparison, describe, mismatch
+from potto.types.mismatches import between, comparison, describe, mismatch, no_field, sized_by
 from potto.types.motionless import check_tangents, takes_duals
 from potto.types.scope import Builtin
 from potto.types.slopes import slope
@@ -37,6 +38,7 @@ from potto.types.types import (
     Meta,
     Parameter,
     Real,
+    RecordName,
     Truth,
     TupleOf,
     Type,
@@ -46,7 +48,7 @@ from potto.types.types import (
     resolve,
     without_d,
 )
-from potto.types.unify import settle, unify
+from potto.types.unify import unify
 from potto.types.vectors import vector_form
 
 
@@ -62,7 +64,7 @@ def _apply(inference: Inference, node: nodes.Apply) -> Type:
             return loaded(inference, node)
         if form in DERIVATIVES:
             return slope(inference, node, form)
-        return _deriv(inference, node) if form == "deriv" else _delta(inference, node)
+        return deriv(inference, node) if form == "deriv" else delta(inference, node)
     callee = resolve(inference.infer(node.function))
     types = [inference.infer(argument.value) for argument in node.arguments]
     _no_comparisons(inference, node, types)
@@ -77,7 +79,7 @@ def _apply(inference: Inference, node: nodes.Apply) -> Type:
     if variadic is not None:
         return variadic
     groups = groups_of(callee) if is_known(inference, node.function) else (callee.parameters,)
-    filling = _Filling(inference, node, groups, types)
+    filling = _Filling(inference, node, groups, types, callee.result)
     return filling.result(callee) if filling.fill() else UNKNOWN
 
 
@@ -175,7 +177,7 @@ def callee_name(node: nodes.Apply) -> str:
 
 
 class _Filling:
-    """One call being planned: what each parameter gets."""
+    """One call being planned: what each parameter gets. made: what a function of a single group gives."""
 
     def __init__(
         self,
@@ -183,8 +185,10 @@ class _Filling:
         node: nodes.Apply,
         groups: tuple[tuple[Parameter, ...], ...],
         types: Sequence[Type],
+        made: Type = UNKNOWN,
     ) -> None:
         self.inference, self.node, self.groups, self.types = inference, node, groups, types
+        self.made = made
         self.parameters = groups[0] if len(groups) == 1 else [parameter for group in groups for parameter in group]
         self.slots: list[tuple[int, ...]] = [()] * len(self.parameters)
         self.positional = [place for place, argument in enumerate(node.arguments) if argument.name is None]
@@ -218,6 +222,10 @@ class _Filling:
     def _unknown_keyword(self, argument: nodes.Argument, names: tuple[str, ...]) -> Diagnostic:
         if not names:
             return _no_names(argument, self.node)
+        record = _record_of(self.parameters, resolve(self.made))
+        if record is not None:
+            span = argument.name_span or argument.span
+            return no_field(self.inference.outside, span, argument.name or "", record, f"of `{record.name}`")
         near = near_names(argument.name or "", names)
         return kinds.UNKNOWN_KEYWORD(
             argument.name_span or argument.span,
@@ -349,48 +357,24 @@ class _Filling:
             return
         if not self.inference.fits(self.types[place], expected):
             what = f"`{name}`" if name else "the argument"
-            said = mismatch(self.types[place], expected, expr, f"{what} of {callee_name(self.node)}")
+            said = mismatch(
+                self.types[place],
+                expected,
+                expr,
+                f"{what} of {callee_name(self.node)}",
+                self._sized_by(place, expected),
+            )
             if lacks_tangents(self.types[place], expected):
                 said = replace(said, help="give its tangents as well: `(value, tangents)`")
             self.inference.report(said)
 
-
-# Special forms
-
-
-def _deriv(inference: Inference, node: nodes.Apply) -> Type:
-    if len(node.arguments) != 1 or node.arguments[0].name is not None:
-        types = [inference.infer(argument.value) for argument in node.arguments]
-        wrong = kinds.TOO_MANY if len(types) > 1 else kinds.MISSING
-        message = "`deriv` takes one function"
-        inference.report(wrong(node.span, message, label="one function", help="write `deriv(f)`, then apply it"))
-        return UNKNOWN
-    inner = node.arguments[0].value
-    found = resolve(inference.infer(inner))
-    if isinstance(found, Unknown):
-        return UNKNOWN
-    if not isinstance(found, Function | Meta):
-        help = "write it as a function of what it depends on: `deriv(\\t . …)`"
-        if isinstance(without_parentheses(inner), nodes.Apply):
-            help = "derive the function and apply the result: `deriv(f)(…)`"
-        message = f"`deriv` takes a function, but this is {describe(found)}"
-        inference.report(kinds.NOT_A_FUNCTION(inner.span, message, label=describe(found), help=help))
-        return UNKNOWN
-    if is_known(inference, inner):
-        settle(found)
-    return inference.dual(found, inner)
+    def _sized_by(self, place: int, expected: Type) -> tuple[Related, ...]:
+        """The argument that says how many elements another one must have."""
+        given = [(p.type, slot[0]) for p, slot in zip(self.parameters, self.slots) if len(slot) == 1]
+        return sized_by(expected, [(type, self.node.arguments[at].value) for type, at in given if at != place])
 
 
-def _delta(inference: Inference, node: nodes.Apply) -> Type:
-    if not node.arguments:
-        inference.report(
-            kinds.MISSING(node.span, "`delta` needs a surface", label="nothing given", help="write `delta(x - t)`")
-        )
-    for argument in node.arguments:
-        type = resolve(inference.infer(argument.value))
-        if len(node.arguments) == 1 and isinstance(type, Diffeo):
-            continue
-        if len(node.arguments) == 1 and isinstance(type, TupleOf) and unify(type, Diffeo(len(type.items))):
-            continue
-        inference.need_number(type, argument.value, "what `delta` is of")
-    return REAL
+def _record_of(parameters: Sequence[Parameter], made: Type) -> RecordName | None:
+    """The record that a function makes of its fields, if that is all it does."""
+    record = made.record if isinstance(made, TupleOf) else None
+    return record if record is not None and tuple(p.name for p in parameters) == record.fields else None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from potto.diagnostics import Diagnostic
+from potto.diagnostics import Diagnostic, Related
 from potto.syntax import nodes
 from potto.syntax.written import without_parentheses
 from potto.types import kinds
@@ -92,7 +92,10 @@ def _if(inference: Inference, node: nodes.If) -> Type:
     _condition(inference, node)
     then, orelse = inference.infer(node.then), inference.infer(node.orelse)
     if not unify(then, orelse):
-        inference.report(mismatch(orelse, then, node.orelse, "both branches must be of one type: the second one"))
+        inference.report(mismatch(
+            orelse, then, node.orelse, "both branches must be of one type: the second one",
+            (Related(node.then.span, "the first one"),),
+        ))  # fmt: skip
     plain = inference.conditions.get(id(node)) == "plain"
     for branch, type in ((node.then, then), (node.orelse, orelse)):
         if not plain:

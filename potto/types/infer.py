@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cache
 
-from potto.diagnostics import Diagnostic
+from potto.diagnostics import Diagnostic, Related
 from potto.modules.builtins import DERIVATIVES, SPECIALS
 from potto.primitives import PRIMITIVES
 from potto.syntax import nodes
@@ -191,7 +191,10 @@ def _list(inference: Inference, node: nodes.ListLiteral) -> Type:
         if isinstance(resolve(type), Truth):
             inference.report(comparison(expr, "an array holds numbers, tuples or functions"))
         elif not unify(item, type):
-            inference.report(mismatch(type, item, expr, "all elements of an array must be of one type: this one"))
+            inference.report(mismatch(
+                type, item, expr, "all elements of an array must be of one type: this one",
+                (Related(node.items[0].span, "as the first one is"),),
+            ))  # fmt: skip
     return ArrayOf(Count(len(types)), item)
 
 

@@ -32,7 +32,8 @@ def interp(inference: Inference, node: nodes.Apply, types: list[Type]) -> Type:
         a, b = format_type(resolve(xs)), format_type(found)
         inference.report(kinds.SIZES(
             node.span, f"`interp` takes as many values as places, but these are `{a}` and `{b}`",
-            label=f"`{a}` and `{b}`", help="take as many of both",
+            label="two sizes", related=(Related(places.span, f"`{a}`"), Related(values.span, f"`{b}`")),
+            help="take as many of both",
         ))  # fmt: skip
     _several(inference, resolve(size), places, "interp")
     _rising(inference, places)

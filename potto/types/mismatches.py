@@ -5,14 +5,17 @@ Owns `describe`, a type in the middle of a sentence, and the diagnostics that se
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from potto.diagnostics import Diagnostic, Related, Replacement, Suggestion, shortened
 from potto.modules.hints import did_you_mean, instead, near_names
+from potto.modules.texts import definition
 from potto.source import Span
 from potto.syntax import nodes
 from potto.syntax.printer import print_expression
 from potto.types import kinds
 from potto.types.format import format_type, format_types
-from potto.types.scope import Local
+from potto.types.scope import Local, Outside
 from potto.types.types import (
     REAL,
     ArrayOf,
@@ -20,6 +23,7 @@ from potto.types.types import (
     Diffeo,
     Dist,
     Function,
+    Meta,
     Real,
     RecordName,
     Truth,
@@ -27,6 +31,7 @@ from potto.types.types import (
     Type,
     resolve,
 )
+from potto.types.unify import parts, unify
 
 _TABLES = (".csv", ".tsv")
 
@@ -63,13 +68,17 @@ def describe(type: Type) -> str:
             return f"`{format_type(found)}`"
 
 
-def mismatch(actual: Type, expected: Type, expr: nodes.Expr, what: str) -> Diagnostic:
-    """`what` is the sentence's head: "the argument `x` of `f`"."""
+def mismatch(
+    actual: Type, expected: Type, expr: nodes.Expr, what: str, related: tuple[Related, ...] = ()
+) -> Diagnostic:
+    """`what` is the sentence's head: "the argument `x` of `f`". related: where it is said what is expected."""
     if isinstance(resolve(actual), Truth):
         return comparison(expr, f"{what} must be {describe(expected)}")
     shown, wanted = format_types((actual, expected))
-    help = ""
-    if isinstance(resolve(actual), Function) and isinstance(resolve(expected), Function):
+    kind, help = kinds.MISMATCH, ""
+    if differs_in_size(actual, expected):
+        kind, help = kinds.SIZES, "take as many of both"
+    elif isinstance(resolve(actual), Function) and isinstance(resolve(expected), Function):
         undone = _needs_deriv(actual, expected)
         help = "give the derivative of the function: `deriv(…)`" if undone else ""
     elif isinstance(resolve(actual), Function):
@@ -78,9 +87,52 @@ def mismatch(actual: Type, expected: Type, expr: nodes.Expr, what: str) -> Diagn
         help = "it decides a condition there; a number is compared first: `if t > 0 then … else …`"
     elif isinstance(resolve(actual), Real) and isinstance(resolve(expected), Function):
         help = "it is applied there, as a function; if a product is meant, write it with `*`"
-    return kinds.MISMATCH(
-        expr.span, f"{what} must be `{wanted}`, but this is `{shown}`", label=f"this is `{shown}`", help=help
-    )
+    message = f"{what} must be `{wanted}`, but this is `{shown}`"
+    return kind(expr.span, message, label=f"this is `{shown}`", related=related, help=help)
+
+
+def differs_in_size(actual: Type, expected: Type) -> bool:
+    """Whether two types would be one, were it not for the sizes of arrays."""
+    apart = False
+    waiting = [(actual, expected)]
+    while waiting:
+        a, b = map(resolve, waiting.pop())
+        if isinstance(a, ArrayOf) and isinstance(b, ArrayOf):
+            waiting.append((a.item, b.item))
+            apart = apart or not unify(a.size, b.size)
+        elif isinstance(a, TupleOf) and isinstance(b, TupleOf) and len(a.items) == len(b.items):
+            if a.record != b.record:
+                return False
+            waiting += zip(a.items, b.items)
+        elif not unify(a, b):
+            return False
+    return apart
+
+
+def sized_by(expected: Type, others: Iterable[tuple[Type, nodes.Expr]]) -> tuple[Related, ...]:
+    """Which of other arguments, by the types of their parameters, says how many elements are expected."""
+    mine = _named_sizes(expected)
+    for type, expr in others:
+        for meta in _named_sizes(type):
+            known = resolve(meta)
+            if meta in mine and isinstance(known, Count):
+                return (Related(expr.span, f"so `{meta.size or 'n'}` is {known.number}"),)
+    return ()
+
+
+def _named_sizes(type: Type) -> list[Meta]:
+    """The sizes in a type that have names, as what they are found to be is known."""
+    found: list[Meta] = []
+    waiting = [type]
+    while waiting:
+        part = waiting.pop()
+        if isinstance(part, Meta) and part.size is not None:
+            found.append(part)
+        elif isinstance(part, Meta):
+            waiting += [] if part.found is None else [part.found]
+        else:
+            waiting += parts(part)
+    return found
 
 
 def _needs_deriv(actual: Type, expected: Type) -> bool:
@@ -157,8 +209,11 @@ def shadowing(local: Local, before: Local) -> Diagnostic:
     )
 
 
-def no_field(span: Span, name: str, record: RecordName, label: str) -> Diagnostic:
+def no_field(outside: Outside, span: Span, name: str, record: RecordName, label: str) -> Diagnostic:
     """What is said of a field that a record doesn't have."""
+    item = definition(outside.db, record.file, record.name) if "." not in record.name else None  # else it is data
+    here = None if record.file == outside.file else record.file
+    related = () if item is None else (Related(item.name_span, f"`{record.name}` is defined here", here, record.name),)
     near = near_names(name, record.fields)
     help = did_you_mean(near) or "it has " + ", ".join(f"`{name}`" for name in record.fields)
     message = f"a record `{record.name}` has no field `{name}`"
@@ -166,7 +221,7 @@ def no_field(span: Span, name: str, record: RecordName, label: str) -> Diagnosti
         message = f"`{record.name}` has no column `{name}`"
     elif "." in record.name:  # another file of data
         message = f"`{record.name}` holds no `{name}`"
-    return kinds.UNKNOWN_FIELD(span, message, label=label, help=help, suggestions=instead(span, near))
+    return kinds.UNKNOWN_FIELD(span, message, label=label, related=related, help=help, suggestions=instead(span, near))
 
 
 def around(span: Span, before: str, after: str, title: str) -> Suggestion:

@@ -232,9 +232,16 @@ def without_d(parameters: Sequence[Parameter]) -> dict[str, int]:
     found: dict[str, int] = {}
     for place, parameter in enumerate(parameters):
         type = resolve(parameter.type)
-        if parameter.name is not None and parameter.name[:1] == "d" and isinstance(type, TupleOf) and type.dual:
+        if parameter.name is not None and parameter.name[:1] == "d" and isinstance(type, TupleOf) and _of_two(type):
             found[parameter.name[1:]] = place
     return found
+
+
+def _of_two(type: TupleOf) -> bool:
+    """Whether a type is that of a dual: of a number, or of a tuple, which is two tuples of one length."""
+    parts = [resolve(item) for item in type.items]
+    sizes = {len(part.items) for part in parts if isinstance(part, TupleOf)}
+    return type.dual or (len(parts) == 2 and len(sizes) == 1 and all(isinstance(part, TupleOf) for part in parts))
 
 
 def derivative_type(type: Type) -> Type:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from potto.diagnostics import Diagnostic, Suggestion, suggest
+from potto.diagnostics import Diagnostic, Related, Suggestion, suggest
 from potto.source import Span
 from potto.syntax import nodes
 from potto.types import kinds
@@ -117,7 +117,7 @@ def field(inference: Inference, type: Type, name: str, node: nodes.Member | node
         inference.fields.setdefault(id(node), []).append(place)
         inference.parts.append(Part(span, name, found, found.items[place]))
         return found.items[place]
-    inference.report(_no_part(found, name, span, place))
+    inference.report(_no_part(inference, found, name, span, place))
     return UNKNOWN
 
 
@@ -136,10 +136,10 @@ def place_of(name: str) -> int | None:
     return AXES.index(name) if len(name) == 1 and name in AXES else None
 
 
-def _no_part(found: Type, name: str, span: Span, place: int | None) -> Diagnostic:
+def _no_part(inference: Inference, found: Type, name: str, span: Span, place: int | None) -> Diagnostic:
     help, label, suggestions = "", f"of `{format_type(found)}`", tuple[Suggestion, ...]()
     if isinstance(found, TupleOf) and found.record is not None:
-        return no_field(span, name, found.record, label)
+        return no_field(inference.outside, span, name, found.record, label)
     if isinstance(found, Meta):
         help = "say in the head what it is: `(u: (Real, Real))`"
         message = f"it is not known what `.{name}` is a part of"
@@ -233,7 +233,8 @@ def _alike(inference: Inference, found: list[Type], node: nodes.Apply, name: str
     if problem is not None:
         a, b = format_types((left, right))
         message = f"`{name}` takes two vectors of one size, but these are `{a}` and `{b}`"
-        inference.report(kinds.SIZES(node.span, message, label=f"`{a}` and `{b}`", help="take as many of both"))
+        both = tuple(Related(item.value.span, f"`{shown}`") for item, shown in zip(node.arguments, (a, b)))
+        inference.report(kinds.SIZES(node.span, message, label="two sizes", related=both, help="take as many of both"))
 
 
 def _numbers(inference: Inference, type: Type, expr: nodes.Expr, name: str) -> bool:
@@ -254,9 +255,11 @@ def _numbers(inference: Inference, type: Type, expr: nodes.Expr, name: str) -> b
 
 
 def expect_array(
-    inference: Inference, type: Type, expr: nodes.Expr, what: str, suggestions: tuple[Suggestion, ...] = ()
-) -> Type:
-    """The type of the elements of what must be an array; UNKNOWN if it is none, as is reported."""
+    inference: Inference, type: Type, expr: nodes.Expr, what: str, suggestions: tuple[Suggestion, ...] = (),
+    index: bool = False,
+) -> Type:  # fmt: skip
+    """The type of the elements of what must be an array; UNKNOWN if it is none, as is reported. index: one is asked
+    for, not all that it has."""
     found = resolve(type)
     if isinstance(found, ArrayOf):
         return found.item
@@ -267,19 +270,21 @@ def expect_array(
     if not isinstance(found, Unknown):
         inference.report(kinds.NOT_AN_ARRAY(
             expr.span, f"{what}, but this is {describe(found)}", label=f"this is `{format_type(found)}`",
-            help=_instead(found), suggestions=suggestions,
+            help=_instead(found, index), suggestions=suggestions,
         ))  # fmt: skip
     return UNKNOWN
 
 
-def _instead(found: Type) -> str:
+def _instead(found: Type, index: bool) -> str:
     from potto.types.types import Function
 
     if isinstance(found, Function):
         return "a function is called with parentheses: `f(i)`"
     if isinstance(found, TupleOf):
         return "the parts of a tuple are `u.0`, `u.1`, …; an array is written `[a, b]`"
-    return "to count up to it, write `0..n-1`" if resolve(found) is REAL else ""
+    if resolve(found) is REAL:
+        return "" if index else "to count up to it, write `0..n-1`"
+    return ""
 
 
 _FORMS: dict[str, Callable[[Inference, nodes.Apply], Type]] = {

@@ -277,3 +277,59 @@ def test_arrays_of_a_batch_in_tiles_keep_their_axes() -> None:
     f = potto.compile("def f(a) [a, a^2, integral [0, a] x d(x)]").f
     a = np.linspace(0.1, 2, 5_000)
     assert np.abs(f(a).value - np.stack((a, a**2, a**2 / 2), axis=-1)).max() <= 1e-14
+
+
+DISCS = """
+record Disc(at: (Real, Real), r: Real)
+record Plain(x: Real, r: Real)
+def area(ds: [n] Disc, t) sum d in ds (d.at.x*d.r^2*t)
+def flat(ds: [n] Plain, t) sum i in 0..n-1 ((i + 1)*ds[i].x*ds[i].r^2*t)
+def held(u: (Real, Real), t) u.x*t + u.y
+k = deriv(held)(t=(3, 1), u=((1, 2), (0, 1)))
+"""
+
+
+def test_records_in_an_array_are_dicts_or_columns_and_so_are_slopes_by_them() -> None:
+    module = potto.compile(DISCS)
+    by_flat, by_area = potto.grad(module.flat), potto.grad(module.area)
+    each = [{"x": 1.0, "r": 2.0}, {"r": 4.0, "x": 3.0}]
+    assert module.flat(each, 0.5).value == 50
+    assert by_flat(each, 0.5).tangent == [{"x": 2.0, "r": 2.0}, {"x": 16.0, "r": 24.0}]
+    columns = {"r": np.array([2.0, 4.0]), "x": [1.0, 3.0]}
+    assert module.flat(columns, 0.5).value == 50
+    slopes = by_flat(columns, np.array([0.5, 1.0])).tangent
+    assert {name: part.tolist() for name, part in slopes.items()} == {
+        "x": [[2.0, 16.0], [4.0, 32.0]], "r": [[2.0, 24.0], [4.0, 48.0]]
+    }  # fmt: skip
+    nested = [{"at": (1.0, 5.0), "r": 2.0}, ((3.0, 6.0), 4.0)]
+    assert by_area(nested, 0.5).tangent == [{"at": (2.0, 0.0), "r": 2.0}, ((8.0, 0.0), 12.0)]
+    with pytest.raises(potto.PottoError, match="has no `r` and has `R`") as told:
+        module.flat([{"x": 1.0, "R": 2.0}], 0.5)
+    assert told.value.diagnostics[0].help == "did you mean `r`?"
+    with pytest.raises(potto.PottoError, match="has 2 elements"):
+        module.flat({"x": [1.0, 2.0], "r": [1.0]}, 0.5)
+
+
+def test_a_table_is_taken_by_its_names() -> None:
+    """Not by the order of its columns, which numpy would see."""
+
+    class Column:
+        def __init__(self, items: list[float]) -> None:
+            self.items = items
+
+        def to_numpy(self) -> np.ndarray:
+            return np.array(self.items)
+
+    class Table:
+        columns = ("r", "x")
+        held = {"r": [2.0, 4.0], "x": [1.0, 3.0]}
+
+        def __getitem__(self, name: str) -> Column:
+            return Column(self.held[name])
+
+        def to_numpy(self) -> np.ndarray:
+            return np.array(list(self.held.values())).T
+
+    module = potto.compile(DISCS)
+    assert module.flat(Table(), 0.5).value == 50
+    assert (module.k.value, module.k.tangent) == (5, 2)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from marks import check, only, type_of
+from marks import FOLDER, check, database, only, type_of
+
+from potto.checking.check import diagnostics
 
 TYPES = [
     ("def f(xs: [n] Real) sum i in 0..n-1 (xs[i])", "(xs: [n] Real) -> Real"),
@@ -52,9 +54,9 @@ def test_sizes_that_do_not_agree() -> None:
         #              ^^^^^^ error[P0326]: `cross` takes vectors of three numbers
         def two(xs: [2] Real) xs[0] + xs[1]
         l = two([1, 2, 3])
-        #       ^^^^^^^^^ error[P0306]: must be `[2] Real`, but this is `[3] Real`
+        #       ^^^^^^^^^ error[P0326]: must be `[2] Real`, but this is `[3] Real`
         m = [[1, 2], [3]]
-        #            ^^^ error[P0306]: must be `[2] Real`, but this is `[1] Real`
+        #            ^^^ error[P0326]: must be `[2] Real`, but this is `[1] Real`
     """)
 
 
@@ -65,10 +67,10 @@ def test_sizes_that_follow_from_each_other_agree_in_any_order() -> None:
         def before(xs, ys) pair(xs, ys) + dot(diff(xs), ys)
         def after(ys, xs) dot(ys, diff(xs)) + pair(xs, ys)
         k = pair([1, 2, 3], [1, 2, 3])
-        #                   ^^^^^^^^^ error[P0306]: `ys` of `pair` must be `[2] Real`, but this is `[3] Real`
+        #                   ^^^^^^^^^ error[P0326]: `ys` of `pair` must be `[2] Real`, but this is `[3] Real`
         def last(xs: [n] Real, ys: [n - 1] Real) xs[0] + ys[0]
         l = last([1, 2, 3], [1, 2, 3])
-        #                   ^^^^^^^^^ error[P0306]: `ys` of `last` must be `[2] Real`, but this is `[3] Real`
+        #                   ^^^^^^^^^ error[P0326]: `ys` of `last` must be `[2] Real`, but this is `[3] Real`
     """)
 
 
@@ -183,3 +185,30 @@ def test_a_size_and_a_parameter_of_one_name() -> None:
     assert type_of("def f(n, xs) n*norm(xs)") == "(n: Real*, xs: [m] Real*) -> Real"
     shown = type_of("def g(xs, m: Real, n)(ys) norm(xs)*m*n*norm(ys)")
     assert shown == "(xs: [k] Real*, m: Real, n: Real*) -> (ys: [l] Real*) -> Real"
+
+
+@pytest.mark.parametrize(("text", "code", "places"), [
+    ("def a(xs: [n] Real, ys: [n] Real) xs[0]*ys[0]\nb = a([1, 2, 3], [1, 2])", "P0326", ["[1, 2, 3]: so `n` is 3"]),
+    ("def a(xs: [n + 1] Real, ys: [n] Real) xs[0]\nb = a(ys=[1, 2], xs=[1, 2])", "P0326", ["[1, 2]: so `n` is 1"]),
+    ("m = [[1, 2], [3]]", "P0326", ["[1, 2]: as the first one is"]),
+    ("f = fold s = [1, 2] for i in 1..3 ([s[0]])", "P0326", ["[1, 2]: the state at first"]),
+    ("def f(t) if t > 0 then [1, 2] else [1]", "P0326", ["[1, 2]: the first one"]),
+    ("def f(t) -> [3] Real\n    [t, t]", "P0326", ["[3] Real: declared here"]),
+    ("a = dot([1, 2], [1, 2, 3])", "P0326", ["[1, 2]: `[2] Real`", "[1, 2, 3]: `[3] Real`"]),
+    ("a = interp([1, 2], [1, 2, 3], 1)", "P0326", ["[1, 2]: `[2] Real`", "[1, 2, 3]: `[3] Real`"]),
+    ("record P(x: Real)\ndef f(p: P) p.y", "P0332", ["P: `P` is defined here"]),
+    ("record P(x: Real)\np = P(x=1, z=2)", "P0332", ["P: `P` is defined here"]),
+    ("record P(x: Real)\np = P(x=1) with w = 2", "P0332", ["P: `P` is defined here"]),
+])  # fmt: skip
+def test_what_disagrees_is_told_with_the_place_that_says_otherwise(text: str, code: str, places: list[str]) -> None:
+    (located,) = diagnostics(database(text), FOLDER + "main.po")
+    said = located.diagnostic
+    assert said.code == code
+    assert [f"{text[r.span.start : r.span.end]}: {r.message}" for r in said.related] == places
+
+
+def test_the_record_of_another_file() -> None:
+    db = database("# file: lib.po\nrecord P(x: Real)\n# file: main.po\nfrom lib import P\ndef f(p: P) p.y")
+    (located,) = diagnostics(db, FOLDER + "main.po")
+    related = [(r.file, r.span.start, r.message) for r in located.diagnostic.related]
+    assert related == [(FOLDER + "lib.po", 7, "`P` is defined here")]

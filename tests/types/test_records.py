@@ -53,7 +53,7 @@ def test_mistakes():
         def missing(t) Camera(eye=Vec(1, 2))
         #                     ^^^^^^^^^^^^^ error[P0309]: focal
         def extra(t) Vec(x=1, y=2, z=3)
-        #                          ^ error[P0310]: no parameter
+        #                          ^ error[P0332]: has no field
         def none(c: Camra) 1
         #           ^^^^^ error[P0116]: no type
         def function(c: given) 1
