@@ -1,11 +1,12 @@
 """The language server against its goals: a real client over standard streams, 200 modules, 42,000 lines.
 
-Run: `python benchmarks/lsp.py [--json] [--quick] [--peers FOLDER] [--plot FILE]`. Times are of the wall clock between a
-message sent and the answer read; on a busy machine they are those of the machine, so the load is shown before and
-after, and beside the times how much of a processor the server has used for one such thing, in the mean.
+Run: `python benchmarks/lsp.py [--json] [--quick] [--arrays] [--peers FOLDER] [--plot FILE]`. Times are of the wall
+clock between a message sent and the answer read; on a busy machine they are those of the machine, so the load is shown
+before and after, and beside the times how much of a processor the server has used for one such thing, in the mean.
 
 Then files of 100 to 20,000 lines (`lsp_whole`), drawn with `--plot`; and with `--peers`, type checkers of Python from a
-folder of programs (`lsp_peers`).
+folder of programs (`lsp_peers`). With `--arrays`, instead of all this, the programs have arrays, records, folds and
+look-ups, and beside each figure stands its ratio to that of as many lines without.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import statistics
 import sys
 import tempfile
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +63,7 @@ def measure(folder: Path, texts: dict[str, str], rounds: int) -> Iterator[Row]:
     yield from signatures(client, texts, rounds)
     yield from questions(client, large, rounds)
     yield "G10", "memory with the whole workspace checked, and after all this", client.memory(), "MB", 120, 90
-    yield "G12", f"longest pause over {rounds * 50:,} random edits", pauses(client, rounds * 50), "ms", 20, 10
+    yield "G12", f"longest pause over {rounds * 50:,} random edits", pauses(client, large, rounds * 50), "ms", 20, 10
     client.process.kill()
     client = Client(folder)
     client.open("large", large)
@@ -180,10 +182,9 @@ def questions(client: Client, large: str, rounds: int) -> Iterator[Row]:
     yield "G6", "a cancelled request is answered RequestCancelled, p95", quantile(cancelled, 0.95), "ms", 5, 2
 
 
-def pauses(client: Client, edits: int) -> float:
+def pauses(client: Client, text: str, edits: int) -> float:
     """The longest time between an edit somewhere and its diagnostics, in ms."""
     rng, worst = random.Random(2), 0.0
-    text = workspace()["large"]
     client.change("large", {"text": text})
     client.diagnosed("large")
     lines = text.split("\n")
@@ -204,22 +205,23 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--json", action="store_true", help="one object a row instead of a table")
     parser.add_argument("--quick", action="store_true", help="fewer rounds")
+    parser.add_argument("--arrays", action="store_true", help="programs with arrays, beside as many lines without")
     parser.add_argument(
         "--peers", type=Path, metavar="FOLDER", help="where the programs of type checkers of Python are"
     )
     parser.add_argument("--plot", type=Path, metavar="FILE", help="draw what a key costs against the lines of the file")
     arguments = parser.parse_args()
+    as_installed()
+    print(f"front end: {front_end()}", file=sys.stderr)
+    rounds = 20 if arguments.quick else 200
+    if arguments.arrays:
+        plain = list(rows_of(workspace(), rounds))
+        for row, beside in zip(rows_of(workspace(arrays=True), rounds), plain, strict=True):
+            show(row, arguments.json, row[2] / beside[2] if beside[2] else None)
+        return
     texts = workspace()
-    with tempfile.TemporaryDirectory(prefix="potto-bench-") as name, tempfile.TemporaryDirectory() as cache:
-        os.environ["POTTO_CACHE"] = cache
-        as_installed()
-        for module, text in texts.items():
-            (Path(name) / f"{module}.po").write_text(text)
-        lines = sum(text.count("\n") for text in texts.values())
-        print(f"{len(texts)} modules, {lines:,} lines, one of {texts['large'].count(chr(10)):,}", file=sys.stderr)
-        print(f"front end: {front_end()}", file=sys.stderr)
-        print(f"load {os.getloadavg()[0]:.1f} of {os.cpu_count()} processors", file=sys.stderr)
-        for row in measure(Path(name), texts, 20 if arguments.quick else 200):
+    with written(texts) as folder:
+        for row in measure(folder, texts, rounds):
             show(row, arguments.json)
         if not arguments.json:
             rows = sizes_measured()
@@ -228,18 +230,39 @@ def main() -> None:
                 drawn(rows, arguments.plot)
         if arguments.peers is not None:
             print(f"{'ms, MB':<14}" + "".join(f"{column:>12}" for column in COLUMNS))
-            for server, found in compare(Path(name), texts, arguments.peers, 3 if arguments.quick else 10):
+            for server, found in compare(folder, texts, arguments.peers, 3 if arguments.quick else 10):
                 print(f"{server:<14}" + "".join(f"{value:12.1f}" for value in found), flush=True)
+
+
+def rows_of(texts: dict[str, str], rounds: int) -> Iterator[Row]:
+    with written(texts) as folder:
+        yield from measure(folder, texts, rounds)
+
+
+@contextmanager
+def written(texts: dict[str, str]) -> Iterator[Path]:
+    """The modules of a workspace in a folder, and nothing on disk from before."""
+    with tempfile.TemporaryDirectory(prefix="potto-bench-") as name, tempfile.TemporaryDirectory() as cache:
+        os.environ["POTTO_CACHE"] = cache
+        for module, text in texts.items():
+            (Path(name) / f"{module}.po").write_text(text)
+        lines = sum(text.count("\n") for text in texts.values())
+        print(f"{len(texts)} modules, {lines:,} lines, one of {texts['large'].count(chr(10)):,}", file=sys.stderr)
+        print(f"load {os.getloadavg()[0]:.1f} of {os.cpu_count()} processors", file=sys.stderr)
+        yield Path(name)
         print(f"load {os.getloadavg()[0]:.1f}", file=sys.stderr)
 
 
-def show(row: Row, as_json: bool) -> None:
+def show(row: Row, as_json: bool, ratio: float | None = None) -> None:
+    """ratio: to the same without arrays."""
     gate, what, value, unit, goal, stretch = row
     if as_json:
-        print(json.dumps({"gate": gate, "what": what, "value": value, "unit": unit, "goal": goal, "stretch": stretch}))
+        told = {"gate": gate, "what": what, "value": value, "unit": unit, "goal": goal, "stretch": stretch}
+        print(json.dumps(told if ratio is None else {**told, "ratio": ratio}))
         return
     verdict = "stretch" if value <= stretch else "goal" if value <= goal else "MISSED"
-    print(f"{gate:<4} {what:<72} {value:9.2f} {unit:<3} {goal:>6g} / {stretch:<6g} {verdict}", flush=True)
+    beside = "" if ratio is None else f", {ratio:.2f} x without arrays"
+    print(f"{gate:<4} {what:<72} {value:9.2f} {unit:<3} {goal:>6g} / {stretch:<6g} {verdict}{beside}", flush=True)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
 """A workspace like a large project of one's own: 200 modules, 42,000 lines, one module of 2,000.
 
-Owns `workspace`. Definitions are of the size of those in the paper and in `examples/`: shaders, small integrals with
-a condition, helpers, documented; a module imports a few others that come before it, so that there are leaves, a middle
-and a top, and no cycles.
+Owns `workspace`, without arrays and with them. Definitions are of the size of those in the paper and in `examples/`:
+shaders, small integrals with a condition, helpers, documented; a module imports a few others that come before it, so
+that there are leaves, a middle and a top, and no cycles.
 """
 
 from __future__ import annotations
@@ -23,13 +23,17 @@ def imports_of(number: int) -> list[int]:
     return sorted(other for other in wanted if 0 <= other < number)[:4]
 
 
-def definition(module: int, index: int, imported: list[str]) -> list[str]:
-    """One definition of about seven lines."""
-    name, turn = f"f{index}", (module + index) % 6
+def called(index: int, imported: list[str]) -> str:
+    """What a definition adds: a call of the one before it, or of one that is imported."""
     helper = f"f{index - 1}" if index and index % 3 else None
     other = imported[index % len(imported)] if imported else None
     calls = [f"{call}(t, {n + 1}/2)" for n, call in enumerate(c for c in (helper, other) if c) if index % 2 or n]
-    extra = "".join(f" + {call}" for call in calls[:1])
+    return "".join(f" + {call}" for call in calls[:1])
+
+
+def definition(module: int, index: int, imported: list[str]) -> list[str]:
+    """One definition of about seven lines."""
+    name, turn, extra = f"f{index}", (module + index) % 6, called(index, imported)
     head = [f"# {name} of module {module}: what a reader wants to know", "# before using it."]
     match turn:
         case 0:
@@ -62,7 +66,39 @@ def definition(module: int, index: int, imported: list[str]) -> list[str]:
     return [*head, *body, ""]
 
 
-def module_text(number: int, lines: int) -> str:
+def of_arrays(module: int, index: int, imported: list[str]) -> list[str]:
+    """One definition as long as that of `definition`, and called like it, with arrays, records and what goes through
+    them."""
+    name, turn, extra = f"f{index}", (module + index) % 6, called(index, imported)
+    head = [f"# {name} of module {module}: what a reader wants to know", "# before using it."]
+    match turn:
+        case 0:
+            body = [f"def {name}(t, k)", f"    a = [k^2 + {index}*i for i in 0..3]",
+                    f"    integral [0, 1] sum i in 0..3 ([x < t*a[i]] * a[i] * x) d(x){extra}"]  # fmt: skip
+        case 1:
+            body = [f"def {name}(t, k)", f"    u = (t, sqrt(k^2 + {index + 1}), 1)", "    v = 2*u - (0, k, 0)",
+                    f"    dot(u, v)/norm(v)*exp(-u.x){extra}"]  # fmt: skip
+        case 2:
+            body = [f"def {name}(t, k)", f"    spot = Spot(at=(t, k), r=1/{index + 2})",
+                    f"    integral ([0, 1], [0, 1]) inside(spot with r = k, x, y)*(x - y) d(x, y){extra}"]  # fmt: skip
+        case 3:
+            body = [f"{name} = \\(t, k) . sum i in 0..4 (1/(sqrt(2)*(t + k*i + {index + 2})^2 + 1))"]
+        case 4:
+            body = [f"def {name}(t, k)", "    xs = [t*i + k for i in 0..7]",
+                    "    (s, w) = fold (s, w) = (k, 1) for x in xs ((s/2 + x*w, w*0.9))",
+                    f"    s*sin({index}*t) + max x in xs (x*w){extra}"]  # fmt: skip
+        case _:
+            body = [f"def {name}(t, k)", f"    places = [0, 1/{index + 2}, 1]", "    values = [t, k, t*k]",
+                    f"    integral [0, 2] interp(places, values, x/2)*x^2 d(x){extra}"]  # fmt: skip
+    return [*head, *body, ""]
+
+
+RECORDS = [
+    "record Spot(at: (Real, Real), r: Real)", "def inside(s: Spot, x, y) [(x - s.at.x)^2 + (y - s.at.y)^2 < s.r]", ""
+]  # fmt: skip
+
+
+def module_text(number: int, lines: int, arrays: bool) -> str:
     """A module of at least so many lines."""
     imports = imports_of(number)
     written, imported = [], []
@@ -73,16 +109,16 @@ def module_text(number: int, lines: int) -> str:
         else:
             written.append(f"from {module_name(other)} import f1 as g{other}")
             imported.append(f"g{other}")
-    written.append("")
+    written += ["", *RECORDS] if arrays else [""]
     index = 0
     while len(written) < lines:
-        written += definition(number, index, imported)
+        written += (of_arrays if arrays else definition)(number, index, imported)
         index += 1
     return "\n".join(written) + "\n"
 
 
-def workspace() -> dict[str, str]:
-    """The modules by name."""
+def workspace(arrays: bool = False) -> dict[str, str]:
+    """The modules by name; `arrays`: of definitions with arrays."""
     rest = (LINES - LARGE) // (MODULES - 1)
     sizes = {n: LARGE if module_name(n) == "large" else rest for n in range(MODULES)}
-    return {module_name(n): module_text(n, lines) for n, lines in sizes.items()}
+    return {module_name(n): module_text(n, lines, arrays) for n, lines in sizes.items()}

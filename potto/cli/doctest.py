@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from msgspec.structs import asdict
 
+from potto.cli.calling import add_set
 from potto.cli.console import Console
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ EXAMPLE = "  potto test examples/"
 
 def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("paths", nargs="+", metavar="PATH", help="files, or folders to walk; `-` is standard input")
+    add_set(parser)
     parser.add_argument("-v", "--verbose", action="store_true", help="show what passes as well")
 
 
@@ -33,7 +35,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     outcomes: list[Outcome] = []
     for path in files:
         try:
-            file = opened(world, path)
+            file = opened(world, path, options.set)
             problems += world.errors(file)
             outcomes += outcomes_of(world, file)
         except ProgramError as error:

@@ -97,10 +97,12 @@ class Index(Base, frozen=True, eq=False):
 
 
 class Length(Base, frozen=True, eq=False):
-    """How many elements an array has, which are numbers that rise if that is asked."""
+    """How many elements an array has, which are numbers that rise if that is asked. like: an array that must have as
+    many."""
 
     array: Term
     rising: bool = False
+    like: Term | None = None
 
 
 class Data(Base, frozen=True, eq=False):
@@ -280,10 +282,23 @@ def index(array: Term, place: Term) -> Term:
     return make(Index, array.free | place.free, array, place)
 
 
-def length(array: Term, rising: bool = False) -> Term:
+def length(array: Term, rising: bool = False, like: Term | None = None) -> Term:
+    if like is not None and length(array) is length(like):
+        like = None
+    if like is not None:
+        own = array if rising else _sized(array)
+        other = _sized(like)
+        return make(Length, own.free | other.free, own, rising, other)
     if isinstance(array, ListOf) and not (rising and len(array.items) > 1 and not _rise(array.items)):
         return const(len(array.items))
     return array.size if isinstance(array, Array) and not rising else make(Length, array.free, array, rising)
+
+
+def _sized(whole: Term) -> Term:
+    """An array of which only the size is asked: what it is made of may vary, where the size does not."""
+    while isinstance(whole, Array) and isinstance(whole.size, Length) and whole.size.like is None:
+        whole = whole.size.array
+    return array(whole.variable, whole.size, ZERO) if isinstance(whole, Array) else whole
 
 
 def _rise(items: tuple[Term, ...]) -> bool:

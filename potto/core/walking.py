@@ -90,7 +90,7 @@ _CHILDREN: dict[type, Callable[[Any], tuple[Term, ...]]] = {
     Fold: attrgetter("lo", "hi", "start", "body"),
     Array: attrgetter("size", "body"),
     Index: attrgetter("array", "index"),
-    Length: lambda term: (term.array,),
+    Length: lambda term: (term.array,) if term.like is None else (term.array, term.like),
     Deriv: lambda term: (term.function,),
 }
 
@@ -139,7 +139,7 @@ def rebuild(term: Term, parts: tuple[Term, ...]) -> Term:
         case Index():
             return index(*parts)
         case Length():
-            return length(parts[0], term.rising)
+            return length(parts[0], term.rising, *parts[1:])
         case Deriv():
             return deriv(parts[0])
 

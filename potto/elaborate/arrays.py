@@ -14,6 +14,7 @@ from potto.core.terms import (
     Array,
     Const,
     Index,
+    Length,
     Term,
     add,
     app,
@@ -47,7 +48,7 @@ from potto.elaborate.values import Scope, Value
 from potto.modules.data import data_file
 from potto.syntax import nodes
 from potto.types.loading import type_of
-from potto.types.types import ArrayOf, TupleOf, Type, resolve
+from potto.types.types import ANY_SIZE, AnySize, ArrayOf, TupleOf, Type, resolve
 from potto.types.vectors import place_in
 
 
@@ -279,7 +280,7 @@ def lifted(elaboration: Elaboration, operation: Operation, *operands: tuple[Term
     if isinstance(wide, ArrayOf):
         place = elaboration.fresh("k")
         elaboration.numbers.add(place)
-        size = next(length(term) for term, type in operands if isinstance(type, ArrayOf))
+        size = together(*((term, type) for term, type in operands if isinstance(type, ArrayOf)))
         parts = [_element(operand, var(place), size) for operand in operands]
         return array(place, size, lifted(elaboration, operation, *parts))
     return operation(*(term for term, _ in operands))
@@ -295,9 +296,35 @@ def _element(operand: tuple[Term, Type], place: Term, size: Term) -> tuple[Term,
     return (element(term, place, size), resolve(type.item)) if isinstance(type, ArrayOf) else operand
 
 
+def together(first: tuple[Term, Type], *others: tuple[Term, Type], rising: bool = False) -> Term:
+    """The size of arrays that go element by element; what their types don't tell of it is seen to when they are met."""
+    term, type = first
+    known = resolve(type.size) if isinstance(type, ArrayOf) else ANY_SIZE
+    for other, its in others:
+        if isinstance(known, AnySize) or not isinstance(its, ArrayOf) or known != resolve(its.size):
+            return length(term, rising, other)
+    return length(term, rising)
+
+
+def as_long_as(elaboration: Elaboration, whole: Term, first: Term) -> Term:
+    """An array that must be as long as another one, where their types don't tell whether it is."""
+    shapes = elaboration.shapes.of(first), elaboration.shapes.of(whole)
+    if not any(isinstance(shape, ArrayOf) and isinstance(resolve(shape.size), AnySize) for shape in shapes):
+        return whole
+    size = length(whole, like=first)
+    if size is length(whole):
+        return whole
+    if isinstance(whole, Array):
+        return array(whole.variable, size, whole.body)
+    place = elaboration.fresh("k")
+    elaboration.numbers.add(place)
+    return array(place, size, index(whole, var(place)))
+
+
 def element(whole: Term, place: Term, size: Term) -> Term:
     """The element at a place below `size`; of an array of just that size, which is made on the spot, what it makes."""
-    if isinstance(whole, Array) and whole.size is size:
+    own = length(size.array) if isinstance(size, Length) else size
+    if isinstance(whole, Array) and whole.size in (size, own):
         return substitute(whole.body, {whole.variable: place})
     return index(whole, place)
 
@@ -319,7 +346,7 @@ def _dot(elaboration: Elaboration, u: Term, v: Term) -> Term:
     shape = elaboration.shapes.of(u)
     if isinstance(shape, TupleOf):
         return add(*(mul(proj(u, place), proj(v, place)) for place in range(len(shape.items))))
-    place, size = elaboration.fresh("k"), length(u)
+    place, size = elaboration.fresh("k"), together((u, shape), (v, elaboration.shapes.of(v)))
     elaboration.numbers.add(place)
     return sum_(place, ZERO, sub(size, ONE), mul(element(u, var(place), size), element(v, var(place), size)))
 

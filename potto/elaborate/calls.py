@@ -31,7 +31,7 @@ from potto.core.terms import (
     tuple_,
 )
 from potto.elaborate import builtins
-from potto.elaborate.arrays import loaded, of_vectors, standing
+from potto.elaborate.arrays import as_long_as, loaded, of_vectors, standing
 from potto.elaborate.context import Elaboration, rule
 from potto.elaborate.filling import Filling, Given, Packed, Spread, fill
 from potto.elaborate.lookups import image, interp
@@ -43,6 +43,7 @@ from potto.source import Span
 from potto.syntax import nodes
 from potto.types import interface
 from potto.types.still import lacks_tangents
+from potto.types.types import ArrayOf, SizeVar, Type, resolve
 
 Arguments = Sequence[Given[Value]]
 
@@ -108,10 +109,22 @@ def _call_known(elaboration: Elaboration, function: Term, groups: Groups, given:
     for group, filling in zip(groups, filled):
         args = tuple(map(elaboration.as_term, _values(elaboration, len(group), filling)))
         if not isinstance(filling, Spread | Packed):
-            args = _with_tangents(elaboration, function, args)
+            args = _with_tangents(elaboration, function, _of_one_size(elaboration, function, args))
         elaboration.shapes.meets_records |= elaboration.shapes.makes_record(function)
         function = elaboration.note(app(function, args), span)
     return function
+
+
+def _of_one_size(elaboration: Elaboration, function: Term, args: tuple[Term, ...]) -> tuple[Term, ...]:
+    """The arguments; arrays that must be of one size are seen to be when they are met, where types leave it open."""
+    expected = elaboration.shapes.parameters(function) if len(args) > 1 and isinstance(function, Global) else ()
+    first: dict[Type, Term] = {}
+    found = list(args)
+    for place, (arg, type) in enumerate(zip(args, map(resolve, expected))):
+        size = resolve(type.size) if isinstance(type, ArrayOf) else None
+        if isinstance(size, SizeVar) and first.setdefault(size, arg) is not arg:
+            found[place] = as_long_as(elaboration, arg, first[size])
+    return tuple(found)
 
 
 def _with_tangents(elaboration: Elaboration, function: Term, args: tuple[Term, ...]) -> tuple[Term, ...]:

@@ -26,7 +26,7 @@ from potto.core.terms import (
     sum_,
     var,
 )
-from potto.elaborate.arrays import element, shaped
+from potto.elaborate.arrays import element, shaped, together
 from potto.elaborate.context import Elaboration
 from potto.types.types import ArrayOf, TupleOf, Type, resolve
 
@@ -37,13 +37,14 @@ Read = Callable[[Term], Term]
 def interp(elaboration: Elaboration, xs: Term, ys: Term, x: Term) -> Term:
     """Piecewise linear through `ys` at the places `xs`, which rise."""
     place = _number(elaboration)
+    both = (xs, elaboration.shapes.of(xs)), (ys, elaboration.shapes.of(ys))
     size, after, first = length(xs), add(place, ONE), index(ys, ZERO)
     left, right = element(xs, place, size), element(xs, after, size)
     into = apply("between", x, left, right)
 
     def at(read: Read) -> Term:
         rise = mul(sub(read(element(ys, after, size)), read(element(ys, place, size))), into)
-        return add(read(first), sum_(_name(place), ZERO, sub(length(xs, rising=True), const(2)), rise))
+        return add(read(first), sum_(_name(place), ZERO, sub(together(*both, rising=True), const(2)), rise))
 
     return _by_numbers(elaboration, elaboration.shapes.of(first), first, at, _itself)
 

@@ -47,7 +47,10 @@ def image(inference: Inference, node: nodes.Apply, types: list[Type]) -> Type:
     item: Type = inference.fresh()
     rows = ArrayOf(inference.fresh_size("h"), ArrayOf(inference.fresh_size("w"), item))
     if not unify(photo, rows):
-        inference.report(mismatch(photo, rows, node.arguments[0].value, "the first argument of `image`"))
+        expr, shown = node.arguments[0].value, format_type(photo)
+        message = f"the first argument of `image` must be rows of pixels, but this is `{shown}`"
+        help = "it is an array of rows, `[h, w] Real` or `[h, w] (Real, Real, Real)`"
+        inference.report(kinds.MISMATCH(expr.span, message, label=f"this is `{shown}`", help=help))
         item = UNKNOWN
     for type, argument in zip((u, v), node.arguments[1:]):
         inference.need_number(type, argument.value, "where `image` looks")

@@ -87,6 +87,8 @@ def mismatch(
         help = "it decides a condition there; a number is compared first: `if t > 0 then … else …`"
     elif isinstance(resolve(actual), Real) and isinstance(resolve(expected), Function):
         help = "it is applied there, as a function; if a product is meant, write it with `*`"
+    elif isinstance(resolve(actual), ArrayOf) and isinstance(resolve(expected), Real):
+        help = "write it for each element, `[… for x in xs]`, or take one, `xs[i]`"
     message = f"{what} must be `{wanted}`, but this is `{shown}`"
     return kind(expr.span, message, label=f"this is `{shown}`", related=related, help=help)
 

@@ -230,7 +230,12 @@ def _alike(inference: Inference, found: list[Type], node: nodes.Apply, name: str
         if not _numbers(inference, type, argument.value, name):
             return
     problem = _differ(left, right)
-    if problem is not None:
+    if problem is not None and not all(isinstance(size, SIZES) for size in problem):
+        inference.report(kinds.MISMATCH(
+            node.span, f"`{name}` takes two tuples or two arrays, but these are {describe(left)} and {describe(right)}",
+            label="of two kinds", help="write both in parentheses, or both in brackets",
+        ))  # fmt: skip
+    elif problem is not None:
         a, b = format_types((left, right))
         message = f"`{name}` takes two vectors of one size, but these are `{a}` and `{b}`"
         both = tuple(Related(item.value.span, f"`{shown}`") for item, shown in zip(node.arguments, (a, b)))

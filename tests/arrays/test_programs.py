@@ -202,6 +202,32 @@ still = deriv(powers)(dcs=([1, 2], [0, 1]))
     assert module.still.tangent == pytest.approx(0.5, rel=1e-15)
 
 
+SIZED = """
+def ones(m) [1 for i in 1..m]
+def added(xs: [n] Real, m) xs + ones(m)
+def dotted(xs: [n] Real, t, m) integral [0, 1] dot(xs, [t*x*i for i in 1..m]) d(x)
+def paired(xs: [n] Real, ys: [n] Real) sum i in 0..n-1 (xs[i]*ys[i])
+def given(xs: [n] Real, m) paired(xs, ones(m)) + paired([2*x for x in xs], xs)
+def looked(xs: [n] Real, m) interp([i/m for i in 0..m-1], xs, 0.25)
+"""
+
+
+def test_sizes_that_types_leave_open_are_told_where_arrays_go_together() -> None:
+    """Also where the second array is the longer one, whose rest nobody would read."""
+    module, xs = potto.compile(SIZED), [1.0, 2.0, 6.0]
+    assert module.added(xs, 3).value.tolist() == [2, 3, 7]
+    assert module.dotted(xs, 2, 3) == pytest.approx(1 + 4 + 18, rel=1e-14)
+    assert module.given(xs, 3) == 9 + 2 * 41
+    assert module.looked(xs, 3) == pytest.approx(1.75, rel=1e-14)
+    calls = {"added": (xs,), "dotted": (xs, 2), "given": (xs,), "looked": (xs,)}
+    for name, arguments in calls.items():
+        for other in (2, 4):
+            with pytest.raises(potto.PottoError) as told:
+                getattr(module, name)(*arguments, other)
+            said = told.value.diagnostics[0]
+            assert said.code == "P0513" and "3" in said.message and str(other) in said.message
+
+
 def test_a_large_array_is_a_handful_of_passes() -> None:
     xs = np.random.default_rng(0).uniform(-1, 1, 100_000)
     found = potto.grad(M.squares)(xs)

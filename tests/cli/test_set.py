@@ -73,6 +73,14 @@ def test_pictures_fits_and_derivatives(program: str, tmp_path: Path, capsys: pyt
     assert "interior  2*x*dx" in answered(capsys, "deriv", program, "shade", "--set", "shade=\\x . x^2")
 
 
+def test_live_expressions_with_other_data(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "xs.csv").write_text("7\n8\n")
+    path = tmp_path / "mean.po"
+    path.write_text("xs = [1, 2, 3]\ndef mean(v: [n] Real) sum x in v (x)/n\n#> mean(xs)\n#= 7.5\n")
+    assert "expected 7.5, got 2" in answered(capsys, "test", str(path), status=1)
+    assert "all hold" in answered(capsys, "test", str(path), "--set", f"xs=@{tmp_path / 'xs.csv'}")
+
+
 def test_what_is_wrong_with_a_value(program: str, capsys: pytest.CaptureFixture[str]) -> None:
     said = answered(capsys, "eval", program, "shade(2)", "--set", "c=1 +", status=1)
     assert "<c>:1:3" in said and "P0101" in said

@@ -230,6 +230,34 @@ def test_an_edit_elsewhere_evaluates_nothing(server: Server, uri: Uri) -> None:
     assert shown(client, uri("main"), {2})[2].startswith("= 0.04166")  # t^3/3 at 1/2
 
 
+def test_an_edited_file_of_data_counts_again(server: Server, uri: Uri, tmp_path: Path) -> None:
+    """Its values, its size and its hover; a broken row is told at the `load`."""
+    client = server(REFRESHES)
+    heights = tmp_path / "heights.csv"
+    heights.write_text("1\n2\n6\n")
+    client.open(uri("main"), 'xs = load("heights.csv")\ndef mean(v: [n] Real) sum x in v (x)/n\n#> mean(xs)\n')
+    hover = {"textDocument": {"uri": uri("main")}, "position": {"line": 0, "character": 0}}
+
+    def edited(text: str) -> None:
+        heights.write_text(text)
+        client.tell("workspace/didChangeWatchedFiles", {"changes": [{"uri": heights.as_uri(), "type": 2}]})
+
+    assert shown(client, uri("main"), {2})[2].startswith("= 3.0")
+    assert "[3] Real" in client.ask("textDocument/hover", hover)["contents"]["value"]
+    edited("2\n4\n6\n8\n")
+    until(lambda: shown(client, uri("main"), {2})[2].startswith("= 5.0"))
+    assert "[4] Real" in client.ask("textDocument/hover", hover)["contents"]["value"]
+    edited("2\nfour\n")
+    until(lambda: "P0803" in {said["code"] for said in client.note(PUSHED, uri=uri("main"))["diagnostics"]})
+
+
+def until(holds: Callable[[], bool], seconds: float = 60) -> None:
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
 def test_a_value_that_is_not_the_expected_one_is_an_error(server: Server, uri: Uri) -> None:
     client = server(REFRESHES)
     client.open(uri("main"), TEXT)

@@ -322,7 +322,9 @@ def test_a_table_is_taken_by_its_names() -> None:
 
     class Table:
         columns = ("r", "x")
-        held = {"r": [2.0, 4.0], "x": [1.0, 3.0]}
+
+        def __init__(self) -> None:
+            self.held = {"r": [2.0, 4.0], "x": [1.0, 3.0]}
 
         def __getitem__(self, name: str) -> Column:
             return Column(self.held[name])

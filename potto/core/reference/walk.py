@@ -155,6 +155,8 @@ class Oracle:
             case Index():
                 return self.element(self.run(term.array, env), self.decide(term.index, env))
             case Length():
+                if term.like is not None and len(self.run(term.like, env)) != len(self.run(term.array, env)):
+                    raise ValueError("sizes that do not agree")
                 return self.length(self.run(term.array, env), term.rising)
             case Data(path=path, column=column):
                 return self.data[path, column]

@@ -147,17 +147,24 @@ def _places(place: Number, size: int) -> Any:
     return at.astype(np.int64)
 
 
-def length(machine: Machine, whole: Value, rising: bool) -> Value:
-    """How many elements an array has, which are numbers that rise if that is asked."""
-    if isinstance(whole, Rows):
-        count = whole.size
-    elif isinstance(whole, tuple | list):
-        count = len(whole)
-    else:
-        raise errors.wrong_call("only an array has a length")
+def length(machine: Machine, whole: Value, rising: bool, like: Value | None) -> Value:
+    """How many elements an array has, which are numbers that rise if that is asked, and as many as `like` has."""
+    count = _count(whole)
+    if like is not None and _count(like) != count:
+        message = f"two arrays that go together have {count} and {_count(like)} elements"
+        help = "take as many of both: `+`, `-`, `*`, `/`, `dot` and `interp` go element by element"
+        raise PottoError([RAGGED(errors.NOWHERE, message, help=help)])
     if rising:
         _see_that_it_rises(whole)
     return Cell(float(count), None, (None,) * machine.directions)
+
+
+def _count(whole: Value) -> int:
+    if isinstance(whole, Rows):
+        return whole.size
+    if isinstance(whole, tuple | list):
+        return len(whole)
+    raise errors.wrong_call("only an array has a length")
 
 
 def _see_that_it_rises(whole: Value) -> None:

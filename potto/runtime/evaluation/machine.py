@@ -77,7 +77,7 @@ class Semantics:
     culled: Callable[[Machine, Sum, int, int, dict[str, Value]], Value | None]
     array: Callable[[Machine, Array, Value, dict[str, Value]], Value]
     element: Callable[[Value, Value], Value]
-    length: Callable[[Machine, Value, bool], Value]
+    length: Callable[[Machine, Value, bool, Value | None], Value]
     data: Callable[[Data], Value]
     fold: Callable[[Machine, Fold, Value, Value, Value, dict[str, Value]], Value]
     integral: Callable[[Machine, Integral, dict[str, Value]], Value]
@@ -420,8 +420,8 @@ class Machine:
     def index(self, whole: Value, place: Value) -> Value:
         return self.linker.semantics.element(whole, place)
 
-    def length(self, whole: Value, rising: bool) -> Value:
-        return self.linker.semantics.length(self, whole, rising)
+    def length(self, whole: Value, rising: bool, like: Value | None) -> Value:
+        return self.linker.semantics.length(self, whole, rising, like)
 
     def fold(self, term: Fold, lo: Value, hi: Value, start: Value, env: dict[str, Value]) -> Value:
         return self.linker.semantics.fold(self, term, lo, hi, start, env)
