@@ -77,3 +77,65 @@ def again(a: [n, m, k] Real) [[[2*x for x in row] for row in plane] for plane in
     if shape[0]:
         assert module.total(a).value == pytest.approx((a * (1 + i + 2 * j + 3 * k)).sum(), abs=1e-14)
         assert potto.grad(module.total)(a).tangent == pytest.approx(1.0 + i + 2 * j + 3 * k, rel=1e-15)
+
+
+# Where an index may stand: over an array of n elements that are 10, 11, …, at place k.
+INDICES = {
+    "f(xs, k)": "def f(xs: [n] Real, k) xs[k]",
+    "f(xs, k) of rows": "def f(xs: [n] Real, k) [xs, xs][1, k]",
+    "f(xs, k) of columns": "def f(xs: [n] Real, k) [[x, 2*x] for x in xs][k, 0]",
+    "f(xs, k) of what is made": "def f(xs: [n] Real, k) [x + 0 for x in xs][k]",
+    "f(xs, k) in a loop": "def f(xs: [n] Real, k) sum i in k..k (xs[i])",
+    "f(xs, k) in a fold": "def f(xs: [n] Real, k) fold s = 0 for i in 1..2 (s/2 + xs[k]*2/3)",
+    "f(xs, k) beside a variable": "def f(xs: [n] Real, k) integral [0, 1] xs[k]*2*x d(x)",
+    "f(xs, k) of what varies": "def f(xs: [n] Real, k) integral [0, 1] [y*2*x for y in xs][k] d(x)",
+    "f(xs, k) in a condition": "def f(xs: [n] Real, k) integral [0, 20] [x < xs[k]] d(x)",
+    "f(xs, k) of records": "record P(x: Real)\ndef f(xs: [n] Real, k) [P(x=y) for y in xs][k].x",
+}
+
+
+@pytest.mark.parametrize("where", INDICES)
+def test_every_index_at_every_bound(where: str) -> None:
+    """Each is the element, or an error that says which index and how many elements there are."""
+    f = potto.compile(INDICES[where]).f
+    for size in (1, 3):
+        xs = [10.0 + place for place in range(size)]
+        for k in range(-2, size + 2):
+            if 0 <= k < size:
+                assert f(xs, k).value == pytest.approx(xs[k], rel=1e-12)
+                assert potto.deriv(f)((xs, [float(place == k) for place in range(size)]), k).tangent == pytest.approx(1)
+                continue
+            with pytest.raises(potto.PottoError) as told:
+                f(xs, k)
+            said = told.value.diagnostics[0]
+            elements = f"{size} element" + "s" * (size > 1)
+            assert (said.code, said.message) == ("P0511", f"the index {k} is out of range: the array has {elements}")
+    with pytest.raises(potto.PottoError) as told:
+        f([10.0, 11.0], 0.5)
+    assert told.value.diagnostics[0].code in ("P0512", "P0507")  # of an index, or of the bound of a loop
+
+
+# What is wrong with an element x, a place i, a variable u of integration and a number t.
+WRONG = [
+    "if x*u < t then 1 else 0", "floor(x + u)", "q*x", "sin(x, t)", "if [u < x] then 1 else sin", "delta(u - x)^2",
+    "sum k in 1..u (k)", "[1, 2][u]", "[1, 2] + (x, x)", "x(t)", "(t, x).z", "[x < u] + sign(u)", "t = x", "x^",
+    "let y = x",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("body", WRONG)
+def test_what_is_wrong_is_wrong_in_the_program_written_out(body: str) -> None:
+    """With the same codes, whatever the loop is."""
+
+    def codes(text: str) -> set[str]:
+        try:
+            potto.compile(text)
+        except potto.PottoError as error:
+            return {said.code for said in error.diagnostics if said.severity == "error"}
+        return set()
+
+    apart = codes(f"def f(x: Real, t) integral [0, 1] ({body}) d(u)")
+    assert apart
+    for loop in ("sum x in xs ({})", "sum i in 0..n-1 (let x = xs[i] in {})", "fold s = 0 for x in xs (s + ({}))"):
+        whole = codes(f"def f(xs: [n] Real, t) integral [0, 1] ({loop.format(body)}) d(u)")
+        assert whole == apart, loop

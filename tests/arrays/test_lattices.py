@@ -247,3 +247,33 @@ def f(t, ys: [m] Real) integral [-0.5, 1] x*[(if [up(ys, x) > t] then 1 else up(
     value = program.f(0.8, [0.4, 1.0])  # interp passes 0.5 at x = 0.2, and its sides above t stay above
     assert value.converged and abs(value - (1 - 0.2**2) / 2) < 1e-12
     assert abs(program.f(0.3, [0.4, 1.0]) - (1 - 0.5**2) / 2) < 1e-12  # all of it is above t
+
+
+def test_each_summand_looks_up_at_places_of_its_own() -> None:
+    """Sprites with one texture: each goes from cell to cell, and what it costs is not the pixels of the texture."""
+    program = potto.compile("""
+record Sprite(x: Real, y: Real, r: Real)
+def texel(photo: [h, w] Real, s: Sprite, x, y) image(photo, (x - s.x)/s.r, (y - s.y)/s.r)
+def inside(s: Sprite, x, y) [s.x <= x < s.x + s.r and s.y <= y < s.y + s.r]
+def pixel(ss: [n] Sprite, photo: [h, w] Real, a, b, d)
+    integral ([a, a + d], [b, b + d]) sum s in ss (inside(s, x, y)*texel(photo, s, x, y)) d(x, y)
+""")
+    photo = np.random.default_rng(3).uniform(size=(6, 5))
+    sprites = [(0.1, 0.2, 0.5), (0.45, 0.3, 0.3), (0.8, 0.9, 0.7)]
+    places = np.arange(8) / 8
+    found = program.pixel(sprites, photo, places[:, None], places[None, :], 1 / 8)
+    assert found.evals < 20_000
+
+    def covered(sprite: tuple[float, float, float], a: float, b: float) -> mp.mpf:
+        """In the coordinates of the texture, from 0 to 1."""
+        ends = [
+            [min(max((mp.mpf(at) - low) / sprite[2], 0), 1) for at in (start, start + mp.mpf(1) / 8)]
+            for start, low in ((a, sprite[0]), (b, sprite[1]))
+        ]
+        h, w = photo.shape
+        across, down = borders(*ends[0], w), borders(*ends[1], h)
+        return sprite[2] ** 2 * exact(lambda v: exact(lambda u: bilinear(photo, u, v), across), down)
+
+    for i, j in ((0, 0), (2, 3), (4, 4), (5, 4), (7, 7)):
+        value = mp.fsum(covered(sprite, places[i], places[j]) for sprite in sprites)
+        assert abs(found.value[i, j] - value) < 1e-14

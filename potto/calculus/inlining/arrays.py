@@ -13,6 +13,7 @@ from functools import lru_cache
 from potto.calculus.differentiation.dual import Differentiator
 from potto.calculus.inlining.choices import at_place, calls_of_items
 from potto.calculus.inlining.expand import Resolve, expanded
+from potto.calculus.inlining.lattices import looks_up
 from potto.core.binders import apart
 from potto.core.terms import (
     ZERO,
@@ -134,10 +135,20 @@ def _read_of(node: Term, whole: Term) -> Term:
 # Sums
 
 
-def summands(term: Integral) -> Term:
+def each_integral(term: Term, change: Callable[[Integral], Term]) -> Term:
+    """A term with something done to its outermost integrals."""
+    found = transform(
+        term,
+        lambda _, new: change(new) if isinstance(new, Integral) else new,
+        lambda node: () if isinstance(node, Integral) else children(node),
+    )
+    return found if found is term else apart(found)
+
+
+def summands(term: Integral, look_ups: bool = True) -> Term:
     """An equal term with the sums that read arrays outside of the integral, where the integrand is linear in them.
 
-    An integral of an array is an array of integrals.
+    An integral of an array is an array of integrals. look_ups: whether the sums of look-ups are taken outside as well.
     """
     varying = frozenset(bound(term))
     body = term.body
@@ -146,7 +157,7 @@ def summands(term: Integral) -> Term:
         return array(place, term.body.size, with_integrand(term, body))  # type: ignore[union-attr]
     if isinstance(body, ListOf):
         return list_of(with_integrand(term, item) for item in body.items)
-    parts = _Linear(varying, Holding(*ARRAYS)).parts(body)
+    parts = _Linear(varying, Holding(*ARRAYS), look_ups).parts(body)
     if parts is None:
         assert isinstance(body, Tuple)
         return tuple_(with_integrand(term, item) for item in body.items)
@@ -184,15 +195,15 @@ def _size(term: Term) -> int:
 class _Linear:
     """An integrand as a sum of terms, each inside of the sums over arrays that it is linear in."""
 
-    def __init__(self, varying: frozenset[str], arrays: Holding) -> None:
-        self.varying, self.arrays = varying, arrays
+    def __init__(self, varying: frozenset[str], arrays: Holding, look_ups: bool) -> None:
+        self.varying, self.arrays, self.look_ups = varying, arrays, look_ups
 
     def parts(self, term: Term) -> list[Summand] | None:
         """None: the items of a tuple are inside of different sums."""
         if not self.arrays(term):
             return [((), term)]
         match term:
-            case Sum() if not self.varying.isdisjoint(term.body.free - {term.variable}):
+            case Sum() if not self.varying.isdisjoint(term.body.free - {term.variable}) and self.goes_out(term):
                 own = (term.variable, term.lo, term.hi)
                 return [((own, *loops), part) for loops, part in self.parts(term.body) or [((), term.body)]]
             case Prim(op="add", args=args):
@@ -205,6 +216,9 @@ class _Linear:
                 return self._items(items)
             case _:
                 return [((), term)]
+
+    def goes_out(self, term: Sum) -> bool:
+        return self.look_ups or not looks_up(term)
 
     def _scaled(self, term: Prim, args: tuple[Term, ...]) -> list[Summand]:
         found = [self.parts(arg) or [((), arg)] for arg in args]

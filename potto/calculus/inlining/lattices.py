@@ -1,8 +1,8 @@
 """What is looked up between the places of a lattice: a sum of elements, each times a tent around its place.
 
-Owns `middle` and `by_cells`. Tents bend at every place, and there are many. Between two places only two of them are
-not 0, and what is looked up is a polynomial. So an integral along which a look-up walks from place to place becomes a
-sum of integrals, each from one place to the next: as a rule few of all, and without kinks.
+Owns `middle`, `looks_up` and `by_cells`. Tents bend at every place, and there are many. Between two places only two of
+them are not 0, and what is looked up is a polynomial. So an integral along which a look-up walks from place to place
+becomes a sum of integrals, each from one place to the next: as a rule few of all, and without kinks.
 """
 
 from __future__ import annotations
@@ -83,6 +83,11 @@ def by_cells(term: Integral) -> Term:
     varying = frozenset(name for node in postorder(term) for name in bound_names(node))
     found = transform(term, lambda _, new: _by_cells(new, varying) if isinstance(new, Integral) else new)
     return found if found is term else apart(found)
+
+
+def looks_up(term: Sum) -> bool:
+    """Whether a sum is one over a lattice, of what lies around a place."""
+    return _factor(term, "tent") is not None or _factor(term, "between") is not None
 
 
 def _by_cells(term: Integral, varying: frozenset[str]) -> Term:

@@ -9,7 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from potto.calculus.inlining.arrays import MOST_STEPS, TooMany, inlined, loops, summands, unrolled
+from potto.calculus.inlining.arrays import MOST_STEPS, TooMany, each_integral, inlined, loops, summands, unrolled
 from potto.calculus.inlining.lattices import by_cells
 from potto.calculus.inlining.reads import Access, hoisted
 from potto.core.terms import Index, Integral, Term, function_of, substitute, tuple_, var
@@ -65,7 +65,10 @@ def without_arrays(machine: Machine, term: Integral, env: Env) -> tuple[Term, En
 @lru_cache(maxsize=4096)
 def _outside(term: Integral, arrays: frozenset[str], reach: Reach) -> Term:
     found = by_cells(inlined(term, lambda name: Index in reach.kinds(name), reach.resolve, arrays))
-    return summands(found) if isinstance(found, Integral) else found
+    if isinstance(found, Integral):  # else its cells are sums around it already
+        # Around an integral the index of a sum is plain: what each summand looks up at places of its own has cells.
+        found = each_integral(summands(found, look_ups=False), by_cells)
+    return each_integral(found, summands)
 
 
 def _whole(machine: Machine, end: Term, env: Env) -> float:
