@@ -82,6 +82,10 @@ def type_like_a_person(client: Client, module: str, text: str, rounds: int) -> t
     """Seconds from each key to the diagnostics that it calls for, and to the last answer of what is asked after it."""
     typist = Typist(client, module, text)
     told, answered = list[float](), list[float]()
+    waiting = typist.ask()  # as an editor does when a file is opened
+    while waiting:
+        _, message = client.until(lambda message: "method" not in message)
+        waiting.pop(message["id"], None)
     for _ in range(rounds):
         for typed, wrong in KEYS:
             time.sleep(PAUSE)

@@ -130,6 +130,17 @@ It is given the buffer's URI and ARGUMENTS."
         (view-mode))
       (display-buffer (current-buffer)))))
 
+(defun potto-more (name)
+  "Choose from what can be done with the definition NAME.
+The server asks, and shows what comes of it."
+  (interactive (list (or (thing-at-point 'symbol t) (read-string "Definition: "))))
+  (potto--command "potto.more" name))
+
+(defun potto-view ()
+  "Show the integrals of this file as a page in the browser."
+  (interactive)
+  (start-process "potto-view" nil potto-program "view" buffer-file-name))
+
 (defun potto-run ()
   "Run this file."
   (interactive)

@@ -20,6 +20,21 @@ local function root_of(path)
   return start
 end
 
+--- Values of live expressions as inlay hints (0.10 or newer), values of definitions as code lenses.
+local function show_values(buffer)
+  if vim.lsp.inlay_hint and vim.lsp.inlay_hint.enable then
+    vim.lsp.inlay_hint.enable(true, { bufnr = buffer })
+  end
+  if vim.lsp.codelens then
+    vim.api.nvim_create_autocmd({ "BufEnter", "InsertLeave", "BufWritePost" }, {
+      buffer = buffer,
+      callback = function()
+        vim.lsp.codelens.refresh({ bufnr = buffer })
+      end,
+    })
+  end
+end
+
 local clients = {} -- by root
 
 local function attach(buffer, options)
@@ -45,6 +60,7 @@ local function attach(buffer, options)
   end
   if id then
     vim.lsp.buf_attach_client(buffer, id)
+    show_values(buffer)
   end
 end
 
@@ -77,6 +93,12 @@ function M.setup(options)
   vim.api.nvim_create_user_command("PottoDerivative", function(given)
     command("potto.differentiate", given.args ~= "" and given.args or vim.fn.expand("<cword>"))
   end, { nargs = "?", desc = "The derivative of a definition, in symbols" })
+  vim.api.nvim_create_user_command("PottoView", function()
+    vim.fn.jobstart({ options.cmd[1], "view", vim.api.nvim_buf_get_name(0) }, { detach = true })
+  end, { desc = "The integrals of this file, as a page in the browser" })
+  vim.api.nvim_create_user_command("PottoMore", function(given)
+    command("potto.more", given.args ~= "" and given.args or vim.fn.expand("<cword>"))
+  end, { nargs = "?", desc = "What can be done with a definition, to choose from" })
   vim.api.nvim_create_user_command("PottoRun", "!potto run %", { desc = "Run this file" })
   vim.api.nvim_create_user_command("PottoRepl", "botright split | terminal potto repl %", { desc = "A prompt with the names of this file" })
   for _, buffer in ipairs(vim.api.nvim_list_bufs()) do

@@ -3,7 +3,7 @@
 Taken from pygls: the server and its table of handlers, the way from a message to its handler, answers as futures and
 their cancellation, requests and notifications to the client, the codes of errors. Of pygls 2.1.1 does not hold:
 
-- `io_.run` knows `Content-Length: n` in exactly that form, answers nothing to what is no JSON and takes a body that
+- `io_.run` knows `Content-Length: n` in exactly that form, answers nothing to what is not JSON and takes a body that
   ends early for a message: `Carrier.carry` is given what `wire.messages` reads.
 - `structure_message` is called for every object inside of a message, and makes classes that are taken apart again:
   messages stay plain JSON here.
@@ -67,8 +67,8 @@ class Protocol(JsonRPCProtocol):
 
     def handle_message(self, message: Any) -> None:
         if isinstance(message, BadMessage):
-            logger.error("a message that is no JSON: %s", message)
-            self.fail(None, errors.PARSE_ERROR, "this is no JSON")
+            logger.error("a message that is not JSON: %s", message)
+            self.fail(None, errors.PARSE_ERROR, "this is not JSON")
         elif not isinstance(message, dict):
             logger.error("a message that is no object")
             self.fail(None, errors.INVALID_REQUEST, "a message is an object")

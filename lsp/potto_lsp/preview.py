@@ -74,7 +74,7 @@ def _given_values(
 
 
 def _none(name: str) -> NoPicture:
-    return NoPicture(f"`{name}` is no function of one or two numbers that gives a number")
+    return NoPicture(f"`{name}` is not a function of one or two numbers that gives a number")
 
 
 def _box(box: Any) -> tuple[tuple[float, float], tuple[float, float]]:

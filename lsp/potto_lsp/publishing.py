@@ -156,7 +156,7 @@ class Publisher:
         return {"uri": self._analysis.uri(key), "version": version, **self.answer(key, previous)}
 
     def gone(self, known: Iterable[str]) -> list[dict[str, Any]]:
-        """Empty reports of files that a client knows, or may still show, and that are no programs any more.
+        """Empty reports of files that a client knows, or may still show, and that are not programs any more.
 
         A client that asks for a file a last time before it closes it shows that answer until it hears of it again, and
         does not say that it does: files that were deleted or renamed while they were open are named every time.

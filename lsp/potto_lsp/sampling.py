@@ -43,7 +43,7 @@ def sample(
     module = Module(world, file)
     function = getattr(module, name, None)
     if not isinstance(function, Function):
-        raise NoSamples(f"`{name}` is no function")
+        raise NoSamples(f"`{name}` is not a function")
     places, shape = _places(axes)
     given = {key: argument(module, key, value) for key, value in values.items() if key not in places} | places
     with settings(rtol=rtol or RTOL):

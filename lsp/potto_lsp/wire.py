@@ -20,11 +20,11 @@ MOST_BYTES = 256_000_000  # of one message; a header that says more is broken
 
 
 class BadMessage(ValueError):
-    """A body that is no JSON."""
+    """A body that is not JSON."""
 
 
 def messages(stream: BinaryIO) -> Iterator[Any]:
-    """The messages of a stream until it ends or breaks; for a body that is no JSON, a `BadMessage`."""
+    """The messages of a stream until it ends or breaks; for a body that is not JSON, a `BadMessage`."""
     try:
         yield from _messages(stream)
     except OSError as error:

@@ -62,7 +62,9 @@ def function_in(world: World, file: str, text: str) -> Function:
 
     tree, type = world.typed(file, text)
     if not isinstance(type, FunctionType | Diffeo):
-        raise wrong_call(f"`{text}` is no function", "name a function of the program, or write one: `\\(x, y) . x*y`")
+        raise wrong_call(
+            f"`{text}` is not a function", "name a function of the program, or write one: `\\(x, y) . x*y`"
+        )
     return Function(world, file, tree, type)
 
 

@@ -58,7 +58,7 @@ def _symbols(options: argparse.Namespace, console: Console) -> int:
             facts = derivative_facts(world.db, target.file, target.name)
         if facts is None:
             near = difflib.get_close_matches(options.name, names(world.db, file), 1)
-            what = "is no function" if isinstance(target, DefinitionTarget) else "is not defined here"
+            what = "is not a function" if isinstance(target, DefinitionTarget) else "is not defined here"
             help = f"did you mean `{near[0]}`?" if near and near[0] != options.name else ""
             complaint = NO_SUCH_DEFINITION(NOWHERE, f"`{options.name}` {what}", help=help)
             raise ProgramError([Located(options.file, complaint)], lambda name: None)

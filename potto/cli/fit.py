@@ -56,7 +56,7 @@ def _bound(text: str) -> tuple[str, tuple[float, float]]:
     except ValueError:
         found = (1.0, 0.0)
     if not colon or not found[0] < found[1]:
-        raise argparse.ArgumentTypeError(f"{text!r} is no bound; write `{name}=0:1`, from less to more")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a bound; write `{name}=0:1`, from less to more")
     return name, found
 
 

@@ -84,7 +84,7 @@ def _pixels(width: int, height: int, text: str) -> tuple[int, int]:
 def _size(text: str) -> tuple[int, int]:
     width, _, height = text.partition("x")
     if not (width.isdecimal() and (height or width).isdecimal()) or int(width) * int(height or width) == 0:
-        raise argparse.ArgumentTypeError(f"{text!r} is no size; write `256x256`")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a size; write `256x256`")
     return _pixels(int(width), int(height or width), repr(text))
 
 

@@ -52,7 +52,7 @@ def _text(path: str, console: Console) -> str | None:
         with open(path, encoding="utf-8") as file:
             return file.read()
     except (OSError, UnicodeDecodeError) as error:
-        said = error.strerror if isinstance(error, OSError) else "it is no text"
+        said = error.strerror if isinstance(error, OSError) else "it is not text"
         console.complain(f"potto: {path} cannot be read: {(said or '').lower()}")
         return None
 

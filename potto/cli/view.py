@@ -33,7 +33,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def _count(text: str) -> int:
     if not text.isdecimal() or not int(text):
-        raise argparse.ArgumentTypeError(f"{text!r} is no number of an integral; they count from 1")
+        raise argparse.ArgumentTypeError(f"{text!r} is not the number of an integral; they count from 1")
     return int(text)
 
 

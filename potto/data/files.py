@@ -65,7 +65,7 @@ def read(path: Path) -> bytes | DataMistake:
         if path.is_dir():
             return _unreadable(f"{quoted(path.name)} is a folder, not a file", "name a file within it")
         if path.exists() and not path.is_file():
-            return _unreadable(f"{quoted(path.name)} is no ordinary file", "copy what it gives into a file")
+            return _unreadable(f"{quoted(path.name)} is not an ordinary file", "copy what it gives into a file")
         return path.read_bytes()
     except FileNotFoundError:
         return _absent(path)

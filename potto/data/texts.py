@@ -25,13 +25,13 @@ def text_of(content: bytes) -> str:
         raise malformed("this is a text in UTF-16, not in UTF-8", hint=_UTF8)
     if b"\0" in content:
         row = content.count(b"\n", 0, content.index(b"\0")) + 1
-        raise malformed(f"line {row} holds a NUL byte: this is no text", row=row, hint=_UTF8)
+        raise malformed(f"line {row} holds a NUL byte: this is not text", row=row, hint=_UTF8)
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         at = error.start + (3 if content.startswith(codecs.BOM_UTF8) else 0)
         row, byte = content.count(b"\n", 0, at) + 1, f"{content[at]:#04x}"
-        message = f"line {row} is no text in UTF-8: it holds the byte {byte}"
+        message = f"line {row} is not text in UTF-8: it holds the byte {byte}"
         raise malformed(message, row=row, found=byte, hint=_UTF8) from None
     return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
 

@@ -55,7 +55,7 @@ def type_indexed(context: Context, v: Values) -> TypeExpr:
     numbers = [token for token in indices if token.kind == "NUMBER"]
     if head.text == "Diffeo":
         if len(indices) == 1 and numbers and numbers[0].text.isdigit():
-            # A hundred digits are no number of dimensions; what is too large is reported by those who know why.
+            # A hundred digits are not a number of dimensions; what is too large is reported by those who know why.
             return DiffeoType(span, int(numbers[0].text[:9]))
         context.report(kinds.BAD_TYPE(span, "`Diffeo` takes the number of its variables, as in `Diffeo[2]`"))
         return DiffeoType(span, max(1, len(indices)))

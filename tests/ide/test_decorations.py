@@ -110,7 +110,7 @@ def test_lenses():
     assert [(offer.command, offer.title) for offer in ide.offered(f.db, f.file, "y")] == [
         ("evaluate", "evaluate"), ("showReferences", "2 references"),
     ]  # fmt: skip
-    assert "- boundary" in fixture("def f(t) integral [0, 1] [x < t] d(x)\n").hover("f(")
+    assert "boundary" in fixture("def f(t) integral [0, 1] [x < t] d(x)\n").hover("f(")
     assert "boundary" in (ide.derivative_markdown(f.db, f.file, "f") or "")
 
 
@@ -203,3 +203,24 @@ def test_edits_of_a_long_line_are_one_for_each_place() -> None:
     assert len(edits) == 2 * 19_999 and applied(old, edits) == new
     lines = [f"a{i}" if i % 2 else f"a{i} " for i in range(20_000)]
     assert len(minimal("\n".join(lines), "\n".join(line.strip() for line in lines))) == 10_000
+
+
+def test_a_scene_is_given_what_fits_from_the_whole_workspace_and_the_reach_of_its_numbers():
+    f = fixture("""
+# file: far/away.po
+def third(x, y)(c) x*y*c
+# file: beside.po
+def second(x, y)(c) x + y + c
+def other(x) x
+# file: main.po
+def first(x, y)(c) x - y
+def drawn(c, shader) integral ([0, 1], [0, 1]) shader(x, y)(c) d(x, y)
+#> drawn(-1, first)
+#> drawn(c=3, shader=first)
+#> drawn(0.5, first)
+""")
+    (scene,) = (scene for scene in ide.scenes(f.db, f.file) if scene.name == "drawn")
+    number, shader = scene.parameters
+    assert (number.value, number.reach) == ((-1,), (-1, 3))
+    assert shader.reach is None and shader.fits[:2] == ("first", "beside.second")
+    assert set(shader.fits) >= {"far.away.third"} and "beside.other" not in shader.fits

@@ -7,6 +7,8 @@ from pathlib import Path
 from ide_fixture import Fixture, fixture
 
 import potto.ide as ide
+from potto.checking.library import Library
+from potto.source import Span
 
 FILES = """
 # file: half_plane.diffeo
@@ -155,3 +157,17 @@ def test_broken_chunks_keep_their_names():
     f = fixture("def f(a) a\ndef g(\ny = f($0 + 1\n")
     assert [s.name for s in ide.document_symbols(f.db, f.file)] == ["f", "g", "y"]
     assert len(ide.references(f.db, f.file, f.find("f("))) == 2
+
+
+def test_a_column_is_defined_in_its_file(tmp_path: Path) -> None:
+    (tmp_path / "flights.csv").write_text("time,fast time,signal\n1,2,3\n")
+    text = 'data = load("flights.csv")\nfirst = data.signal[0]\n'
+    (tmp_path / "main.po").write_text(text)
+    library = Library([tmp_path])
+    file = library.key(tmp_path / "main.po")
+    column = ide.definition(library.db, file, text.index("signal"))
+    named = ide.definition(library.db, file, text.index("flights"))
+    assert column is not None and named is not None
+    ((where, span),) = [(Path(target.file).name, target.span) for target in column.targets]
+    assert where == "flights.csv" and "time,fast time,signal"[span.start : span.end] == "signal"
+    assert [(Path(target.file).name, target.span) for target in named.targets] == [("flights.csv", Span(0, 0))]

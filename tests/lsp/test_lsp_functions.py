@@ -125,11 +125,11 @@ def test_a_function_that_fits(
 @pytest.mark.parametrize(
     ("head", "expected"),
     [
-        ("from shades import lin\n", ["lin"]),
-        ("from shades import lin as other\n", ["other"]),
+        ("from shades import lin\n", ["lin", "shades.sq"]),
+        ("from shades import lin as other\n", ["other", "shades.sq"]),
         ("import shades\n", ["shades.lin", "shades.sq"]),
         ("import shades as s\n", ["s.lin", "s.sq"]),
-        ("", ["shades.lin", "shades.sq"]),  # it is beside the file, which does not import it
+        ("", ["shades.lin", "shades.sq"]),  # of a module that the file does not import
         ("def own(x) x/4\nimport shades\n", ["own", "shades.lin", "shades.sq"]),
         ("from shades import pair\n", ["shades.lin", "shades.sq"]),  # what is imported does not fit
         ("from shades import nowhere\n", ["shades.lin", "shades.sq"]),

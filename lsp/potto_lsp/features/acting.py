@@ -10,7 +10,7 @@ from potto.source import Span
 from potto_lsp import convert, protocol
 from potto_lsp.asking import Ask
 
-_DIGITS = frozenset("0123456789.e+-(), ")  # of numbers and tuples of them: all else is no value to write down
+_DIGITS = frozenset("0123456789.e+-(), ")  # of numbers and tuples of them: anything else is not a value to write down
 
 
 def code_actions(ask: Ask) -> list[protocol.CodeAction]:

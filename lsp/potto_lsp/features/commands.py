@@ -69,7 +69,7 @@ def _differentiate(ask: Ask, file: str, arguments: list[Any]) -> Any:
         return _shown(ask, point.text, deferred)
     facts = derivative_facts(ask.db, file, text)
     if facts is None:
-        raise Refusal(f"`{text}` is no function, so it has no derivative")
+        raise Refusal(f"`{text}` is not a function, so it has no derivative")
     inverse = ide.diffeo_markdown(ask.db, file, text)
     lines = [] if inverse is None else ["", *(f"  {line[2:]}" for line in inverse.replace("`", "").splitlines())]
     result = {"text": "\n".join([facts.text, *lines])}

@@ -13,7 +13,7 @@ from potto_lsp.uris import to_key
 
 
 def document(ask: Ask) -> dict[str, Any]:
-    """What is wrong with a program. A project file is no program: what is wrong with it is pushed."""
+    """What is wrong with a program. A project file is not a program: what is wrong with it is pushed."""
     if os.path.basename(ask.file) == PROJECT:
         return {"kind": "full", "items": []}
     return ask.session.publisher.answer(ask.file, ask.optional("previousResultId"))

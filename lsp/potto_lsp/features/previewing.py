@@ -32,6 +32,7 @@ def _parameter(parameter: ide.SceneParameter) -> dict[str, Any]:
     return {
         "name": parameter.name, "kind": parameter.kind, "type": parameter.type, "size": parameter.size,
         "value": list(parameter.value), "fits": list(parameter.fits),
+        "reach": None if parameter.reach is None else list(parameter.reach),
     }  # fmt: skip
 
 

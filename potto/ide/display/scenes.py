@@ -24,6 +24,7 @@ from potto.syntax.walk import walk
 from potto.types import Diffeo, Function, TupleOf, Type, format_type, groups_of, interface, result_of
 from potto.types.types import resolve
 
+MOST_CALLS = 100  # of a function that are looked at, and the last one
 _PAIRS = (("x", "y"), ("u", "v"), ("i", "j"))
 
 
@@ -38,8 +39,9 @@ Arguments = tuple[tuple[str | int, Given], ...]
 
 
 class SceneParameter(Struct, frozen=True):
-    """A parameter. `size`: how many numbers it has, 0 for a function; `fits`: texts of functions that it could be
-    given, the one to begin with first."""
+    """A parameter. `size`: how many numbers it has, 0 for a function; `reach`: the least and the largest number that
+    live expressions give it, if they give it several; `fits`: texts of functions that it could be given, the one to
+    begin with first."""
 
     name: str
     kind: Literal["number", "tuple", "function"]
@@ -47,6 +49,7 @@ class SceneParameter(Struct, frozen=True):
     size: int
     value: tuple[float, ...] = ()
     fits: tuple[str, ...] = ()
+    reach: tuple[float, float] | None = None
 
 
 class Scene(Struct, frozen=True):
@@ -89,20 +92,30 @@ def scene(db: Database, file: str, name: str) -> Scene | None:
     groups = groups_of(type)
     if not components or not groups:
         return None
-    given = dict(db.entry(_given, (file,), name) or ())
+    calls = [dict(arguments) for arguments in db.entry(_given, (file,), name) or ()]
     made: list[SceneParameter] = []
     for parameter in (parameter for group in groups for parameter in group):
         kind, size = _kind(parameter.type)
         if kind is None or parameter.name is None:
             return None
-        written = given.get(parameter.name, given.get(len(made), Given()))
+        places = parameter.name, len(made)
+        everywhere = [next((call[place] for place in places if place in call), Given()) for call in calls]
+        written = everywhere[0] if everywhere else Given()
         value = written.value if len(written.value) == size else ()
         usable = fits(db, file, name, parameter.type) if kind == "function" else ()
         if kind == "function" and written.text and not wrong_with(db, file, written.text):
             usable = tuple(dict.fromkeys((written.text, *usable)))
-        made.append(SceneParameter(parameter.name, kind, format_type(parameter.type), size, value, usable))
+        made.append(
+            SceneParameter(parameter.name, kind, format_type(parameter.type), size, value, usable, reach(everywhere))
+        )
     axes = _axes([parameter.name for parameter in made if parameter.kind == "number"])
     return Scene(name, NOWHERE, tuple(made), components, axes) if axes else None
+
+
+def reach(given: list[Given]) -> tuple[float, float] | None:
+    """The least and the largest of the single numbers that calls give, if they differ."""
+    found = [one.value[0] for one in given if len(one.value) == 1]
+    return (min(found), max(found)) if found and min(found) < max(found) else None
 
 
 def _kind(type: Type) -> tuple[Literal["number", "tuple", "function"] | None, int]:
@@ -123,14 +136,13 @@ def _axes(numbers: list[str]) -> tuple[str, ...]:
 
 
 @query
-def _given(db: Database, file: str) -> Mapping[str, Arguments]:
-    """What live expressions give to each function, by name and by place; the first call counts. A table, to be read
-    by entry."""
-    table: dict[str, Arguments] = {}
+def _given(db: Database, file: str) -> Mapping[str, tuple[Arguments, ...]]:
+    """What live expressions give to each function, by name and by place, call by call. A table, to be read by entry."""
+    table: dict[str, tuple[Arguments, ...]] = {}
     for text in pieces(db, file):
         for live in piece_lives(db, text):
             for called, arguments in _calls(db, live.text):
-                table.setdefault(called, arguments)
+                table[called] = (*table.get(called, ())[:MOST_CALLS], arguments)
     return table
 
 

@@ -87,7 +87,7 @@ def _coloured(db: Database, chunk: ChunkAt, name: str | None = None) -> list[Wor
 
 @query(keep=8192)
 def plain_words(db: Database, text: str, diffeo: bool) -> tuple[Word, ...]:
-    """The words of a chunk that are no names; a live expression in its comments is coloured as code."""
+    """The words of a chunk that are not names; a live expression in its comments is coloured as code."""
     live = [found.text_span for found in live_expressions(text)] if "#>" in text else []
     found: list[Word] = []
     for token in tokenize(text, diffeo):

@@ -1,7 +1,8 @@
 """What a parameter that is a function can be given. Owns `fits`.
 
-A name of the file, one that it imports, or one of a module beside it; else a constant function of the type that is
-asked for. What is found depends on interfaces alone, file by file, so that an edit of a body finds nothing anew.
+A name of the file, one that it imports, or one of any module of the workspace, the nearest first; else a constant
+function of the type that is asked for. What is found depends on interfaces alone, file by file, so that an edit of a
+body finds nothing anew.
 """
 
 from __future__ import annotations
@@ -20,19 +21,21 @@ from potto.types.types import resolve as known
 from potto.types.unify import as_tuple, open_type, rebuild, unify
 
 MOST = 50  # that are offered for one parameter
-NEAR = 20  # modules beside a file that are looked at where nothing in it fits
+Fitting = tuple[str, DefinitionTarget]  # a text, and the function that it means
 _USUAL = ("x", "y", "z")
 
 
-def fits(db: Database, file: str, name: str, type: Type, beside: bool = True) -> tuple[str, ...]:
+def fits(db: Database, file: str, name: str, type: Type, elsewhere: bool = True) -> tuple[str, ...]:
     """Texts of functions that a parameter of this type of the definition `name` can be given, the likeliest first.
 
-    `beside`: also functions of modules that the file does not import, as `module.function`.
+    `elsewhere`: also functions of modules that the file does not import, as `module.function`.
     """
     type = of_numbers(type)
-    found = [text for text in _fitting(db, file, type) if text != name]
-    if not found and beside:
-        found = list(_found_beside(db, file, type))
+    near = _fitting(db, file, type)
+    found = [text for text, _ in near if text != name]
+    if elsewhere and len(found) < MOST:
+        known = {target for _, target in near}
+        found += [text for text, target in _found_elsewhere(db, file, type) if target not in known]
     return tuple(found[:MOST]) or tuple(constant(type))
 
 
@@ -94,46 +97,53 @@ def _stars(type: Type) -> list[bool]:
 
 
 @query(keep=256)
-def _fitting(db: Database, file: str, type: Type) -> tuple[str, ...]:
+def _fitting(db: Database, file: str, type: Type) -> tuple[Fitting, ...]:
     """What fits among the names of a file, found once for all parameters of a type."""
     groups = len(groups_of(type))
     near = itertools.chain(_own(db, file, groups), _imported(db, file, groups))
-    fitting = (text for text, where, name in near if accepts(type, interface(db, where, name).type))
+    fitting = ((text, target) for text, target in near if accepts(type, interface(db, *target).type))
     return tuple(itertools.islice(fitting, MOST + 1))  # one of them may be the function itself
 
 
 @query(keep=256)
-def _found_beside(db: Database, file: str, type: Type) -> tuple[str, ...]:
-    """What fits in other modules of the folder, the first one that has something."""
-    for other in _beside(db, file):
+def _found_elsewhere(db: Database, file: str, type: Type) -> tuple[Fitting, ...]:
+    """What fits in other modules."""
+    found: list[Fitting] = []
+    for other in _elsewhere(db, file):
         module = module_name(db, file, other)
         if module is not None:
-            own = [name for _, _, name in _own(db, other, len(groups_of(type)))]
-            found = [f"{module}.{name}" for name in own if accepts(type, interface(db, other, name).type)]
-            if found:
-                return tuple(found)
-    return ()
+            own = _own(db, other, len(groups_of(type)))
+            found += [(f"{module}.{n}", target) for n, target in own if accepts(type, interface(db, *target).type)]
+        if len(found) >= MOST:
+            break
+    return tuple(found)
 
 
-def _own(db: Database, file: str, groups: int) -> Iterator[tuple[str, str, str]]:
+def _own(db: Database, file: str, groups: int) -> Iterator[Fitting]:
     for name in db.entry(_by_groups, (file,), groups) or ():
-        yield name, file, name
+        yield name, DefinitionTarget(file, name)
 
 
-def _imported(db: Database, file: str, groups: int) -> Iterator[tuple[str, str, str]]:
+def _imported(db: Database, file: str, groups: int) -> Iterator[Fitting]:
     for bound, meaning in scope(db, file).items():
         target = resolve(db, file, bound) if isinstance(meaning, Imported) else None
         if isinstance(target, DefinitionTarget):
-            yield bound, target.file, target.name
+            yield bound, target
         elif isinstance(target, ModuleTarget):
             for name in db.entry(_by_groups, (target.file,), groups) or ():
-                yield f"{bound}.{name}", target.file, name
+                yield f"{bound}.{name}", DefinitionTarget(target.file, name)
 
 
-def _beside(db: Database, file: str) -> list[str]:
-    """Other programs in the folder of a file."""
-    folder = os.path.dirname(file)
-    return [other for other in files(db) if other != file and os.path.dirname(other) == folder][:NEAR]
+def _elsewhere(db: Database, file: str) -> list[str]:
+    """The other programs of the workspace, those whose folders are nearest first."""
+    parts = os.path.dirname(file).split(os.sep)
+
+    def distance(other: str) -> int:
+        others = os.path.dirname(other).split(os.sep)
+        common = sum(1 for _ in itertools.takewhile(lambda both: both[0] == both[1], zip(parts, others)))
+        return len(parts) + len(others) - 2 * common
+
+    return sorted((other for other in files(db) if other != file), key=distance)
 
 
 @query

@@ -124,7 +124,7 @@ def _usual(db: Database, file: str, name: str, type: Type) -> str | None:
         return USUAL
     if isinstance(resolve(type), Function):
         said = not isinstance(resolve(result_of(type)), Var)  # whether it is known what it gives
-        return next(iter(fits(db, file, name, type, beside=False)), None) if said else None
+        return next(iter(fits(db, file, name, type, elsewhere=False)), None) if said else None
     size = numbers(type)
     return f"({', '.join([USUAL] * size)})" if size else None
 

@@ -7,12 +7,16 @@ is the diffeomorphism behind it.
 
 from __future__ import annotations
 
+import re
+
+from potto.data.mistakes import DataMistake
 from potto.ide.model import Links, Location
 from potto.ide.names.documents import item_span, name_span
-from potto.ide.names.places import ChunkAt, all_chunks, chunk_at
-from potto.ide.names.symbols import DefinitionSymbol, Found, LocalSymbol, ModuleSymbol, symbol_at
+from potto.ide.names.places import NOWHERE, ChunkAt, all_chunks, chunk_at
+from potto.ide.names.symbols import DefinitionSymbol, Found, LocalSymbol, ModuleSymbol, PartSymbol, symbol_at
 from potto.modules import DefinitionTarget, dependencies, references, resolve, resolve_member, source
 from potto.modules import definition as tree_of
+from potto.modules.data import data_file
 from potto.query import Database
 from potto.source import Span
 from potto.syntax import node_at, nodes, walk
@@ -22,9 +26,31 @@ MOST_STEPS = 20
 
 
 def definition(db: Database, file: str, offset: int) -> Links | None:
-    """Where the name at an offset is defined."""
+    """Where the name at an offset is defined; of the name of a data file, that file."""
     found = symbol_at(db, file, offset)
-    return None if found is None else _links(found.span, place_of(db, found))
+    return _data_link(db, file, offset) if found is None else _links(found.span, place_of(db, found))
+
+
+def _data_link(db: Database, file: str, offset: int) -> Links | None:
+    """From the name of a file in `load("…")` to the file."""
+    chunk = chunk_at(db, file, offset)
+    item = None if chunk is None else chunk.parsed(db).item
+    if chunk is None or item is None:
+        return None
+    for node in node_at(item, offset - chunk.start):
+        if isinstance(node, nodes.Text):
+            found = data_file(db, file, node.text)
+            if not isinstance(found, DataMistake):
+                return Links(chunk.absolute(node.span), (Location(found.path, NOWHERE, NOWHERE),))
+    return None
+
+
+def _column(db: Database, path: str, name: str) -> Location:
+    """Where a column of a file of data has its name, in the first line that has it; else the head of the file."""
+    found = source(db, path)
+    named = None if found is None else re.search(rf"(?<![^\s,;\"\'])({re.escape(name)})(?![^\s,;\"\'])", found.text)
+    span = NOWHERE if named is None else Span(*named.span(1))
+    return Location(path, span, span)
 
 
 def declaration(db: Database, file: str, offset: int) -> Links | None:
@@ -74,6 +100,8 @@ def place_of(db: Database, found: Found) -> tuple[Location, ...]:
             return (Location(chunk.file, chunk.absolute(binder.span), chunk.absolute(binder.span)),)
         case DefinitionSymbol(file, name):
             return (location(db, file, name),)
+        case PartSymbol(name, data=str() as path):
+            return (_column(db, path, name),)
         case ModuleSymbol(file, _):
             return (Location(file, Span(0, 0), Span(0, 0)),) if source(db, file) is not None else ()
         case _:

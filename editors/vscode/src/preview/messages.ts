@@ -10,6 +10,8 @@ export interface SceneParameter {
   readonly value: readonly number[];
   /** Functions that it could be, as texts: definitions, or at least a constant one; empty if nothing fits. */
   readonly fits: readonly string[];
+  /** The least and the largest number that live expressions give it, if they give it several. */
+  readonly reach?: readonly [number, number] | null;
 }
 
 export interface Scene {

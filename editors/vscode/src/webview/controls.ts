@@ -120,7 +120,8 @@ export class Controls {
     slider.dataset["parameter"] = parameter.name;
     const typed = make("input", { id: `p-${parameter.name}`, type: "text", className: "number", spellcheck: false });
     const place = (number: number): void => {
-      let [low, high] = this.reach.get(parameter.name) ?? [Math.min(0, 2 * number), Math.max(1, 2 * number)];
+      let [low, high] = this.reach.get(parameter.name) ??
+        parameter.reach ?? [Math.min(0, 2 * number), Math.max(1, 2 * number)];
       if (number < low || number > high) [low, high] = [Math.min(low, 2 * number), Math.max(high, 2 * number)];
       this.reach.set(parameter.name, [low, high]);
       slider.min = String(low);
