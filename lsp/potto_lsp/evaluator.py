@@ -265,6 +265,21 @@ def _sample(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
         raise Unanswerable(str(error)) from None
 
 
+_VIEWS: dict[str, Any] = {}  # by file: what the views of its integrals have compiled
+
+
+def _view(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
+    """What the page of an integral view asks."""
+    from potto.applications.integral_answers import Answers
+
+    file = task["file"]
+    found = _VIEWS.setdefault(file, Answers(world, file)).answer(task["text"], task["question"])
+    if found is None:
+        raise Unanswerable(f"there is no question `{task['text']}`")
+    answered: dict[str, Any] = found
+    return answered
+
+
 TASKS: Mapping[str, Callable[[World, Mapping[str, Any]], dict[str, Any]]] = {
     "evaluate": _evaluate,
     "live": _live,
@@ -272,6 +287,7 @@ TASKS: Mapping[str, Callable[[World, Mapping[str, Any]], dict[str, Any]]] = {
     "run": _run,
     "preview": _preview,
     "sample": _sample,
+    "view": _view,
 }
 
 

@@ -1,8 +1,9 @@
 """An integral as SVG: the domain and its cells, surfaces, arrows for what the boundary gains, and the numbers.
 
-Owns `integral_svg`. Every surface is a group with its number as `data-surface`, so that a page can tell which one was
-clicked. Arrows point to where a place moves; they are as long as what it gains is great, blue where the integral gains
-and red where it loses.
+Owns `integral_svg`, `words` and `told`. Every surface is a group with its number as `data-surface` and its equation as
+`data-equation`, so that a page can tell which one was clicked. Arrows point to where a place moves; they are as long as
+what it gains is great, blue where the integral gains and red where it loses. Colours are those of classes, which a page
+may set; a picture that stands alone brings its own.
 """
 
 from __future__ import annotations
@@ -10,18 +11,26 @@ from __future__ import annotations
 import base64
 import html
 import math
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from potto.applications.integral_views import Arrow, IntegralNumbers, IntegralView
+from potto.applications.integral_views import Arrow, IntegralNumbers, IntegralView, Line
 from potto.applications.png import encode
 from potto.runtime.answers.printing import format_digits, format_number
 
 WIDE, TALL, LEFT, TOP, LINE = 420.0, 300.0, 64.0, 40.0, 20.0
-GAIN, LOSS, SURFACE, INK = "#1f77b4", "#d62728", "#2ca02c", "#333"
+STYLE = (
+    "<style>.gain{stroke:#1f77b4}.loss{stroke:#d62728}.edge{stroke:#2ca02c}.curve{stroke:#333}.frame{stroke:#999}"
+    ".ghost{stroke:#888}.node{fill:#555}text{fill:#333}text.quiet{fill:#888}text.edge{fill:#2ca02c;stroke:none}"
+    "text.loss{fill:#d62728;stroke:none}</style>"
+)
 LONGEST = 70.0  # of an arrow
 CELLS = ((222, 233, 247), (253, 236, 214), (226, 243, 224), (244, 226, 241), (250, 246, 205), (228, 228, 228))
-OUTSIDE = (255, 255, 255)
+DARK = ((44, 62, 88), (84, 62, 38), (44, 74, 50), (76, 50, 76), (80, 76, 40), (66, 66, 66))
+DARKER, LIGHTER = 0.35, 0.75  # how much the size of the integrand changes a colour
+
+Said = tuple[str, str]  # a line, and its class
 
 
 class _Frame:
@@ -48,35 +57,77 @@ class _Frame:
         return TOP + (self.y1 - value) * self.up
 
 
-def integral_svg(view: IntegralView, numbers: IntegralNumbers | None, title: str, wrt: str) -> str:
-    """The picture; without numbers it shows the geometry alone."""
+def integral_svg(view: IntegralView, said: Sequence[Said] = (), dark: bool = False) -> str:
+    """The picture, with what is `said` above and below it; without, it is for a page that has a style of its own."""
     frame = _Frame(view)
     flat = len(view.box) == 1
-    parts = [_text(LEFT, 22, title, "start", 'font-weight="bold"'), *(_curve if flat else _cells)(view, frame)]
+    cells = DARK if dark else CELLS
+    parts = _curve(view, frame, cells) if flat else _cells(view, frame, cells, dark)
+    parts += [f'<path class="ghost" d="{_path(lines, frame, flat)}" fill="none" stroke-dasharray="4 3"/>'
+              for lines in view.ghosts if lines]  # fmt: skip
+    parts += _nodes(view, frame)
     largest = max((abs(a.weight) for a in _arrows(view)), default=0.0)
     for number, surface in enumerate(view.surfaces):
-        parts.append(f'<g class="surface" data-surface="{number}"><title>{html.escape(surface.equation)}</title>')
-        parts += _lines(surface.lines, frame, flat)
+        name = html.escape(surface.equation, quote=True)
+        parts.append(f'<g class="surface" data-surface="{number}" data-equation="{name}"><title>{name}</title>')
+        path = _path(surface.lines, frame, flat)
+        parts += [f'<path class="grip" d="{path}" fill="none" stroke="transparent" stroke-width="12"/>',
+                  f'<path class="edge" d="{path}" fill="none" stroke-width="2"/>'] if path else []  # fmt: skip
         parts += [_arrow(arrow, frame, largest) for arrow in surface.arrows]
         parts.append("</g>")
     parts += ['<g class="bounds">', *(_arrow(arrow, frame, largest) for arrow in view.bounds), "</g>"]
     parts += _axes(view, frame)
-    below = _words(view, numbers, wrt)
+    title, below = said[:1], said[1:]
     start = TOP + frame.tall + 58
-    parts += [
-        _text(LEFT, start + LINE * n, line, "start", f'fill="{colour}"') for n, (line, colour) in enumerate(below)
-    ]
-    wide, tall = LEFT + max(frame.wide, WIDE) + 90, start + LINE * len(below) + 6
+    parts += [_text(LEFT, 22, title[0][0], "start", 'font-weight="bold"')] if title else []
+    parts += [_text(LEFT, start + LINE * n, line, "start", f'class="{kind}"') for n, (line, kind) in enumerate(below)]
+    tall = start + LINE * len(below) + 6 if said else start - 16
+    wide = LEFT + max(frame.wide, WIDE if said else 0.0) + (90 if said else 24)
     head = f'<svg xmlns="http://www.w3.org/2000/svg" width="{wide:.0f}" height="{tall:.0f}" '
     head += f'viewBox="0 0 {wide:.0f} {tall:.0f}" font-family="sans-serif" font-size="12">'
-    return "\n".join([head, f'<rect width="{wide:.0f}" height="{tall:.0f}" fill="white"/>', *parts, "</svg>", ""])
+    ground = [STYLE, f'<rect width="{wide:.0f}" height="{tall:.0f}" fill="white"/>'] if said else []
+    return "\n".join([head, *ground, *parts, "</svg>", ""])
+
+
+def words(view: IntegralView, numbers: IntegralNumbers, title: str, wrt: str) -> list[Said]:
+    """What stands above and below a picture."""
+    found: list[Said] = [(title, "")]
+    for name, text in told(view, numbers, wrt):
+        found.append((f"{'   ' * (name in ('interior', 'boundary'))}{name} {text}", "quiet" if "diff" in name else ""))
+    if not numbers.converged:
+        found.append(("not as accurate as was asked", "loss"))
+    for surface in view.surfaces:
+        found.append((surface.equation if surface.lines else f"{surface.equation}: not in the domain", "edge"))
+    return [*found, *((text, "quiet") for text in remarks(view))]
+
+
+def told(view: IntegralView, numbers: IntegralNumbers, wrt: str) -> list[tuple[str, str]]:
+    """The numbers with their names and errors."""
+
+    def with_error(value: float, error: float) -> str:
+        return f"{format_number(value, error)} ± {format_digits(error, 2)}"
+
+    n = numbers
+    return [
+        ("value", with_error(n.value, n.error)),
+        (f"derivative by {wrt}", with_error(n.tangent, n.tangent_error)),
+        ("interior", with_error(n.interior, n.interior_error)),
+        ("boundary", with_error(n.boundary, n.boundary_error)),
+        (f"central difference, {wrt} ± {format_digits(n.step, 2)}:", format_digits(n.difference, 8)),
+    ]
+
+
+def remarks(view: IntegralView) -> list[str]:
+    """What the picture leaves out."""
+    found = [f"section at {name} = {format_digits(value, 4)}" for name, value in view.held]
+    return [*found, "the domain goes on beyond what is drawn"] if view.cut else found
 
 
 def _arrows(view: IntegralView) -> list[Arrow]:
     return [*view.bounds, *(arrow for surface in view.surfaces for arrow in surface.arrows)]
 
 
-def _curve(view: IntegralView, frame: _Frame) -> list[str]:
+def _curve(view: IntegralView, frame: _Frame, colours: Sequence[tuple[int, int, int]]) -> list[str]:
     """The integrand over the range, with the ground below it in the colour of its cell."""
     values, cells = view.integrand[0], view.cells[0]
     xs = np.linspace(frame.x0, frame.x1, len(values)).tolist()
@@ -90,39 +141,47 @@ def _curve(view: IntegralView, frame: _Frame) -> list[str]:
                   if math.isfinite(v)]  # fmt: skip
         if points:
             line = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
-            colour = "#{:02x}{:02x}{:02x}".format(*CELLS[cells[start] % len(CELLS)])
+            colour = "#{:02x}{:02x}{:02x}".format(*colours[cells[start] % len(colours)])
             area = f"{points[0][0]:.1f},{ground:.1f} {line} {points[-1][0]:.1f},{ground:.1f}"
             left, right = points[0][0], frame.x(xs[min(place, len(xs) - 1)])
             out.append(f'<rect x="{left:.1f}" y="{TOP}" width="{right - left:.1f}" height="{frame.tall:.1f}" '
                        f'fill="{colour}" opacity="0.45"/>')  # fmt: skip
             out.append(f'<polygon points="{area}" fill="{colour}"/>')
-            out.append(f'<polyline points="{line}" fill="none" stroke="{INK}" stroke-width="1.5"/>')
+            out.append(f'<polyline class="curve" points="{line}" fill="none" stroke-width="1.5"/>')
         start = place
     return out
 
 
-def _cells(view: IntegralView, frame: _Frame) -> list[str]:
-    """The cells in their colours, darker where the integrand is greater."""
+def _cells(view: IntegralView, frame: _Frame, colours: Sequence[tuple[int, int, int]], dark: bool) -> list[str]:
+    """The cells in their colours, stronger where the integrand is greater; nothing outside of the domain."""
     cells, values = np.asarray(view.cells), np.asarray(view.integrand, dtype=float)
     size = np.abs(np.where(np.isfinite(values), values, 0.0))
     share = size / (size.max() or 1.0)
-    rgb = np.asarray(CELLS, dtype=float)[cells % len(CELLS)] * (1 - 0.35 * share)[:, :, None]
-    rgb[cells < 0] = OUTSIDE
-    data = base64.b64encode(encode(rgb[::-1].astype(np.uint8).tobytes(), *cells.shape[::-1])).decode()
-    rows, columns = cells.shape  # a pixel is around its place: half of one is beyond each side
+    factor = 1 + LIGHTER * share if dark else 1 - DARKER * share
+    rgb = np.minimum(np.asarray(colours, dtype=float)[cells % len(colours)] * factor[:, :, None], 255)
+    rgba = np.concatenate([rgb, np.where(cells < 0, 0.0, 255.0)[:, :, None]], axis=2)
+    rows, columns = cells.shape
+    data = base64.b64encode(encode(rgba[::-1].astype(np.uint8).tobytes(), columns, rows, quick=True)).decode()
+    # A pixel is around its place: half of one is beyond each side.
     wide, tall = frame.wide / (columns - 1), frame.tall / (rows - 1)
     return [f'<image x="{LEFT - wide / 2:.1f}" y="{TOP - tall / 2:.1f}" width="{frame.wide + wide:.1f}" '
-            f'height="{frame.tall + tall:.1f}" style="image-rendering:pixelated" '
+            f'height="{frame.tall + tall:.1f}" image-rendering="pixelated" '
             f'preserveAspectRatio="none" href="data:image/png;base64,{data}"/>']  # fmt: skip
 
 
-def _lines(lines: tuple[tuple[tuple[float, ...], tuple[float, ...]], ...], frame: _Frame, flat: bool) -> list[str]:
+def _path(lines: Iterable[Line], frame: _Frame, flat: bool) -> str:
     if flat:
-        path = "".join(f"M{frame.x(a[0]):.1f} {TOP}V{TOP + frame.tall:.1f}" for a, _ in lines)
-    else:
-        path = "".join(f"M{frame.x(a):.1f} {frame.y(b):.1f}L{frame.x(c):.1f} {frame.y(d):.1f}"
-                       for (a, b), (c, d) in lines)  # fmt: skip
-    return [f'<path d="{path}" fill="none" stroke="{SURFACE}" stroke-width="2"/>'] if path else []
+        return "".join(f"M{frame.x(a[0]):.1f} {TOP}V{TOP + frame.tall:.1f}" for a, _ in lines)
+    return "".join(f"M{frame.x(a):.1f} {frame.y(b):.1f}L{frame.x(c):.1f} {frame.y(d):.1f}" for (a, b), (c, d) in lines)
+
+
+def _nodes(view: IntegralView, frame: _Frame) -> list[str]:
+    """A dot for each place where the integrand was evaluated; of one variable, on the ground."""
+    if not view.nodes:
+        return []
+    places = [(frame.x(p[0]), frame.y(p[1]) if len(p) > 1 else frame.y(0)) for p in view.nodes]
+    return ['<g class="nodes">', *(f'<circle class="node" cx="{x:.1f}" cy="{y:.1f}" r="1.6"/>' for x, y in places),
+            "</g>"]  # fmt: skip
 
 
 def _arrow(arrow: Arrow, frame: _Frame, largest: float) -> str:
@@ -140,12 +199,12 @@ def _arrow(arrow: Arrow, frame: _Frame, largest: float) -> str:
     right = (tip[0] - wing * dx + 0.6 * wing * dy, tip[1] - wing * dy - 0.6 * wing * dx)
     path = f"M{x:.1f} {y:.1f}L{tip[0]:.1f} {tip[1]:.1f}M{left[0]:.1f} {left[1]:.1f}L{tip[0]:.1f} {tip[1]:.1f}"
     path += f"L{right[0]:.1f} {right[1]:.1f}"
-    colour = GAIN if arrow.weight > 0 else LOSS
-    return f'<path d="{path}" fill="none" stroke="{colour}" stroke-width="{2.5 if flat else 1.3}"/>'
+    kind = "gain" if arrow.weight > 0 else "loss"
+    return f'<path class="{kind}" d="{path}" fill="none" stroke-width="{2.5 if flat else 1.3}"/>'
 
 
 def _axes(view: IntegralView, frame: _Frame) -> list[str]:
-    out = [f'<rect x="{LEFT}" y="{TOP}" width="{frame.wide:.1f}" height="{frame.tall:.1f}" fill="none" stroke="#999"/>']
+    out = [f'<rect class="frame" x="{LEFT}" y="{TOP}" width="{frame.wide:.1f}" height="{frame.tall:.1f}" fill="none"/>']
     foot = TOP + frame.tall
     names = (view.variables[0], view.variables[1] if len(view.box) == 2 else "integrand")
     for share in (0.0, 0.5, 1.0):
@@ -153,32 +212,8 @@ def _axes(view: IntegralView, frame: _Frame) -> list[str]:
         out.append(_text(frame.x(across), foot + 17, format_digits(across, 4), "middle"))
         out.append(_text(LEFT - 6, frame.y(up) + 4, format_digits(up, 3), "end"))
     out.append(_text(LEFT + frame.wide / 2, foot + 34, names[0], "middle", 'font-style="italic"'))
-    out.append(_text(LEFT - 8, TOP - 12, names[1], "end", 'font-style="italic"'))
+    out.append(_text(LEFT - 24, TOP - 12, names[1], "start", 'font-style="italic"'))
     return out
-
-
-def _words(view: IntegralView, numbers: IntegralNumbers | None, wrt: str) -> list[tuple[str, str]]:
-    """What stands below the picture, with its colour."""
-    found: list[tuple[str, str]] = []
-    if numbers is not None:
-        n = numbers
-
-        def told(value: float, error: float) -> str:
-            return f"{format_number(value, error)} ± {format_digits(error, 2)}"
-
-        found.append((f"value {told(n.value, n.error)}", INK))
-        found.append((f"derivative by {wrt} {told(n.tangent, n.tangent_error)}", INK))
-        found.append((f"   interior {told(n.interior, n.interior_error)}", INK))
-        found.append((f"   boundary {told(n.boundary, n.boundary_error)}", INK))
-        found.append(
-            (f"central difference, {wrt} ± {format_digits(n.step, 2)}: {format_digits(n.difference, 8)}", "#888")
-        )
-        if not n.converged:
-            found.append(("not as accurate as was asked", LOSS))
-    for surface in view.surfaces:
-        found.append((surface.equation if surface.lines else f"{surface.equation}: not in the domain", SURFACE))
-    found += [(f"section at {name} = {format_digits(value, 4)}", "#888") for name, value in view.held]
-    return [*found, ("the domain goes on beyond what is drawn", "#888")] if view.cut else found
 
 
 def _text(x: float, y: float, text: str, anchor: str, style: str = "") -> str:

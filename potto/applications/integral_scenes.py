@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 from msgspec import Struct
 
-from potto.applications.integral_pictures import integral_svg
+from potto.applications.integral_pictures import integral_svg, words
 from potto.applications.integral_views import IntegralNumbers, IntegralView, Viewer, numbers
 from potto.checking.regions import Region, regions
 from potto.diagnostics import PottoError
@@ -29,7 +29,13 @@ class Shot(Struct, frozen=True):
 
     view: IntegralView
     numbers: IntegralNumbers
-    svg: str
+    title: str
+    wrt: str
+
+    @property
+    def svg(self) -> str:
+        """The picture that stands alone, with its words."""
+        return integral_svg(self.view, words(self.view, self.numbers, self.title, self.wrt))
 
 
 class IntegralScene:
@@ -122,16 +128,19 @@ class IntegralScene:
                     return name
         return next(iter(self.values))
 
-    def look(self, values: Mapping[str, float], wrt: str, which: int = 0) -> Shot:
-        """The integral number `which`, from 0, with these values. Raises PottoError where it has none."""
+    def look(
+        self, values: Mapping[str, float], wrt: str, which: int = 0, ghost: float | None = None, nodes: bool = False
+    ) -> Shot:
+        """The integral number `which`, from 0, with these values; `ghost`: the step of what is seen of differences,
+        `nodes`: also where it was evaluated. Raises PottoError where it has no value."""
         known = self.regions(wrt)
         if not 0 <= which < len(known):
             raise wrong_call(f"`{self.name}` has {len(known)} integrals", f"choose one from 1 to {len(known)}")
         viewer = self._viewers.setdefault((wrt, which), Viewer(known[which], self._compiled))
-        seen = viewer.look(values)
-        found = numbers(known[which], self._compiled, values, wrt)
+        seen = viewer.look(values, wrt, ghost or 0.0, nodes)
+        found = numbers(known[which], self._compiled, values, wrt, ghost)
         title = f"{self.name}({', '.join(f'{name} = {value:.4g}' for name, value in values.items())})"
-        return Shot(seen, found, integral_svg(seen, found, title, wrt))
+        return Shot(seen, found, title, wrt)
 
     def _compiled(self, text: str) -> Function:
         if text not in self._functions:

@@ -15,20 +15,25 @@ from msgspec import Struct
 
 from potto.applications.contours import zero_lines
 from potto.checking.regions import Region, RegionSurface
-from potto.kernels.cells import Array
+from potto.core.terms import Lam
+from potto.kernels.cells import Array, Cell, Value
 from potto.python.functions import Function
 from potto.python.gradients import grad
+from potto.runtime.answers.estimate import Estimate
+from potto.runtime.evaluation.machine import WATCHING
 
 PLACES = 257  # along a curve
 SIDE = 97  # along a side of a square
 REACH = 6.0  # how far an endless range is drawn
 ARROWS = 24  # of one surface, at most
+NODES = 1500
 STEP = 1e-3  # of the parameter, or of 1 where that is more
 TINY = 1e-13
-CLOSER = 60  # halvings: the ends of a root are neighbours then
+PARTS, CLOSER = 64, 10  # a root is looked for in so many parts, so often: its ends are neighbours then
 
 Call = Callable[..., Any]
 Point = tuple[float, ...]
+Line = tuple[Point, Point]
 
 
 class Arrow(Struct, frozen=True):
@@ -46,7 +51,7 @@ class SurfaceView(Struct, frozen=True):
     """A surface inside of the domain. lines: from and to, in one variable the same point twice."""
 
     equation: str
-    lines: tuple[tuple[Point, Point], ...]
+    lines: tuple[Line, ...]
     arrows: tuple[Arrow, ...]
     gain: float  # what all of it adds to the derivative, as far as that is seen
 
@@ -56,7 +61,8 @@ class IntegralView(Struct, frozen=True):
 
     box: from and to of each variable that is seen. cells: at the places of `integrand` the number of the cell, one for
     each way that the surfaces can be on their sides; -1 outside of the domain. integrand: PLACES numbers, or rows of
-    SIDE from below. held: the variables that are not seen, and where they stand.
+    SIDE from below. held: the variables that are not seen, and where they stand. ghosts: where surfaces and bounds are
+    when the parameter is a step less, and a step more. nodes: where the integrand was evaluated for the value.
     """
 
     variables: tuple[str, ...]
@@ -67,6 +73,8 @@ class IntegralView(Struct, frozen=True):
     bounds: tuple[Arrow, ...]
     held: tuple[tuple[str, float], ...] = ()
     cut: bool = False  # whether a range goes on beyond what is drawn
+    ghosts: tuple[tuple[Line, ...], tuple[Line, ...]] = ((), ())
+    nodes: tuple[Point, ...] = ()
 
 
 class IntegralNumbers(Struct, frozen=True):
@@ -89,22 +97,23 @@ class IntegralNumbers(Struct, frozen=True):
     evals: int
 
 
-def numbers(region: Region, compile: Callable[[str], Function], given: Mapping[str, float], wrt: str
-            ) -> IntegralNumbers:  # fmt: skip
-    """The integral and its derivative by `wrt`. Raises PottoError where there is none."""
+def numbers(region: Region, compile: Callable[[str], Function], given: Mapping[str, float], wrt: str,
+            step: float | None = None) -> IntegralNumbers:  # fmt: skip
+    """The integral and its derivative by `wrt`, and a difference over `step`. Raises PottoError where there is none."""
     whole = compile(region.whole)
     both = grad(whole, [wrt])(**given)
-    inner = compile(region.interior)(**given)
+    still = _constant(region.interior)
+    inner = compile(region.interior)(**given) if still is None else Estimate(still, 0.0)
     rest, error = both.tangent - inner.value, both.tangent_error + inner.error
     if abs(rest) <= max(error, TINY * max(abs(both.tangent), abs(inner.value))):
         rest, error = 0.0, error if rest else 0.0
-    step = STEP * max(1.0, abs(given[wrt]))
-    ahead, behind = (whole(**{**given, wrt: given[wrt] + way}) for way in (step, -step))
+    step = STEP * max(1.0, abs(given[wrt])) if step is None else step
+    beside = whole(**{**given, wrt: given[wrt] + step * np.array([-1.0, 1.0])})
     return IntegralNumbers(
         float(both.value), float(both.error), float(both.tangent), float(both.tangent_error),
         float(inner.value), float(inner.error), float(rest), float(error),
-        float(ahead.value - behind.value) / (2 * step), float(ahead.error + behind.error) / (2 * step), step,
-        bool(both.converged and inner.converged), both.evals + inner.evals + ahead.evals + behind.evals,
+        float(np.diff(beside.value)[0]) / (2 * step), float(np.sum(beside.error)) / (2 * step), step,
+        bool(both.converged and inner.converged), both.evals + inner.evals + beside.evals,
     )  # fmt: skip
 
 
@@ -117,13 +126,13 @@ class Viewer:
         self._calls: dict[str, Call] = {}
         self.seen = region.variables[:2]
 
-    def look(self, given: Mapping[str, float]) -> IntegralView:
-        """The view with these parameters. Raises PottoError where the integrand has no value."""
+    def look(self, given: Mapping[str, float], wrt: str = "", ghost: float = 0.0, nodes: bool = False) -> IntegralView:
+        """The view with these parameters; with ghosts for steps of `wrt`, and nodes, if they are wanted. Raises
+        PottoError where the integrand has no value."""
         places: dict[str, Any] = {**given, **dict.fromkeys(self.region.variables, 0.0)}
         box, held, cut = self._ranges(places)
         grids = [np.linspace(low, high, PLACES if len(box) == 1 else SIDE) for low, high in box]
-        mesh = np.meshgrid(*grids)
-        at = {**places, **dict(zip(self.seen, mesh, strict=True))}
+        at = {**places, **self._mesh(grids)}
         inside = self._inside(at)
         values = self._numbers(self.region.integrand, at)
         levels = [self._numbers(surface.level, at) for surface in self.region.surfaces]
@@ -139,17 +148,77 @@ class Viewer:
         return IntegralView(
             self.seen, tuple(box), _rows(np.where(inside, values, np.nan)), _rows(cells), surfaces,
             self._bounds(places, box), tuple(held), cut,
+            self._ghosts(places, grids, wrt, ghost) if ghost else ((), ()),
+            self._nodes(given, box) if nodes else (),
         )  # fmt: skip
+
+    def _ghosts(
+        self, places: Mapping[str, Any], grids: Sequence[Array], wrt: str, step: float
+    ) -> tuple[tuple[Line, ...], tuple[Line, ...]]:
+        """The surfaces that move, and the bounds, a step to both sides."""
+        sides: list[tuple[Line, ...]] = []
+        for way in (-step, step):
+            there = {**places, wrt: places[wrt] + way}
+            found: list[Line] = []
+            for surface in self.region.surfaces:
+                if surface.rate.endswith(" . 0"):
+                    continue
+                level = self._numbers(surface.level, {**there, **self._mesh(grids)})
+                ends = self._roots(surface, level, grids[0], there) if len(grids) == 1 else zero_lines(level, *grids)
+                if len(ends):
+                    middles = dict(zip(self.seen, ends.mean(axis=1).T, strict=True))
+                    found += _lines(ends[np.nonzero(self._inside({**there, **middles}))[0]])
+            for axis in range(len(self.seen)):
+                for low_or_high, rate in zip(self.region.bounds[axis], self.region.rates[axis], strict=True):
+                    if not rate.endswith(" . 0"):
+                        found += _edge(self._number(low_or_high, there), axis, grids)
+            sides.append(tuple(found))
+        return sides[0], sides[1]
+
+    def _mesh(self, grids: Sequence[Array]) -> dict[str, Any]:
+        return dict(zip(self.seen, np.meshgrid(*grids), strict=True))
+
+    def _nodes(self, given: Mapping[str, float], box: Sequence[tuple[float, float]]) -> tuple[Point, ...]:
+        """Where terms over all variables are evaluated while the integral is: some of MOST of them."""
+        met: list[Array] = []
+
+        def watch(function: Lam, args: list[Value]) -> None:
+            where = dict(zip(function.params, args, strict=True))
+            if set(self.region.variables) <= where.keys():
+                values = [where[name] for name in self.seen]
+                numbers = [np.asarray(value.v) for value in values if isinstance(value, Cell)]
+                if len(numbers) == len(self.seen) and any(n.ndim for n in numbers):
+                    met.append(np.stack([np.ravel(n) for n in np.broadcast_arrays(*numbers)], axis=1))
+
+        whole = self._compiled(self.region.whole)
+        token = WATCHING.set(watch)
+        try:
+            whole(**given)
+        finally:
+            WATCHING.reset(token)
+        if not met:
+            return ()
+        low, high = np.array(box).T
+        found = np.unique(np.concatenate(met), axis=0)
+        found = found[((found >= low) & (found <= high)).all(axis=1)]
+        return tuple(map(tuple, found[:: max(1, -(-len(found) // NODES))].tolist()))
 
     # Numbers
 
     def _numbers(self, text: str, at: Mapping[str, Any]) -> Array:
-        if text not in self._calls:
-            self._calls[text] = self._compile(text)
+        plain = _constant(text)
+        if plain is not None:
+            return np.full(np.broadcast_shapes(*(np.shape(at[name]) for name in self.region.names)), plain)
+        call = self._compiled(text)
         arguments = np.broadcast_arrays(*(np.asarray(at[name], dtype=float) for name in self.region.names))
-        answer = self._calls[text](*(a if a.ndim else float(a) for a in arguments))
+        answer = call(*(a if a.ndim else float(a) for a in arguments))
         found: Array = np.broadcast_to(np.asarray(answer.value, dtype=float), arguments[0].shape)
         return found
+
+    def _compiled(self, text: str) -> Call:
+        if text not in self._calls:
+            self._calls[text] = self._compile(text)
+        return self._calls[text]
 
     def _number(self, text: str, at: Mapping[str, Any]) -> float:
         return float(self._numbers(text, at))
@@ -201,7 +270,7 @@ class Viewer:
         velocities = -(rate / safe**2)[:, None] * slopes
         lengths = np.ones(len(ends)) if len(grids) == 1 else np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         chosen = np.nonzero(keep)[0]
-        lines = tuple((tuple(a), tuple(b)) for a, b in ends[chosen].tolist())
+        lines = _lines(ends[chosen])
         around = middles[chosen] - middles[chosen].mean(axis=0) if len(chosen) else middles[chosen]
         order = np.argsort(np.arctan2(around[:, -1], around[:, 0]), kind="stable")
         shown = chosen[order][:: max(1, -(-len(chosen) // ARROWS))]
@@ -212,11 +281,14 @@ class Viewer:
         """The points of a surface on a line: (n, 2, 1), each twice."""
         positive = level > 0
         at = np.nonzero(positive[1:] != positive[:-1])[0]
-        low, high, side = xs[at], xs[at + 1], positive[at]
+        low, high, side = xs[at], xs[at + 1], positive[at][:, None]
+        each = np.arange(len(at))
         for _ in range(CLOSER if len(at) else 0):
-            middle = (low + high) / 2
-            same = (self._numbers(surface.level, {**places, self.seen[0]: middle}) > 0) == side
-            low, high = np.where(same, middle, low), np.where(same, high, middle)
+            inner = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, PARTS + 1)
+            beyond = (self._numbers(surface.level, {**places, self.seen[0]: inner}) > 0) != side
+            beyond[:, 0], beyond[:, -1] = False, True
+            first = np.argmax(beyond, axis=1)
+            low, high = inner[each, first - 1], inner[each, first]
         middle = (low + high) / 2
         return np.stack([middle, middle], axis=1)[:, :, None]
 
@@ -240,6 +312,29 @@ class Viewer:
                 moves[:, axis] = rate
                 found += _arrows(points, moves, gain)
         return tuple(found)
+
+
+def _constant(text: str) -> float | None:
+    """The number that a function gives everywhere, if it is written as one."""
+    try:
+        return float(text.rpartition(" . ")[2])
+    except ValueError:
+        return None
+
+
+def _lines(ends: Array) -> tuple[Line, ...]:
+    return tuple((tuple(a), tuple(b)) for a, b in ends.tolist())
+
+
+def _edge(at: float, axis: int, grids: Sequence[Array]) -> list[Line]:
+    """A bound as a line across the box."""
+    if not np.isfinite(at):
+        return []
+    if len(grids) == 1:
+        return [((at,), (at,))]
+    low, high = (float(grids[1 - axis][end]) for end in (0, -1))
+    ends = ((at, low), (at, high)) if axis == 0 else ((low, at), (high, at))
+    return [ends]
 
 
 def _drawn(low: float, high: float) -> tuple[float, float]:

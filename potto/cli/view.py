@@ -98,9 +98,10 @@ def _page(world: World, file: str, options: argparse.Namespace, console: Console
     import webbrowser
     from contextlib import suppress
 
-    from potto.cli.view_page import Answers, serve
+    from potto.applications.integral_answers import Answers
+    from potto.cli.view_page import Answering, serve
 
-    answers = Answers(world, file, options.name, dict(options.given), options.wrt)
+    answers = Answering(Answers(world, file, options.name, dict(options.given), options.wrt))
     server, address = serve(answers)
     with server:
         console.answer(f"{address}\nCtrl+C ends it")

@@ -14,6 +14,7 @@ from potto.ide.display.inlay_hints import inlay_hints, resolve_inlay_hint
 from potto.ide.display.inline_values import inline_values
 from potto.ide.display.scenes import Scene, SceneParameter, scene, scenes
 from potto.ide.display.semantic_tokens import semantic_tokens
+from potto.ide.display.views import Viewed, viewed
 from potto.ide.hover.derivatives import derivative_markdown, diffeo_markdown
 from potto.ide.hover.derivatives import sound as is_sound
 from potto.ide.hover.hovers import hover
@@ -93,6 +94,7 @@ __all__ = [
     "SemanticToken",
     "Signature",
     "SignatureHelp",
+    "Viewed",
     "WorkspaceSymbol",
     "code_actions",
     "code_lenses",
@@ -140,5 +142,6 @@ __all__ = [
     "semantic_tokens",
     "signature_help",
     "type_definition",
+    "viewed",
     "workspace_symbols",
 ]

@@ -1,5 +1,5 @@
 // The packaged extension in a real Visual Studio Code: first what its providers give, then what a person sees.
-// usage: node run.mjs CHROMIUM [host|ui]; pictures go to test-results/. The exit status is 1 if anything failed.
+// usage: node run.mjs CHROMIUM [host|ui|views]; pictures go to test-results/. The exit status is 1 if anything failed.
 import { existsSync, mkdirSync, rmSync } from "node:fs";
 import { spawnSync } from "node:child_process";
 import { join } from "node:path";
@@ -41,8 +41,8 @@ function fences() {
 if (only === undefined) fences();
 const code = await start(vsix, chromiumPath);
 try {
-  if (only !== "ui") await hostTests(code, report);
-  if (only !== "host") await uiTests(code, pictures, report);
+  if (only === undefined || only === "host") await hostTests(code, report);
+  if (only !== "host") await uiTests(code, pictures, report, only);
 } catch (error) {
   if (!results.at(-1)?.error) report({ name: "the run", error: error.stack, milliseconds: Date.now() - began });
 } finally {

@@ -4,9 +4,10 @@ import { join } from "node:path";
 import assert from "node:assert/strict";
 import { PREVIEWS, RENAMED } from "./previews.mjs";
 import { THEMES } from "./themes.mjs";
+import { VIEWS } from "./views.mjs";
 import { EDITOR, frameOf, preview, windowOn } from "./window.mjs";
 
-export async function uiTests(code, pictures, report) {
+export async function uiTests(code, pictures, report, only) {
   const run = async (name, window, test) => {
     const started = Date.now();
     let error = null;
@@ -21,16 +22,21 @@ export async function uiTests(code, pictures, report) {
     await window.page.keyboard.press("Escape");
     return error === null;
   };
-  const main = await windowOn(code, code.workspace, "broken.po", pictures);
-  const tests = { ...TESTS, ...PREVIEWS, ...THEMES, ...PROMPT, ...RENAMED };
-  const names = Object.keys(tests);
-  for (const [place, name] of names.entries()) {
-    if (await run(name, main, tests[name])) continue;
-    const rest = names.length - place - 1; // they go on from where this one should have ended
-    if (rest) report({ name: `ui: ${rest} more`, error: "not run, as they go on from where the one above should have ended", milliseconds: 0 });
-    break;
-  }
-  await main.page.context().close();
+  /** Tests in one window, each of which goes on from where the one before it has ended. */
+  const series = async (file, tests) => {
+    const window = await windowOn(code, code.workspace, file, pictures);
+    const names = Object.keys(tests);
+    for (const [place, name] of names.entries()) {
+      if (await run(name, window, tests[name])) continue;
+      const rest = names.length - place - 1;
+      if (rest) report({ name: `ui: ${rest} more`, error: "not run, as they go on from where the one above should have ended", milliseconds: 0 });
+      break;
+    }
+    await window.page.context().close();
+  };
+  await series("moving.po", VIEWS);
+  if (only === "views") return;
+  await series("broken.po", { ...TESTS, ...PREVIEWS, ...THEMES, ...PROMPT, ...RENAMED });
   const lost = await windowOn(code, code.lost, "shapes.po", pictures);
   await run("one message with a button when there is no server", lost, noServer);
   await lost.page.context().close();

@@ -9,6 +9,7 @@ import { Server, type ServerState } from "./server";
 import { explain, showMenu, showStatus } from "./status";
 import { openRepl, runFile, runSelection } from "./terminal";
 import { utf16 } from "./text";
+import { openView } from "./view/panel";
 
 /** What other extensions, and tests, may use. */
 export interface Api {
@@ -80,6 +81,7 @@ function registerCommands(context: vscode.ExtensionContext, server: Server, deri
     const position = vscode.window.activeTextEditor?.selection.active;
     await openPreview(context, server, document.uri, typeof name === "string" ? name : undefined, position);
   });
+  command("view", () => openView(context, server));
   command("evaluate", (uri?: vscode.Uri | string, expression?: unknown) => evaluateCommand(server, uri, expression));
   command("differentiate", async (uri?: vscode.Uri | string, name?: unknown) => {
     const document = await documentOf(uri);

@@ -121,6 +121,9 @@ _ALL = (
     Feature("workspace/diagnostic", "diagnosing.workspace", pace="slow"),
     Feature("potto/scenes", "previewing.scenes", pace="slow"),
     Feature("potto/sample", "previewing.sample"),
+    Feature("potto/viewPage", "viewing.page"),
+    Feature("potto/viewed", "viewing.viewed"),
+    Feature("potto/view", "viewing.view"),
     Feature(
         "workspace/executeCommand",
         "commands.execute",

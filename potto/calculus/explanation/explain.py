@@ -226,7 +226,7 @@ def _integral(
             if _outside(item.surface, box):
                 continue
             if continuous(item, node.variables):
-                meeting.append(equation(item.surface))
+                meeting.append(equation(words.fields(item.surface)))
             else:
                 deltas.append(words.text(item.contribution, *names, box=box))
         deltas += [words.text(t, *names, box=box) for t in moving_deltas(node, rate)]
@@ -243,19 +243,19 @@ def _integral(
         reason = str(problem)
     except PottoError as problem:
         reason = problem.diagnostics[0].message
-    head = format_term(integral(node.variables, node.bounds, ONE)).rpartition(" 1 ")[0]
+    head = format_term(words.fields(integral(node.variables, node.bounds, ONE))).rpartition(" 1 ")[0]
     return IntegralText(
         head,
         ", ".join(node.variables),
-        format_term(simplify(node.body)),
+        words.plain(node.body),
         interior,
         tuple(deltas),
         tuple(bounds),
         tuple(b for b in boundary if b != "0"),
-        _surfaces(node, inside),
+        _surfaces(node, inside, words),
         reason,
         tuple(meeting),
-        ", ".join(f"{name} in {format_term(simplify(lo))}..{format_term(simplify(hi))}" for name, lo, hi in around),
+        ", ".join(f"{name} in {words.plain(lo)}..{words.plain(hi)}" for name, lo, hi in around),
     )
 
 
@@ -278,7 +278,7 @@ def _why_searched(node: Integral) -> str:
     return ""
 
 
-def _surfaces(node: Integral, tangents: Mapping[str, Term]) -> tuple[SurfaceText, ...]:
+def _surfaces(node: Integral, tangents: Mapping[str, Term], words: Words) -> tuple[SurfaceText, ...]:
     found: dict[Term, SurfaceText] = {}
     box = box_of(node)
     for item in branches_of(opened(node.body), node.variables):
@@ -290,11 +290,13 @@ def _surfaces(node: Integral, tangents: Mapping[str, Term]) -> tuple[SurfaceText
             try:
                 for root in pivots(node, factor)[0].roots:
                     each = f" for integers {root.index}" if root.index else ""
-                    at = format_term(readable(simplify(root.at), frozenset()))
+                    at = format_term(readable(simplify(words.fields(root.at)), frozenset()))
                     roots.append(f"{root.variable} = {at}{each}")
             except NoClosedForm:
                 pass
-            found[canonical] = SurfaceText(equation(factor), tuple(sorted(factor.free & tangents.keys())), tuple(roots))
+            found[canonical] = SurfaceText(
+                equation(words.fields(factor)), tuple(sorted(factor.free & tangents.keys())), tuple(roots)
+            )
     return tuple(found.values())
 
 

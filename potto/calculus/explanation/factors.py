@@ -69,7 +69,7 @@ def _collect(term: Term, exponent: Fraction, into: Factors) -> None:
         case Const(name=None, value=value) if math.isfinite(value) and value and exponent.denominator == 1:
             into.coefficient *= Fraction(_short(value)) ** int(exponent)
         case Prim(op="neg", args=(inner,)) if exponent.denominator == 1:
-            into.coefficient *= (-1) ** int(exponent)
+            into.coefficient *= Fraction(-1) ** int(exponent)
             _collect(inner, exponent, into)
         case Prim(op="mul", args=args) if exponent.denominator == 1 or all(range_of(a).lo >= 0 for a in args):
             for arg in args:
@@ -84,10 +84,10 @@ def _collect(term: Term, exponent: Fraction, into: Factors) -> None:
         case Prim(op="sqrt", args=(inner,)) if exponent.denominator == 1:
             _collect(inner, exponent / 2, into)
         case Prim(op="add", args=args) if exponent.denominator == 1 and all(map(_negative, args)):
-            into.coefficient *= (-1) ** int(exponent)
+            into.coefficient *= Fraction(-1) ** int(exponent)
             into.times(add(*map(neg, args)), exponent)
         case Prim(op="add") if exponent.denominator == 1 and (found := _cosine(term)) is not None:
-            into.coefficient *= found[1] ** int(exponent)
+            into.coefficient *= Fraction(found[1]) ** int(exponent)
             into.times(found[0], 2 * exponent)
         case Prim(op="exp", args=(inner,)):
             into.exponents.append(inner if exponent == 1 else mul(_number(exponent), inner))

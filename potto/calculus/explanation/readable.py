@@ -55,8 +55,13 @@ def readable(term: Term, tangents: frozenset[str], box: Box | None = None) -> Te
     variables."""
     if len(format_term(term)) > _LONG:
         return term
-    work = _Work(tangents)
+    work = _Work(tangents, _bound(term) | frozenset(box or ()))
     return _decided(transform(term, lambda _, new: work.node(new)), box or {}, work)
+
+
+def _bound(term: Term) -> frozenset[str]:
+    """The variables of the integrals in a term."""
+    return frozenset(name for node in postorder(term) if isinstance(node, Integral) for name in node.variables)
 
 
 def _decided(term: Term, box: Box, work: _Work) -> Term:
@@ -76,8 +81,9 @@ def _decided(term: Term, box: Box, work: _Work) -> Term:
 
 
 class _Work:
-    def __init__(self, tangents: frozenset[str]) -> None:
+    def __init__(self, tangents: frozenset[str], inside: frozenset[str]) -> None:
         self.tangents = tangents
+        self.inside = inside  # variables of integration, on which no `sign` may depend
 
     def node(self, node: Term) -> Term:
         match node:
@@ -202,6 +208,8 @@ class _Work:
         one = [c for c in first.conditions if c not in second.conditions]
         other = [c for c in second.conditions if c not in first.conditions]
         if len(one) != 1 or len(other) != 1 or not opposite(one[0], other[0]):
+            return None
+        if not one[0].surface.free.isdisjoint(self.inside):
             return None
         kept = [c for c in first.conditions if c is not one[0]]
         found = Factors(first.coefficient, dict(first.powers), list(first.exponents), kept)

@@ -60,6 +60,10 @@ class Words(Struct, frozen=True):
     names: frozenset[str]
     tangents: frozenset[str]
 
+    def plain(self, term: Term) -> str:
+        """A term as it is written, parts of records by their names."""
+        return format_term(simplify(self.fields(term)))
+
     def text(self, term: Term, *inside: str, box: Box | None = None) -> str:
         """A formula that is Potto, in the parameters, their tangents and the variables it is `inside` of. Raises
         NoFormula."""

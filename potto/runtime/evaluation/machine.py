@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -58,6 +59,8 @@ OVERDRAFT = 3
 
 
 Groups = tuple[tuple[Value, ...], ...]
+WATCHING: ContextVar[Callable[[Lam, list[Value]], None] | None] = ContextVar("WATCHING", default=None)
+"""Who is told of each term that is evaluated over a batch, and at what places: pictures show nodes so."""
 
 
 @dataclass(frozen=True)
@@ -284,6 +287,9 @@ class Machine:
         return self.run(function, [env[p] for p in function.params], trace)
 
     def run(self, function: Lam, args: list[Value], trace: Trace | None) -> Value:
+        watching = WATCHING.get()
+        if watching is not None:
+            watching(function, args)
         k = self.directions
         found = self.kernel(function, tuple([pattern(a, k) for a in args]))
         if found.plain and many(args) and not self.taping:

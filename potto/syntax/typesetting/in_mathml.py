@@ -15,7 +15,7 @@ def mathml(text: str, tangents: Container[str] = ()) -> str:
     """An expression as a `math` element."""
     found = boxes(text, tangents)
     inner = f"<mtext>{html.escape(text)}</mtext>" if found is None else _text(found)
-    return f'<math display="block">{inner}</math>'
+    return f'<math displaystyle="true">{inner}</math>'
 
 
 def _text(box: Box) -> str:

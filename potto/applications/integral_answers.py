@@ -1,0 +1,126 @@
+"""What the page of an integral view asks, answered: values in, a picture and numbers out.
+
+Owns `Answers`, which the page's server and the evaluation process of editors share. Nothing queues here: who asks
+sends the newest values only when the last answer has come.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import msgspec
+
+from potto.applications.integral_pictures import integral_svg, remarks, told
+from potto.applications.integral_scenes import IntegralScene, Shot
+from potto.calculus.explanation.layout import DerivativeText
+from potto.diagnostics import PottoError
+from potto.evaluating.world import World
+from potto.ide.display.scenes import scenes
+from potto.ide.display.views import viewed
+from potto.ide.hover.derivatives import derivative_text
+from potto.modules import chunk_start
+from potto.syntax.typesetting import mathml
+
+FRAME = 0.016  # seconds
+MOST = 400  # characters of a formula that is shown
+
+
+class Answers:
+    """Answers about the functions of one file. name, given, wrt: what the page begins with."""
+
+    def __init__(
+        self, world: World, file: str, name: str | None = None, given: Mapping[str, str] | None = None,
+        wrt: str | None = None,
+    ) -> None:  # fmt: skip
+        self.world, self.file, self.name, self.given, self.wrt = world, file, name, dict(given or {}), wrt
+        self._scenes: dict[str, IntegralScene] = {}
+        self._revision = -1
+
+    def answer(self, path: str, asked: Mapping[str, Any]) -> dict[str, Any] | None:
+        """What goes back as JSON; None for a question that there is not. An error of the program is an `error`."""
+        self.world.refresh()
+        if self._revision != self.world.db.revision:
+            self._scenes.clear()
+            self._revision = self.world.db.revision
+        try:
+            match path:
+                case "/names":
+                    names = [scene.name for scene in scenes(self.world.db, self.file)]
+                    return {"names": names, "chosen": self.name or (names[0] if names else "")}
+                case "/open":
+                    return self._open(str(asked["name"]))
+                case "/look":
+                    return self._look(asked)
+        except PottoError as error:
+            return {"error": str(error)}
+        except (KeyError, TypeError, ValueError):
+            return {"error": "the question is not one of this page"}
+        return None
+
+    def _scene(self, name: str) -> IntegralScene:
+        if name not in self._scenes:
+            given = self.given if name == self.name else {}
+            self._scenes[name] = IntegralScene(self.world, self.file, name, given)
+            self._revision = self.world.db.revision
+        return self._scenes[name]
+
+    def _open(self, name: str) -> dict[str, Any]:
+        """What there is to choose, the formulas, and the text with its conditions."""
+        found = self._scene(name)
+        wrt = self.wrt if self.wrt in found.values else found.moving
+        count = len(found.regions(wrt))
+        return {"values": found.values, "wrt": wrt, "integrals": count, "formulas": self._formulas(name),
+                **self._text(name)}  # fmt: skip
+
+    def _formulas(self, name: str) -> list[dict[str, str]]:
+        found = derivative_text(self.world.db, self.file, name)
+        return [] if found is None else [
+            {"part": part, "of": str(number), "math": mathml(text, found.tangents)}
+            for number, part, text in _parts(found) if len(text) <= MOST
+        ]  # fmt: skip
+
+    def _text(self, name: str) -> dict[str, Any]:
+        """The definition as it is written, and where its conditions are in that."""
+        start = chunk_start(self.world.db, self.file, name)
+        source = self.world.source(self.file)
+        seen = None if start is None else viewed(self.world.db, self.file, start)
+        if source is None or seen is None:
+            return {"source": "", "conditions": []}
+        text, start = source.text[seen.span.start : seen.span.end], seen.span.start
+        while text.startswith("#"):  # what is written above the definition
+            line, _, text = text.partition("\n")
+            start += len(line) + 1
+        marks = [
+            {"equation": c.equation, "from": c.span.start - start, "to": c.span.end - start} for c in seen.conditions
+        ]
+        return {"source": text, "conditions": marks}
+
+    def _look(self, asked: Mapping[str, Any]) -> dict[str, Any]:
+        found = self._scene(str(asked["name"]))
+        values = {name: float(asked["values"][name]) for name in found.values}
+        wrt, which, ghost = str(asked["wrt"]), int(asked["which"]), asked.get("ghost")
+        start = time.perf_counter()
+        shot = found.look(values, wrt, which, None if ghost is None else float(ghost), bool(asked.get("nodes")))
+        svg = integral_svg(shot.view, dark=bool(asked.get("dark")))
+        seconds = time.perf_counter() - start
+        return {
+            "svg": svg, "numbers": msgspec.to_builtins(shot.numbers), "told": told(shot.view, shot.numbers, wrt),
+            "surfaces": _surfaces(shot), "remarks": remarks(shot.view), "seconds": seconds, "slow": seconds > FRAME,
+        }  # fmt: skip
+
+
+def _parts(found: DerivativeText) -> list[tuple[int, str, str]]:
+    """Of each integral, with its number, the formulas of interior and boundary."""
+    parts: list[tuple[int, str, str]] = []
+    for number, item in enumerate(found.integrals):
+        parts.append((number, "integral", item.over(item.integrand)))
+        parts += [(number, "interior", item.over(item.interior))] if item.interior else []
+        parts += [(number, "boundary", item.over(text)) for text in item.deltas]
+        parts += [(number, "moving bound", text) for text in item.bounds]
+    return parts
+
+
+def _surfaces(shot: Shot) -> list[dict[str, Any]]:
+    return [{"equation": s.equation, "inside": bool(s.lines), "gain": s.gain} for s in shot.view.surfaces]

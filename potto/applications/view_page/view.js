@@ -1,0 +1,265 @@
+// The integral view. One page with two hosts: a browser asks the server it came from, an editor's webview its extension.
+"use strict";
+const $ = (id) => document.getElementById(id);
+const make = (tag, properties = {}, ...inside) => {
+  const element = Object.assign(document.createElement(tag), properties);
+  element.append(...inside);
+  return element;
+};
+
+// Hosts: ask(path, body) answers with an object; an editor also tells where its cursor is.
+
+const editor = typeof acquireVsCodeApi === "function" ? acquireVsCodeApi() : null;
+const waiting = new Map();
+let number = 0;
+async function ask(path, body) {
+  if (!editor) return (await fetch(path + location.search, { method: "POST", body: JSON.stringify(body) })).json();
+  const id = ++number;
+  editor.postMessage({ type: "ask", id, path, body });
+  return new Promise((resolve) => waiting.set(id, resolve));
+}
+
+let state = { name: "", values: {}, wrt: "", which: 0, integrals: 1 };
+let lit = "";
+let last = null; // the newest answer
+let pinned = null;
+let begun = 0; // openings: an answer for an older one is dropped
+
+const dark = () =>
+  editor ? document.body.matches(".vscode-dark, .vscode-high-contrast:not(.vscode-high-contrast-light)")
+         : matchMedia("(prefers-color-scheme: dark)").matches;
+const shade = () => document.documentElement.classList.toggle("dark", dark());
+
+// Asking: the newest state wins, nothing queues.
+
+let busy = false;
+let newest = false;
+async function look() {
+  if (busy) { newest = true; return; }
+  busy = true;
+  const opening = begun;
+  const since = performance.now();
+  const { name, values, wrt, which } = state;
+  const body = { name, values: { ...values }, wrt, which, dark: dark(), nodes: $("nodes").checked };
+  if ($("ghost").checked) body.ghost = Math.max(1e-9, +$("step").value * Math.max(1, Math.abs(values[wrt] ?? 0)));
+  try {
+    const found = await ask("/look", body);
+    if (opening === begun) {
+      say(found.error ?? "");
+      if (!found.error) {
+        last = { ...found, title: titleOf(name, body.values), wrt, body };
+        show($("now"), last, pinned);
+        tell(found, performance.now() - since);
+      }
+    }
+  } catch {
+    say("the view's server has ended; start it again");
+  }
+  busy = false;
+  if (newest) { newest = false; look(); }
+}
+
+/** Light or dark has changed: what is pinned is drawn anew too. */
+async function repaint() {
+  shade();
+  if (state.name) await look();
+  if (!pinned) return;
+  const found = await ask("/look", { ...pinned.body, dark: dark() });
+  if (!found.error && pinned) showPinned({ ...pinned, ...found });
+}
+function showPinned(shot) {
+  pinned = shot;
+  show($("pinned"), shot, null);
+  $("pinned").querySelector("figcaption").prepend("pinned: ");
+}
+
+const titleOf = (name, values) =>
+  `${name}(${Object.entries(values).map(([n, v]) => `${n} = ${+v.toPrecision(5)}`).join(", ")})`;
+const say = (text) => { $("said").textContent = text; };
+function tell(found, whole) {
+  const time = $("time");
+  time.textContent = `${(found.seconds * 1000).toFixed(1)} ms${found.slow ? ", more than a frame" : ""}`;
+  time.title = `${whole.toFixed(1)} ms until it was drawn`;
+  time.classList.toggle("slow", found.slow);
+  time.dataset.frames = String(1 + Number(time.dataset.frames ?? 0));
+}
+
+// Drawing
+
+function show(figure, shot, beside) {
+  const rows = shot.told.map(([name, value], place) => {
+    const kind = ["interior", "boundary"].includes(name) ? "part" : place > 3 ? "quiet" : "";
+    const row = make("tr", { className: kind }, make("td", { textContent: name }), make("td", { textContent: value }));
+    if (beside && beside !== shot && beside.body.name === shot.body.name && beside.wrt === shot.wrt)
+      row.append(make("td", { className: "changed", textContent: difference(shot, beside, place), title: "less the pinned one" }));
+    return row;
+  });
+  const table = make("table", { className: "numbers" }, ...rows);
+  const picture = make("div");
+  picture.innerHTML = shot.svg;
+  const list = make("ul", { className: "list" }, ...shot.surfaces.map(surfaceName), ...shot.remarks.map((text) => make("li", { textContent: text })));
+  if (!shot.numbers.converged) list.prepend(make("li", { textContent: "not as accurate as was asked" }));
+  figure.replaceChildren(make("figcaption", { textContent: shot.title }), picture, table, list);
+  light(lit);
+}
+
+const KEYS = ["value", "tangent", "interior", "boundary", "difference"];
+function difference(shot, other, place) {
+  const by = shot.numbers[KEYS[place]] - other.numbers[KEYS[place]];
+  return `Δ ${by < 0 ? "−" : "+"}${Math.abs(by).toPrecision(3)}`;
+}
+
+function surfaceName({ equation, inside }) {
+  const name = make("span", { className: "surface-name", textContent: equation });
+  name.dataset.equation = equation;
+  name.onclick = () => chosen(equation);
+  return make("li", {}, name, inside ? "" : " is not in the domain");
+}
+
+// From the picture to the code and back
+
+function chosen(equation) {
+  light(equation);
+  if (editor) editor.postMessage({ type: "reveal", equation });
+  else document.querySelector("#source mark.lit")?.scrollIntoView({ block: "nearest" });
+}
+function light(equation) {
+  lit = equation;
+  for (const element of document.querySelectorAll("[data-equation]"))
+    element.classList.toggle("lit", equation !== "" && element.dataset.equation === equation);
+}
+$("shots").addEventListener("click", (event) => {
+  const surface = event.target.closest("svg .surface");
+  if (surface) chosen(surface.dataset.equation);
+});
+
+// What is chosen
+
+const fill = (select, names, selected) =>
+  select.replaceChildren(...names.map(([value, text]) => new Option(text, value, false, String(value) === String(selected))));
+
+async function open(name, keep = false, which = 0) {
+  const opening = ++begun;
+  const found = await ask("/open", { name });
+  if (opening !== begun) return;
+  say(found.error ?? "");
+  if (found.error) { if (!keep) $("now").replaceChildren(); return; }
+  const same = keep && name === state.name && Object.keys(found.values).join() === Object.keys(state.values).join();
+  state = {
+    name, integrals: found.integrals, which: Math.min(same ? state.which : which, found.integrals - 1),
+    values: same ? state.values : found.values, wrt: same ? state.wrt : found.wrt,
+  };
+  $("name").value = name;
+  fill($("wrt"), Object.keys(state.values).map((n) => [n, n]), state.wrt);
+  fill($("which"), Array.from({ length: found.integrals }, (_, n) => [n, `integral ${n + 1} of ${found.integrals}`]), state.which);
+  $("which").hidden = found.integrals < 2;
+  if (!same) sliders();
+  formulas(found.formulas);
+  source(found);
+  moves();
+  await look();
+}
+
+function sliders() {
+  $("sliders").replaceChildren(...Object.entries(state.values).map(([name, value]) => {
+    const reach = Math.max(1, Math.abs(value));
+    const slider = make("input", { type: "range", min: value - reach, max: value + reach, step: reach / 500, value, name });
+    const told = make("output", { textContent: String(+value.toPrecision(6)) });
+    slider.dataset.parameter = name;
+    slider.oninput = () => {
+      state.values[name] = +slider.value;
+      told.textContent = String(+(+slider.value).toPrecision(6));
+      look();
+    };
+    const label = make("label", {}, make("span", { className: "name", textContent: name }), slider, told);
+    label.dataset.name = name;
+    return label;
+  }));
+}
+const moves = () => { for (const label of $("sliders").children) label.classList.toggle("moves", label.dataset.name === state.wrt); };
+
+function formulas(found) {
+  const several = new Set(found.map((each) => each.of)).size > 1;
+  const rows = found.map((each) => {
+    const math = make("td");
+    math.innerHTML = each.math;
+    return make("tr", {}, make("td", { textContent: several ? `${each.part} ${+each.of + 1}` : each.part }), math);
+  });
+  $("formulas").replaceChildren(...(rows.length ? [make("h2", { textContent: "Formulas" }), make("table", {}, ...rows)] : []));
+}
+
+function source({ source: text, conditions }) {
+  if (editor) return;
+  const parts = [];
+  let at = 0;
+  for (const each of [...conditions].sort((a, b) => a.from - b.from)) {
+    if (each.from < at) continue;
+    const mark = make("mark", { textContent: text.slice(each.from, each.to), onclick: () => chosen(each.equation) });
+    mark.dataset.equation = each.equation;
+    parts.push(text.slice(at, each.from), mark);
+    at = each.to;
+  }
+  $("source").replaceChildren(...parts, text.slice(at));
+}
+
+$("name").onchange = () => {
+  if (editor) editor.postMessage({ type: "chosen", name: $("name").value });
+  open($("name").value);
+};
+$("wrt").onchange = () => { state.wrt = $("wrt").value; moves(); look(); };
+$("which").onchange = () => { state.which = +$("which").value; look(); };
+for (const id of ["ghost", "step", "nodes"]) $(id).oninput = () => look();
+$("pin").onclick = () => {
+  if (pinned) {
+    pinned = null;
+    $("pinned").replaceChildren();
+  } else if (last) {
+    showPinned(last);
+  }
+  $("pin").textContent = pinned ? "Unpin" : "Pin";
+  if (last) show($("now"), last, pinned);
+};
+
+async function begin(wanted = "", which = 0) {
+  shade();
+  const { names, chosen: first, error } = await ask("/names", {});
+  if (error) { say(error); return; }
+  const name = names.includes(wanted) ? wanted : first;
+  fill($("name"), names.map((n) => [n, n]), name);
+  if (names.length) await open(name, false, which);
+  else say("there is no function of numbers here that has an integral");
+}
+
+window.addEventListener("message", ({ data }) => {
+  if (!editor) return;
+  switch (data.type) {
+    case "answer":
+      waiting.get(data.id)?.(data.answer);
+      waiting.delete(data.id);
+      break;
+    case "file": // another file, or this one with other names
+      lit = data.lit;
+      void begin(data.name, data.which);
+      break;
+    case "follow":
+      if (data.name !== state.name) void open(data.name, false, data.which);
+      else if (data.which !== state.which && data.which < state.integrals) {
+        state.which = data.which;
+        $("which").value = String(data.which);
+        void look();
+      }
+      light(data.lit);
+      break;
+    case "changed": // the text: what the sliders say stays
+      void open(state.name, true);
+      break;
+  }
+});
+if (editor) {
+  new MutationObserver(() => void repaint()).observe(document.body, { attributeFilter: ["class"] });
+  shade();
+  editor.postMessage({ type: "ready" });
+} else {
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => void repaint());
+  void begin();
+}
