@@ -26,7 +26,7 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 WITHOUT = {
     "mesh.po:pixel", "room.po:mean", "room.po:discomfort", "plate.po:stepped",  # too long to be read
     "geometry.po:pixel", "main.po:two_tones", "main.po:by_law", "shadows.po:sharp", "sphere.po:pixel",
-    "sphere.po:shaded", "stylize.po:pixel",
+    "sphere.po:shaded", "stylize.po:pixel", "shaders.po:law",
     # where it jumps depends on what is summed over
     "hidden.po:pixel", "polygon.po:area", "voronoi.po:cell", "voronoi.po:spread",
 }  # fmt: skip

@@ -89,7 +89,7 @@ function tell(found, whole) {
 function show(figure, shot, beside) {
   const rows = shot.told.map(([name, value], place) => {
     const kind = ["interior", "boundary"].includes(name) ? "part" : place > 3 ? "quiet" : "";
-    const row = make("tr", { className: kind }, make("td", { textContent: name }), make("td", { textContent: value }));
+    const row = make("tr", { className: kind }, make("td", { textContent: name.replace(/^central |:$/g, "") }), make("td", { textContent: value }));
     if (beside && beside !== shot && beside.body.name === shot.body.name && beside.wrt === shot.wrt)
       row.append(make("td", { className: "changed", textContent: difference(shot, beside, place), title: "less the pinned one" }));
     return row;

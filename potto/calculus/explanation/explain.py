@@ -196,10 +196,14 @@ def _with_deltas(
         return replace(found, problems=(*found.problems, f"where it jumps has no closed form: {problem}"))
     if not over:
         return found
-    smooth = words.text(work.dual(plain, tangents)[1])  # calls carried out here too: else they count twice
-    meeting = [item for item in over if continuous(item, tangents)]
+    try:
+        smooth = words.text(work.dual(plain, tangents)[1])  # calls carried out here too: else they count twice
+        meeting = [item for item in over if continuous(item, tangents)]
+        moving = [item for item in over if item.rate is not ZERO and item not in meeting]
+        deltas = tuple(words.text(item.contribution) for item in moving)
+    except NoFormula as problem:
+        return replace(found, tangent="", smooth="", problems=(*found.problems, str(problem)))
     found = replace(found, continuous=tuple(equation(item.surface) for item in meeting))
-    deltas = tuple(words.text(item.contribution) for item in over if item.rate is not ZERO and item not in meeting)
     first = f"({smooth})" if smooth.startswith("if ") else smooth  # an `else` would take in what is added
     parts = (smooth,) if not deltas else deltas if smooth == "0" else (first, *deltas)
     return replace(found, tangent=" + ".join(parts), smooth=smooth, deltas=deltas)
