@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import ast
+import functools
 from collections.abc import Iterator
 from pathlib import Path
-
-import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -79,6 +78,11 @@ def _files() -> Iterator[tuple[str, Path]]:
 MODULES = dict(_files())
 
 
+@functools.cache
+def _tree(module: str) -> ast.Module:
+    return ast.parse(MODULES[module].read_text(encoding="utf-8"))
+
+
 def _floor(module: str) -> int | None:
     """The floor of a module, counted from the top; None for the package `potto` itself."""
     for number, names in enumerate(FLOORS):
@@ -91,20 +95,26 @@ def _inside(module: str, package: str) -> bool:
     return module == package or module.startswith(package + ".")
 
 
-def _imports(module: str, path: Path) -> Iterator[tuple[str, int]]:
+@functools.cache
+def _imports(module: str) -> tuple[tuple[str, int], ...]:
+    return tuple(_imports_of(module, MODULES[module], _tree(module)))
+
+
+def _imports_of(module: str, path: Path, tree: ast.Module) -> list[tuple[str, int]]:
     """Every module that a file imports anywhere, also inside of functions; what only type checkers see is left out."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
     skipped = {id(inner) for node in ast.walk(tree) if _typing_only(node) for inner in ast.walk(node)}
+    found: list[tuple[str, int]] = []
     for node in ast.walk(tree):
         if id(node) in skipped and not isinstance(node, ast.If):
             continue
         if isinstance(node, ast.Import):
-            yield from ((alias.name, node.lineno) for alias in node.names)
+            found += ((alias.name, node.lineno) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             base = _absolute(module, path, node)
             for alias in node.names:
                 full = f"{base}.{alias.name}"
-                yield (full if full in MODULES else base), node.lineno
+                found.append((full if full in MODULES else base, node.lineno))
+    return found
 
 
 def _absolute(module: str, path: Path, node: ast.ImportFrom) -> str:
@@ -118,60 +128,92 @@ def _typing_only(node: ast.AST) -> bool:
     return isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
 
 
-@pytest.mark.parametrize("module", sorted(MODULES))
-def test_a_module_imports_only_downwards(module: str) -> None:
+def _upwards(module: str) -> Iterator[str]:
+    """What a module imports that it must not."""
     here = _floor(module)
     if module == "potto":  # loads its names when they are used
         return
-    assert here is not None, f"{module} stands on no floor: add it to FLOORS"
-    for target, line in _imports(module, MODULES[module]):
+    if here is None:
+        yield f"{module} stands on no floor: add it to FLOORS"
+        return
+    for target, line in _imports(module):
         there = _floor(target)
         if there is None:
             continue
         where = f"{MODULES[module]}:{line}"
-        assert there >= here, f"{where}: {module} imports {target} from a floor above"
+        if there < here:
+            yield f"{where}: {module} imports {target} from a floor above"
         for package, forbidden in FORBIDDEN.items():
-            wrong = _inside(module, package) and any(_inside(target, name) for name in forbidden)
-            assert not wrong, f"{where}: {module} must not know {target}"
+            if _inside(module, package) and any(_inside(target, name) for name in forbidden):
+                yield f"{where}: {module} must not know {target}"
+
+
+def test_modules_import_only_downwards() -> None:
+    assert len(MODULES) > 400
+    assert not [wrong for module in MODULES for wrong in _upwards(module)]
+
+
+def test_imports_are_seen_wherever_they_stand() -> None:
+    """At the top, in functions, and relative ones; not those for type checkers alone."""
+    text = """
+import lark
+def f():
+    from potto.cli import run
+    from ..core import terms
+if TYPE_CHECKING:
+    import numpy
+"""
+    found = _imports_of("potto.syntax.made_up", Path("made_up.py"), ast.parse(text))
+    assert sorted(found) == [("lark", 2), ("potto.cli.run", 4), ("potto.core.terms", 5)]
+
+
+@functools.cache
+def _neighbours(module: str) -> frozenset[str]:
+    """The modules that a module imports, inside of functions and for types alone, too."""
+    found = set()
+    for node in ast.walk(_tree(module)):
+        for alias in node.names if isinstance(node, ast.ImportFrom) and node.module else ():
+            full = f"{node.module}.{alias.name}"
+            target = full if full in MODULES else node.module
+            if target in MODULES:
+                found.add(target)
+    return frozenset(found)
 
 
 def _reached(module: str, rooms: tuple[str, ...]) -> set[str]:
-    """What a module leads to, of these packages, by any import: inside of functions and for types alone, too."""
+    """What a module leads to, of these packages, by any import."""
     seen: set[str] = set()
     todo = [module]
     while todo:
-        at = todo.pop()
-        tree = ast.parse(MODULES[at].read_text(encoding="utf-8"))
-        for node in ast.walk(tree):
-            for alias in node.names if isinstance(node, ast.ImportFrom) and node.module else ():
-                full = f"{node.module}.{alias.name}"
-                target = full if full in MODULES else node.module
-                if target in MODULES and target not in seen and any(_inside(target, room) for room in rooms):
-                    seen.add(target)
-                    todo.append(target)
+        for target in _neighbours(todo.pop()) - seen:
+            if any(_inside(target, room) for room in rooms):
+                seen.add(target)
+                todo.append(target)
     return seen
 
 
 NO_CIRCLES = ("potto.kernels", "potto.integrate", "potto.runtime")
 
 
-@pytest.mark.parametrize("module", [name for name in sorted(MODULES) if any(_inside(name, r) for r in NO_CIRCLES)])
-def test_numbers_have_no_import_circles(module: str) -> None:
-    assert module not in _reached(module, NO_CIRCLES)
+def test_numbers_have_no_import_circles() -> None:
+    rooms = [name for name in MODULES if any(_inside(name, room) for room in NO_CIRCLES)]
+    assert len(rooms) > 100
+    assert not [module for module in rooms if module in _reached(module, NO_CIRCLES)]
 
 
-@pytest.mark.parametrize("module", sorted(MODULES))
-def test_only_its_owner_imports_a_library(module: str) -> None:
-    for target, line in _imports(module, MODULES[module]):
-        owners = OUTSIDERS.get(target.split(".")[0])
-        if owners is not None:
-            allowed = any(_inside(module, owner) for owner in owners)
-            assert allowed, f"{MODULES[module]}:{line}: {module} may not import {target}"
+def test_only_its_owner_imports_a_library() -> None:
+    wrong = [
+        f"{MODULES[module]}:{line}: {module} may not import {target}"
+        for module in MODULES
+        for target, line in _imports(module)
+        if (owners := OUTSIDERS.get(target.split(".")[0])) is not None
+        and not any(_inside(module, owner) for owner in owners)
+    ]
+    assert not wrong
 
 
-@pytest.mark.parametrize("module", sorted(MODULES))
-def test_a_module_says_what_it_owns(module: str) -> None:
-    assert ast.get_docstring(ast.parse(MODULES[module].read_text(encoding="utf-8"))), f"{module} has no docstring"
+def test_a_module_says_what_it_owns() -> None:
+    assert not [module for module in MODULES if not ast.get_docstring(_tree(module))]
 
 
 def test_the_front_end_starts_without_numpy() -> None:
