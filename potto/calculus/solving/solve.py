@@ -90,7 +90,7 @@ class Unsolvable(Struct, frozen=True):
 
 
 class Goal(Struct, frozen=True):
-    """Still to solve: inner = value, where `inner` contains the variable and `value` does not."""
+    """Still to solve: inner = value, where only `inner` contains the variable. before: the goal that led here."""
 
     inner: Term
     value: Term
@@ -98,6 +98,14 @@ class Goal(Struct, frozen=True):
     index: str | None = None
     count: Term | None = None
     counted: Term | None = None
+    before: Goal | None = None
+
+    def repeats(self, item: Step) -> bool:
+        """Whether a step leads back to an equation on the way to this one, and so would go on for ever."""
+        at: Goal | None = self
+        while at is not None and (item.inner is not at.inner or item.value is not at.value):
+            at = at.before
+        return at is not None
 
 
 def sections(surface: Term, name: str) -> Sections | Unsolvable:
@@ -215,7 +223,7 @@ class _Search:
             return steps
         goals: list[Goal] = []
         for item in steps:
-            if item.inner is term and item.value is goal.value:  # a step that leads to itself would go on for ever
+            if goal.repeats(item):
                 return Stuck(f"`{self.name}` cannot be isolated in {format_term(term)}")
             following = self.follow(goal, item)
             if isinstance(following, Stuck):
@@ -224,7 +232,7 @@ class _Search:
         return goals
 
     def follow(self, goal: Goal, item: Step) -> Goal | Stuck:
-        following = replace(goal, inner=item.inner, value=item.value, guards=goal.guards + item.guards)
+        following = replace(goal, inner=item.inner, value=item.value, guards=goal.guards + item.guards, before=goal)
         if item.period is None:
             return following
         if goal.index is not None:
@@ -247,7 +255,7 @@ class _Search:
         for case, taken in ((term.then, True), (term.orelse, False)):
             if self.name in case.free:
                 value = if_(term.condition, goal.value, NAN) if taken else if_(term.condition, NAN, goal.value)
-                goals.append(replace(goal, inner=case, value=value))
+                goals.append(replace(goal, inner=case, value=value, before=goal))
         return goals
 
 
