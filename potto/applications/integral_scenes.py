@@ -53,7 +53,7 @@ class IntegralScene:
         world.lookup(target.file, target.name)
         found = scene(world.db, target.file, target.name)
         if found is None:
-            raise wrong_call(f"`{name}` is no function of numbers", "name a function whose parameters are numbers, "
+            raise wrong_call(f"`{name}` is not a function of numbers", "name a function whose parameters are numbers, "
                              "tuples of them, or functions of them")  # fmt: skip
         unknown = sorted(given.keys() - {parameter.name for parameter in found.parameters})
         if unknown:

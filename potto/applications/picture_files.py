@@ -35,7 +35,7 @@ def complaint(path: str, known: dict[str, tuple[str, str, str] | None] = NEEDS) 
     """Why a file can't be written, for a person: its ending, a library, its folder; None if it seems that it can."""
     ending = ending_of(path)
     if ending not in known:
-        what = f"`{ending}` is no picture" if ending else f"`{path}` does not say which kind of picture it is"
+        what = f"`{ending}` is not a picture" if ending else f"`{path}` does not say which kind of picture it is"
         return f"{what}: end the name with {', '.join(list(known)[:-1])} or {list(known)[-1]}"
     needed = known[ending]
     if needed is not None and find_spec(needed[1]) is None:

@@ -135,7 +135,7 @@ def _surfaces(db: Database, term: Term) -> dict[str, None]:
 
 
 def derivative_facts(db: Database, file: str, name: str) -> DerivativeFacts | None:
-    """The derivative of a definition in symbols; None for one that is no function."""
+    """The derivative of a definition in symbols; None for one that is not a function."""
     whole = core(db, file, name).term
     term = whole
     while isinstance(term, Deriv | Global):

@@ -47,7 +47,7 @@ class Library:
         return key
 
     def put_bytes(self, key: str, data: bytes) -> Located | None:
-        """The same from bytes; the diagnostic if they are no text."""
+        """The same from bytes; the diagnostic if they are not text."""
         text = decode(data) if len(data) <= MAX_BYTES else Unreadable("too large", f"{len(data):,} bytes")
         if isinstance(text, Unreadable):
             return Located(key, unreadable(text, key, NOWHERE, "standard input"))

@@ -44,7 +44,7 @@ def unpacked(data: bytes) -> Any:
             reader.terms.append(rebuilt(reader.kinds[row[0]], tuple(map(reader.value, row[1:]))))
         return reader.value(root)
     except Exception as error:  # bytes of others may lead to any
-        raise ValueError(f"these bytes are no value: {error}") from None
+        raise ValueError(f"these bytes are not a value: {error}") from None
 
 
 def keep(kind: str, key: bytes, value: object) -> None:

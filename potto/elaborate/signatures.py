@@ -31,7 +31,7 @@ class Signature(Struct, frozen=True):
 def signature(db: Database, file: str, name: str) -> Signature | None:
     """The signature of a definition, through aliases, imports, `deriv` and partial application; None if there is none.
 
-    A value that is no function has no groups.
+    A value that is not a function has no groups.
     """
     item = definition(db, file, name)
     if item is None:

@@ -1,6 +1,6 @@
 """Files on disk, and in open editors, as inputs of the database.
 
-Owns `Files`: loading, what is wrong with a file that is no text, the workspace's roots, unsaved texts, and noticing
+Owns `Files`: loading, what is wrong with a file that is not text, the workspace's roots, unsaved texts, and noticing
 what changed on disk. Queries never read the disk. They read the inputs `("file", key)`, `("overlay", key)`,
 `("folder", path)`, `("data", path)`, which is what a file of data holds, and `("workspace",)`; an input that was never
 set is loaded once, at its first reading (`Database.on_missing_input`), which is sound because nothing can have read it

@@ -11,7 +11,7 @@ from potto.runtime.evaluation.arguments import uncurried
 
 
 def kernel_text(program: Program, file: str, name: str) -> str | None:
-    """The kernel of a function that carries one tangent in every number; None for what is no function."""
+    """The kernel of a function that carries one tangent in every number; None for what is not a function."""
     term = program.linker.function(program.linker.term(file, name))
     if not isinstance(term, Lam):
         return None

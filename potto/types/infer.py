@@ -199,7 +199,7 @@ def _list(inference: Inference, node: nodes.ListLiteral) -> Type:
 
 
 def value_only(inference: Inference, type: Type, expr: nodes.Expr, what: str) -> None:
-    """Check, now or when the type is known, that this is no function and no comparison."""
+    """Check, now or when the type is known, that this is neither a function nor a comparison."""
     if isinstance(resolve(type), Truth):
         inference.report(comparison(expr, what))
     elif not isinstance(resolve(type), Real):

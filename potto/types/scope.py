@@ -70,7 +70,7 @@ class Builtin:
 
 @value
 class Module:
-    """A module's name, which is no value."""
+    """A module's name, which is not a value."""
 
     name: str
 

@@ -257,7 +257,7 @@ def with_items(type: TupleOf, items: tuple[Type, ...]) -> TupleOf:
 def dual_of_tuple(duals: tuple[Type, ...], dual: bool = False, record: RecordName | None = None) -> Type:
     """The dual of a tuple of numbers (and tuples of them): the tuple of values, then the tuple of tangents.
 
-    What is no tuple of numbers (a function in it, something wrong) keeps its duals side by side.
+    What is not a tuple of numbers (a function in it, something wrong) keeps its duals side by side.
     """
     pairs = [d.items for d in duals if isinstance(d, TupleOf) and len(d.items) == 2]
     if len(pairs) != len(duals):

@@ -73,7 +73,7 @@ def call_of(session: Conversation, text: str, usage: str) -> Called:
     parameters = head.groups
     given: list[tuple[str, nodes.Expr]] = []
     if len(parameters) < len(groups):
-        raise Refusal(f"`{head.text}` is no function of known parameters", f"write `{usage}`")
+        raise Refusal(f"`{head.text}` is not a function of known parameters", f"write `{usage}`")
     for group, arguments in zip(parameters, groups):
         given += _filled(group, arguments)
     if len(parameters) != len(groups):

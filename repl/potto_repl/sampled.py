@@ -69,7 +69,7 @@ def axes_of(session: Conversation, text: str, count: int, usage: str) -> Axes:
         asked = checked(session, text, usage)
     if not isinstance(asked.type, FunctionType | Diffeo) or len(asked.groups) != 1 or len(asked.groups[0]) != count:
         what = "one number" if count == 1 else f"{count} numbers"
-        raise Refusal(f"`{text}` is no function of {what}", f"write `{usage}`, or leave a name free: `sin(x)`")
+        raise Refusal(f"`{text}` is not a function of {what}", f"write `{usage}`, or leave a name free: `sin(x)`")
     return _axes(session, text, asked)
 
 

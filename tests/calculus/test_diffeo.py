@@ -239,7 +239,7 @@ def test_a_given_inverse_is_proven_or_says_that_it_was_sampled() -> None:
 def test_a_condition_on_an_integral_says_why_and_what_to_write_instead() -> None:
     (said,) = check("def f(t) integral [0, 1] [(integral [0, 1] [y < x*t] d(y)) > 0.1] d(x)")
     assert said.code == "P0402" and "`x` is inside an integral" in said.notes[0]
-    assert said.help == "write what `integral [0, 1] [y < x*t] d(y)` comes to as a formula in `x`"
+    assert said.help == "write `integral [0, 1] [y < x*t] d(y)` as a formula in `x`"
     assert not check("def f(t) integral [0, 1] [clamp(x*t, 0, 1) > 0.1] d(x)")
 
 

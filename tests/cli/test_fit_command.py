@@ -94,7 +94,7 @@ def test_the_way_there_is_drawn(potto: Potto, tmp_path) -> None:
     svg = (tmp_path / "way.svg").read_text()
     assert ">step<" in svg and ">loss<" in svg and "evaluations" in svg
     ran = potto("fit", "s.po", "loss", "a=0", "--plot", "way.bmp")
-    assert ran.status == 2 and "`.bmp` is no picture" in ran.err and ran.out == ""
+    assert ran.status == 2 and "`.bmp` is not a picture" in ran.err and ran.out == ""
     pytest.importorskip("matplotlib")
     assert potto("fit", "s.po", "loss", "a=0", "--plot", "way.png").status == 0
     assert (tmp_path / "way.png").read_bytes().startswith(b"\x89PNG")

@@ -109,7 +109,7 @@ def test_for_machines(potto: Potto) -> None:
     (["pixel", "c=1", "--axes", "px"], "two axes", 1),
     (["pixel", "c"], "which parameter is what", 2),
     (["pixel", "c=1", "-o", "no/such/folder.png"], "there is no folder `no/such`", 2),
-    (["3"], "is no function", 1),
+    (["3"], "is not a function", 1),
 ])  # fmt: skip
 def test_mistakes(potto: Potto, words, said, status) -> None:
     ran = potto("render", "s.po", *words, s=SCENE)

@@ -98,7 +98,7 @@ def test_exr_holds_the_numbers(potto: Potto, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("words", "said"), [
-    (["-o", "x.bmp"], "`.bmp` is no picture: end the name with .png"),
+    (["-o", "x.bmp"], "`.bmp` is not a picture: end the name with .png"),
     (["-o", "x"], "`x` does not say which kind"),
     (["-o", "x.gif"], "say what moves, `--over c=-2..0`"),
     (["-o", "x.png", "--over", "a=0..1"], "an animation ends with .gif, .mp4, .npy"),

@@ -43,7 +43,7 @@ def test_folders_and_devices(tmp_path: Path) -> None:
     assert unread(tmp_path / "data.csv")[:2] == ("P0801", "`data.csv` is a folder, not a file")
     if hasattr(os, "mkfifo"):
         os.mkfifo(tmp_path / "pipe.csv")
-        assert unread(tmp_path / "pipe.csv")[:2] == ("P0801", "`pipe.csv` is no ordinary file")
+        assert unread(tmp_path / "pipe.csv")[:2] == ("P0801", "`pipe.csv` is not an ordinary file")
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="who may read everything is never refused")

@@ -131,7 +131,7 @@ def said(text: str, name: str = "t.csv") -> tuple[str, int | None, int | None, s
         ("x,y\n", ("P0805", None, None, "", "the file has a header and no rows")),
         ("", ("P0805", None, None, "", "the file holds no values")),
         ("# nothing\n\n", ("P0805", None, None, "", "the file holds no values")),
-        ("1,2\n3,\0\n", ("P0805", 2, None, "", "line 2 holds a NUL byte: this is no text")),
+        ("1,2\n3,\0\n", ("P0805", 2, None, "", "line 2 holds a NUL byte: this is not text")),
     ],
 )  # fmt: skip
 def test_mistakes(text: str, expected: tuple[object, ...]) -> None:
@@ -149,7 +149,7 @@ def test_a_long_text_is_shown_in_part() -> None:
 def test_what_is_no_utf8() -> None:
     found = mistake("t.csv", b"x\n1\n\xe9\n")
     assert (found.code, found.row, found.found) == ("P0805", 3, "0xe9")
-    assert found.message == "line 3 is no text in UTF-8: it holds the byte 0xe9"
+    assert found.message == "line 3 is not text in UTF-8: it holds the byte 0xe9"
     assert mistake("t.csv", "x\n1".encode("utf-16")).message == "this is a text in UTF-16, not in UTF-8"
     assert mistake("t.csv", b"\xef\xbb\xbfx\n\xff").row == 2
 

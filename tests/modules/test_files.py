@@ -1,4 +1,4 @@
-"""Files on disk and in editors: loading, what is no text, noticing changes."""
+"""Files on disk and in editors: loading, what is not text, noticing changes."""
 
 from __future__ import annotations
 

@@ -237,9 +237,9 @@ def no_inverse(
     help = _ADVICE[role if searchable else "bracket"].format(format_term(surface))
     inner = next((node for node in postorder(surface) if isinstance(node, Integral)), None)
     if inner is not None:  # neither can be done: an inverse is a formula, and is verified as one
-        reasons = (*reasons, "what an integral comes to is found by numbers, and the surface has to be known before")
+        reasons = (*reasons, "an integral is evaluated by numbers, and the surface has to be known before")
         what = " or ".join(f"`{name}`" for name in variables if name in inner.free)
-        help = f"write what `{format_term(inner)}` comes to as a formula in {what}" if what else help
+        help = f"write `{format_term(inner)}` as a formula in {what}" if what else help
     called = {node.function for node in postorder(surface) if isinstance(node, App)}
     named = next((node for node in postorder(surface) if isinstance(node, Global) and node not in called), None)
     if named is not None and role == "bracket":  # what is arithmetic, or an array, is not seen as a name here

@@ -111,7 +111,7 @@ def definition_markdown(db: Database, file: str, name: str) -> str:
 
 
 def _no_diffeo(db: Database, file: str, name: str) -> str:
-    """Why a definition is no diffeomorphism."""
+    """Why a definition is not a diffeomorphism."""
     wrong = next((d for d in definition_diagnostics(db, file, name) if d.severity == "error"), None)
     if wrong is None:
         return "**no diffeomorphism**"

@@ -47,7 +47,7 @@ def show_derivative(session: Conversation, text: str) -> Part:
             f"write `:grad {text.strip()}` for numbers, or name the function alone",
         )
     if not isinstance(asked.type, Function | Diffeo):
-        raise Refusal(f"`{text.strip()}` is no function, so there is nothing to differentiate by")
+        raise Refusal(f"`{text.strip()}` is not a function, so there is nothing to differentiate by")
     found = derivative_text(session, asked)
 
     def named(text: str) -> str:
