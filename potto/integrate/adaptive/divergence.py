@@ -25,7 +25,7 @@ from potto.integrate.rules.gauss import EPS, gauss
 from potto.integrate.rules.substitution import Segments
 from potto.kernels.cells import Array, Bools, Ints
 
-# The error of a value, as a part of what is added up, from which on it is not a value; that of a piece which is to blame.
+# The error of a value, as a part of what is added up, from which on it is no longer one; that of a piece to blame.
 HOPELESS, BLAMED = 1e-2, 1e-3
 # How many times the errors of integrals further in an error may be that is nothing else.
 NOISE = 8.0
