@@ -101,7 +101,7 @@ def test_for_machines(potto: Potto) -> None:
     (["pixel"], "`px`, `py`, `c`", 1),
     (["pixel", "c=1", "--wrt", "d"], "no parameter `d`", 1),
     (["pixle"], "not defined", 1),
-    (["pixel", "c=1", "--size", "0x3"], "no size", 2),
+    (["pixel", "c=1", "--size", "0x3"], "not a size", 2),
     (["pixel", "c=1", "--box", "1,0,0,1"], "not X0,X1,Y0,Y1", 2),
     (["pixel", "c=1", "--box", "0,1,1,1"], "not X0,X1,Y0,Y1", 2),
     (["pixel", "c=1", "--range", "1,0"], "not LO,HI", 2),

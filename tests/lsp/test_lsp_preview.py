@@ -103,7 +103,7 @@ def test_components_and_holes(server: Server, uri: Uri) -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"name": "width"}, "no function"),
+        ({"name": "width"}, "not a function"),
         ({"name": "nowhere"}, "nowhere"),
         ({"values": {"k": 1}}, "more parameters"),
         ({"values": {"k": 1, "m": "1 +"}}, "expected"),
