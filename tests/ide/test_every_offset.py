@@ -1,5 +1,5 @@
 """Every feature all along every example, also when the text is broken: an answer or none, never an exception, and
-nothing outside of it. `make fuzz` asks at every offset, `make test` at every fifth."""
+nothing outside of it. `make fuzz` asks at every offset, `make test` at every eleventh."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def test_every_feature_here_and_there(name: str) -> None:
 def test_every_feature_all_along(name: str) -> None:
     """With those that look through the workspace, and every action and proposal resolved."""
     library, file, text = opened(name)
-    offsets = range(0, len(text) + 1, examples(5, 1))
+    offsets = range(0, len(text) + 1, examples(11, 1))
     ask_everything(library, file, text, offsets)
     db = library.db
     for offset in offsets:

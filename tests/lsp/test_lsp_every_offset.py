@@ -1,6 +1,7 @@
 """Every request about a place, all along every example, through a real server: never an internal error.
 
-The features themselves are asked more often by `tests/ide/test_every_offset.py`; `make fuzz` asks at every offset.
+The features themselves are asked more often by `tests/ide/test_every_offset.py`, at a fraction of the cost; `make fuzz`
+asks at every offset.
 """
 
 from __future__ import annotations
@@ -76,4 +77,4 @@ def test_at_some_offsets(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
 def test_at_offsets_of_every_example(path: Path) -> None:
-    at_offsets(path, examples(11, 1))
+    at_offsets(path, examples(37, 1))
