@@ -17,6 +17,7 @@ FAIR = (-32800, -32801, -32803)  # cancelled, outdated, refused: what a client m
 NEEDS = {  # what the server asks a client, by what the client must have said that it can do
     "client/registerCapability": "workspace.didChangeWatchedFiles.dynamicRegistration",
     "workspace/configuration": "workspace.configuration",
+    "workspace/codeLens/refresh": "workspace.codeLens.refreshSupport",
     "workspace/inlayHint/refresh": "workspace.inlayHint.refreshSupport",
     "workspace/diagnostic/refresh": "workspace.diagnostics.refreshSupport",
     "window/workDoneProgress/create": "window.workDoneProgress",

@@ -144,7 +144,7 @@ def test_answers_stay_at_hand(talk):
 
 def test_an_answer_is_the_value_that_was_answered(talk):
     talk.all(JUMP, ":method mc", ":set samples 1000", "f(0.3)")
-    first = talk.session.entries[-1].outcomes[0].estimates[0]
+    (first,) = [e for outcome in talk.session.entries[-1].outcomes for e in getattr(outcome, "estimates", ())]
     talk.all(":set seed 8", ":set samples 5000", "def f(t) 100*t")  # nothing of this changes what was answered
     again = talk.data("_")
     assert again["value"] == first.value and 1e-3 < first.error < 0.1
