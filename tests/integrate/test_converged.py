@@ -16,6 +16,10 @@ import numpy as np
 import pytest
 
 import potto
+from potto.core.terms import ONE, ZERO, add, integral, var
+from potto.integrate.pieces import Sums
+from potto.projects.settings import DEFAULTS
+from potto.runtime.answers.convergence import missing
 
 INF = math.inf
 
@@ -144,6 +148,14 @@ def test_members_of_a_batch_converge_by_themselves(method: Any) -> None:
     assert (answer.member_converged == (answer.error <= 0.1 * answer.value)).all()
     assert answer.member_converged[1] and not answer.member_converged[0] and not answer.converged
     assert answer.reasons_of(0) == answer.reasons and not answer.reasons_of(1)
+
+
+def test_what_is_infinite_give_or_take_infinity_is_looked_at_again() -> None:
+    """Of the derivatives 1, inf, inf and 1 with these errors only the first is as accurate as was asked for."""
+    v, t = np.full((1, 4), 2.0), np.array([[[1.0, INF, -INF, 1.0]]])
+    sums = Sums(v, np.full((1, 4), 1e-14), t, np.array([[[1e-13, INF, INF, 0.1]]]))
+    term = integral(("x",), ((ZERO, ONE),), add(var("x"), ONE))
+    assert missing(term, sums, DEFAULTS, {}).tolist() == [False, True, True, True]
 
 
 def test_arrays_say_who_missed() -> None:

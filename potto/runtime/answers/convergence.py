@@ -96,6 +96,7 @@ def missing(term: Integral, sums: Sums, settings: Settings, env: dict[str, Value
         size = np.abs(number)
         speck = SPECK * np.max(size, axis=-1, keepdims=True, initial=0.0, where=np.isfinite(size))
         fine = error <= np.maximum(np.maximum(settings.atol, settings.rtol * size), np.maximum(within, speck))
+        fine &= np.isfinite(error)  # of what may be infinite, and may be anything, nothing is known yet
         out |= ~fine.reshape(-1, out.size).all(axis=0)
     return out
 
