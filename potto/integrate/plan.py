@@ -65,7 +65,8 @@ class Plan(Struct, frozen=True, dict=True):
     decisions: plain terms and the values that they had when the plan was made; it holds where they are the same.
     reaches: whether every jump is known of; if not, boundary terms may be missing.
     hides: whether there are jumps whose side can't be forced, though it is known where they are.
-    box: how members of a batch are recognized that no surface cuts, where that can be told.
+    surfaces: all that a box which nothing cuts has on one side. inlined: the integrand with calls carried out, where
+    that can be done.
     doublings: how often its surfaces double what quadrature takes, about: up to three times each.
     straight: its terms where it can be integrated by rules that are proved to do, if the parameters let it.
     premise: what has to be positive for the plan to hold: for these parameters some cases are never met.
@@ -84,7 +85,8 @@ class Plan(Struct, frozen=True, dict=True):
     decisions: tuple[tuple[Term, float | None], ...]
     reaches: bool = True
     hides: bool = False
-    box: Box | None = None
+    surfaces: tuple[Term, ...] = ()
+    inlined: Term | None = None
     doublings: int = 0
     straight: Straight | None = None
     premise: Lam | None = None
@@ -93,6 +95,11 @@ class Plan(Struct, frozen=True, dict=True):
     degrees: tuple[int | None, ...] = ()
     over: LevelSet | None = None
     kinks: Lam = NO_KINKS
+
+    @cached_property
+    def box(self) -> Box | None:
+        """How members of a batch are recognized that no surface cuts, where that can be told."""
+        return None if self.inlined is None else box_of(self.term, self.surfaces, self.body, self.inlined)
 
     @cached_property
     def searches(self) -> int:
@@ -191,7 +198,8 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve, numb
         tuple((t, v) for t, v in asked.decisions.items() if not isinstance(t, Const)),
         reaches,
         hides or over is not None,
-        None if inlined is None else box_of(term, found, body, inlined),
+        tuple(dict.fromkeys(f.surface for f in found)),
+        inlined,
         _doublings(term, found),
         None if inlined is None else straight(term, inlined, levels),
         _premise(premises),

@@ -20,7 +20,6 @@ from msgspec import Struct
 
 from potto.calculus.algebra.degree import degree, plane
 from potto.calculus.solving.enclosable import enclosable
-from potto.calculus.surfaces.discontinuities import Finding
 from potto.core.kinds import union_of
 from potto.core.terms import Branch, Const, Integral, Lam, Term, Tuple, children, function_of, postorder, tuple_
 from potto.integrate.columns import distinct
@@ -92,7 +91,7 @@ class Box(Struct, frozen=True, dict=True, eq=False):
         return union_of(self.surfaces[self.flat :]) - set(self.variables)
 
 
-def box_of(term: Integral, found: Iterable[Finding], body: Lam, inlined: Term) -> Box | None:
+def box_of(term: Integral, surfaces: Iterable[Term], body: Lam, inlined: Term) -> Box | None:
     """The box of an integral, or None if its bounds depend on its variables or a surface can't be enclosed over it.
 
     inlined: the integrand with calls carried out.
@@ -103,16 +102,19 @@ def box_of(term: Integral, found: Iterable[Finding], body: Lam, inlined: Term) -
         return None
     if any(isinstance(node, Integral) for node in postorder(term.body)):
         return None
-    surfaces = tuple(dict.fromkeys(f.surface for f in found if f.surface.free & names))
-    flat = tuple(s for s in surfaces if all(plane(s, (name,)) for name in names))
-    curved = tuple(s for s in surfaces if s not in flat)
+    flat: list[Term] = []
+    curved: list[Term] = []
+    for surface in surfaces:
+        if surface.free & names:
+            (flat if all(plane(surface, (name,)) for name in names) else curved).append(surface)
     if not all(map(enclosable, curved)):
         return None
     nodes = postorder(inlined)
     large = len(nodes) > MOST_TERMS
     sides = () if large else tuple(dict.fromkeys(n.surface for n in nodes if isinstance(n, Branch)))
-    decided = tuple(s for s in sides if s in surfaces)
-    places = tuple((*flat, *curved).index(s) for s in decided)
+    number = {surface: i for i, surface in enumerate((*flat, *curved))}
+    decided = tuple(s for s in sides if s in number)
+    places = tuple(number[s] for s in decided)
     plan = _plan(term, inlined, decided)
     return Box(term.variables, function_of(tuple_(bounds)), (*flat, *curved), len(flat), plan, places,
                body if large else None)  # fmt: skip
