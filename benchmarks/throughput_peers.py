@@ -100,7 +100,7 @@ def _jax(quadax: bool) -> Iterator[Peer]:
 
         def whole(c: Any, cut: bool = cut) -> Any:
             ends = jnp.stack([jnp.zeros(()), -c, jnp.ones(())]) if cut else jnp.array([0.0, 1.0])
-            return quadgk(jax.vmap(lambda x: inner(x, c, cut)), ends)[0]
+            return quadgk(jnp.vectorize(lambda x: inner(x, c, cut)), ends)[0]
 
         rate = jax.jit(jax.grad(whole))
         yield name, lambda rate=rate: float(rate(C)), True

@@ -36,7 +36,7 @@ LEAST = 2048  # members, from which on a batch has blocks: below, the calls for 
 # Members of a block: as many as take ENOUGH seconds at least, tried from PILOT on; after less than LITTLE with 64 times
 # as many, else with 8 times. What is cut in a block costs a few milliseconds whatever there is of it, so that a picture
 # that takes 28 ms in one block takes 83 in 16.
-PILOT, MOST = 1 << 6, 1 << 20
+PILOT, MOST = 1 << 6, 1 << 18
 ENOUGH, LITTLE = 0.25, 0.03
 COLD = 2.0  # seconds, less than which the first run may only have been slow because it was the first
 TILE = 0.5  # seconds of a tile by the clock

@@ -27,7 +27,7 @@ from potto.kernels.native.promotion import Promotion
 # Nodes per variable: first few, then more for the boxes that need them.
 ORDERS = (4, 8)
 # Nodes that are evaluated at once by numpy; boxes at once by machine code.
-POINTS, BOXES = 1 << 15, 1 << 13
+POINTS, BOXES = 1 << 16, 1 << 13
 
 Way = Callable[[dict[str, Value], Array, Array], "tuple[Sums, Bools] | None"]
 
