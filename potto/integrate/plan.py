@@ -25,7 +25,7 @@ from potto.calculus.inlining.expand import expanded
 from potto.calculus.inlining.unrolled import unrolled
 from potto.calculus.solving.enclosable import slope_of
 from potto.calculus.surfaces.branch_assignment import box_of as extents
-from potto.calculus.surfaces.case_split import cased
+from potto.calculus.surfaces.case_split import by_extremes
 from potto.calculus.surfaces.discontinuities import Decide, Finding, Resolve, findings
 from potto.calculus.surfaces.hoist import hidden, hoisted
 from potto.calculus.surfaces.lifted import Lifted, lifted
@@ -168,7 +168,7 @@ def make(term: Integral, resolve: Resolve, decide: Decide, inline: Resolve, numb
     """
     asked = _Asked(resolve, decide)
     over = placed_along(term)
-    term = cased(term if over is None else integral(term.variables, term.bounds, over.weight, term.hints))
+    term = by_extremes(term if over is None else integral(term.variables, term.bounds, over.weight, term.hints))
     found = asked.findings(term.body)
     premises: tuple[Term, ...] = ()
     confused = False

@@ -28,7 +28,7 @@ from potto.calculus.decomposition.surface_cuts import (
     points_of,
 )
 from potto.calculus.differentiation.level_sets import LevelSet
-from potto.calculus.surfaces.case_split import cased
+from potto.calculus.surfaces.case_split import by_extremes
 from potto.calculus.surfaces.discontinuities import Decide, Finding, Kind, Resolve, findings
 from potto.core.terms import Integral, Term
 
@@ -177,7 +177,7 @@ def _kind(placed: Placed) -> Kind:
 
 def outer_findings(term: Integral, resolve: Resolve, decide: Decide) -> tuple[Finding, ...]:
     """What the variables around an integral see of it: jumps that none of its variables take part in, and kinks."""
-    term = cased(term)
+    term = by_extremes(term)
     found = findings(term.body, resolve, decide)
     inner = set(term.variables)
     bounds = (f for pair in term.bounds for bound in pair for f in findings(bound, resolve, decide))

@@ -1,12 +1,15 @@
 """Conditions on abs, min, max and clamp as conditions on what is inside of them.
 
-Owns `cased`, `unnested` and `resolved`. The surface of `[max(x, y) < t]` runs along x and along y, so that no
-variable of integration cuts all of it; those of `if [x >= y] then [x < t] else [y < t]` do. The condition that chooses
-has no jump of its own.
+Owns `cased`, `by_extremes`, `unnested` and `resolved`. The surface of `[max(x, y) < t]` runs along x and along y, so
+that no variable of integration cuts all of it; those of `[x < t]*[y < t]` do, which is the same. Where a condition does
+not rise or fall with what is the greatest or the least, a condition that has no jump of its own chooses between cases.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+from potto.calculus.algebra.ranges import positive
 from potto.calculus.surfaces.nested_brackets import has_nested
 from potto.core.terms import (
     Branch,
@@ -27,18 +30,28 @@ from potto.core.terms import (
 from potto.primitives import PRIMITIVES
 
 _FLAT = ("max", "min", "clamp")
+_EXTREME = frozenset(op for op, entry in PRIMITIVES.items() if op in ("max", "min") or entry.extremes)
 MOST = 8  # cases that one condition is taken apart into
 
 
 def cased(term: Integral) -> Integral:
     """An equal integral, or the same one where there is nothing to take apart."""
-    if not any(isinstance(node, Branch) and _changes(node) for node in postorder(term.body)):
+    return _changed(term, lambda node: _apart(node, MOST) if _changes(node) else node)
+
+
+def by_extremes(term: Integral) -> Integral:
+    """The same with a condition on a greatest or a least as one on each of them, where that is an `and` or an `or`."""
+    return _changed(term, lambda node: _settled(node, MOST))
+
+
+def _changed(term: Integral, change: Callable[[Branch], Term]) -> Integral:
+    if not any(isinstance(node, Branch) and _bent(node) for node in postorder(term.body)):
         return term
 
-    def change(node: Term, new: Term) -> Term:
-        return _apart(new, MOST) if isinstance(node, Branch) and _changes(node) else new
+    def changed(_: Term, new: Term) -> Term:
+        return change(new) if isinstance(new, Branch) and _bent(new) else new
 
-    return with_integrand(term, transform(term.body, change))
+    return with_integrand(term, transform(term.body, changed))
 
 
 def resolved(term: Term) -> Term:
@@ -85,6 +98,65 @@ def _split(node: Term, most: int) -> Term:
     down = _split(branch((neg(rest),), node.strict, node.then, node.orelse), most // 2)
     none = node.orelse if node.strict else node.then  # a parameter may be 0 over the whole domain
     return branch((apart,), True, up, branch((neg(apart),), True, down, none))
+
+
+def _bent(node: Branch) -> bool:
+    """Whether a condition is on abs, min, max or clamp of something."""
+    return any(isinstance(part, Prim) and PRIMITIVES[part.op].cases for part in _outside(node.surface))
+
+
+def _settled(node: Term, most: int) -> Term:
+    """A condition on a greatest or a least as one on each of them; one in which it can't be is split by cases if these
+    vary with less."""
+    if not isinstance(node, Branch) or len(node.coordinates) != 1:
+        return node
+    (surface,) = node.coordinates
+    chosen = _outermost(surface)
+    if len(chosen) == 1:  # of n in one sum there would be 2^n conditions
+        (part,) = chosen
+        written = PRIMITIVES[part.op].extremes
+        extreme = part if written is None else written(*part.args)
+        rises = _direction(surface, part) if part.op in _EXTREME else 0
+        if rises and isinstance(extreme, Prim) and extreme.op in ("max", "min") and len(extreme.args) <= most:
+            every = (extreme.op == "max") == (rises < 0)
+            found = node.then if every else node.orelse
+            for arg in reversed(extreme.args):
+                yes, no = (found, node.orelse) if every else (node.then, found)
+                own = branch((replaced(surface, {part: arg}),), node.strict, yes, no)
+                found = _settled(own, most // len(extreme.args))
+            return found
+    return _apart(node, most) if _changes(node) else node
+
+
+def _outermost(surface: Term) -> list[Prim]:
+    """The builtins of a surface that choose and vary, those not inside of others."""
+
+    def chooses(node: Term) -> bool:
+        return isinstance(node, Prim) and PRIMITIVES[node.op].cases is not None and bool(node.free)
+
+    order = postorder_by(surface, lambda node: () if bound_names(node) or chooses(node) else children(node))
+    return [node for node in order if isinstance(node, Prim) and chooses(node)]
+
+
+def _direction(surface: Term, part: Term) -> int:
+    """+1 where a surface rises with a part of it, -1 where it falls, as sums, products and quotients show; 0 where it
+    is not known."""
+    above, sign = surface, 1
+    while above is not part:
+        if not isinstance(above, Prim):
+            return 0
+        inside = [n for n, arg in enumerate(above.args) if any(node is part for node in _outside(arg))]
+        if len(inside) != 1 or above.op not in ("add", "neg", "mul", "div"):
+            return 0
+        (place,) = inside
+        others = [arg for n, arg in enumerate(above.args) if n != place]
+        if above.op in ("mul", "div"):
+            if (above.op == "div" and place) or not all(positive(arg) or positive(neg(arg)) for arg in others):
+                return 0
+            sign *= -1 if sum(positive(neg(arg)) for arg in others) % 2 else 1
+        sign *= -1 if above.op == "neg" else 1
+        above = above.args[place]
+    return sign
 
 
 def _changes(node: Branch) -> bool:

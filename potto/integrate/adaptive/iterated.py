@@ -97,7 +97,9 @@ class Iteration(Struct):
         if keep is not None:
             here, sides = seg.pick(keep), {g: take(m, keep) for g, m in sides.items()}
         moving = cuts.moving and machine.directions > 0
-        work = PanelBatch(self, number, level, env, here, sides, machine, moving, batch, root, slack, cuts.conflict)
+        work = PanelBatch(
+            self, number, level, env, here, sides, machine, moving, batch, root, slack, cuts.conflict, cuts.paired
+        )
         sums = integrated(work)
         if not number and (lost_far_out := sums.undefined(batch)).size:
             self.nearer(work, sums, lost_far_out)
@@ -130,7 +132,7 @@ class Iteration(Struct):
         sides = {g: take(m, rows) for g, m in work.sides.items()}
         again = integrated(PanelBatch(
             self, work.number, work.level, work.env, seg, sides, work.machine, work.moving, work.batch, work.root,
-            work.slack, work.conflict,
+            work.slack, work.conflict, work.paired,
         ))  # fmt: skip
         again.e += left_out
         again.et += left_out

@@ -50,7 +50,7 @@ def integrated(work: PanelBatch) -> Sums:
     if work.last and work.parent.extent is not None:
         size = fresh.size.reshape(work.width, -1, fresh.segment.size)[:, 0].max(axis=0)
         work.parent.extent.saw_values(size / (work.seg.b - work.seg.a), work.below(work.seg.owner))
-    if work.conflict and not work.last:
+    if (work.conflict or work.paired) and not work.last:
         work.steps = steps_at_cuts(work, fresh)
     found = totals(work, fresh, ends)
     if good_enough(work, fresh, found, ends):

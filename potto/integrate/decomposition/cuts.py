@@ -47,6 +47,8 @@ class Cuts(Struct):
     brushes: edges at which only something further in changes. folds: where roots of one surface are at one place.
     slivers: what may lie between cuts that are taken for one. lost: the most that cuts left out may matter.
     conflict: cuts all but at one place move differently: harmless only where the integrand does not jump there.
+    paired: cuts at one place, at which it should only bend, move as one: so does a surface that runs along what is
+    further in, where it leaves the one bound and the other.
     """
 
     sign: Array
@@ -55,6 +57,7 @@ class Cuts(Struct):
     edges: list[Edge]
     bound_nan: Bools | None
     conflict: bool = False
+    paired: bool = False
     meetings: list[Meeting] = []
     brushes: list[Edge] = []
     folds: list[Fold] = []
@@ -141,15 +144,15 @@ def segments(
     turning = (row.turning or (row.cut >= 0 and plan.level.cuts[row.cut].turning) for row in rows)
     beyond = [(root, True) for root, turns in zip(roots, turning, strict=True) if turns]
     rank = np.zeros((count + 2, batch), dtype=np.int64)
-    conflict = merged = False
+    conflict = paired = merged = False
     blur = np.zeros_like(x)
     if count == 1:  # in order already
         rank[1] = _rank(plan, rows[0]) * inside[1]
     elif count:
-        x, e, t, rank, conflict, blur = _sorted(plan, rows, x, e, t, inside)
+        x, e, t, rank, (conflict, paired), blur = _sorted(plan, rows, x, e, t, inside)
         merged = bool(blur.any())
     cuts = _pieces(x, e, t, rank, blur, sign, beyond, edges)
-    cuts.conflict, cuts.brushes = conflict, brushes
+    cuts.conflict, cuts.paired, cuts.brushes = conflict, paired, brushes
     if merged or edges or not nested or any(row.hides is not None for row in rows):
         cuts.slivers = slivers(plan, rows, low, high, ((tl, el), (th, eh)), directions, batch, kin)
     if directions:
@@ -198,8 +201,8 @@ def _edges(
 
 def _sorted(
     plan: LevelPlan, rows: list[Row], x: Array, e: Array, t: Array, inside: Bools
-) -> tuple[Array, Array, Array, Ints, bool, Array]:
-    conflict, blur = False, np.zeros_like(x)
+) -> tuple[Array, Array, Array, Ints, tuple[bool, bool], Array]:
+    conflict, paired, blur = False, False, np.zeros_like(x)
     order = np.argsort(x, axis=0, kind="stable")
     # the bounds stay first and last even among equals: candidates were clipped to the upper bound
     member = np.arange(x.shape[1])
@@ -218,8 +221,10 @@ def _sorted(
             speeds = t[: t.shape[0] // 2]
             apart = np.abs(speeds[:, 1:] - speeds[:, :-1]) > 1e-9 * (np.abs(speeds[:, 1:]) + np.abs(speeds[:, :-1]))
             conflict = bool((near & apart.any(axis=0)).any())
+            bends = (rank[1:] == 1) & (rank[:-1] == 1) & speeds[:, 1:].any(axis=0)
+            paired = bool((near & bends & ~apart.any(axis=0)).any())
             _agree(t, near & (x[1:] == x[:-1]), rank)
-    return x, e, t, rank, conflict, blur
+    return x, e, t, rank, (conflict, paired), blur
 
 
 def _rank(plan: LevelPlan, row: Row) -> int:

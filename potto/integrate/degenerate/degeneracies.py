@@ -12,7 +12,7 @@ import numpy as np
 from potto.integrate.columns import distinct
 from potto.integrate.decomposition.cuts import Cuts
 from potto.integrate.degenerate.coincidences import Scene, around, placed
-from potto.integrate.degenerate.faces import THIN, Place, crossing, running_along, several
+from potto.integrate.degenerate.faces import THIN, Place, crossing, running, running_along, several
 from potto.integrate.events import Degenerate
 from potto.integrate.panels.panel_batch import PanelBatch
 from potto.integrate.pieces import Crossing, Pieces, take
@@ -44,6 +44,8 @@ def steps_at_cuts(work: PanelBatch, whole: Pieces) -> Crossing | None:
     owner, x = seg.owner[right], seg.a[right]
     width = np.minimum((seg.b - seg.a)[right], (seg.b - seg.a)[left])
     scene = Scene(work.parent, work.number, work.level, work.env, {}, work.machine, work.batch, work.root)
+    if not work.conflict and not running(scene, owner, x, np.maximum(seg.ea[right], x - seg.b[left])):
+        return None
     beside = [end + sign * part * np.minimum(width, 1e300)
               for part in BESIDE for end, sign in ((x, 1.0), (seg.b[left], -1.0))]  # fmt: skip
     index = np.concatenate([right, left] * parts)

@@ -98,16 +98,20 @@ def _sides(plan: Straight, machine: Evaluator, cells: _Cells, plain: Bools) -> I
 
 
 def _gathered(plan: Straight, machine: Evaluator, cells: _Cells, sides: Ints) -> list[Alike]:
-    """The cells by their sides, and by which ends of their stretches are like square roots."""
+    """The cells by what is integrated over them, which several combinations of sides may lead to (of a union each but
+    one), and by which ends of their stretches are like square roots."""
     count, found = len(plan.variables), []
     turns = np.zeros(cells.members.size, dtype=np.int64)
     for i, turning in enumerate(plan.turning):
         if turning:
             ends = np.isin(cells.rows[i], list(turning))
             turns |= (ends[0].astype(np.int64) << 2 * i) | (ends[1].astype(np.int64) << 2 * i + 1)
-    for code in distinct(sides):
+    codes: dict[Term, list[int]] = {}
+    for code in distinct(sides).tolist():
         face = plan.face(tuple(bool(code >> bit & 1) for bit in range(len(children(plan.surfaces.body)))))
-        own = sides == code
+        codes.setdefault(face, []).append(code)
+    for face, those in codes.items():
+        own = np.isin(sides, those) if len(those) > 1 else sides == those[0]
         dark = isinstance(face, Const) and face.value == 0
         if machine.costs is not None:
             machine.costs.stretches(int(own.sum()), 0 if dark else int(own.sum()))

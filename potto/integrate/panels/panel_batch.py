@@ -42,6 +42,7 @@ class PanelBatch(Struct, dict=True):
     root: Ints | None = None
     slack: Array | None = None
     conflict: bool = False
+    paired: bool = False
     width: int = 1
     ends: Ends | None = None
     endless: Array | None = None  # (k, B) the tangents that are infinite, with their signs; 0 for others

@@ -1,0 +1,116 @@
+"""The same condition written in two ways: the same answer, at the same cost, counted in evaluations and in calls."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+import potto
+
+SAME = 1.5
+T = 0.7
+UNIT = "([0, 1], [0, 1])"
+DISCS = "([-2, 2], [-2, 2])"
+ONE, OTHER = "x^2 + y^2 - 1", "(x - t)^2 + y^2 - 1"
+
+# Bounds, a condition, the same in another way, and its area and the derivative of that where they have plain formulas.
+PAIRS: list[tuple[str, str, str, str, tuple[float, float] | None]] = [
+    ("and", UNIT, "[x < t and y < t]", "[x < t]*[y < t]", (T**2, 2 * T)),
+    ("or", UNIT, "[x < t or y < t]", "([x < t] + [y < t] - [x < t]*[y < t])", (1 - (1 - T) ** 2, 2 - 2 * T)),
+    ("max", UNIT, "[max(x, y) < t]", "[x < t]*[y < t]", (T**2, 2 * T)),
+    ("min", UNIT, "[min(x, y) < t]", "(1 - [x >= t]*[y >= t])", (1 - (1 - T) ** 2, 2 - 2 * T)),
+    ("max of three", UNIT, "[max(x + y, x - y, 2*x) < t]", "[x + y < t]*[x - y < t]*[2*x < t]",
+     (3 / 8 * T**2, 3 / 4 * T)),
+    ("abs", UNIT, "[abs(x - y) < t]", "[x - y < t]*[y - x < t]", (1 - (1 - T) ** 2, 2 - 2 * T)),
+    ("abs that is larger", UNIT, "[2*abs(x - y) - t > 0]", "([x - y > t/2] + [y - x > t/2])",
+     ((1 - T / 2) ** 2, T / 2 - 1)),
+    ("clamp", UNIT, "[clamp(x + y, 0.2, 1.5) < t]", "[x + y < t]", (T**2 / 2, T)),
+    ("clamp that is flat", UNIT, "[clamp(x + y, 0.2, t) < 1.5]", "[0.1 < 0.2]", (1.0, 0.0)),
+    ("tents", UNIT, "[t - max(abs(2*x - 1), abs(2*y - 1)) > 0]",
+     "[2*x - 1 < t]*[1 - 2*x < t]*[2*y - 1 < t]*[1 - 2*y < t]", (T**2, 2 * T)),
+    ("discs that meet", DISCS, f"[max({ONE}, {OTHER}) < 0]", f"[{ONE} < 0]*[{OTHER} < 0]", None),
+    ("discs joined", DISCS, f"[min({ONE}, {OTHER}) < 0]", f"[{ONE} < 0 or {OTHER} < 0]", None),
+]  # fmt: skip
+
+
+def asked(bounds: str, condition: str) -> tuple[Any, int]:
+    """The area and its derivative, and how many calls of functions it takes, once everything is made."""
+    f = potto.deriv(potto.compile(f"def f(t) integral {bounds} {condition} d(x, y)").f)
+
+    def call() -> Any:
+        return f((T, 1.0))
+
+    call()
+    return call(), calls_in(call)
+
+
+def calls_in(call: Callable[[], Any]) -> int:
+    count = 0
+
+    def seen(frame: Any, event: str, argument: Any) -> None:
+        nonlocal count
+        count += event in ("call", "c_call")
+
+    before = sys.getprofile()
+    sys.setprofile(seen)
+    try:
+        call()
+    finally:
+        sys.setprofile(before)
+    return count
+
+
+@pytest.mark.parametrize(("name", "bounds", "one", "other", "exact"), PAIRS, ids=[row[0] for row in PAIRS])
+def test_greatest_and_least_are_products_and_unions(
+    name: str, bounds: str, one: str, other: str, exact: tuple[float, float] | None
+) -> None:
+    (first, calls), (second, others) = asked(bounds, one), asked(bounds, other)
+    assert abs(first.value - second.value) <= first.error + second.error + 1e-15
+    assert abs(first.tangent - second.tangent) <= first.tangent_error + second.tangent_error + 1e-15
+    if exact is not None:
+        assert abs(first.value - exact[0]) <= first.error + 1e-15 <= 1e-10
+        assert abs(first.tangent - exact[1]) <= first.tangent_error + 1e-15 <= 1e-10
+    if name != "clamp that is flat":
+        assert first.evals <= SAME * second.evals and second.evals <= SAME * first.evals
+        assert calls <= SAME * others and others <= SAME * calls
+
+
+@pytest.mark.parametrize(
+    "condition", ["[t*abs(x - y) < 0.3]", "[abs(x - y)*(x - 0.5) < 0.1*t]", "[exp(-abs(x)) > t*y]"]
+)
+def test_what_does_not_rise_or_fall_with_it_stays(condition: str) -> None:
+    """Nothing says that t is positive: the condition keeps its one surface, and the answer is that of its cases."""
+    bounds = "([-1, 1], [-1, 1])"
+    found, _ = asked(bounds, condition)
+    inner = "abs(x)" if "abs(x)" in condition else "abs(x - y)"
+    up, down = condition.replace(inner, inner[3:]), condition.replace(inner, f"(-{inner[3:]})")
+    cases, _ = asked(bounds, f"({up}*[{inner[3:]} >= 0] + {down}*[{inner[3:]} < 0])")
+    assert abs(found.value - cases.value) <= found.error + cases.error
+    assert abs(found.tangent - cases.tangent) <= found.tangent_error + cases.tangent_error
+
+
+def test_a_sum_of_magnitudes_stays_a_sum() -> None:
+    """|x| + |y| + |z| + |w| < t has 16 faces, and is a sum of four parts: its volume is 2^4 t^4/4!."""
+    cube = ", ".join(["[-1, 1]"] * 4)
+    f = potto.deriv(
+        potto.compile(f"def f(t) integral ({cube}) [abs(x) + abs(y) + abs(z) + abs(w) < t] d(x, y, z, w)").f
+    )
+    found = f((T, 1.0))
+    assert abs(found.value - 2 / 3 * T**4) <= found.error + 1e-15 <= 1e-9
+    assert abs(found.tangent - 8 / 3 * T**3) <= found.tangent_error + 1e-15 <= 1e-9
+    assert found.converged and found.evals <= 50_000
+
+
+@pytest.mark.parametrize("at", ["t", "t + 0.1"])
+def test_an_edge_along_an_axis_but_for_rounding_that_moves_as_a_whole(at: str) -> None:
+    """Its sections leave the bounds of y at two places of x that are one and move as one."""
+    body = "[6.123233995736766e-17*y + x < {}]*exp(x)"
+    f = potto.deriv(potto.compile(f"def f(t) integral ([-1, 1], [-1, 1]) {body.format(at)} d(x, y)").f)
+    exact = potto.deriv(potto.compile(f"def f(t) integral ([-1, 1], [-1, 1]) [x < {at}]*exp(x) d(x, y)").f)
+    found, plain = f((T, 1.0)), exact((T, 1.0))
+    assert abs(found.value - plain.value) <= found.error + plain.error
+    assert abs(found.tangent - plain.tangent) <= found.tangent_error + plain.tangent_error <= 1e-10
+    assert found.converged and found.evals <= 500  # refined until it gave up, a hundred times as many
