@@ -40,6 +40,10 @@ class Domain(Generic[V]):
         """A builtin whose arguments are known; for domains that look at how these are written."""
         return self.apply(node.op, [known[arg] for arg in node.args])
 
+    def does(self, op: str) -> bool:
+        """Whether `builtin` needs no rule for an operator."""
+        return False
+
     def apply(self, op: str, args: Sequence[V]) -> V:
         entry = PRIMITIVES.get(op)
         if entry is None:
@@ -74,7 +78,7 @@ class Domain(Generic[V]):
         entry = PRIMITIVES.get(op)
         if entry is None:
             return False
-        if self.rule(entry) is not None:
+        if self.does(op) or self.rule(entry) is not None:
             return True
         return entry.formula is not None and all(
             self.knows(node.op) for node in postorder(formula_of(op, entry.arity or 2)[0]) if isinstance(node, Prim)

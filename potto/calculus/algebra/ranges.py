@@ -122,6 +122,9 @@ class _Ranges(Domain[Range]):
         args = [known[arg] for arg in node.args]
         return rule(node, args) if rule is not None else self.apply(node.op, args)
 
+    def does(self, op: str) -> bool:
+        return op in ARITHMETIC
+
     def rule(self, entry: Primitive) -> Callable[..., Range] | None:
         return _rule(entry.name)
 

@@ -1,8 +1,9 @@
 """One step of undoing a builtin: from f(..., u, ...) = y to equations for u.
 
 Owns the inverses that need more than the registry knows: operators, powers, `abs`, `hypot`, `min`, `max`, `clamp`,
-`atan2`. Everything else comes from `Primitive.inverse` and `Primitive.period`. A step keeps the structure of what it
-moves to the other side, so that (x - 0.5)^2 = t gives 0.5 ± sqrt(t) and no digits are lost by expanding.
+`atan2`. Everything else comes from `Primitive.inverse` and `Primitive.period`, or from the formula of a builtin. A step
+keeps the structure of what it moves to the other side, so that (x - 0.5)^2 = t gives 0.5 ± sqrt(t) and no digits are
+lost by expanding.
 """
 
 from __future__ import annotations
@@ -23,15 +24,20 @@ from potto.core.terms import (
     Prim,
     Term,
     add,
+    children,
     const,
     div,
     mul,
     neg,
+    postorder,
     pow_,
     prim,
     sub,
+    substitute,
+    var,
 )
 from potto.primitives import PRIMITIVES
+from potto.primitives.walking import formula_of
 
 
 class Guard(Struct, frozen=True):
@@ -64,7 +70,7 @@ def step(term: Prim, index: int, value: Term) -> Steps:
     special = _SPECIAL.get(term.op)
     if special is not None:
         return special(term.args, index, value)
-    return _registered(term.op, term.args, value)
+    return _registered(term.op, term.args, index, value)
 
 
 # Operators
@@ -203,9 +209,12 @@ def _atan2(args: tuple[Term, ...], index: int, value: Term) -> Steps:
     return (Step(x, div(y, prim("tan", value)), (*within, Guard(mul(y, prim("sin", value)), True))),)
 
 
-def _registered(op: str, args: tuple[Term, ...], value: Term) -> Steps:
+def _registered(op: str, args: tuple[Term, ...], index: int, value: Term) -> Steps:
     """Through the registry: a builtin of one argument that has an inverse."""
     entry = PRIMITIVES.get(op)
+    written = _written_out(op, args, index)
+    if written is not None:
+        return (Step(written, value),)
     if entry is None or len(args) != 1:
         return Stuck(f"`{op}` has no inverse")
     (inner,) = args
@@ -223,6 +232,16 @@ def _registered(op: str, args: tuple[Term, ...], value: Term) -> Steps:
         return tuple(Step(inner, s) for s in solutions)
     period, further = entry.period(value)
     return tuple(Step(inner, s, (), period) for s in (*solutions, *further))
+
+
+def _written_out(op: str, args: tuple[Term, ...], index: int) -> Term | None:
+    """The formula of a builtin without an inverse of its own, if the argument stands in it once."""
+    entry = PRIMITIVES.get(op)
+    if entry is None or entry.formula is None or entry.inverse is not None:
+        return None
+    whole, names = formula_of(op, len(args))
+    uses = sum(part is var(names[index]) for node in postorder(whole) for part in children(node))
+    return substitute(whole, dict(zip(names, args, strict=True))) if uses == 1 else None
 
 
 def _folded(term: Term) -> Term:
@@ -244,7 +263,7 @@ def _turn(start: Term) -> Callable[[tuple[Term, ...], int, Term], Steps]:
     def run(args: tuple[Term, ...], index: int, value: Term) -> Steps:
         if value is ZERO:
             return (Step(args[0], start, (), PI),)
-        return _registered("sin" if start is ZERO else "cos", args, value)
+        return _registered("sin" if start is ZERO else "cos", args, 0, value)
 
     return run
 

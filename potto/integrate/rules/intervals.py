@@ -89,6 +89,9 @@ class _Intervals(Domain[Interval]):
         rule = _ARITHMETIC.get(node.op)
         return _defined(args, rule(node, args)) if rule is not None else self.apply(node.op, args)
 
+    def does(self, op: str) -> bool:
+        return op in _ARITHMETIC
+
     def rule(self, entry: Primitive) -> Callable[..., Interval] | None:
         return _rule(entry.name)
 
