@@ -69,3 +69,12 @@ def test_an_octagon_costs_what_a_turned_one_does(a: float) -> None:
     assert along.evals <= 1.5 * turned.evals
     assert abs(along.value - 8 * 0.49 * math.tan(math.pi / 8)) <= along.error + 1e-15
     assert abs(along.tangent) <= along.tangent_error <= 1e-10 and along.converged
+
+
+@pytest.mark.parametrize("turn", [0.0, math.pi / 2, math.pi])
+def test_what_crosses_a_face_may_cancel_but_for_its_speed(turn: float) -> None:
+    """Of x*y nothing crosses the upright edges of a rectangle, whose ends move in opposite directions as it turns."""
+    edges = "[x*cos(t) + y*sin(t) < 1/2]*[-x*cos(t) - y*sin(t) < 1/2]*[y*cos(t) - x*sin(t) < 1/4]"
+    program = f"def f(t) integral ([-1, 1], [-1, 1]) {edges}*[x*sin(t) - y*cos(t) < 1/4]*x*y d(x, y)"
+    found = potto.deriv(potto.compile(program).f)((turn, 1.0))
+    assert abs(found.tangent - math.cos(2 * turn) / 32) <= found.tangent_error + 1e-16 <= 1e-9

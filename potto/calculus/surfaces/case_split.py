@@ -7,7 +7,7 @@ not rise or fall with what is the greatest or the least, a condition that has no
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from potto.calculus.algebra.ranges import positive
 from potto.calculus.surfaces.nested_brackets import has_nested
@@ -40,7 +40,7 @@ def cased(term: Integral) -> Integral:
 
 
 def by_extremes(term: Integral) -> Integral:
-    """The same with a condition on a greatest or a least as one on each of them, where that is an `and` or an `or`."""
+    """The same with a condition on a greatest or a least as one on each of them, where that is an `and`."""
     return _changed(term, lambda node: _settled(node, MOST))
 
 
@@ -119,13 +119,19 @@ def _settled(node: Term, most: int) -> Term:
         rises = _direction(surface, part) if part.op in _EXTREME else 0
         if rises and isinstance(extreme, Prim) and extreme.op in ("max", "min") and len(extreme.args) <= most:
             every = (extreme.op == "max") == (rises < 0)
-            found = node.then if every else node.orelse
-            for arg in reversed(extreme.args):
-                yes, no = (found, node.orelse) if every else (node.then, found)
-                own = branch((replaced(surface, {part: arg}),), node.strict, yes, no)
-                found = _settled(own, most // len(extreme.args))
-            return found
+            # Of an `or` the one surface with a kink takes less than two, unless one of the two is a number.
+            if every or not all(arg.free for arg in extreme.args):
+                return _one_by_one(node, part, extreme.args, every, most // len(extreme.args))
     return _apart(node, most) if _changes(node) else node
+
+
+def _one_by_one(node: Branch, part: Term, args: Sequence[Term], every: bool, most: int) -> Term:
+    """A condition with each of some terms in the place of a part: all of them hold, or one."""
+    found = node.then if every else node.orelse
+    for arg in reversed(args):
+        yes, no = (found, node.orelse) if every else (node.then, found)
+        found = _settled(branch((replaced(node.surface, {part: arg}),), node.strict, yes, no), most)
+    return found
 
 
 def _outermost(surface: Term) -> list[Prim]:

@@ -44,7 +44,8 @@ def steps_at_cuts(work: PanelBatch, whole: Pieces) -> Crossing | None:
     owner, x = seg.owner[right], seg.a[right]
     width = np.minimum((seg.b - seg.a)[right], (seg.b - seg.a)[left])
     scene = Scene(work.parent, work.number, work.level, work.env, {}, work.machine, work.batch, work.root)
-    if not work.conflict and not running(scene, owner, x, np.maximum(seg.ea[right], x - seg.b[left])):
+    along = running(scene, owner, x, np.maximum(seg.ea[right], x - seg.b[left]))
+    if not work.conflict and not along.any():
         return None
     beside = [end + sign * part * np.minimum(width, 1e300)
               for part in BESIDE for end, sign in ((x, 1.0), (seg.b[left], -1.0))]  # fmt: skip
@@ -58,7 +59,9 @@ def steps_at_cuts(work: PanelBatch, whole: Pieces) -> Crossing | None:
     after, before = values[:, 0::2], values[:, 1::2]
     mean = whole.size.reshape(work.width, -1, seg.a.size)[:, 0] / (seg.b - seg.a)
     size = np.abs(after[:, 1]) + np.abs(before[:, 1]) + mean[:, right] + mean[:, left]
-    jumps = np.nonzero(does_jump(np.abs(after - before), size))[0]
+    # What jumps may come to nothing over the variables further in, as x*y does over an even range of y, but not times
+    # the speed, which depends on them.
+    jumps = np.nonzero(does_jump(np.abs(after - before), size) | along)[0]
     if not jumps.size:
         return None
     left, right = left[jumps], right[jumps]

@@ -1,8 +1,8 @@
 """Faces of surfaces that run along all variables further in: what crosses them, integrated over these variables.
 
 Owns `crossing`, `several`, `running`, `running_along` and `Face`. Where a surface psi = 0 is a place of one variable x,
-whatever the variables y further in are, it has no section in y. Its boundary term is then an integral over y, in which F
-stands with the surface on either side and everything else as it falls at the place:
+whatever the variables y further in are, it has no section in y. Its boundary term is then an integral over y, in which
+F stands with the surface on either side and everything else as it falls at the place:
 
     int (F before - F after) dx/dtheta dy,  dx/dtheta = - psi_theta / psi_x  on psi(x, y) = 0
 
@@ -122,10 +122,10 @@ def _crossed(scene: Scene, place: Place, group: int, here: Bools) -> tuple[Array
     return sums.v, sums.e, sums.t, sums.et
 
 
-def running(scene: Scene, owner: Ints, x: Array, off: Array) -> bool:
-    """Whether a surface runs along the variables further in at any of some places, as far as that can be seen."""
+def running(scene: Scene, owner: Ints, x: Array, off: Array) -> Bools:
+    """At which places, of some members, a surface runs along the variables further in, as far as that can be seen."""
     along = None if scene.parent.plan.hides or scene.machine.frozen else _running_along(scene, owner, x, off)
-    return along is not None and bool(along.any())
+    return np.zeros(owner.size, dtype=bool) if along is None else np.asarray(along.any(axis=0))
 
 
 def several(scene: Scene, owner: Ints, x: Array, off: Array) -> Bools:
