@@ -1,138 +1,97 @@
-"""The worlds beside the program that samples first and differentiates its sum: `python examples/beside.py`.
+"""The worlds beside the program that samples first and differentiates its sum: `python examples/beside.py [--jax]`.
 
-The sums are differentiated exactly, by a complex step of 1e-30; comparisons see the real parts, as `where` does in
-JAX or PyTorch, whose derivatives of these sums are the same numbers. What is missing is what moves with the jumps.
+By numpy the sums are differentiated exactly, by a complex step of 1e-30: comparisons see the real parts, as `where`
+does in JAX or PyTorch. With `--jax`, where JAX is installed, it is asked, compiled, in double precision: derivatives
+are the same numbers. What is missing is what moves with the jumps.
 """
 
 from __future__ import annotations
 
+import argparse
+import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 import potto
 
 HERE = Path(__file__).parent
+sys.path.append(str(HERE))
+from sampled_worlds import WORLDS, World  # noqa: E402
+
 STEP = 1e-30
-
-
-class World(NamedTuple):
-    """A program's function of one number, where it is looked at, and the same by samples."""
-
-    program: str
-    function: str
-    place: float
-    sampled: Callable[[Any], Any]
+Pair = tuple[float, float]
 
 
 class Row(NamedTuple):
+    """Value, derivative and error estimate of ours; value and derivative of the sum; the times of both."""
+
     world: World
     value: float
     slope: float
+    error: float
     seconds: float
     sampled: float
     sampled_slope: float
     sampled_seconds: float
 
 
-def middles(low: float, high: float, n: int) -> Any:
-    return low + (high - low) * (np.arange(n) + 0.5) / n
+def by_numpy(world: World) -> Callable[[], Pair]:
+    def run() -> Pair:
+        found = world.sampled(np, np.complex128(complex(world.place, STEP)))
+        return float(np.real(found)), float(np.imag(found)) / STEP
+
+    return run
 
 
-def where(condition: Any, yes: Any, no: Any) -> Any:
-    return np.where(condition, yes + 0j, no + 0j)
+def by_jax(world: World) -> Callable[[], Pair]:
+    import jax
+    import jax.numpy as jnp
+
+    jax.config.update("jax_enable_x64", True)
+    both = jax.jit(lambda t: jax.jvp(lambda u: world.sampled(jnp, u), (t,), (jnp.ones_like(t),)))
+
+    def run() -> Pair:
+        value, slope = both(jnp.asarray(world.place, dtype=float))
+        return float(value), float(slope)
+
+    run()  # compiled once
+    return run
 
 
-def normal(z: Any) -> Any:
-    return np.exp(-(z**2) / 2) / np.sqrt(2 * np.pi)
-
-
-def ball(wall: Any) -> Any:
-    t = middles(0, 1, 1_000_000)
-    return np.mean(where(2 * t < wall.real, 2, -1))
-
-
-def switch(s: Any) -> Any:
-    t = middles(0, 2, 1_000_000)
-    return 2 * np.mean((2 - t) * where(t < s.real, 1, -1))
-
-
-def order(q: Any) -> Any:
-    z = middles(-8, 8, 1_000_000)
-    d = np.exp(3 + 0.4 * z)
-    return 16 * np.mean(normal(z) * where(d < q.real, q - d, 3 * (d - q)))
-
-
-def digital(spot: Any) -> Any:
-    z = middles(-8, 8, 1_000_000)
-    later = spot * np.exp(0.01 + 0.2 * z)
-    return np.exp(-0.03) * 16 * np.mean(normal(z) * where(later.real > 105, 1, 0))
-
-
-def truncated(a: Any) -> Any:
-    x = middles(-8, 8, 1_000_000)
-    inside = where((x > a.real) & (x < 2), 1, 0) * normal(x)
-    return np.sum(inside * x) / np.sum(inside)
-
-
-def mistakes(threshold: Any) -> Any:
-    x = middles(-9, 9, 1_000_000)
-    sick, healthy = normal(x - 1.5) * where(x < threshold.real, 1, 0), normal(x) * where(x > threshold.real, 1, 0)
-    return 18 * np.mean(sick + 0.8 * healthy)
-
-
-def states(energy: Any) -> Any:
-    k = middles(-np.pi, np.pi, 1_000_000)
-    return np.mean(where(-2 * np.cos(k) < energy.real, 1, 0))
-
-
-def blobs(apart: Any) -> Any:
-    x, y = np.meshgrid(middles(-3, 3, 1000), middles(-3, 3, 1000))
-    field = np.exp(-((x + apart) ** 2) - y**2) + np.exp(-((x - apart) ** 2) - y**2)
-    return 36 * np.mean(where(field.real > 0.5, 1, 0))
-
-
-def half(x_of_site: Any) -> Any:
-    x = middles(0, 1, 1_000_000)  # both sites have the same height
-    return np.mean(where((x - 0.2) ** 2 < ((x - x_of_site) ** 2).real, 1, 0))
-
-
-WORLDS = (
-    World("dynamics/ball_and_wall", r"\w . place(2, w, 0.5)", 1.5, ball),
-    World("dynamics/parking", r"\s . place(2, s)", 0.75, switch),
-    World("probability/truncated", r"\a . mean(a, 2)", -1.0, truncated),
-    World("probability/newsvendor", "best", 20.0, order),
-    World("probability/options", r"\s . digital(market with spot = s, 105, 1)", 100.0, digital),
-    World("probability/threshold", r"\t . cost(t, 5, 1)", 0.5, mistakes),
-    World("fields/bands", "below", 1.0, states),
-    World("fields/metaballs", r"\a . area(a, 1, 0.5)", 0.7, blobs),
-    World("fields/voronoi", r"\x . cell([(0.2, 0.5), (x, 0.5)], 0)", 0.6, half),
-)
-
-
-def rows() -> Iterator[Row]:
-    for world in WORLDS:
-        module = potto.load(HERE / f"{world.program}.po")
-        module.eval(f"deriv({world.function})(({world.place}, 1))")  # plans and kernels are made once
-        start = time.perf_counter()
-        found = module.eval(f"deriv({world.function})(({world.place}, 1))")
-        middle = time.perf_counter()
-        sampled = world.sampled(np.complex128(complex(world.place, STEP)))
-        end = time.perf_counter()
-        yield Row(world, float(found.value), float(found.tangent), middle - start,
-                  float(sampled.real), float(sampled.imag) / STEP, end - middle)  # fmt: skip
+def row(world: World, sampler: Callable[[World], Callable[[], Pair]] = by_numpy) -> Row:
+    module = potto.load(HERE / f"{world.program}.po")
+    text = f"deriv({world.function})(({world.place}, 1))"
+    module.eval(text)  # plans and kernels are made once
+    start = time.perf_counter()
+    found = module.eval(text)
+    seconds = time.perf_counter() - start
+    sampled = sampler(world)
+    start = time.perf_counter()
+    value, slope = sampled()
+    spent = time.perf_counter() - start
+    ours = float(found.value), float(found.tangent), float(found.tangent_error)
+    return Row(world, *ours, seconds, value, slope, spent)
 
 
 def main() -> None:
-    print("| program | value | of a million samples | derivative | of the sum | time | of the sum |")
-    print("|---|---|---|---|---|---|---|")
-    for row in rows():
-        numbers = [f"{x:.9g}" for x in (row.value, row.sampled, row.slope, row.sampled_slope)]
-        times = [f"{1000 * t:.1f} ms" for t in (row.seconds, row.sampled_seconds)]
-        print("| " + " | ".join([f"`{row.world.program}`", *numbers, *times]) + " |")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--jax", action="store_true", help="sums by JAX instead of numpy")
+    options = parser.parse_args()
+    try:
+        print("| program | value | of samples | derivative | may be off by | of the sum | time | of the sum |")
+        print("|---|---|---|---|---|---|---|---|")
+        for world in WORLDS:
+            found = row(world, by_jax if options.jax else by_numpy)
+            numbers = [f"{x:.9g}" for x in (found.value, found.sampled, found.slope)]
+            sums = [f"{found.error:.0e}", f"{found.sampled_slope:.9g}"]
+            times = [f"{1000 * t:.1f} ms" for t in (found.seconds, found.sampled_seconds)]
+            print("| " + " | ".join([f"`{world.program}`", *numbers, *sums, *times]) + " |", flush=True)
+    except ModuleNotFoundError as error:
+        sys.exit(f"beside.py: {error.name} is not installed: pip install '.[jax]'")
 
 
 if __name__ == "__main__":

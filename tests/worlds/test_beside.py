@@ -3,27 +3,47 @@
 from __future__ import annotations
 
 import runpy
+from functools import lru_cache
 from typing import Any
 
+import numpy as np
 import pytest
 from worlds_references import EXAMPLES
 
 BESIDE: dict[str, Any] = runpy.run_path(str(EXAMPLES / "beside.py"))
-ROWS = list(BESIDE["rows"]())
-SMOOTH = "probability/newsvendor"  # its cost bends at the order and does not jump: there the sum is right
+WORLDS = range(len(BESIDE["WORLDS"]))
 
 
-@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.world.program)
-def test_values_agree_and_slopes_of_sums_lack_the_boundary(row: Any) -> None:
-    assert abs(row.sampled - row.value) < 2e-3 * max(1.0, abs(row.value))
-    if row.world.program == SMOOTH:
-        assert abs(row.sampled_slope - row.slope) < 1e-4
-    else:
-        assert row.sampled_slope == 0.0 and abs(row.slope) > 0.01
+def named(number: int) -> str:
+    return str(BESIDE["WORLDS"][number].sampled.__name__)
 
 
-@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.world.program)
-def test_differences_of_sums_see_it(row: Any) -> None:
+@lru_cache
+def row_of(number: int) -> Any:
+    return BESIDE["row"](BESIDE["WORLDS"][number])
+
+
+def test_every_program_is_there() -> None:
+    """Of the paper's one for its renderer, of the ray tracer's those that have pixels."""
+    folders = ("dynamics", "probability", "fields")
+    wanted = {f"{folder}/{file.stem}" for folder in folders for file in (EXAMPLES / folder).glob("*.po")}
+    wanted |= {"paper/image", "stylize/stylize", *(f"raytrace/{n}" for n in ("main", "hidden", "sphere", "shadows"))}
+    assert {world.program for world in BESIDE["WORLDS"]} == wanted
+
+
+@pytest.mark.parametrize("number", WORLDS, ids=named)
+def test_values_agree_and_slopes_of_sums_lack_the_boundary(number: int) -> None:
+    """What bends and does not jump, the newsvendor's cost, has the derivative of its sum. Of all others a tenth of it
+    or more is missing, mostly all."""
+    row = row_of(number)
+    assert abs(row.sampled - row.value) < row.world.near * max(1.0, abs(row.value))
+    lacking = abs(row.sampled_slope - row.slope)
+    assert lacking < 1e-4 if row.world.smooth else lacking > 0.1 * abs(row.slope) > 0.001
+
+
+@pytest.mark.parametrize("number", WORLDS, ids=named)
+def test_differences_of_sums_see_it(number: int) -> None:
     """The sum's values, a tenth apart, change as our derivative says, to what samples can tell."""
-    up, down = (row.world.sampled(complex(row.world.place + h)).real for h in (0.05, -0.05))
+    row = row_of(number)
+    up, down = (np.real(row.world.sampled(np, np.complex128(row.world.place + h))) for h in (0.05, -0.05))
     assert abs((up - down) / 0.1 - row.slope) < 0.03 * max(1.0, abs(row.slope))
