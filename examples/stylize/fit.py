@@ -140,7 +140,9 @@ def pictures(folder: Path, quick: bool) -> list[dict[str, Any]]:
     photo = target()
     if quick:
         photo = photo.reshape(8, 6, 8, 6, 3).mean(axis=(1, 3))
-    shown = []
+    begin = np.rint(255 * photo).astype(np.uint8)
+    Image.fromarray(begin).resize((384, 384), Image.Resampling.NEAREST).save(folder / "stylize-target.png")
+    shown: list[dict[str, Any]] = [{"file": "stylize-target.png", "caption": "the target", "seconds": 0.0}]
     for kind in TERMS:
         mesh = fitted(kind, photo, 2 if quick else 7, 2 if quick else 60)
         file = f"stylize-{kind}.png"
