@@ -34,8 +34,10 @@ def lying_along(plan: Plan, env: dict[str, Value], batch: int, machine: Evaluato
     found = quiet.evaluate(plan.kinks, {n: here[n] for n in plan.kinks.params}, None)
     met = []
     for number, kink in enumerate(components(found)):
-        moves = np.any([np.abs(t) > CLEAR * (0.0 if et is None else et)
-                        for t, et in zip(kink.t, kink.et or kink.t) if t is not None], axis=0)  # fmt: skip
+        moves = np.zeros(owner.shape, dtype=bool)
+        for t, et in zip(kink.t, kink.et or (None,) * len(kink.t), strict=True):
+            if t is not None:
+                moves |= np.abs(t) > CLEAR * (0.0 if et is None else et)
         there = (np.abs(kink.v) <= CLEAR * (0.0 if kink.e is None else kink.e)) & moves
         members = np.unique(owner[np.broadcast_to(there, owner.shape)])
         if members.size:
