@@ -128,7 +128,7 @@ def test_members_of_an_array_are_told_apart() -> None:
 def test_a_kink_that_moves_alike_everywhere_in_one_direction_and_not_in_another() -> None:
     """The kink x/2 = s moves with s alone, as fast at every x: int_0^1 max(x/2, s) t dx = t (1/4 + s^2)."""
     f = potto.compile("def f(t, s) integral [0, 1] max(integral [0, 1] y*x d(y), s)*t d(x)").f
-    found = potto.grad(f)(1.5, 0.2)
+    found = potto.grad(f, wrt=["t", "s"])(1.5, 0.2)
     # on [0, 2 s] it is s, beyond x/2: 2 s^2 + (1 - 4 s^2)/4, whose derivative is 2 s
     assert abs(found.value - 1.5 * (0.25 + 0.2**2)) <= found.error + 1e-15
     assert np.abs(np.array(found.tangent) - (0.25 + 0.2**2, 1.5 * 2 * 0.2)).max() <= 1e-12
