@@ -46,6 +46,6 @@ def _on_side(machine: Machine, term: Prim, args: tuple[Cell, ...], side: int) ->
     beside = machine.changed(side=side, root=False, taping=False, directions=directions)
     value = beside.run(function_of(prim(term.op, *map(var, names))), list(args), None)
     assert isinstance(value, Cell)
-    shape = np.shape(value.v)
+    shape = np.broadcast_shapes(*(np.shape(x) for x in (value.v, *value.t, *value.et) if x is not None))
     found = [[np.broadcast_to(0.0 if x is None else x, shape) for x in part] for part in (value.t, value.et)]
     return np.array(found[0]), np.array(found[1] or np.zeros((directions, *shape)))
