@@ -109,9 +109,11 @@ def summed_alone(
     if machine.backend == "numpy" or any(cells[name].e is not None or any(cells[name].et) for name in plan.names):
         return summed(plan.variables, plan.frames, region, machine, env, frame)
     faces = _faces(plan, region, machine, cells)
-    functions = [face.way.function(machine) for face in faces]
+    promotion = faces[0].way.promotion
+    # For one integral nobody waits for the compiler, whatever the backend: a swapped shader would take ten times as long.
+    functions = [face.way.function(machine) for face in faces] if promotion.spent else [None]
     if None in functions:
-        with faces[0].way.promotion.by_numpy():
+        with promotion.by_numpy():
             return summed(plan.variables, plan.frames, region, machine, env, frame)
     total: Totals | None = None
     for face, function in zip(faces, functions, strict=True):
