@@ -110,7 +110,7 @@ def summed_alone(
         return summed(plan.variables, plan.frames, region, machine, env, frame)
     faces = _faces(plan, region, machine, cells)
     promotion = faces[0].way.promotion
-    # For one integral nobody waits for the compiler, whatever the backend: a swapped shader would take ten times as long.
+    # For one integral nobody waits for the compiler, whatever the backend: of a swapped shader it is all of the time.
     functions = [face.way.function(machine) for face in faces] if promotion.spent else [None]
     if None in functions:
         with promotion.by_numpy():
