@@ -86,7 +86,7 @@ def test_bytes_of_others(data: bytes) -> None:
 
 @pytest.mark.parametrize("name", ["os:system", "potto.store:put", "potto.nothing:A", "potto.source:Nothing", "potto:x"])
 def test_nothing_but_structs_of_ours_is_made(name: str) -> None:
-    with pytest.raises(ValueError, match="no value"):
+    with pytest.raises(ValueError, match="not a value"):
         unpacked(msgspec.msgpack.encode([[name], [], [5, 0, "echo"]]))
 
 

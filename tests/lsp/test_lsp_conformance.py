@@ -150,7 +150,7 @@ def test_bad_json_is_logged_and_survived(server: Server, body: bytes) -> None:
     client.send_raw(body)
     assert client.answer(None)["error"]["code"] == -32700
     assert client.stop() == 0
-    assert b"no JSON" in client.stderr
+    assert b"not JSON" in client.stderr
 
 
 @pytest.mark.parametrize("message", [[], 3, "x", None, {"jsonrpc": "2.0", "id": {}, "method": "shutdown"}])

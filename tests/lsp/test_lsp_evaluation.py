@@ -191,7 +191,7 @@ def test_preview(server: Server, uri: Uri, text: str, kind: str | None) -> None:
     client.open(uri("main"), text)
     answer = run(client, "potto.preview", uri("main"), "f")
     if kind is None:
-        assert "no function of one or two numbers" in answer["error"]["message"]
+        assert "not a function of one or two numbers" in answer["error"]["message"]
     else:
         assert answer["result"]["kind"] == kind and "0 to 1" in answer["result"]["text"]
         data = base64.b64decode(answer["result"]["image"].partition(",")[2])

@@ -21,7 +21,8 @@ BUDGET = 2_000_000
 
 
 def bend(program: Program, point: Point) -> tuple[float, float]:
-    """The second derivative along the direction of a point, and how far the extrapolations are apart."""
+    """The second derivative along the direction of a point, and how far the extrapolations are apart. Raises TooHard,
+    also where brute force has no number: scipy's besselj1 has none at infinity, where a density is 0."""
     value, off = estimate(program, **point.moved(0.0))
     found = []
     for h in STEPS:
@@ -30,6 +31,8 @@ def bend(program: Program, point: Point) -> tuple[float, float]:
         off = max(off, a, b)
     first, second = (4 * found[1] - found[0]) / 3, (4 * found[2] - found[1]) / 3
     best = (16 * second - first) / 15
+    if not math.isfinite(best):
+        raise TooHard
     return best, 10 * abs(best - second) + (4e-13 * max(1.0, abs(value)) + 10 * off) / STEPS[-1] ** 2
 
 
