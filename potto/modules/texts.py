@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import accumulate
-from typing import Literal
+from typing import Any, Literal
 
 from potto.diagnostics import Diagnostic
 from potto.modules.free import Reference, references_in
@@ -245,7 +245,8 @@ def names(db: Database, file: str) -> tuple[str, ...]:
 
 def chunk_text(db: Database, file: str, name: str) -> str | None:
     """The text of the chunk that defines `name`; the last one if there are several."""
-    found: str | None = db.entry(texts, (file,), name)
+    table: Any = texts  # mypyc takes what is in a table of parts for None
+    found: str | None = db.entry(table, (file,), name)
     return found
 
 
