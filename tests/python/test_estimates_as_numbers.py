@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import copy
+import json
 import math
 import pickle
+import statistics
 from decimal import Decimal
 from fractions import Fraction
 from typing import Any
@@ -54,6 +56,38 @@ def test_formats() -> None:
     assert str(bar) == f"{bar}" == "0.3498588075760(41)"
     assert repr(Estimate(0.5, 0.1, converged=False)).startswith("not converged: 0.50(10)  ")
     assert str(Estimate(0.5, 0.1, converged=False)) == "not converged: 0.50(10)"
+
+
+def test_whole_parts_and_complex_numbers() -> None:
+    found = divmod(Estimate(7.5, 0.25), 2)
+    assert found == (3, 1.5) and found[1].error == pytest.approx(0.25) and divmod(7, Estimate(2.5, 0.25)) == (2, 2)
+    assert math.trunc(Estimate(-2.5, 0.1)) == -2 and math.ceil(R + 0.5) == 3
+    assert R + 1j == 2 + 1j and 1j * R == 2j and R == 2 + 0j and (R * np.array([1j, 2])).tolist() == [2j, 4]
+    assert statistics.fmean([R, S]) == 1.25 and json.dumps({"r": R}, default=float) == '{"r": 2.0}'
+    for wrong in (lambda: R < 1j, lambda: divmod(R, "2"), lambda: divmod("2", R)):
+        with pytest.raises(TypeError, match=r"unsupported operand|not supported between"):
+            wrong()
+
+
+def test_sums_means_and_products_of_arrays_keep_errors() -> None:
+    """By interval arithmetic on small whole numbers, where nothing but the rounding on top is rounded."""
+    b = Estimate(np.arange(6.0).reshape(2, 3), np.full((2, 3), 0.25))
+    assert b.sum() == 15 and b.sum().error == 1.5 and b.sum(axis=0) == pytest.approx([3, 5, 7])
+    assert b.mean() == 2.5 and b.mean().error == pytest.approx(0.25, rel=1e-15) and np.mean(b, axis=1).error[1] < 0.2501
+    assert b.min() == 0 and (np.max(b, axis=1) == [2, 5]).all() and b.max().error == 0.25
+    assert b.mean(axis=1, keepdims=True).shape == (2, 1) and R.mean() == 2
+    assert R.mean().error == pytest.approx(0.25, rel=1e-15)  # and the rounding of a product
+    exact = np.array([1.0, -2.0, 3.0])
+    product = b @ exact
+    assert product.value.tolist() == [4, 10] and product.error == pytest.approx([1.5, 1.5]) and exact @ b[0] == 4
+    assert (b[0] @ b[1]).error == pytest.approx(0.25 * (0 + 1 + 2) + 0.25 * (3 + 4 + 5))  # |x|dy + dx|y|
+
+
+def test_rows_of_an_array_stand_in_brackets() -> None:
+    assert str(Estimate(np.arange(4.0).reshape(2, 2), np.zeros((2, 2)))) == "[[0, 1], [2, 3]]"
+    wide = str(Estimate(np.zeros((20, 20)), np.zeros((20, 20))))
+    assert wide == f"[[{'0, ' * 12}...], ...]" and str(Estimate(np.zeros((3, 5)), 0.0)).count("]") == 3
+    assert str(Estimate(np.zeros((2, 0)), 0.0)) == "[[], []]"
 
 
 def test_errors_of_sums_and_products() -> None:

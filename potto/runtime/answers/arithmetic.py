@@ -76,14 +76,25 @@ def applied(ufunc: np.ufunc, operands: Sequence[Pair], **options: Any) -> tuple[
     values = [value for value, _ in operands]
     with np.errstate(all="ignore"):
         value = ufunc(*values, **options)
+        if any(np.iscomplexobj(part) for part in values):
+            return value, None
         if ufunc in EXTREMES:
             return value, np.maximum(*(np.asarray(error, dtype=float) for _, error in operands))
+        if ufunc is np.matmul:
+            return value, _error_of_product(*operands)
         slopes = SLOPES.get(ufunc)
         if slopes is None:
             return value, None
         parts = [_part(s, error) for s, (_, error) in zip(slopes(*values), operands, strict=True)]
         error = np.broadcast_to(np.asarray(sum(parts)), np.shape(value))
         return value, np.where(error > 0, error + np.abs(value) * ROUNDING, error)
+
+
+def _error_of_product(first: Pair, second: Pair) -> Any:
+    """The error of a matrix product of arrays, with what is rounded in its sums."""
+    (x, dx), (y, dy) = ((np.abs(value), np.broadcast_to(error, np.shape(value))) for value, error in (first, second))
+    error = x @ dy + dx @ y
+    return np.where(error > 0, error + np.shape(x)[-1] * ROUNDING * (x @ y), error)
 
 
 def _part(slope: Any, error: Any) -> Any:
@@ -109,10 +120,12 @@ def operand(other: object) -> Pair | None:
     """A number or an array as an operand without error; None for what is neither."""
     if isinstance(other, bool | int | float):
         return _double(other), 0.0
-    if isinstance(other, str | bytes | complex | tuple | dict | set) or other is None:
+    if isinstance(other, str | bytes | tuple | dict | set) or other is None:
         return None
     try:
         array = np.asarray(other)
+        if array.dtype.kind == "c":
+            return array if array.ndim else complex(array), 0.0
         if array.dtype.kind not in "Obiuf":
             return None
         array = array.astype(float)
@@ -129,7 +142,7 @@ def _double(number: float) -> float:
 
 
 class Operators:
-    """The operators of a class that says what a ufunc makes of it."""
+    """The operators, sums and extremes of a class that says what a ufunc makes of it, and is an array to numpy."""
 
     __slots__ = ()
 
@@ -138,6 +151,8 @@ class Operators:
         raise NotImplementedError
 
     def _compared(self, ufunc: np.ufunc, other: object) -> Any:
+        if np.iscomplexobj(other) and ufunc is not np.equal:
+            return NotImplemented
         found = self._computed(ufunc, self, other)
         return bool(found) if isinstance(found, np.bool_) else found
 
@@ -192,6 +207,14 @@ class Operators:
     def __rfloordiv__(self, other: Any) -> Any:
         return self._computed(np.floor_divide, other, self)
 
+    def __divmod__(self, other: Any) -> Any:
+        whole = self.__floordiv__(other)
+        return whole if whole is NotImplemented else (whole, self.__mod__(other))
+
+    def __rdivmod__(self, other: Any) -> Any:
+        whole = self.__rfloordiv__(other)
+        return whole if whole is NotImplemented else (whole, self.__rmod__(other))
+
     def __mod__(self, other: Any) -> Any:
         return self._computed(np.remainder, self, other)
 
@@ -203,3 +226,26 @@ class Operators:
 
     def __rpow__(self, other: Any) -> Any:
         return self._computed(np.power, other, self)
+
+    def __matmul__(self, other: Any) -> Any:
+        return self._computed(np.matmul, self, other)
+
+    def __rmatmul__(self, other: Any) -> Any:
+        return self._computed(np.matmul, other, self)
+
+    def sum(self, axis: Any = None, out: Any = None, **options: Any) -> Any:
+        """The sum along axes, all of them if none is named, as of an array; errors add up."""
+        return np.add.reduce(self, axis=axis, out=out, **options)
+
+    def min(self, axis: Any = None, out: Any = None, **options: Any) -> Any:
+        """The least number along axes, as of an array; off by no more than the largest error."""
+        return np.minimum.reduce(self, axis=axis, out=out, **options)
+
+    def max(self, axis: Any = None, out: Any = None, **options: Any) -> Any:
+        """The largest number along axes, as of an array; off by no more than the largest error."""
+        return np.maximum.reduce(self, axis=axis, out=out, **options)
+
+    def mean(self, axis: Any = None, out: Any = None, **options: Any) -> Any:
+        """The mean along axes, as of an array; off by the mean of the errors."""
+        total = self.sum(axis, out, **options)
+        return total * (np.size(total) / np.size(self))

@@ -158,6 +158,9 @@ class Estimate(Operators, Struct, frozen=True, eq=False):
     def __int__(self) -> int:
         return int(float(self))
 
+    def __trunc__(self) -> int:
+        return int(self)
+
     def __bool__(self) -> bool:
         return self.value is None or bool(np.all(self._pair[0]) if self.tangent is None else True)
 

@@ -216,9 +216,17 @@ def _joined(value: Any, error: Any, form: Callable[[float, float], str]) -> str:
     if value is None:
         return "<function>"
     if getattr(value, "ndim", 0):
-        shown = [form(v, e) for v, e in _first(value, error)]
-        return f"[{', '.join(shown)}{', ...' if value.size > MOST_ITEMS else ''}]"
+        return _rows(value, error, form)
     return form(float(value), float(error))
+
+
+def _rows(value: Any, error: Any, form: Callable[[float, float], str]) -> str:
+    """An array in as many brackets as it has axes: the first rows, as many as have few enough numbers together."""
+    if not getattr(value, "ndim", 0):
+        return form(float(value), float(error))
+    shown = min(len(value), max(1, MOST_ITEMS // max(1, math.prod(value.shape[1:]))))
+    parts = [_rows(value[i], error[i] if getattr(error, "ndim", 0) else error, form) for i in range(shown)]
+    return f"[{', '.join(parts)}{', ...' if len(value) > shown else ''}]"
 
 
 def _first(value: Any, error: Any) -> list[tuple[float, float]]:
