@@ -150,8 +150,11 @@ class Operators:
         """What a ufunc makes of operands; NotImplemented where one of them is not a number."""
         raise NotImplementedError
 
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray[Any, Any]:
+        raise NotImplementedError
+
     def _compared(self, ufunc: np.ufunc, other: object) -> Any:
-        if np.iscomplexobj(other) and ufunc is not np.equal:
+        if isinstance(other, complex) and ufunc is not np.equal:
             return NotImplemented
         found = self._computed(ufunc, self, other)
         return bool(found) if isinstance(found, np.bool_) else found
