@@ -99,9 +99,10 @@ def _file_rename(analysis: Analysis, rename: FileRename) -> dict[str, Any]:
 # Diagnostics
 
 
-def diagnostics(analysis: Analysis, client: Client, found: Iterable[Located], file: str) -> list[protocol.Diagnostic]:
-    """What is said about a file."""
-    text = analysis.text(file)
+def diagnostics(
+    analysis: Analysis, client: Client, found: Iterable[Located], file: str, text: Text
+) -> list[protocol.Diagnostic]:
+    """What is said about a file with this text."""
     return [_diagnostic(analysis, client, located.diagnostic, file, text) for located in found]
 
 

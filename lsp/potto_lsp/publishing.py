@@ -66,7 +66,7 @@ class Publisher:
         elsewhere = any(located.diagnostic.related for said in found for located in said)  # in files that may differ
         if old is not None and old.found == found and old.text is text and old.levels == levels and not elsewhere:
             return old
-        items = convert.diagnostics(analysis, self._client, levelled((*checked, *further), levels), key)
+        items = convert.diagnostics(analysis, self._client, levelled((*checked, *further), levels), key, text)
         if old is not None and old.items == items:
             new = Report(found, text, levels, old.items, old.id)
         else:
@@ -169,16 +169,11 @@ class Publisher:
 
     def push_projects(self, projects: tuple[Project, ...]) -> None:
         """What is wrong with project files; nobody asks for that, so it is pushed to every client."""
+        from potto.projects.project import problems_of
+
         for project in projects:
-            items: list[protocol.Diagnostic] = [
-                {
-                    "range": {"start": {"line": line, "character": 0}, "end": {"line": line + 1, "character": 0}},
-                    "severity": convert.SEVERITIES["error"],
-                    "source": "potto",
-                    "message": message,
-                }
-                for line, message in project.problems
-            ]
+            text = Text(project.text, self._analysis.encoding)
+            items = convert.diagnostics(self._analysis, self._client, problems_of(project), project.path, text)
             if items or project.folder in self._wrong_projects:
                 self._publish(to_uri(project.path), items, None)
         self._wrong_projects = {project.folder for project in projects if project.problems}

@@ -50,6 +50,7 @@ class Session:
         self.tokens: dict[str, Colours] = {}
         self.checked = False
         self.to_prepare: set[str] = set()  # files that were opened
+        self._unknown_lints: list[str] = []
         self.to_keep: set[str] = set()  # saved files, of which it is to be kept what was found out about them
         self._progress = Progress(self, "Potto: checking the workspace")
 
@@ -93,6 +94,18 @@ class Session:
         """The client's settings under `potto`."""
         self.analysis.settings = settings_of(settings)
         self.publisher.whole_workspace = self.analysis.settings.get("diagnostics.scope") != "openFiles"
+        self._tell_unknown_lints()
+
+    def _tell_unknown_lints(self) -> None:
+        """Codes in the client's settings that mean nothing are told once."""
+        from potto.projects.project import LINTS
+
+        lints = self.analysis.settings.get("lints")
+        unknown = [code for code in lints if code not in LINTS] if isinstance(lints, Mapping) else []
+        if unknown and unknown != self._unknown_lints:
+            told = f"The setting potto.lints has {', '.join(unknown)}; lints are {', '.join(LINTS)}."
+            self.notify("window/showMessage", {"type": 2, "message": told})
+        self._unknown_lints = unknown
 
     def idle(self) -> Iterator[Callable[[], None] | None]:
         """The steps of what is done when there is nothing else to do; a None when it is told what is wrong with the

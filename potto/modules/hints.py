@@ -1,16 +1,15 @@
-"""What the user may have meant: near names, near modules, and modules that define a name."""
+"""What the user may have meant: names of other languages, near modules, and modules that define a name."""
 
 from __future__ import annotations
 
 import os.path
 from collections.abc import Iterable
 
-from potto.diagnostics import Suggestion, suggest
 from potto.modules.builtins import is_builtin
 from potto.modules.lookup import SUFFIXES, folders
 from potto.modules.workspace import definers, module_name
 from potto.query import Database
-from potto.source import Span
+from potto.reports.near import near_names
 
 _ELSEWHERE = {
     "ln": "the natural logarithm is `log`",
@@ -80,34 +79,6 @@ def library_hint(module: str, names: Iterable[str] = ()) -> str:
     if module.partition(".")[0] in _LIBRARIES:
         return "modules of Python can't be imported; builtins such as `sqrt` and `pi` need no import"
     return ""
-
-
-MUCH_WORSE = 0.2  # a second name this much less alike is no help: `grad` for `raduis`, beside `radius`
-
-
-def near_names(name: str, candidates: Iterable[str], count: int = 2) -> tuple[str, ...]:
-    """The names that `name` may have been meant to be, the likeliest first."""
-    known = dict.fromkeys(candidate for candidate in candidates if candidate != name)
-    exact = [candidate for candidate in known if candidate.casefold() == name.casefold()]
-    if exact or len(name) < 2:
-        return tuple(exact[:count])
-    import difflib  # most programs name what there is
-
-    cutoff = 0.6 if len(name) > 3 else 0.5
-    close = difflib.get_close_matches(name, list(known), n=count, cutoff=cutoff)
-    scores = [difflib.SequenceMatcher(None, candidate, name).ratio() for candidate in close]
-    return tuple(candidate for candidate, score in zip(close, scores) if score > scores[0] - MUCH_WORSE)
-
-
-def did_you_mean(near: Iterable[str]) -> str:
-    """A question, or nothing if there is nothing near."""
-    names = [f"`{name}`" for name in near]
-    return f"did you mean {' or '.join(names)}?" if names else ""
-
-
-def instead(span: Span, near: Iterable[str]) -> tuple[Suggestion, ...]:
-    """The names that may have been meant, as changes of what stands in a place."""
-    return tuple(suggest(span, name, f"Change to `{name}`") for name in near)
 
 
 def near_modules(db: Database, file: str, dotted: str) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from potto.diagnostics import Diagnostic, Kind
 from potto.modules.builtins import is_builtin
 from potto.modules.graph import import_cycle
-from potto.modules.hints import did_you_mean, elsewhere, instead, library_hint, looked_in, near_modules, near_names
+from potto.modules.hints import elsewhere, library_hint, looked_in, near_modules
 from potto.modules.kinds import (
     CIRCULAR,
     HIDES_BUILTIN,
@@ -37,6 +37,7 @@ from potto.modules.lookup import (
 from potto.modules.texts import Importing, Unreadable, imports, names, outline, problem
 from potto.modules.usage import unused_imports
 from potto.query import Database, query
+from potto.reports.near import did_you_mean, instead, near_names
 from potto.source import Span
 from potto.syntax import nodes
 

@@ -9,7 +9,7 @@
     rtol = 1e-6              # or method, atol, samples, seed, max_evals, backend
 
 The project of a file is told by the nearest such file in its folder and above. Owns finding and reading it, and what
-is wrong with it as sentences; the command line, the prompt, Python and the editor all ask here.
+is wrong with it, all at once; the command line, the prompt, Python and the editor all ask here.
 """
 
 from __future__ import annotations
@@ -21,28 +21,36 @@ from typing import Any
 from msgspec import Struct
 from msgspec.structs import replace
 
-from potto.diagnostics import Severity, declare
+from potto.diagnostics import Diagnostic, Severity, declare
 from potto.projects.settings import DEFAULTS, Settings, problem
+from potto.projects.toml_places import entry_at, mistake_at
+from potto.reports.near import did_you_mean, instead, near_names
+from potto.reports.pages import codes
 from potto.reports.render import Located
 from potto.source import Span
 
 NAME = "potto.toml"
 LEVELS = ("off", "hint", "info", "warning", "error")
 KEYS = ("roots", "lints", "settings")
+# The codes whose severity a project may set: of all that are not errors. A test holds them against what is declared.
+LINTS = (
+    "P0406", "P0501", "P0522", "P0524", "P0610", "P0611", "P0612", "P0613", "P0614", "P0615", "P0616", "P0620", "P0621",
+    "P0622", "P0623", "P0624", "P0625",
+)  # fmt: skip
 BAD_PROJECT = declare("P0231", "a project file that says what is not understood")
 
 _SEVERITIES: Mapping[str, Severity] = {"error": "error", "warning": "warning", "info": "info", "hint": "hint"}
 
 
 class Project(Struct, frozen=True):
-    """A folder with a project file, or one that is a root by itself. `problems` are pairs of a line (from 0) and a
-    sentence."""
+    """A folder with a project file, or one that is a root by itself. `problems` have places in `text`, the file's."""
 
     folder: str
     roots: tuple[str, ...]
     lints: Mapping[str, str] = {}
     settings: Settings = DEFAULTS
-    problems: tuple[tuple[int, str], ...] = ()
+    problems: tuple[Diagnostic, ...] = ()
+    text: str = ""
 
     @property
     def path(self) -> str:
@@ -89,8 +97,12 @@ def read_project(folder: str) -> Project:
     except (FileNotFoundError, NotADirectoryError):
         return Project(folder, (folder,))
     except OSError as error:
-        return Project(folder, (folder,), problems=((0, f"cannot be read: {error.strerror}"),))
+        return Project(folder, (folder,), problems=(_unreadable(f"cannot be read: {error.strerror}"),))
     return _parsed(folder, data)
+
+
+def _unreadable(message: str) -> Diagnostic:
+    return BAD_PROJECT(Span(0, 0), message)
 
 
 def _parsed(folder: str, data: bytes) -> Project:
@@ -100,80 +112,95 @@ def _parsed(folder: str, data: bytes) -> Project:
         text = data.decode("utf-8")
         table = tomllib.loads(text)
     except UnicodeDecodeError:
-        return Project(folder, (folder,), problems=((0, "this is not a text in UTF-8"),))
+        return Project(folder, (folder,), problems=(_unreadable("this is not a text in UTF-8"),))
     except tomllib.TOMLDecodeError as error:
-        return Project(folder, (folder,), problems=((_line(str(error)), str(error)),))
-    problems: list[tuple[str, str]] = []
-    roots = _roots(folder, table.get("roots", []), problems)
-    lints = _lints(table.get("lints", {}), problems)
-    settings = _settings(table.get("settings", {}), problems)
-    problems += [(name, f"there is no `{name}` here: known are {_listed(KEYS)}") for name in table if name not in KEYS]
-    return Project(folder, roots, lints, settings, tuple((_line_of(text, word), said) for word, said in problems))
+        message, place = mistake_at(text, str(error))
+        return Project(folder, (folder,), problems=(BAD_PROJECT(place, message),), text=text)
+    reader = _Reader(text)
+    roots = reader.roots(folder, table.get("roots", []))
+    lints = reader.lints(table.get("lints", {}))
+    settings = reader.settings(table.get("settings", {}))
+    for name in table:
+        if name not in KEYS:
+            reader.unknown("", name, KEYS, f"there is no `{name}` here: known are {_listed(KEYS)}")
+    problems = sorted(reader.problems, key=lambda said: said.span.start)
+    return Project(folder, roots, lints, settings, tuple(problems), text)
 
 
 def _listed(names: Iterable[str]) -> str:
     return ", ".join(f"`{name}`" for name in names)
 
 
-def _line(message: str) -> int:
-    """The line that the TOML parser names in its message."""
-    _, _, after = message.partition("at line ")
-    digits = after.split(",")[0].split(")")[0]
-    return max(int(digits) - 1, 0) if digits.isdigit() else 0
+class _Reader:
+    """Takes the tables of a project file apart, and notes what it does not understand."""
 
+    def __init__(self, text: str) -> None:
+        self._text = text
+        self.problems: list[Diagnostic] = []
 
-def _line_of(text: str, word: str) -> int:
-    """The first line that starts with a word, or has it at all; for a message to stand at."""
-    lines = text.split("\n")
-    starting = (number for number, line in enumerate(lines) if line.lstrip(' \t["').startswith(word))
-    having = (number for number, line in enumerate(lines) if word in line)
-    return next(starting, next(having, 0))
+    def unknown(self, table: str, key: str, known: Iterable[str], message: str) -> None:
+        """A key that means nothing, with those that may have been meant."""
+        near, (place, _) = near_names(key, known), entry_at(self._text, table, key)
+        said = BAD_PROJECT(place, message, help=did_you_mean(near), suggestions=instead(place, near))
+        self.problems.append(said)
 
+    def wrong(self, table: str, key: str, message: str) -> None:
+        """A value that cannot be the one of its key."""
+        self.problems.append(BAD_PROJECT(entry_at(self._text, table, key)[1], message))
 
-def _roots(folder: str, written: Any, problems: list[tuple[str, str]]) -> tuple[str, ...]:
-    if not isinstance(written, list) or not all(isinstance(root, str) for root in written):
-        problems.append(("roots", '`roots` is a list of folders, such as ["src"]'))
-        return (folder,)
-    found = [os.path.abspath(os.path.join(folder, root)) for root in written]
-    missing = [root for root, path in zip(written, found) if not os.path.isdir(path)]
-    problems += [("roots", f"`roots`: there is no folder `{root}`") for root in missing]
-    return tuple(dict.fromkeys([*found, folder]))
+    def roots(self, folder: str, written: Any) -> tuple[str, ...]:
+        """Where modules are looked for: absolute, the project's own folder last."""
+        if not isinstance(written, list) or not all(isinstance(root, str) for root in written):
+            self.wrong("", "roots", '`roots` is a list of folders, such as ["src"]')
+            return (folder,)
+        found = [os.path.abspath(os.path.join(folder, root)) for root in written]
+        for root, path in zip(written, found):
+            if not os.path.isdir(path):
+                self.wrong("", "roots", f"`roots`: there is no folder `{root}`")
+        return tuple(dict.fromkeys([*found, folder]))
 
+    def lints(self, written: Any) -> dict[str, str]:
+        """The levels of lints by their codes."""
+        if not isinstance(written, Mapping):
+            self.wrong("", "lints", '`lints` is a table of codes and levels, such as `P0620 = "off"`')
+            return {}
+        found: dict[str, str] = {}
+        for code, level in written.items():
+            if code not in LINTS:
+                self._no_lint(code)
+            elif level not in LEVELS:
+                self.wrong("lints", code, f"`lints`: the level of {code} is one of {_listed(LEVELS)}")
+            else:
+                found[code] = level
+        return found
 
-def _lints(written: Any, problems: list[tuple[str, str]]) -> dict[str, str]:
-    if not isinstance(written, Mapping):
-        problems.append(("lints", "`lints` is a table of codes and levels"))
-        return {}
-    for code, level in written.items():
-        if level not in LEVELS:
-            problems.append((code, f"`lints`: the level of {code} is one of {', '.join(LEVELS)}"))
-    return {str(code): str(level) for code, level in written.items() if level in LEVELS}
+    def _no_lint(self, code: str) -> None:
+        if code in codes():
+            told = f"`lints`: {code} is not a lint, its severity cannot be changed; lints are {_listed(LINTS)}"
+            self.problems.append(BAD_PROJECT(entry_at(self._text, "lints", code)[0], told))
+        else:
+            self.unknown("lints", code, LINTS, f"`lints`: there is no diagnostic `{code}`; lints are {_listed(LINTS)}")
 
-
-def _settings(written: Any, problems: list[tuple[str, str]]) -> Settings:
-    if not isinstance(written, Mapping):
-        problems.append(("settings", "`settings` is a table such as `rtol = 1e-6`"))
-        return DEFAULTS
-    complaints = {name: problem(name, value) for name, value in written.items()}
-    problems += [(name, f"`settings`: {said}") for name, said in complaints.items() if said is not None]
-    return replace(DEFAULTS, **{name: value for name, value in written.items() if complaints[name] is None})
+    def settings(self, written: Any) -> Settings:
+        """How numbers are asked for."""
+        if not isinstance(written, Mapping):
+            self.wrong("", "settings", "`settings` is a table such as `rtol = 1e-6`")
+            return DEFAULTS
+        found: dict[str, Any] = {}
+        for name, value in written.items():
+            if name not in Settings.__struct_fields__:
+                known = Settings.__struct_fields__
+                self.unknown("settings", name, known, f"`settings`: there is no `{name}`; there are {_listed(known)}")
+            elif (complaint := problem(name, value)) is not None:
+                self.wrong("settings", name, f"`settings`: {complaint}")
+            else:
+                found[name] = value
+        return replace(DEFAULTS, **found)
 
 
 def problems_of(project: Project) -> tuple[Located, ...]:
-    """What is wrong with a project file, as diagnostics."""
-    if not project.problems:
-        return ()
-    try:
-        with open(project.path, encoding="utf-8", errors="replace", newline="") as file:
-            lines = file.read().split("\n")
-    except OSError:
-        lines = []
-    found = []
-    for line, message in project.problems:
-        start = sum(len(text) + 1 for text in lines[:line])
-        end = start + len(lines[line].rstrip()) if line < len(lines) else start
-        found.append(Located(project.path, BAD_PROJECT(Span(start, end), message)))
-    return tuple(found)
+    """What is wrong with a project file, as diagnostics of it."""
+    return tuple(Located(project.path, said) for said in project.problems)
 
 
 def levelled(found: Iterable[Located], levels: Mapping[str, str]) -> Iterator[Located]:

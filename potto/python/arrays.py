@@ -16,7 +16,7 @@ import numpy as np
 
 from potto.kernels.cells import Cell, Rows, Value, all_cells, listed, map_cells, parts_of
 from potto.kernels.errors import wrong_call
-from potto.modules.hints import near_names
+from potto.reports.near import near_names
 from potto.runtime.answers.estimate import Estimate
 from potto.types import format_type
 from potto.types.types import ArrayOf, Count, Dist, Real, RecordName, Shifted, SizeVar, TupleOf, Type, resolve

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 
 from potto.diagnostics import Diagnostic, Related, Suggestion, shortened
 from potto.modules.builtins import DERIVATIVES
-from potto.modules.hints import did_you_mean, instead, near_names
 from potto.primitives import PRIMITIVES
 from potto.quick import replace
+from potto.reports.near import did_you_mean, instead, near_names
 from potto.source import Span
 from potto.syntax import nodes
 from potto.syntax.printer import print_expression

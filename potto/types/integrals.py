@@ -12,7 +12,7 @@ from potto.diagnostics import Diagnostic
 from potto.measures import COMPOSITIONS, MEASURES
 from potto.measures.composed import problem
 from potto.modules.free import free_references
-from potto.modules.hints import did_you_mean, instead, near_names
+from potto.reports.near import did_you_mean, instead, near_names
 from potto.syntax import nodes
 from potto.types import kinds
 from potto.types.context import Inference, rule

@@ -8,7 +8,7 @@ from potto.data.mistakes import TITLES, DataMistake
 from potto.data.values import Columns, Row, Shape, Sizes
 from potto.diagnostics import Diagnostic, declare
 from potto.modules.data import data_file, path_of
-from potto.modules.hints import instead
+from potto.reports.near import instead
 from potto.source import Span
 from potto.syntax import nodes
 from potto.types import kinds

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from potto.diagnostics import Diagnostic, Related, Replacement, Suggestion, shortened
-from potto.modules.hints import did_you_mean, instead, near_names
 from potto.modules.texts import definition
+from potto.reports.near import did_you_mean, instead, near_names
 from potto.source import Span
 from potto.syntax import nodes
 from potto.syntax.printer import print_expression

@@ -6,10 +6,10 @@ A record is a tuple whose type has the name of its definition. Its definition is
 from __future__ import annotations
 
 from potto.diagnostics import Diagnostic
-from potto.modules.hints import did_you_mean, instead, near_names
 from potto.modules.lookup import DefinitionTarget
 from potto.modules.lookup import resolve as resolve_name
 from potto.modules.texts import definition
+from potto.reports.near import did_you_mean, instead, near_names
 from potto.syntax import nodes
 from potto.syntax.kinds import BAD_TYPE
 from potto.types import kinds

@@ -13,12 +13,13 @@ from typing import Literal
 
 from potto.diagnostics import Diagnostic
 from potto.modules.builtins import CONSTANTS, PROJECTIONS, SPECIALS, VECTORS, is_builtin
-from potto.modules.hints import called_here, did_you_mean, elsewhere, instead, known_elsewhere, near_names
+from potto.modules.hints import called_here, elsewhere, known_elsewhere
 from potto.modules.lookup import Defined, DefinitionTarget, find_module, meaning, preludes, resolve_module
 from potto.modules.texts import imports, names
 from potto.primitives import PRIMITIVES
 from potto.query import Database, query
 from potto.quick import quick, value
+from potto.reports.near import did_you_mean, instead, near_names
 from potto.source import Span
 from potto.syntax import nodes
 from potto.types.interfaces import Interface

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from potto.diagnostics import Diagnostic
-from potto.modules.hints import did_you_mean, instead, near_names
+from potto.reports.near import did_you_mean, instead, near_names
 from potto.syntax import nodes
 from potto.syntax.written import without_parentheses
 from potto.types import kinds

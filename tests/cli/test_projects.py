@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import importlib
 import json
+import pkgutil
 from pathlib import Path
 
 import pytest
 from command_runs import Potto
 
 import potto as api
+from potto.diagnostics import KINDS
 from potto.evaluating.session import Said, Session, Valued
-from potto.projects.project import Projects, read_project
+from potto.projects.project import LINTS, Projects, read_project
 from potto.projects.settings import DEFAULTS, current
 
 USES_SRC = "from shapes import f\ndef g(t) f(t)\n"
@@ -81,7 +84,7 @@ def test_a_wrong_project_file_is_told_everywhere(potto: Potto, project: Path) ->
     for command in (["check", "main.po"], ["eval", "main.po", "1"], ["run", "main.po"]):
         ran = potto(*command, main="def g(t) t\n")
         assert ran.status == 1 and (ran.out + ran.err).count("error[P0231]") == 3, command
-    assert "potto.toml:2:1" in potto("check", "main.po").out
+    assert "potto.toml:2:8" in potto("check", "main.po").out
     with pytest.raises(api.PottoError) as caught:
         api.load(project / "main.po")
     assert {d.code for d in caught.value.diagnostics} == {"P0231"}
@@ -89,13 +92,46 @@ def test_a_wrong_project_file_is_told_everywhere(potto: Potto, project: Path) ->
     assert [o.located.diagnostic.code for o in told] == ["P0231"] * 3
 
 
-def test_what_is_wrong_is_told_at_its_line(tmp_path: Path) -> None:
-    (tmp_path / "potto.toml").write_text('roots = ["nowhere"]\n\n[lints]\nP0620 = "loud"\n\n[settings]\nseed = -1\n')
+def places(folder: Path, text: str) -> list[str]:
+    """What a project file says that is not understood, in order: the texts of the places."""
+    (folder / "potto.toml").write_text(text)
+    return [text[said.span.start : said.span.end] for said in read_project(str(folder)).problems]
+
+
+def test_what_is_wrong_is_told_at_its_place_and_all_at_once(tmp_path: Path) -> None:
+    text = 'roots = ["nowhere"]  # seed\n\n[lints]\nP0620 = "loud" # P0621\nP0621 = "off"\n\n[settings]\nseed = -1\n'
+    assert places(tmp_path, text) == ['["nowhere"]', '"loud"', "-1"]
     found = read_project(str(tmp_path))
-    assert [line for line, _ in found.problems] == [0, 3, 6]
-    assert found.settings == DEFAULTS and found.lints == {}
-    (tmp_path / "potto.toml").write_text("roots = [\n\nx = 3 = 4")
-    assert len(read_project(str(tmp_path)).problems) == 1
+    assert found.settings == DEFAULTS and found.lints == {"P0621": "off"}
+    assert places(tmp_path, 'lints = { P0620 = "off", "P062" = "off" }\nsettings.sed = 1\n[other]\nseed = 1\n') == [
+        "P062", "sed", "other",
+    ]  # fmt: skip
+    assert places(tmp_path, "lints = 3\nsettings = 4\nroots = 5") == ["3", "4", "5"]
+    assert places(tmp_path, "roots = [\n\nx = 3 = 4") == ["x = 3 = 4"]
+    assert places(tmp_path, "roots = [") == [""]
+    assert read_project(str(tmp_path)).problems[0].span.start == len("roots = [")
+
+
+def test_a_code_that_is_no_lint_is_an_error_with_what_may_have_been_meant(tmp_path: Path) -> None:
+    text = '[lints]\nP620 = "off"\nP0301 = "off"\n[setings]\n[settings]\nrtoll = 1\n'
+    assert places(tmp_path, text) == ["P620", "P0301", "setings", "rtoll"]
+    unknown, language, *_ = read_project(str(tmp_path)).problems
+    assert "no diagnostic `P620`" in unknown.message and "`P0620`" in unknown.help
+    assert "not a lint" in language.message and not language.suggestions
+    edits = [said.suggestions[0].edits[0] for said in read_project(str(tmp_path)).problems if said.suggestions]
+    written = text
+    for edit in reversed(edits):
+        written = written[: edit.span.start] + edit.text + written[edit.span.end :]
+    assert written == text.replace("P620", "P0620").replace("setings", "settings").replace("rtoll", "rtol")
+
+
+def test_lints_are_all_kinds_that_are_no_errors() -> None:
+    for module in pkgutil.walk_packages(api.__path__, "potto."):
+        path = Path(module.module_finder.path, *module.name.rsplit(".", 1)[-1:])  # type: ignore[union-attr]
+        source = path.with_suffix(".py") if not module.ispkg else path / "__init__.py"
+        if "declare(" in source.read_text():
+            importlib.import_module(module.name)
+    assert set(LINTS) == {kind.code for kind in KINDS.values() if kind.severity != "error"}
 
 
 def test_the_nearest_project_file_counts(tmp_path: Path) -> None:

@@ -182,6 +182,15 @@ def test_a_project_file_is_not_read_as_a_program(server: Server, uri: Uri, tmp_p
     assert pull(client, uri("potto.toml"))["items"] == []
 
 
+def test_a_code_in_the_settings_that_means_nothing_is_told_once(server: Server) -> None:
+    client = server()
+    for _ in range(2):
+        client.tell("workspace/didChangeConfiguration", {"settings": {"potto": {"lints": {"P62": "off"}}}})
+    client.tell("workspace/didChangeConfiguration", {"settings": {"potto": {"lints": {"P63": "off"}}}})
+    assert "P62; lints are" in client.note("window/showMessage")["message"]
+    assert "P63; lints are" in client.note("window/showMessage")["message"]
+
+
 def test_settings_are_heeded(server: Server, uri: Uri) -> None:
     client = server(a="def g(t) t\n")
     client.open(uri("main"), "from a import g\ndef f(t) t\n")

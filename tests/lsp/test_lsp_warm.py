@@ -103,6 +103,6 @@ def test_levels_follow_the_settings(session: Session) -> None:
     assert session.analysis.levels(key) == {}
     session.analysis.settings = {"lints": {"P0601": "error"}}
     assert session.analysis.levels(key) == {"P0601": "error"}
-    (session.folder / "potto.toml").write_text('[lints]\nP0602 = "off"\n')
+    (session.folder / "potto.toml").write_text('[lints]\nP0620 = "off"\n')
     session.analysis.reload_projects()
-    assert session.analysis.levels(key) == {"P0601": "error", "P0602": "off"}
+    assert session.analysis.levels(key) == {"P0601": "error", "P0620": "off"}
