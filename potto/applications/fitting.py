@@ -33,7 +33,7 @@ def fit(
     start: Mapping[str, Any],
     *,
     given: Mapping[str, Any] | None = None,
-    bounds: Mapping[str, tuple[float, float]] | None = None,
+    bounds: Mapping[str, tuple[float | None, float | None]] | None = None,
     target: Any = None,
     steps: int = MOST_STEPS,
     progress: Callable[[Step], None] | None = None,
@@ -44,8 +44,8 @@ def fit(
     """Make a function least over the parameters named in `start`, from there on: numbers, arrays, or records as
     dicts.
 
-    given: the other parameters; arrays among them make the function an array. bounds: what a parameter, or each
-    element of one, may be.
+    given: the other parameters; arrays among them make the function an array. bounds: the least and the most that a
+    parameter, or each element of one, may be; None where there is no limit. A start beyond them is moved there.
     target: where the function should come to instead of being least: then what is made least is the mean of the squared
     distances; numbers, tuples and arrays as the function's answer has them. progress: is told every step;
     watch: is given every answer of the function. method: "lbfgs", "gauss-newton" (Levenberg-Marquardt; for a target) or
@@ -75,8 +75,8 @@ def fit(
             watch(answer)
         return _seen(answer, names, {path: np.ndim(value) for path, value in begun.items()}, target)
 
-    free = (-math.inf, math.inf)
-    limits = [(bounds or {}).get(path[0], free) for path, value in begun.items() for _ in _labels(value)]
+    sides = {name: _sides(name, (bounds or {}).get(name)) for name in names}
+    limits = [sides[path[0]] for path, value in begun.items() for _ in _labels(value)]
     numbers = {
         f"{'.'.join(path)}{label}": float(number)
         for path, value in begun.items()
@@ -105,6 +105,19 @@ def _begun(name: str, value: Any) -> Any:
     except (TypeError, ValueError):
         raise wrong_call(f"`{name}` starts at a Python {type(value).__name__}, not at numbers") from None
     return found if found.ndim else float(found)
+
+
+def _sides(name: str, bound: Any) -> tuple[float, float]:
+    """The limits of a parameter; infinite where there are none."""
+    try:
+        low, high = (None, None) if bound is None else bound
+        found = -math.inf if low is None else float(low), math.inf if high is None else float(high)
+    except (TypeError, ValueError):
+        found = (math.nan, math.nan)
+    if not found[0] <= found[1]:
+        help = "give the least and the most that it may be, such as (0, 1); None where there is no limit"
+        raise wrong_call(f"the bounds of `{name}` are {bound!r}, and no number lies between these", help)
+    return found
 
 
 def _labels(value: Any) -> list[str]:
@@ -136,25 +149,24 @@ def _seen(found: Any, names: Sequence[str], axes: Mapping[Path, int], target: An
         return [_by_numbers(reduce(getitem, path, whole), found, count) for path, count in axes.items()]
 
     sides = (rows(side) for side in (found.tangent, found.tangent_error))
-    tangents, errors = (np.concatenate(parts) for parts in sides)
     value, bound = _flat(found.value), _flat(found.error)
-    tangents = np.broadcast_to(tangents, (len(tangents), value.size))
-    error = float(np.max(errors, initial=0.0))
+    joined = (np.concatenate(parts) for parts in sides)
+    tangents, errors = (np.broadcast_to(side, (len(side), value.size)) for side in joined)
     if target is None:
         if value.size != 1:
             raise wrong_call(
                 f"the function gives {value.size} numbers, and only one number can be least",
                 "say which numbers they should be: give a target",
             )
-        return Seen(float(value[0]), tangents[:, 0], error, float(bound[0]))
+        return Seen(float(value[0]), tangents[:, 0], float(np.max(errors, initial=0.0)), float(bound[0]))
     wanted = _flat(target)
     if wanted.size not in (1, value.size):
         raise wrong_call(f"the target has {wanted.size} numbers, the function's answer {value.size}")
     off = value - wanted
-    scale = float(np.sqrt(np.mean(off**2)))
     value_error = float(np.mean((2 * np.abs(off) + bound) * bound))
     slopes = 2 * np.mean(off * tangents, axis=1)
-    return Seen(float(np.mean(off**2)), slopes, 2 * scale * error, value_error, off, tangents.T)
+    slope_errors = 2 * np.mean(np.abs(off) * errors, axis=1)
+    return Seen(float(np.mean(off**2)), slopes, float(np.max(slope_errors, initial=0.0)), value_error, off, tangents.T)
 
 
 def _by_numbers(slopes: Any, found: Any, axes: int) -> Array:

@@ -19,7 +19,7 @@ from potto.applications.descending import adam, gauss_newton
 from potto.diagnostics import PottoError
 from potto.kernels.cells import Array
 from potto.kernels.errors import wrong_call
-from potto.runtime.answers.printing import format_digits, format_error
+from potto.runtime.answers.printing import format_digits, format_error, format_number, format_seconds, with_error
 
 MOST_STEPS = 200
 # The slope of a minimum, measured in the size of the values met and of the parameters.
@@ -34,9 +34,10 @@ FAR = 1e9  # how far a parameter may run from where it started, in its own size,
 STUCK = "no step along the derivative makes it smaller, though a slope is left: a kink, or the limit of accuracy"
 
 NOISE = (
-    "noise limits it: the value is known to ± {}, its slopes to ± {}, and what is left to gain is less; "
+    "noise limits it: the value is known to ± {}, and what is left to gain is less; "
     "more samples or a smaller tolerance take it further"
 )
+MOST_TOLD, MOST_DRAWN = 12, 5  # parameters
 METHODS = ("lbfgs", "gauss-newton", "adam")
 
 Objective = Callable[[Array], "Seen"]
@@ -47,6 +48,7 @@ Way = Callable[["Walk", Array, Array, int], str]
 class Seen(Struct, frozen=True):
     """The value and the gradient at one place; `error` bounds that of the gradient, `value_error` that of the value.
 
+    Of a mean of squares `error` takes the residuals as they are: what all samples have in common is no reason to stop.
     residuals, slopes: of a mean of squares, what is squared, and the derivatives of each: (residuals, parameters).
     """
 
@@ -93,6 +95,41 @@ class Fit(Struct, frozen=True):
 
     def __getitem__(self, name: str) -> Any:
         return self.parameters[name]
+
+    def __repr__(self) -> str:
+        return self.told("value")
+
+    def told(self, what: str) -> str:
+        """The parameters to the digits that are known, `what` was made least, and why it ended: a line each."""
+        doubts, shown = self.doubts(), list(self.numbers.items())[:MOST_TOLD]
+        lines = [f"{name} = {format_number(value, doubts[name])}" for name, value in shown]
+        if len(shown) < len(self.numbers):
+            lines.append(f"… {len(self.numbers) - len(shown):,} more")
+        cost = f"slope {format_error(self.slope)}, {len(self.steps) - 1} steps, {self.evaluations} evaluations"
+        verdict = f"{'' if self.converged else 'not '}converged: {self.reason}"
+        if self.held:
+            verdict += f"; stopped by a bound: {', '.join(sorted(self.held)[:MOST_TOLD])}"
+        end = f"{verdict} ({cost}, {format_seconds(self.seconds)})"
+        return "\n".join([*lines, f"{what} = {with_error(self.value, self.error)}", end])
+
+    def plot(self, path: str, what: str = "value") -> None:
+        """Draw the way there into a file: what was made least, from step to step, and how the parameters went. An
+        `.svg`, or by matplotlib a `.png` or `.pdf`.
+
+        Raises OSError, and PottoError where it takes matplotlib and that is not installed.
+        """
+        from potto.applications.figures import complaint, save
+        from potto.applications.pictures import Curve, Plot, course
+
+        wrong = complaint(path)
+        if wrong is not None:
+            raise wrong_call(wrong)
+        last = len(self.steps) - 1
+        ends = f"{what} = {with_error(self.value, self.error)} after {last} steps, {self.evaluations} evaluations"
+        values = course(what, [step.value for step in self.steps], ends)
+        names = tuple(self.numbers)[:MOST_DRAWN]
+        ways = tuple(Curve.even([step.parameters[i] for step in self.steps], 0, last) for i in range(len(names)))
+        save(path, [values, Plot(names, ways, 0, last, "step", ends, True)], caption=ends)
 
     def doubts(self) -> dict[str, float]:
         """How far each parameter may be off the minimum; digits beyond that say nothing.
@@ -247,7 +284,7 @@ def minimized(
         ways: dict[str, Way] = {"lbfgs": _lbfgs, "gauss-newton": gauss_newton, "adam": adam}
         walk.reason = ways[method](walk, x0, unit, most) or _reason(walk)
         if walk.limited():
-            walk.reason = NOISE.format(format_error(walk.seen.value_error), format_error(walk.seen.error))
+            walk.reason = NOISE.format(format_error(walk.seen.value_error))
     except Done:
         pass
     assert walk.best is not None

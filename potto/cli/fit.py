@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 SUMMARY = "find the parameters that make a function least, along its derivatives"
 EXAMPLE = """  potto fit lamp.po loss angle=0.2 height=1 --with shader=lin --bound angle=0:1.5
   potto fit lamp.po light angle=0.2 --data measured.csv --target brightness --trace steps.csv"""
-MOST_DRAWN = 5  # parameters
 EVERY = 1.0  # seconds between lines of progress where no one line can be overwritten
 
 
@@ -104,7 +103,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         if options.trace:
             _write_trace(found, options.trace)
         if options.plot:
-            _draw(found, options)
+            found.plot(options.plot, _least(options))
     except OSError as error:
         console.complain(f"potto fit: {error}")
         return 1
@@ -208,27 +207,11 @@ def _no_plot(options: argparse.Namespace) -> str | None:
     return complaint(options.plot)
 
 
-def _draw(found: Fit, options: argparse.Namespace) -> None:
-    """What is made least, from step to step, and beside it how the parameters went. Raises OSError."""
-    from potto.applications.figures import save
-    from potto.applications.pictures import Curve, Plot, course
-    from potto.runtime.answers.printing import with_error
-
-    last = len(found.steps) - 1
-    what = _least(options)
-    ends = f"{what} = {with_error(found.value, found.error)} after {last} steps, {found.evaluations} evaluations"
-    values = course(what, [step.value for step in found.steps], ends)
-    names = list(found.numbers)[:MOST_DRAWN]
-    ways = tuple(Curve.even([step.parameters[i] for step in found.steps], 0, last) for i in range(len(names)))
-    save(options.plot, [values, Plot(tuple(names), ways, 0, last, "step", ends, True)], caption=ends)
-
-
 def _least(options: argparse.Namespace) -> str:
     return str(options.name) if options.target is None else "mean squared distance"
 
 
 def _tell(found: Fit, options: argparse.Namespace, console: Console) -> None:
-    from potto.runtime.answers.printing import format_error, format_number, with_error
     from potto.runtime.answers.shown import json_number
 
     console.progress("")
@@ -240,10 +223,4 @@ def _tell(found: Fit, options: argparse.Namespace, console: Console) -> None:
             "seconds": found.seconds, "error": json_number(found.error),
         })  # fmt: skip
         return
-    doubts = found.doubts()
-    for name, value in found.parameters.items():
-        console.answer(f"{name} = {format_number(value, doubts[name])}")
-    console.answer(f"{_least(options)} = {with_error(found.value, found.error)}")
-    slope = f"slope {format_error(found.slope)}"
-    console.answer(f"{'converged' if found.converged else 'not converged'}: {found.reason} ({slope}, "
-                   f"{count} steps, {found.evaluations} evaluations, {found.seconds:.2f} s)")  # fmt: skip
+    console.answer(found.told(_least(options)))

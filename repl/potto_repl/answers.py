@@ -68,10 +68,10 @@ def _is_elsewhere(session: Conversation, located: Located) -> bool:
 def _no_answer(session: Conversation, located: Located, name: str) -> Located:
     """What is said of an answer that there never was, over the place where it is written: `Out[3]`, `_3` or `_`."""
     found = located.diagnostic
-    numbers = [e.number for e in session.entries for o in e.outcomes if isinstance(o, Valued) and o.names]
-    listed = ", ".join(f"`_{number}`" for number in numbers[-FEW:])
-    which = "the last answers" if len(numbers) > FEW else "the answers"
-    help = f"{which} are {listed}" if numbers else "an expression gives one, such as `1 + 1`"
+    names = [o.names[-1] for e in session.entries for o in e.outcomes if isinstance(o, Valued) and o.names]
+    listed = ", ".join(f"`{known}`" for known in names[-FEW:])
+    which = "the last answers" if len(names) > FEW else "the answers"
+    help = f"{which} are {listed}" if names else "an expression gives one, such as `1 + 1`"
     written = re.compile(r"Out\[\d+\]|_\d*").match(session.entries[-1].text, found.span.start)
     span = Span(written.start(), written.end()) if written is not None else found.span
     message = f"there is no answer {name[1:]}" if name != "_" else "there is no answer yet"

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import argparse
 import os
+import shutil
 import sys
+import textwrap
 import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING
@@ -95,7 +97,8 @@ def greeting() -> str:
     """The line above the first prompt."""
     from potto import __version__
 
-    return f"Potto {__version__}   :help says what can be done, Ctrl-D leaves"
+    text = f"Potto {__version__}   :help says what can be done, Ctrl-D leaves"
+    return textwrap.fill(text, shutil.get_terminal_size().columns)
 
 
 def say(text: str) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -100,6 +101,33 @@ def test_noise_of_values_is_told_too() -> None:
     found = minimized(rough, {"x": 0.2}, [(-9.0, 9.0)])
     assert not found.converged and found.reason.startswith("noise limits it: the value is known to ± ")
     assert abs(found["x"] - 1) < 0.3
+
+
+def test_an_answer_is_a_few_lines_and_draws_its_way(tmp_path: Path) -> None:
+    found = potto.fit(m.valley, {"x": -1.0, "y": 1.0}, bounds={"x": (None, 0.5)})
+    lines = str(found).splitlines()
+    assert lines == repr(found).splitlines() and lines[0] == "x = 0.5" and lines[1].startswith("y = 0.25")
+    assert lines[2].startswith("value = ") and "; stopped by a bound: x (slope 0" in lines[3] and len(lines) == 4
+    many = potto.fit(m.spread, {"xs": [1.0] * 20}, steps=1)
+    assert "… 8 more" in str(many) and len(str(many).splitlines()) == 15
+    found.plot(str(tmp_path / "way.svg"))
+    assert "value" in (tmp_path / "way.svg").read_text()
+    with pytest.raises(potto.PottoError, match=r"`\.bmp`|bmp"):
+        found.plot(str(tmp_path / "way.bmp"))
+
+
+def test_samples_in_common_do_not_stop_a_fit_to_a_target() -> None:
+    lit = potto.compile("def lit(x, edge) integral [0, 1] [u*x < edge] d(u)").lit
+    x = np.linspace(0.5, 2, 16)
+    with potto.settings(method="mc", samples=100, seed=1):
+        found = potto.fit(lit, {"edge": 0.4}, given={"x": x}, target=np.minimum(1, 0.7 / x))
+    assert abs(found["edge"] - 0.7) < 0.05 and "noise limits it: the value is known to ± " in found.reason
+
+
+@pytest.mark.parametrize("bounds", [(1, 0), (0, math.nan), 1, ("a", "b"), (0, 1, 2)])
+def test_bounds_that_hold_no_number_are_refused(bounds: Any) -> None:
+    with pytest.raises(potto.PottoError, match="the bounds of `r` are"):
+        potto.fit(m.cover, {"r": 0.5}, bounds={"r": bounds})
 
 
 def test_what_cannot_be_is_told() -> None:

@@ -208,6 +208,11 @@ def test_an_answer_that_there_never_was(talk):
     assert "there is no answer 9" in text and "define `Ou`" not in text
 
 
+def test_the_answers_of_a_paste_have_numbers_of_their_own(talk):
+    assert talk("1 + 1\n2 + 2").text.split() == ["_1", "=", "2", ":", "Real", "_2", "=", "4", ":", "Real"]
+    assert "the answers are `_1`, `_2`" in talk("Out[7]").text
+
+
 def test_a_constant_is_as_accurate_as_is_asked_for_each_time(talk):
     talk.all("def h(t) integral [0, 1] exp(-t*x^2) d(x)", "a = h(3)", ":plot a*x")
     exact = math.sqrt(math.pi / 12) * math.erf(math.sqrt(3))

@@ -7,6 +7,7 @@ import re
 import pytest
 from potto_repl.paint import Look, painted
 from potto_repl.registry import COMMANDS
+from potto_repl.start import greeting
 
 from potto.reports.excerpt import width
 from potto.reports.render import broken
@@ -32,6 +33,13 @@ def test_help_fits_and_breaks_between_words(talk, columns):
         told = lines(talk(f":help {name}"), columns)
         assert " ".join(" ".join(told).split()).startswith(COMMANDS[name].usage)
         assert all(width(line) <= columns or " " not in line.strip() for line in told)
+
+
+@pytest.mark.parametrize("columns", [20, 44, 80])
+def test_the_greeting_breaks_between_words(columns, monkeypatch):
+    monkeypatch.setenv("COLUMNS", str(columns))
+    shown = greeting().split("\n")
+    assert all(len(line) <= columns for line in shown) and " ".join(shown).endswith("can be done, Ctrl-D leaves")
 
 
 @pytest.mark.parametrize("columns", [20, 30, 40, 60, 80])
