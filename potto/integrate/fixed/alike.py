@@ -14,10 +14,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from potto.integrate.fixed.product_rule import CANCELS, FEW, Rule
-from potto.integrate.fixed.straight import Straight
+from potto.integrate.fixed.straight import MOST_CUTS, Straight
 from potto.integrate.fixed.topologies import Alike, topologies
 from potto.integrate.pieces import Evaluator, Sums, gather, together
-from potto.kernels.cells import Array, Bools, Cell, Value
+from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 
 # Nodes per variable that are tried, one after the other.
 ORDERS = (6, 8, 12, 14, 20, 28)
@@ -30,6 +30,10 @@ ENOUGH = 0.9
 # What rounding may leave where what is added up cancels, as a part of that, in the end (`convergence`): of 18,233 pairs
 # of a triangle and a pixel 1,082 would be done again for less, at a hundred times the cost.
 ROUNDED = 1e-12
+
+
+# Enough for the number of a row in a frame: two bounds, then cuts.
+ROW_BITS = (MOST_CUTS + 1).bit_length()
 
 
 def by_shapes(
@@ -79,7 +83,7 @@ def _settled(
 ) -> Bools:  # fmt: skip
     """Add the integrals over cells of one shape to those of their members; for which of them that could be done."""
     fine = np.zeros(cell.members.size, dtype=bool)
-    todo = np.arange(cell.members.size)
+    todo = np.argsort(_between(cell.rows), kind="stable")
     for rule in _tried(plan, degrees, machine, env, cell):
         step = max(1, POINTS // rule.span(env))
         left = []
@@ -97,6 +101,18 @@ def _settled(
         if not todo.size:
             break
     return fine
+
+
+def _between(rows: Ints) -> Ints:
+    """A number for the rows (variables, 2, M) between which cells lie. In its order neighbours lie between the same
+    cuts, which numpy then takes whole."""
+    digits = rows.reshape(-1, rows.shape[-1])
+    number = np.zeros(
+        rows.shape[-1], dtype=np.uint16 if len(digits) * ROW_BITS <= 16 else np.int64
+    )  # sorts in one pass
+    for row in digits:
+        number = (number << ROW_BITS) | row.astype(number.dtype)
+    return number
 
 
 def _tried(

@@ -16,6 +16,7 @@ import numpy as np
 from msgspec import Struct
 
 from potto.core.terms import Lam, Term
+from potto.integrate.columns import run_of
 from potto.integrate.fixed.box_text import NODE_ROUNDING, SLOWING
 from potto.integrate.fixed.lowered import lowered_boxes
 from potto.integrate.fixed.straight import Straight
@@ -78,7 +79,9 @@ def integrated(
             for start in range(0, index.size, step):
                 some = index[start : start + step]
                 machine.count(some.size * math.prod(orders))
-                found = rule(gather(given, some), low[:, some], high[:, some])
+                where = run_of(some)
+                where = some if where is None else where
+                found = rule(gather(given, where), low[:, where], high[:, where])
                 if found is None:
                     return
                 sums, good = found

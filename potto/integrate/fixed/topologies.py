@@ -48,7 +48,7 @@ class _Cells(Struct):
     def pick(self, index: Ints, names: Collection[str]) -> _Cells:
         """Some of the cells, with those numbers that are still asked for."""
         env = {name: value for name, value in self.env.items() if name in names}
-        return _Cells(self.rows[:, :, index], self.members[index], gather(env, index))
+        return _Cells(self.rows.take(index, -1), self.members.take(index), gather(env, index))
 
 
 def topologies(plan: Straight, machine: Evaluator, env: dict[str, Value], batch: int) -> tuple[Bools, list[Alike]]:
@@ -76,12 +76,15 @@ def _along(plan: Straight, i: int, machine: Evaluator, cells: _Cells, plain: Boo
             machine.costs.saw(surface, roots, places[0], places[1], machine.directions > 0)
     order, count, fine = in_order(places, off, machine.backend)
     plain[cells.members[~fine]] = False
-    at, index = np.nonzero((np.arange(1, len(places))[:, None] < count) & fine)
-    low, high = order[at, index], order[at + 1, index]
+    size, flat = places.shape[1], places.reshape(-1)
+    found = [np.flatnonzero((at < count) & fine) for at in range(1, len(places))]
+    index = np.concatenate(found)
+    low, high = (np.concatenate([row.take(at) for row, at in zip(rows, found, strict=True)])
+                 for rows in (order[:-1], order[1:]))  # fmt: skip
     later = (*plan.frames[i + 1 :], plan.surfaces)
     inner = cells.pick(index, {name for function in later for name in function.params})
     inner.rows = np.concatenate((inner.rows, np.stack((low, high))[None]))
-    inner.env[plan.variables[i]] = Cell(0.5 * (places[low, index] + places[high, index]))
+    inner.env[plan.variables[i]] = Cell(0.5 * (flat.take(low * size + index) + flat.take(high * size + index)))
     return inner
 
 
@@ -118,7 +121,7 @@ def _gathered(plan: Straight, machine: Evaluator, cells: _Cells, sides: Ints) ->
         for turn in () if dark else distinct(turns[own]):
             index = np.nonzero(own & (turns == turn))[0]
             turning_ends = tuple((bool(turn >> 2 * i & 1), bool(turn >> 2 * i + 1 & 1)) for i in range(count))
-            found.append(Alike(face, turning_ends, cells.rows[:, :, index], cells.members[index]))
+            found.append(Alike(face, turning_ends, cells.rows.take(index, -1), cells.members.take(index)))
     return found
 
 
