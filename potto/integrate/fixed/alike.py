@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from potto.integrate.fixed.product_rule import CANCELS, FEW, Rule
 from potto.integrate.fixed.straight import MOST_CUTS, Straight
@@ -103,16 +105,14 @@ def _settled(
     return fine
 
 
-def _between(rows: Ints) -> Ints:
+def _between(rows: Ints) -> NDArray[np.integer[Any]]:
     """A number for the rows (variables, 2, M) between which cells lie. In its order neighbours lie between the same
     cuts, which numpy then takes whole."""
     digits = rows.reshape(-1, rows.shape[-1])
-    number = np.zeros(
-        rows.shape[-1], dtype=np.uint16 if len(digits) * ROW_BITS <= 16 else np.int64
-    )  # sorts in one pass
+    number = np.zeros(rows.shape[-1], dtype=np.int64)
     for row in digits:
-        number = (number << ROW_BITS) | row.astype(number.dtype)
-    return number
+        number = (number << ROW_BITS) | row
+    return number.astype(np.uint16) if len(digits) * ROW_BITS <= 16 else number  # sorts in one pass
 
 
 def _tried(

@@ -98,7 +98,8 @@ class _Cells(Struct, frozen=True):
     def picked(self, block: Array, i: int) -> Array:
         """Of the rows of variable i's frame, (R, 1 + k, ..., M), those at the ends of the cells, (2, 1 + k, ..., M)."""
         if not np.ptp(self.rows[i], axis=-1).any():  # as of most members, who come in the order of their rows
-            return block[self.rows[i][:, 0]]
+            same: Array = block[self.rows[i][:, 0]]
+            return same
         index = self.rows[i].reshape(2, *(1,) * (block.ndim - 2), -1)
         found: Array = np.take_along_axis(block, index, 0)
         return found

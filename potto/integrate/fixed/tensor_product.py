@@ -79,8 +79,8 @@ def integrated(
             for start in range(0, index.size, step):
                 some = index[start : start + step]
                 machine.count(some.size * math.prod(orders))
-                where = run_of(some)
-                where = some if where is None else where
+                span = run_of(some)
+                where = some if span is None else span
                 found = rule(gather(given, where), low[:, where], high[:, where])
                 if found is None:
                     return
