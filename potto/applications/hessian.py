@@ -18,9 +18,11 @@ from potto.kernels.errors import wrong_call
 from potto.python.arguments import batch_of
 from potto.python.functions import Function, bound, deriv
 from potto.python.gradients import Gradient, Names, grad, in_given_form, parameters_to_vary
+from potto.python.remade import remade
 from potto.runtime.answers.estimate import Estimate
 
 
+@remade
 def hvp(function: Function, along: Mapping[str, Any]) -> Callable[..., Gradient]:
     """The Hessian of a function times the vector `along`, over the parameters that it names; the others stand still.
 
@@ -39,6 +41,7 @@ def hvp(function: Function, along: Mapping[str, Any]) -> Callable[..., Gradient]
     return product
 
 
+@remade
 def hessian(function: Function, wrt: Names = None) -> Callable[..., Estimate]:
     """All second derivatives of a function that gives one number, by the parameters in `wrt`, or by the first one.
 
@@ -69,6 +72,7 @@ def hessian(function: Function, wrt: Names = None) -> Callable[..., Estimate]:
     return matrix
 
 
+@remade
 def second_gradient(function: Function, first: tuple[str, ...], then: tuple[str, ...]) -> Callable[..., Gradient]:
     """The derivatives by `first`, as value, and theirs by `then`: what `grad(grad(f, first), then)` is.
 

@@ -9,13 +9,13 @@ are in `applications/hessian`.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, overload
 
 import numpy as np
 from msgspec.structs import asdict, replace
 
-from potto.kernels.cells import Cell, Rows, Value, all_cells, listed, map_cells, pad
+from potto.kernels.cells import Cell, Value, all_cells, map_cells, pad
 from potto.kernels.chunks import POINTS
 from potto.kernels.errors import wrong_call
 from potto.kernels.tape import Node, Swept, Untaped, swept
@@ -24,8 +24,10 @@ from potto.python.accepting import as_given
 from potto.python.arguments import Batch, value_of
 from potto.python.calls import Call
 from potto.python.described import typeset_derivative
-from potto.python.forms import as_matrix, bounds_of, by_name, form_of, in_lists, must_match, tangents_of, weighted
+from potto.python.forms import as_matrix, bounds_of, by_name, in_lists, must_match, tangents_of, weighted
 from potto.python.functions import Function, bound, must_be_function
+from potto.python.moving import each_moving, moved, size, with_places
+from potto.python.remade import remade
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.evaluate import Clock, number, report, told
 from potto.runtime.evaluation.machine import Machine
@@ -72,6 +74,7 @@ def grad(function: Function | GradientFunction, wrt: Names = None) -> Any:
     return GradientFunction(function, parameters_to_vary(function, wrt))
 
 
+@remade
 def value_and_grad(function: Function, wrt: Names = None) -> Callable[..., tuple[Estimate, Estimate]]:
     """The value and the derivatives by the parameters named in `wrt`, or by the first one, as two estimates.
 
@@ -87,6 +90,7 @@ def value_and_grad(function: Function, wrt: Names = None) -> Callable[..., tuple
     return pair
 
 
+@remade
 def jacobian(function: Function, wrt: Names = None) -> Callable[..., Estimate]:
     """All derivatives as one array: by the numbers of the function's answer, and by those of the parameters in `wrt`.
 
@@ -97,6 +101,7 @@ def jacobian(function: Function, wrt: Names = None) -> Callable[..., Estimate]:
     return lambda *args, **kwargs: pair(*args, **kwargs)[1]
 
 
+@remade
 def value_and_jacobian(function: Function, wrt: Names = None) -> Callable[..., tuple[Estimate, Estimate]]:
     """The value and what `jacobian` has of it, in one run. Raises as that does."""
     names = parameters_to_vary(function, wrt)
@@ -110,7 +115,7 @@ def value_and_jacobian(function: Function, wrt: Names = None) -> Callable[..., t
         )
         found = run.answer(value, tangents, bounds)
         single = isinstance(value, Cell), len(names) == 1 and isinstance(run.given[names[0]], Cell)
-        count = sum(_size(name, run.given[name]) for name in names)
+        count = sum(size(name, run.given[name]) for name in names)
         slopes, errors = (as_matrix(part, count, run.batch, *single) for part in (found.tangent, found.tangent_error))
         plain = replace(found, tangent=None, tangent_error=None)
         return plain, replace(plain, value=slopes, error=errors)
@@ -118,6 +123,7 @@ def value_and_jacobian(function: Function, wrt: Names = None) -> Callable[..., t
     return pair
 
 
+@remade
 def vjp(function: Function, cotangent: Any, wrt: Names = None) -> Callable[..., Gradient]:
     """The product of a cotangent with the Jacobian: the derivatives of `cotangent` times the function's answer.
 
@@ -136,6 +142,7 @@ def vjp(function: Function, cotangent: Any, wrt: Names = None) -> Callable[..., 
     return product
 
 
+@remade
 def jvp(function: Function, along: Mapping[str, Any]) -> Callable[..., Estimate]:
     """The product of the Jacobian with a vector: the derivative along a direction, over the parameters that it names.
 
@@ -153,7 +160,7 @@ def jvp(function: Function, along: Mapping[str, Any]) -> Callable[..., Estimate]
         }
         run = _Run(*function.prepared(args, kwargs, labels), labels)
         tangents = dict(zip(names, run.extra.values(), strict=True))
-        moving = {name: _moved(name, run.own(name), tangents[name]) for name in names}
+        moving = {name: moved(name, run.own(name), tangents[name]) for name in names}
         value = run.evaluated(moving, run.machine.with_directions(1), lambda value: value)
         return run.batch.shaped(report(value, run.machine, run.clock))
 
@@ -272,7 +279,7 @@ class _Run:
         forward: Callable[[Value], Value],
     ) -> Value:  # fmt: skip
         """What one of these makes of the value: of a tape with its seeds, or of tangents."""
-        directions = sum(_size(name, self.own(name)) for name in wrt)
+        directions = sum(size(name, self.own(name)) for name in wrt)
         shape = () if self.batch.shape is None else (max(1, int(np.prod(self.batch.shape))),)
         if directions >= MANY and np.prod(shape) <= POINTS:  # a tape keeps arrays for all operations
             seeds: list[Any] = []
@@ -281,14 +288,14 @@ class _Run:
                 seeds.append(Node((), (*places, *shape)))
                 return Cell(cell.v, cell.e, (seeds[-1],))
 
-            moving = {name: _with_places(self.given[name], (), seeded) for name in wrt}
+            moving = {name: with_places(self.given[name], (), seeded) for name in wrt}
             self.whole = True
             try:
                 return self.evaluated(moving, self.machine.taped(), lambda value: swept_back(value, seeds))
             except Untaped:
                 self.machine, self.whole = self._machine(), False
         numbers = iter(range(directions))
-        moving = {name: _seeded(self.given[name], numbers, directions) for name in wrt}
+        moving = {name: each_moving(self.given[name], numbers, directions) for name in wrt}
         return self.evaluated(moving, self.machine.with_directions(directions), forward)
 
     def evaluated(self, moving: Mapping[str, Value], machine: Machine, ended: Callable[[Value], Value]) -> Value:
@@ -323,7 +330,7 @@ class _Run:
     def gradient(self, value: Value, moving: Value, wrt: tuple[str, ...]) -> Gradient:
         """The estimate of a value, with the derivatives of `moving` in the form of the parameters."""
         directions = range(len(all_cells(tuple(self.given[name] for name in wrt))) if self.whole
-                           else sum(_size(name, self.given[name]) for name in wrt))  # fmt: skip
+                           else sum(size(name, self.given[name]) for name in wrt))  # fmt: skip
         tangents = [told(moving, lambda cell, d=d: cell.t[d]) for d in directions]  # type: ignore[misc]
         bounds = [told(moving, lambda cell, d=d: cell.et[d]) for d in directions]  # type: ignore[misc]
         forms = (by_name(part, wrt, self.given, self.whole) for part in (tangents, bounds))
@@ -344,56 +351,6 @@ def _plain(found: Estimate) -> Estimate:
 
 def _numbers(value: Value) -> bool:
     return isinstance(value, Cell) or (isinstance(value, tuple | list) and all(map(_numbers, value)))
-
-
-# Parameters that move
-
-
-def _size(name: str, value: Value) -> int:
-    """How many numbers a parameter has."""
-    if isinstance(value, Cell):
-        return 1
-    if isinstance(value, tuple):
-        return sum(_size(name, item) for item in value)
-    if isinstance(value, Rows):
-        return value.size * _size(name, value.item)
-    kind = "list" if isinstance(value, list) else "function"
-    raise wrong_call(
-        f"`{name}` is a {kind} and not a number, so there is no derivative by it", "name other parameters in `wrt`"
-    )
-
-
-def _seeded(value: Value, numbers: Iterator[int], directions: int) -> Value:
-    """The parameter, each of its numbers moving in a direction of its own."""
-    if isinstance(value, tuple):
-        return tuple(_seeded(item, numbers, directions) for item in value)
-    if isinstance(value, Rows):
-        return listed([_seeded(row, numbers, directions) for row in value.rows()])
-    assert isinstance(value, Cell)
-    own = next(numbers)
-    return Cell(value.v, value.e, (None,) * own + (1.0,) + (None,) * (directions - own - 1))
-
-
-def _with_places(value: Value, places: tuple[int, ...], change: Callable[[Cell, tuple[int, ...]], Cell]) -> Value:
-    """The value with `change` done to its cells, which is told how many elements the arrays around each have."""
-    if isinstance(value, tuple):
-        return tuple(_with_places(item, places, change) for item in value)
-    if isinstance(value, Rows):
-        return Rows(_with_places(value.item, (*places, value.size), change), value.size)
-    assert isinstance(value, Cell)
-    return change(value, places)
-
-
-def _moved(name: str, value: Value, tangent: Value) -> Value:
-    """The parameter, moving along the tangent."""
-    _size(name, value)
-    if isinstance(value, Cell) and isinstance(tangent, Cell):
-        return Cell(value.v, value.e, (tangent.v,), (tangent.e,))
-    if isinstance(value, tuple) and isinstance(tangent, tuple) and len(value) == len(tangent):
-        return tuple(_moved(name, *pair) for pair in zip(value, tangent, strict=True))
-    if isinstance(value, Rows) and isinstance(tangent, Rows) and value.size == tangent.size:
-        return Rows(_moved(name, value.item, tangent.item), value.size)
-    raise wrong_call(f"the tangent of `{name}` must have its form, {form_of(value)}")
 
 
 __all__ = ["Gradient", "GradientFunction", "grad", "jacobian", "jvp", "value_and_grad", "vjp"]

@@ -141,3 +141,9 @@ def test_a_fit_with_an_optimizer() -> None:
 
     optimizer.step(loss)
     assert abs(c.item()) == pytest.approx(0.3, abs=1e-6)  # of c^2
+
+
+def test_answers_become_tensors() -> None:
+    one, several = m.area(2.0, 0.5), m.area(2.0, np.array([0.2, 0.5]))
+    assert torch.tensor(one).item() == torch.as_tensor(one).item() == float(one)
+    assert torch.as_tensor(several).tolist() == torch.from_dlpack(several).tolist() == several.value.tolist()

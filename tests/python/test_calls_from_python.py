@@ -106,6 +106,27 @@ def test_gradients_of_gradients() -> None:
         potto.grad(potto.grad(M.volume))((2, 3))
 
 
+MADE = [
+    potto.value_and_grad(M.g, "t"), potto.jacobian(M.g, ["a", "t"]), potto.hessian(M.g, ["a", "t"]),
+    potto.jvp(M.g, {"t": 2.0}), potto.vjp(M.g, 3.0, wrt=["a"]), potto.hvp(M.g, along={"t": 2.0}),
+    potto.grad(M.g, "a"), potto.grad(potto.grad(M.g, "t"), "t"), potto.deriv(M.f),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("made", MADE, ids=repr)
+def test_derivatives_pickle_as_functions_do(made: Any) -> None:
+    again = pickle.loads(pickle.dumps(made))
+    arguments = ((0.5, 1.0),) if made is MADE[-1] else (2.0, 0.5)
+    assert repr(again) == repr(made)
+    assert np.array_equal(*(np.asarray(f(*arguments), dtype=float) for f in (again, made)))
+
+
+def test_an_objective_of_scipy_pickles() -> None:
+    loss = potto.to_scipy(M.g, {"t": 0.5}, given={"a": 2.0})
+    again = pickle.loads(pickle.dumps(loss))
+    assert again.fun([0.5]) == loss.fun([0.5]) == 0.5 and again.jac([0.5]).tolist() == loss.jac([0.5]).tolist()
+
+
 def test_what_inspect_says() -> None:
     assert str(inspect.signature(M.f)) == "(t: 'Real') -> 'Real'"
     assert list(inspect.signature(M.seen).parameters) == ["q", "s"] and M.seen.__annotations__["q"] == "Camera"

@@ -159,6 +159,10 @@ def test_arrays() -> None:
         bool(r == XS)
 
 
+def test_other_libraries_take_them_by_dlpack() -> None:
+    assert np.from_dlpack(M.f(XS)).tolist() == XS.tolist() and np.from_dlpack(M.f(0.25)) == 0.25  # type: ignore[arg-type]
+
+
 def test_members_keep_what_they_missed() -> None:
     with potto.settings(method="mc", samples=64, seed=1, rtol=1e-9, max_evals=64):
         r = M.left(np.array([0.1, 1.0, 2.0]), 0.7)

@@ -211,6 +211,12 @@ class Estimate(Operators, Struct, frozen=True, eq=False):
             float(self)
         return np.array(self._parts, dtype=float if dtype is None else dtype)
 
+    def __dlpack__(self, **options: Any) -> Any:
+        return np.asarray(self).__dlpack__(**options)
+
+    def __dlpack_device__(self) -> Any:
+        return np.asarray(self).__dlpack_device__()
+
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
         if method == "__call__" and ufunc.nout == 1 and not options.keys() & {"out", "where"}:
             return self._computed(ufunc, *inputs, **options)
