@@ -115,14 +115,20 @@ def declare(code: str, title: str, severity: Severity = "error") -> Kind:
 
 
 class PottoError(Exception):
-    """The program, not Potto, is at fault: carries the diagnostics that say how. As text it starts with the message."""
+    """The program, not Potto, is at fault: carries the diagnostics that say how. As text it starts with the message and
+    ends with what to do."""
 
     def __init__(self, diagnostics: tuple[Diagnostic, ...] | list[Diagnostic]) -> None:
         self.diagnostics = tuple(diagnostics)
-        super().__init__("; ".join(map(headline, self.diagnostics)))
+        super().__init__("\n".join(map(_said, self.diagnostics)))
 
     def __reduce__(self) -> tuple[object, ...]:
         return type(self), (self.diagnostics,)
+
+
+def _said(diagnostic: Diagnostic) -> str:
+    more = [f"  = note: {note}" for note in diagnostic.notes] + [f"  = help: {diagnostic.help}"] * bool(diagnostic.help)
+    return "\n".join([headline(diagnostic), *more])
 
 
 def headline(diagnostic: Diagnostic) -> str:

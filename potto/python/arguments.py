@@ -193,7 +193,7 @@ def value_of(name: str, argument: Any, batch: Batch, to_function: ToFunction) ->
         return listed([value_of(name, item, batch, to_function) for item in argument])
     if isinstance(argument, Rows):
         return over_batch(argument, batch.rows)
-    raise no_kind(name, argument, "numbers, numpy arrays, tuples, lists and functions of Potto are accepted")
+    raise no_kind(name, argument, _instead(argument))
 
 
 NUMBERS = Batch(None)
@@ -249,6 +249,15 @@ def _estimate(name: str, argument: Estimate, batch: Batch, to_function: ToFuncti
 def evenly(lo: float, hi: float, count: int) -> np.ndarray[Any, np.dtype[np.float64]]:
     """So many numbers at equal distances, both ends included."""
     return np.linspace(lo, hi, count)
+
+
+def _instead(argument: Any) -> str:
+    """What to do with an argument that is none: of a library that differentiates, what makes a function one of its."""
+    bridges = {"jax": ("JAX", "to_jax"), "jaxlib": ("JAX", "to_jax"), "torch": ("PyTorch", "to_torch")}
+    library, bridge = bridges.get(type(argument).__module__.partition(".")[0], ("", ""))
+    if bridge:
+        return f"{library} differentiates functions of its own: `potto.{bridge}(f)` makes `f` one, derivatives included"
+    return "numbers, numpy arrays, tuples, lists and functions of Potto are accepted"
 
 
 def no_kind(name: str, argument: Any, help: str) -> PottoError:

@@ -138,3 +138,10 @@ def test_a_fit_with_optax() -> None:
         change, state = step.update(slope, state)
         c = optax.apply_updates(c, change)
     assert c == pytest.approx(0.3, abs=1e-3)
+
+
+@pytest.mark.parametrize("transform", [jax.grad, jax.jit, jax.vmap], ids=lambda t: t.__name__)
+def test_what_jax_traces_is_refused_with_what_it_takes(transform: Any) -> None:
+    argument = jax.numpy.ones(3) if transform is jax.vmap else 0.3
+    with pytest.raises(potto.PottoError, match=r"`potto\.to_jax\(f\)` makes `f` one"):
+        transform(potto.compile("def f(t) t^2").f)(argument)

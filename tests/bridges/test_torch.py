@@ -147,3 +147,8 @@ def test_answers_become_tensors() -> None:
     one, several = m.area(2.0, 0.5), m.area(2.0, np.array([0.2, 0.5]))
     assert torch.tensor(one).item() == torch.as_tensor(one).item() == float(one)
     assert torch.as_tensor(several).tolist() == torch.from_dlpack(several).tolist() == several.value.tolist()
+
+
+def test_a_tensor_that_needs_a_gradient_is_refused_with_what_keeps_it() -> None:
+    with pytest.raises(potto.PottoError, match=r"`potto\.to_torch\(f\)` makes `f` one"):
+        m.area(real(2), real(0.5))
