@@ -19,7 +19,14 @@ from potto.applications.descending import adam, gauss_newton
 from potto.diagnostics import PottoError
 from potto.kernels.cells import Array
 from potto.kernels.errors import wrong_call
-from potto.runtime.answers.printing import format_digits, format_error, format_number, format_seconds, with_error
+from potto.runtime.answers.printing import (
+    format_count,
+    format_digits,
+    format_error,
+    format_number,
+    format_seconds,
+    with_error,
+)
 
 MOST_STEPS = 200
 # The slope of a minimum, measured in the size of the values met and of the parameters.
@@ -99,13 +106,17 @@ class Fit(Struct, frozen=True):
     def __repr__(self) -> str:
         return self.told("value")
 
+    @property
+    def _course(self) -> str:
+        return f"{format_count(len(self.steps) - 1, 'step')}, {format_count(self.evaluations, 'evaluation')}"
+
     def told(self, what: str) -> str:
         """The parameters to the digits that are known, `what` was made least, and why it ended: a line each."""
         doubts, shown = self.doubts(), list(self.numbers.items())[:MOST_TOLD]
         lines = [f"{name} = {format_number(value, doubts[name])}" for name, value in shown]
         if len(shown) < len(self.numbers):
             lines.append(f"… {len(self.numbers) - len(shown):,} more")
-        cost = f"slope {format_error(self.slope)}, {len(self.steps) - 1} steps, {self.evaluations} evaluations"
+        cost = f"slope {format_error(self.slope)}, {self._course}"
         verdict = f"{'' if self.converged else 'not '}converged: {self.reason}"
         if self.held:
             verdict += f"; stopped by a bound: {', '.join(sorted(self.held)[:MOST_TOLD])}"
@@ -125,7 +136,7 @@ class Fit(Struct, frozen=True):
         if wrong is not None:
             raise wrong_call(wrong)
         last = len(self.steps) - 1
-        ends = f"{what} = {with_error(self.value, self.error)} after {last} steps, {self.evaluations} evaluations"
+        ends = f"{what} = {with_error(self.value, self.error)} after {self._course}"
         values = course(what, [step.value for step in self.steps], ends)
         names = tuple(self.numbers)[:MOST_DRAWN]
         ways = tuple(Curve.even([step.parameters[i] for step in self.steps], 0, last) for i in range(len(names)))

@@ -19,6 +19,8 @@ EXAMPLE = "  potto kernel install"
 def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("action", choices=("install", "remove", "where"), help="install, remove, or say where it is")
     parser.add_argument("--prefix", metavar="FOLDER", help="an environment to install into; the user's folder without")
+    parser.add_argument("--sys-prefix", dest="prefix", action="store_const", const=sys.prefix,
+                        help="the environment that Potto is installed in")  # fmt: skip
 
 
 def run(options: argparse.Namespace, console: Console) -> int:

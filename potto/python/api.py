@@ -60,7 +60,7 @@ class Workspace:
         if file is None:
             problem = NO_MODULE(NOWHERE, f"there is no module `{name}` in {display_name(self.root)}")
             raise PottoError([problem])
-        return _module(self._world, file)
+        return _module(self._world, file, 3)
 
     def load(self, path: str | os.PathLike[str]) -> Module:
         """The module in a file. A relative path starts at the workspace's folder."""
@@ -107,16 +107,17 @@ def _compile(world: World, key: str, text: str) -> Module:
     return _module(world, world.own(key, text))
 
 
-def _module(world: World, file: str) -> Module:
+def _module(world: World, file: str, level: int = 4) -> Module:
+    """level: of the call that asks, counted from here; warnings name its place."""
     complaint = store.complaint()
     if complaint is not None:
-        warnings.warn(complaint, stacklevel=4)  # told once for each place that loads
+        warnings.warn(complaint, stacklevel=level)  # told once for each place that loads
     wrong = world.errors(file)
     if wrong:
         error = ProgramError(wrong, world.source)
         if not world.has_sound(file):
             raise error
-        warnings.warn(ProgramWarning(f"a definition has an error, the others can be used: {error}"), stacklevel=3)
+        warnings.warn(ProgramWarning(f"a definition has an error, the others can be used: {error}"), stacklevel=level)
     return Module(world, file)
 
 

@@ -6,11 +6,16 @@ functions that are called with numbers, arrays and each other. Needs IPython, wh
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
+from msgspec.structs import replace
+
 from potto.evaluating.session import Defined, Said, Session, Valued
+from potto.kernels.errors import wrong_call
 from potto.python.api import Module
 from potto.reports.render import Located, ProgramError
+from potto_repl.answers import NOT_DEFINED
 from potto_repl.symbols import readable
 
 
@@ -40,13 +45,17 @@ class Cells:
     def _run(self, text: str) -> Any:
         session = self.session
         session.world.refresh()
+        command = re.match(r"\s*(:\w+)", text)
+        if command is not None:
+            help = "commands are for the prompt and for notebooks of Potto's kernel"
+            raise wrong_call(f"`{command[1]}` is a command, and `%potto` takes expressions and definitions", help)
         session.cell = self.shell.displayhook.prompt_count  # as in `Out[3]`
         found: Any = None
         wrong: list[Located] = []
         for outcome in session.steps(readable(text)):
             match outcome:
                 case Said(located=located):
-                    wrong += [located] if outcome.is_error else []
+                    wrong += [self._with_braces(located)] if outcome.is_error else []
                 case Defined(name=name, file=file):
                     found = getattr(Module(session.world, file), name)
                     self.shell.user_ns[name] = found
@@ -57,6 +66,16 @@ class Cells:
         if wrong:
             raise CellError(wrong, session.source)
         return found
+
+    def _with_braces(self, located: Located) -> Located:
+        """Of a name that means nothing here and something in Python, how to pass it on."""
+        found, source = located.diagnostic, self.session.source(located.file) if located.file is not None else None
+        name = "" if source is None else source.text[found.span.start : found.span.end]
+        if found.code != NOT_DEFINED or name not in self.shell.user_ns:
+            return located
+        return replace(
+            located, diagnostic=replace(found, help=f"`{name}` is a name of Python: `{{{name}}}` is its value")
+        )
 
     def _value(self, outcome: Valued) -> Any:
         if outcome.estimates:

@@ -18,7 +18,7 @@ from potto.elaborate import elaborate_expression
 from potto.evaluating.world import World
 from potto.projects.settings import Settings
 from potto.runtime.answers.estimate import Estimate
-from potto.runtime.answers.printing import format_seconds, led, with_error
+from potto.runtime.answers.printing import format_count, format_seconds, led, with_error
 from potto.runtime.answers.shown import as_dual, estimate_json, format_estimate, gives_dual, interval
 from potto.runtime.evaluate import Clock, report
 from potto.syntax import nodes
@@ -46,7 +46,7 @@ def tail(estimate: Estimate, settings: Settings) -> str:
     if "mc" in estimate.method:
         most = "up to " if "qmc" in estimate.method else ""  # it stops where that is enough, or the budget is spent
         words += [f"{most}{settings.samples:,} samples", f"seed {settings.seed}"]
-    words += [f"{estimate.evals:,} evaluations", format_seconds(estimate.seconds)]
+    words += [format_count(estimate.evals, "evaluation"), format_seconds(estimate.seconds)]
     return ", ".join(words)
 
 

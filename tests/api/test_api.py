@@ -303,6 +303,17 @@ def test_a_module_that_is_broken_in_part_warns_and_can_be_used() -> None:
         assert [d.code for d in caught.value.diagnostics] == ["P0201"]
 
 
+def test_warnings_name_the_place_that_loads(tmp_path: Path) -> None:
+    text = "def f(x) x + missing\ndef g(x) 2*x\n"
+    (tmp_path / "part.po").write_text(text)
+    workspace = potto.Workspace(tmp_path)
+    for load in (lambda: potto.compile(text), lambda: potto.load(tmp_path / "part.po"), lambda: workspace.compile(text),
+                 lambda: workspace.load("part.po"), lambda: workspace.module("part")):  # fmt: skip
+        with pytest.warns(potto.ProgramWarning) as caught:
+            load()
+        assert [warning.filename for warning in caught] == [__file__]
+
+
 def test_a_module_of_nothing_but_errors_is_an_error() -> None:
     with pytest.raises(potto.PottoError):
         potto.compile("def f(x) x + missing\n")

@@ -210,6 +210,11 @@ def test_notebooks() -> None:
     assert "<code>0.0270 ± 0.0051</code>" in r._repr_html_() and "5 evaluations" in r._repr_html_()
     assert Estimate(2.7e-7, 5.1e-9)._repr_latex_() == r"$2.700 \times 10^{-7} \pm 5.1 \times 10^{-9}$"
     assert "not converged" in Estimate(1.0, 0.5, converged=False)._repr_html_()
+    assert Estimate(0.5, 0.1, converged=False)._repr_latex_() == r"$\text{not converged: }0.50 \pm 0.10$"
+    many = Estimate(np.arange(20.0), np.full(20, 0.5))
+    assert r"\text{at most }0.50" in many._repr_latex_() and repr(Estimate(1.0, 0.0, evals=1)).endswith(
+        "1 evaluation  0.0 ms"
+    )
     assert Estimate(math.inf, 0.0)._repr_latex_() == r"$\infty$"
 
 

@@ -51,6 +51,14 @@ def test_a_line_is_an_answer_or_a_function(shell):
     assert float(run(shell, "%potto f({t})")) == pytest.approx(0.2, abs=1e-12)
 
 
+def test_what_belongs_to_python_or_to_the_prompt_is_told(shell):
+    shell.run_cell("t = 0.2", store_history=True)
+    with pytest.raises(potto.PottoError, match=r"`t` is a name of Python: `\{t\}` is its value"):
+        run(shell, "%potto t + 1")
+    with pytest.raises(potto.PottoError, match=r"`:plot` is a command"):
+        run(shell, "%potto :plot t")
+
+
 def test_an_answer_has_the_number_of_its_cell(shell):
     run(shell, "%potto 2 + 3")
     number = shell.execution_count - 1

@@ -23,6 +23,7 @@ from potto.runtime.answers.printing import (
     MISSED,
     attainable,
     concisely,
+    format_count,
     format_fields,
     format_list,
     format_number,
@@ -280,7 +281,7 @@ class Estimate(Operators, Struct, frozen=True, eq=False):
 
     @property
     def _cost(self) -> str:
-        return f"{self.evals:,} evaluations  {format_seconds(self.seconds)}"
+        return f"{format_count(self.evals, 'evaluation')}  {format_seconds(self.seconds)}"
 
     def __str__(self) -> str:
         """The number with its error, and that it missed its tolerance if it did."""
@@ -303,7 +304,7 @@ class Estimate(Operators, Struct, frozen=True, eq=False):
         return as_html(*self._shown, "" if self.converged else MISSED.strip(), self._cost)
 
     def _repr_latex_(self) -> str | None:
-        return None if self.value is None else as_latex(*self._shown)
+        return None if self.value is None else as_latex(*self._shown, missed="" if self.converged else MISSED)
 
     @property
     def _shown(self) -> Pair:

@@ -188,6 +188,11 @@ def format_seconds(time: float) -> str:
     return f"{time:.2f} s" if time >= 1 else f"{time * 1e3:.0f} ms" if time >= 0.01 else f"{time * 1e3:.1f} ms"
 
 
+def format_count(number: int, thing: str) -> str:
+    """`1 evaluation`, `1,234 evaluations`."""
+    return f"{number:,} {thing}{'' if number == 1 else 's'}"
+
+
 def format_range(low: float, high: float, digits: int = 6) -> str:
     """`0 to 0.25`: what numbers go from and to."""
     return f"{format_digits(low, digits)} to {format_digits(high, digits)}"

@@ -44,10 +44,10 @@ def rows_latex(rows: Sequence[Row]) -> str:
     return "$\\begin{aligned}" + r" \\ ".join(lines) + "\\end{aligned}$"
 
 
-def as_latex(value: Any, error: Any) -> str:
-    """`$0.0270 \\pm 0.0051$`, powers of ten as such."""
+def as_latex(value: Any, error: Any, missed: str = "") -> str:
+    """`$0.0270 \\pm 0.0051$`, powers of ten as such; in front what it missed."""
     text = with_error(value, error).replace("±", r"\pm").replace("…", r"\ldots").replace("...", r"\ldots")
     text = re.sub(r"(?<=\d)e(-?\d+)", r" \\times 10^{\1}", text)
-    text = re.sub(r"\b(nan|at most|error unknown|more)\b", r"\\text{\1}", text)
+    text = re.sub(r"\b(nan|at most |error unknown|more)(?![a-z])", r"\\text{\1}", text)
     text = re.sub(r"(?<![a-z])inf(?![a-z])", r"\\infty", text)
-    return f"${text}$"
+    return rf"$\text{{{missed}}}{text}$" if missed else f"${text}$"

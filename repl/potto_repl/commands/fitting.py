@@ -16,7 +16,14 @@ from potto.applications.minimizing import Step
 from potto.applications.pictures import course
 from potto.projects.settings import settings
 from potto.python.functions import Function
-from potto.runtime.answers.printing import format_digits, format_error, format_number, format_seconds, with_error
+from potto.runtime.answers.printing import (
+    format_count,
+    format_digits,
+    format_error,
+    format_number,
+    format_seconds,
+    with_error,
+)
 from potto_repl.drawing import braille, room_for_curves
 from potto_repl.expressions import checked, split_items
 from potto_repl.registry import command
@@ -63,10 +70,11 @@ def fit(session: Conversation, text: str) -> Iterator[Part]:
             "steps": len(found.steps) - 1, "converged": found.converged}  # fmt: skip
     yield Part("answer", "\n".join(said), data)
     count = len(found.steps) - 1
+    cost = f"{format_count(count, 'step')}, {format_count(found.evaluations, 'evaluation')}"
     if count >= FEWEST:
-        ends = f"{name} = {with_error(found.value, found.error)} after {count} steps, {found.evaluations} evaluations"
+        ends = f"{name} = {with_error(found.value, found.error)} after {cost}"
         yield _course(session, name, [step.value for step in found.steps], ends)
-    yield Part("tail", f"{count} steps, {found.evaluations} evaluations, {format_seconds(time.perf_counter() - begun)}")
+    yield Part("tail", f"{cost}, {format_seconds(time.perf_counter() - begun)}")
 
 
 def _course(session: Conversation, name: str, values: Sequence[float], ends: str) -> Part:
