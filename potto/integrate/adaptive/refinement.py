@@ -170,7 +170,7 @@ def missed_peak(work: PanelBatch, p: Pieces, ends: Ends) -> Any:
     """
     seg = work.seg
     reach = seg.b - seg.a
-    width = np.where(np.isinf(reach), 1.0, reach)[p.segment] * (p.u1 - p.u0)  # x = a + u/(1 - u) has the slope 1 at a
+    width = np.where(np.isinf(reach), seg.pace, reach)[p.segment] * (p.u1 - p.u0)
     plain = (seg.kind[p.segment] == substitution.LINEAR) & (p.end == 0)
     bad = np.zeros(p.segment.size, dtype=bool)
     m = work.width

@@ -18,12 +18,14 @@ import numpy as np
 from potto.integrate.adaptive.divergence import endless, given_up
 from potto.integrate.adaptive.refinement import Tally, doubtful, filled, missed_peak, stragglers, too_coarse
 from potto.integrate.adaptive.reynolds import Totals, sums, totals
+from potto.integrate.adaptive.tails import paced
 from potto.integrate.columns import distinct
 from potto.integrate.degenerate.degeneracies import steps_at_cuts
 from potto.integrate.events import BUDGET_SPENT
 from potto.integrate.panels.panel_batch import PanelBatch
 from potto.integrate.pieces import Ends, Pieces, Sums, all_of
 from potto.integrate.rules.substitution import GRADE
+from potto.kernels.cells import Array
 
 MOST_HALVINGS = 64
 # Nodes for pieces that were too coarse: first more of them on the same piece, then on halves.
@@ -44,6 +46,7 @@ def integrated(work: PanelBatch) -> Sums:
     if count == 0:
         return Sums.zeros(1, work.k, work.batch)
     zero, one = np.zeros(count), np.ones(count)
+    work.seg = paced(work)
     ends = work.ends = work.end_values()
     whole = Pieces(np.arange(count), zero, one, np.zeros(count, dtype=np.int64))
     fresh = work.measure(whole, work.enough() or work.parent.order, True)
@@ -134,11 +137,21 @@ def replaced(work: PanelBatch, old: Pieces, new: Pieces, order: int, tally: Tall
         level = new.places(rough)
         level.end = np.zeros(rough.size, dtype=np.int64)
         level = work.measure(level, order).settled()
-        smooth = (level.error <= SMOOTH * level.size).all(axis=0)
+        smooth = (level.error <= SMOOTH * by_either_form(work, level.size)).all(axis=0)
         new.settled().put(rough[smooth], level.pick(smooth))
     new.excess, new.stuck = np.tile(old.excess, copies), np.tile(old.stuck, copies)
     tally.replace(work, old, new)
     return new
+
+
+def by_either_form(work: PanelBatch, size: Array) -> Array:
+    """What errors of pieces are measured by, (C, P): of a derivative the larger of its two forms. What moves with its
+    ends leaves nothing of the one but rounding, of which no digit is right."""
+    if not work.both:
+        return size
+    rows = size.reshape(work.width, -1, size.shape[-1])
+    larger = np.maximum(rows[:, 1 : 1 + work.k], rows[:, 1 + work.k :])
+    return np.concatenate((rows[:, :1], larger, larger), axis=1).reshape(size.shape)
 
 
 def halved(p: Pieces) -> Pieces:

@@ -263,5 +263,5 @@ def _pieces(
     bad, ea, eb = np.isnan(x[0]) | np.isnan(x[-1]), e[place, owner], e[place + 1, owner]
     near = np.stack((blur[place, owner], blur[place + 1, owner]))
     rank, kind = rank[place, owner], choose(a, b, left, right)
-    made = Segments(owner, a, b, ta, tb, kind, left, right, rank, ea, eb, near, da, db)
+    made = Segments(owner, a, b, ta, tb, kind, left, right, rank, ea, eb, near, da, db, np.ones(a.shape))
     return Cuts(sign, made, moving, edges, bad if bad.any() else None)

@@ -242,13 +242,13 @@ def _distance(found: Array, turn: Array) -> Array:
 
 
 def _up(seg: Segments, x: Array) -> tuple[Array, Array]:
-    far = x - seg.a
-    return far / (1 + far), (1 + far) ** 2
+    far = (x - seg.a) / seg.pace
+    return far / (1 + far), seg.pace * (1 + far) ** 2
 
 
 def _down(seg: Segments, x: Array) -> tuple[Array, Array]:
-    far = seg.b - x
-    return 1 / (1 + far), (1 + far) ** 2
+    far = (seg.b - x) / seg.pace
+    return 1 / (1 + far), seg.pace * (1 + far) ** 2
 
 
 def _whole(seg: Segments, x: Array) -> tuple[Array, Array]:

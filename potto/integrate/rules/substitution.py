@@ -31,6 +31,7 @@ class Segments(Columns):
     ea, eb: (S,) how far off the ends may be by rounding. da, db: (k, S) the same of their speeds.
     rank: (S,) what lies at the left end: 2 a jump, 1 a place where something further in changes, 0 neither.
     blur: (2, S) within which distance of the ends other cuts lie that rounding does not tell apart from these.
+    pace: (S,) how fast an infinite stretch is run through at its finite end: dx/du there.
     """
 
     owner: Ints
@@ -47,6 +48,7 @@ class Segments(Columns):
     blur: Array
     da: Array
     db: Array
+    pace: Array
 
 
 def choose(a: Array, b: Array, left: Array, right: Array) -> Ints:
@@ -159,14 +161,14 @@ def _both(seg: Segments, u: Array, rest: Array) -> tuple[Array, Array, Array]:
 
 
 def _up(seg: Segments, u: Array, rest: Array) -> tuple[Array, Array, Array]:
-    """[a, inf): x = a + u/(1-u); moves with a."""
-    rest = np.maximum(rest, FARTHEST)
-    return seg.a[:, None] + u / rest, 1.0 / (rest * rest), np.zeros_like(u)
+    """[a, inf): x = a + pace u/(1-u); moves with a."""
+    rest, pace = np.maximum(rest, FARTHEST), seg.pace[:, None]
+    return seg.a[:, None] + pace * (u / rest), pace / (rest * rest), np.zeros_like(u)
 
 
 def _down(seg: Segments, u: Array, rest: Array) -> tuple[Array, Array, Array]:
-    near = np.maximum(u, FARTHEST)
-    return seg.b[:, None] - rest / near, 1.0 / (near * near), np.ones_like(u)
+    near, pace = np.maximum(u, FARTHEST), seg.pace[:, None]
+    return seg.b[:, None] - pace * (rest / near), pace / (near * near), np.ones_like(u)
 
 
 def _whole(seg: Segments, u: Array, rest: Array) -> tuple[Array, Array, Array]:

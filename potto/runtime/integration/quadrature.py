@@ -24,7 +24,7 @@ from potto.kernels.cells import Bools, Ints, Value
 from potto.runtime.evaluation.machine import Machine
 
 START_ORDER = 11
-ORDERS = (4, 6, 8, 10)
+ORDERS = (4, 6, 10, 14, 18)
 PILOTS = 64
 BATCH = 4096  # members integrated at once
 FEW_TURNED = 16  # members up to which it does not pay to look for rules along other variables
