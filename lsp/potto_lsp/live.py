@@ -8,9 +8,9 @@ that an edit elsewhere evaluates nothing.
 from __future__ import annotations
 
 import hashlib
-import itertools
 import time
 from collections.abc import Iterator, Mapping
+from operator import is_
 from typing import TYPE_CHECKING, Any
 
 from msgspec import Struct
@@ -19,7 +19,9 @@ from potto import ide
 from potto.core.terms import Global, Term, postorder
 from potto.diagnostics import Diagnostic
 from potto.elaborate import core, elaborate_expression
+from potto.ide.names.live_expressions import piece_lives
 from potto.modules import names
+from potto.modules.texts import groups_of_pieces
 from potto.query import Database, query
 from potto.reports.render import Located
 from potto.source import Span
@@ -68,6 +70,54 @@ class Key(Struct, frozen=True):
     meaning: bytes
 
 
+Keys = tuple[Key, ...]
+
+
+@query
+def live_keys(db: Database, file: str) -> Keys:
+    """The first live expressions of a file."""
+    found: list[Key] = []
+    for group in groups_of_pieces(db, file):
+        found += _group_keys(db, file, group)
+        if len(found) >= MOST:
+            break
+    return tuple(found[:MOST])
+
+
+@query(keep=512)
+def _group_keys(db: Database, file: str, group: tuple[str, ...]) -> Keys:
+    """Those of some pieces of the file."""
+    return tuple(
+        [
+            Key("live", file, live.text, (("expected", live.expected),), fingerprint(db, file, live.text))
+            for text in group
+            for live in piece_lives(db, text)
+        ]
+    )
+
+
+@query
+def looked_at_keys(db: Database, file: str) -> Keys:
+    """The points of the first definitions that a file's expressions look at."""
+    return tuple([key for target in ide.looked_at(db, file)[:MOST] for key in point_keys(db, *target)])
+
+
+@query
+def point_keys(db: Database, file: str, name: str) -> Keys:
+    """The points of a definition that somebody asked about."""
+    return tuple([_point_key(db, file, point) for point in _asked_points(db, file, name)])
+
+
+def _asked_points(db: Database, file: str, name: str) -> tuple[ide.Point, ...]:
+    if name not in names(db, file) or not ide.is_sound(db, file, name):
+        return ()
+    return tuple(point for point in ide.points(db, file, name) if not point.chosen)
+
+
+def _point_key(db: Database, file: str, point: ide.Point) -> Key:
+    return Key("point", file, point.text, (("slopes", point.slopes),), fingerprint(db, file, point.text))
+
+
 class Value(Struct, frozen=True):
     """What is known of a live expression: an answer of the evaluation process."""
 
@@ -109,6 +159,7 @@ class LiveValues:
         self._session = session
         self._values: dict[Key, Value] = {}
         self._waiting: dict[Key, Task] = {}
+        self._seen: tuple[Keys, ...] = ()  # what was wanted when it was last looked at
         self._shown: set[str] = set()
         self._asked: dict[tuple[str, str], None] = {}
         self._wrong: set[str] = set()  # files in which something was to be said about a value
@@ -161,46 +212,39 @@ class LiveValues:
 
     # What is to be known
 
-    def _live(self, file: str) -> list[tuple[Live, Key]]:
-        text = self._session.analysis.text(file).text
-        if "#>" not in text:
-            return []
+    def _live(self, file: str) -> Iterator[tuple[Live, Key]]:
+        if "#>" not in self._session.analysis.text(file).text:
+            return iter(())
         db = self._session.analysis.db
-        return [
-            (live, Key("live", file, live.text, (("expected", live.expected),), fingerprint(db, file, live.text)))
-            for live in ide.live_in(db, file)[:MOST]
-        ]
+        return zip(ide.live_in(db, file), live_keys(db, file))
 
     def _points(self, file: str, name: str) -> Iterator[tuple[ide.Point, Key]]:
         db = self._session.analysis.db
-        if name in names(db, file) and ide.is_sound(db, file, name):
-            for point in ide.points(db, file, name):
-                if point.chosen:  # nobody asked about this one
-                    continue
-                more = (("slopes", point.slopes),)
-                yield point, Key("point", file, point.text, more, fingerprint(db, file, point.text))
+        return zip(_asked_points(db, file, name), point_keys(db, file, name))
 
-    def _wanted(self) -> tuple[dict[Key, None], dict[Key, None]]:
+    def _wanted(self) -> tuple[Keys, ...]:
         """The live expressions of the shown files in the order of the text, and the points of their definitions and of
-        those that were asked about."""
-        live = {key: None for file in self._shown for _, key in self._live(file)}
+        those that were asked about; the same objects as long as nothing is different."""
         db = self._session.analysis.db
-        looked_at = (each for file in self._shown for each in itertools.islice(ide.looked_at(db, file), MOST))
-        return live, {key: None for each in (*self._asked, *looked_at) for _, key in self._points(*each)}
+        shown = [table(db, file) for table in (live_keys, looked_at_keys) for file in self._shown]
+        return (*shown, *(point_keys(db, *each) for each in self._asked))
 
     def refresh(self) -> None:
         """Evaluate what is shown and not known; forget what nobody shows any more."""
         if not self.enabled or not (self._shown or self._asked):
             return
-        analysis = self._session.analysis
-        self._shown &= set(analysis.documents)
-        live, points = self._wanted()
-        for key in [key for key in self._waiting if key not in live and key not in points]:
+        self._shown &= set(self._session.analysis.documents)
+        wanted = self._wanted()
+        if len(wanted) == len(self._seen) and all(map(is_, wanted, self._seen)):
+            return
+        self._seen = wanted
+        keys = {key: None for found in wanted for key in found}
+        for key in [key for key in self._waiting if key not in keys]:
             self._waiting.pop(key).cancelled.set()
-        self._values = {key: value for key, value in self._values.items() if key in live or key in points}
-        for urgency, keys in ((LIVE, live), (POINTS, points)):
+        self._values = {key: value for key, value in self._values.items() if key in keys}
+        for urgency, do in ((LIVE, "live"), (POINTS, "point")):
             for key in keys:
-                if key not in self._values and key not in self._waiting:
+                if key.do == do and key not in self._values and key not in self._waiting:
                     self._waiting[key] = self._evaluate(key, urgency)
 
     def _evaluate(self, key: Key, urgency: int) -> Task:

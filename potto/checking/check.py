@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from potto.calculus.checking.diffeo import check_conditions
 from potto.diagnostics import Diagnostic, Related
 from potto.modules import chunk_start, module_diagnostics, statements
-from potto.modules.graph import name_runs
+from potto.modules.graph import Run, name_runs
 from potto.modules.texts import moved, syntax_diagnostics
 from potto.query import Database, query
 from potto.quick import replace
@@ -26,8 +26,8 @@ def diagnostics(db: Database, file: str) -> tuple[Located, ...]:
     """Everything about a file, in the order of its text. As one memo, so that a file that an edit does not reach costs
     nothing."""
     found = [*syntax_diagnostics(db, file), *module_diagnostics(db, file)]
-    for run in name_runs(db, file):
-        for name, said in run_diagnostics(db, file, run):
+    for some in name_runs(db, file):
+        for name, said in runs_diagnostics(db, file, some):
             start = chunk_start(db, file, name)
             found += [absolute(db, file, d, start) for d in said]
     for reference in statements(db, file):
@@ -35,11 +35,20 @@ def diagnostics(db: Database, file: str) -> tuple[Located, ...]:
     return tuple(Located(file, d) for d in arranged(found))
 
 
+OfNames = tuple[tuple[str, tuple[Diagnostic, ...]], ...]
+
+
+@query(keep=512)
+def runs_diagnostics(db: Database, file: str, some: tuple[Run, ...]) -> OfNames:
+    """What is said of some neighbouring runs of definitions."""
+    return tuple([each for run in some for each in run_diagnostics(db, file, run)])
+
+
 @query(keep=2048)
-def run_diagnostics(db: Database, file: str, run: tuple[str, ...]) -> tuple[tuple[str, tuple[Diagnostic, ...]], ...]:
+def run_diagnostics(db: Database, file: str, run: Run) -> OfNames:
     """What is said of some neighbouring definitions, by name, of those of which there is something to say."""
-    found = ((name, definition_diagnostics(db, file, name)) for name in run)
-    return tuple((name, said) for name, said in found if said)
+    found = [(name, definition_diagnostics(db, file, name)) for name in run]
+    return tuple([(name, said) for name, said in found if said])
 
 
 @query(travels=True)

@@ -13,12 +13,15 @@ from typing import TypeVar
 from zlib import crc32
 
 from potto.modules.free import Reference
+from potto.modules.grouping import grouped
 from potto.modules.lookup import DefinitionTarget, ModuleTarget, Target, bindings, find_module, resolve, resolve_member
 from potto.modules.texts import chunk_references, chunk_text, imports, is_diffeo, names
 from potto.query import Database, query
 
 N = TypeVar("N", bound=Hashable)
 RUN, MOST_OF_RUN = 12, 32  # definitions in the mean, and at most
+RUNS, MOST_RUNS = 8, 12
+Run = tuple[str, ...]
 _WORD = re.compile(r"[^\W\d]\w*")
 
 
@@ -132,14 +135,14 @@ def _definition_groups(db: Database, files: tuple[str, ...]) -> Mapping[Definiti
 def _suspects(db: Database, file: str) -> list[str]:
     """The definitions of a file that mention each other in a circle, in the order of the text."""
     defined = names(db, file)
-    mentioned = dict(item for run in runs(defined) for item in _mentioned(db, file, run))
+    mentioned = dict(item for some in name_runs(db, file) for item in _mentioned_by(db, file, some))
     groups = components(defined, mentioned.__getitem__)
     circles = {name for group in groups if len(group) > 1 for name in group}
     return [name for name in defined if name in circles]
 
 
 @query(keep=2048)
-def _mentioned(db: Database, file: str, run: tuple[str, ...]) -> tuple[tuple[str, tuple[str, ...]], ...]:
+def _mentioned(db: Database, file: str, run: Run) -> tuple[tuple[str, tuple[str, ...]], ...]:
     """Of some neighbouring definitions of a file the others whose names occur as words in their texts."""
     found, known = [], _names_in(db, file)
     for name in run:
@@ -149,30 +152,32 @@ def _mentioned(db: Database, file: str, run: tuple[str, ...]) -> tuple[tuple[str
     return tuple(found)
 
 
+@query(keep=512)
+def _mentioned_by(db: Database, file: str, some: tuple[Run, ...]) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """The same of some neighbouring runs."""
+    return tuple([item for run in some for item in _mentioned(db, file, run)])
+
+
 @query
 def _names_in(db: Database, file: str) -> frozenset[str]:
     return frozenset(names(db, file))
 
 
 @query(cuts=True)
-def name_runs(db: Database, file: str) -> tuple[tuple[str, ...], ...]:
-    """The names of a file in runs."""
-    return tuple(runs(names(db, file)))
+def name_runs(db: Database, file: str) -> tuple[tuple[Run, ...], ...]:
+    """The names of a file in runs, and these in runs of runs."""
+    in_runs = tuple(runs(names(db, file)))
+    ends = [_hash(run[-1]) // RUN for run in in_runs]  # where one ends that is often a multiple of it
+    return tuple(grouped(in_runs, ends, RUNS, MOST_RUNS))
 
 
-def runs(names: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
-    """Names in runs of a few; where one ends hangs on its names alone, so that a new definition changes one or two.
+def runs(names: tuple[str, ...]) -> Iterator[Run]:
+    """Names in runs of a few."""
+    return grouped(names, list(map(_hash, names)), RUN, MOST_OF_RUN)
 
-    At every keystroke the same is asked of all definitions of a file: a run of them that shares what it hangs on is
-    asked once.
-    """
-    start = 0
-    for index, name in enumerate(names, 1):
-        if index - start == MOST_OF_RUN or crc32(name.encode("utf-8", "surrogatepass")) % RUN == 0:
-            yield names[start:index]
-            start = index
-    if start < len(names):
-        yield names[start:]
+
+def _hash(name: str) -> int:
+    return crc32(name.encode("utf-8", "surrogatepass"))
 
 
 def components(starts: Iterable[N], needs: Callable[[N], Iterable[N]]) -> list[list[N]]:

@@ -16,6 +16,7 @@ from typing import Any, Literal
 
 from potto.diagnostics import Diagnostic
 from potto.modules.free import Reference, references_in
+from potto.modules.grouping import grouped
 from potto.query import Database, Parted, query
 from potto.quick import quick, replace, value
 from potto.source import SourceText, Span
@@ -23,6 +24,7 @@ from potto.syntax import Chunk, ParsedChunk, defined_name, nodes, parse_chunk, s
 from potto.syntax import pieces as cut
 
 Importing = nodes.FromImport | nodes.Import
+GROUP, MOST_OF_GROUP = 8, 24  # pieces in the mean, and at most
 
 
 @value
@@ -130,6 +132,13 @@ def pieces(db: Database, file: str) -> tuple[str, ...]:
     return cut(text, db.former(pieces, (file,)) or ()) if isinstance(text, str) else ()
 
 
+@query(cuts=True)
+def groups_of_pieces(db: Database, file: str) -> tuple[tuple[str, ...], ...]:
+    """The pieces of a file in groups, mostly the same ones as before an edit."""
+    found = pieces(db, file)
+    return tuple(grouped(found, list(map(hash, found)), GROUP, MOST_OF_GROUP))
+
+
 @query
 def chunks(db: Database, file: str) -> tuple[ChunkRef, ...]:
     """The chunks of a file, in order, with their absolute starts. They move at every edit: what looks at all of a file
@@ -215,11 +224,20 @@ def layout(db: Database, file: str) -> Layout:
     """What is where in a file. Read the projections below instead, they stand still."""
     diffeo = is_diffeo(file)
     found = tuple([piece(db, text, diffeo) for text in pieces(db, file)])
+    starts = accumulate([len(one.text) for one in found[:-1]], initial=0) if found else ()
+    return Layout(found, tuple(starts), _place(found, db.former(layout, (file,))))
+
+
+def _place(found: tuple[Piece, ...], former: Layout | None) -> Mapping[str, int]:
+    """The piece that has the definition of each name, which most edits leave as it was."""
+    if former is not None and len(former.pieces) == len(found):
+        pairs = zip(found, former.pieces)
+        if all(one is old or tuple(one.texts) == tuple(old.texts) for one, old in pairs):
+            return former.place
     place: dict[str, int] = {}
     for number, one in enumerate(found):
         place.update(dict.fromkeys(one.texts, number))
-    starts = accumulate([len(one.text) for one in found[:-1]], initial=0) if found else ()
-    return Layout(found, tuple(starts), place)
+    return place
 
 
 @query(travels=True)

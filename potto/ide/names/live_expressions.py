@@ -9,10 +9,9 @@ from collections.abc import Iterator
 
 from potto.diagnostics import Diagnostic
 from potto.ide.names.places import pieces_of
-from potto.modules.texts import moved
+from potto.modules.texts import groups_of_pieces, moved
 from potto.query import Database, query
 from potto.quick import replace
-from potto.source import Span
 from potto.syntax import live_expressions, parse_expression, split
 from potto.syntax.live import Live
 from potto.types import infer_expression
@@ -39,14 +38,27 @@ def _moved(live: Live, start: int) -> Live:
 
 def live_diagnostics(db: Database, file: str) -> tuple[Diagnostic, ...]:
     """What is wrong with the live expressions of a file, and with what they are expected to give."""
-    found = ((at, live) for at in pieces_of(db, file) for live in piece_lives(db, at.text))
-    return tuple(said for at, live in found for said in _of_one(db, file, live, at.start))
+    start, found = 0, list[Diagnostic]()
+    for group in groups_of_pieces(db, file):
+        found += [_shifted(said, start) for said in _group_diagnostics(db, file, group)]
+        start += sum([len(text) for text in group])
+    return tuple(found)
 
 
-def _of_one(db: Database, file: str, live: Live, start: int) -> Iterator[Diagnostic]:
-    yield from (_placed(said, start, live.text_span) for said in wrong_with(db, file, live.text))
+@query(keep=512)
+def _group_diagnostics(db: Database, file: str, group: tuple[str, ...]) -> tuple[Diagnostic, ...]:
+    """What is wrong with those of some pieces of the file, relative to the first."""
+    start, found = 0, list[Diagnostic]()
+    for text in group:
+        found += [_shifted(said, start) for live in piece_lives(db, text) for said in _of_one(db, file, live)]
+        start += len(text)
+    return tuple(found)
+
+
+def _of_one(db: Database, file: str, live: Live) -> Iterator[Diagnostic]:
+    yield from (_shifted(said, live.text_span.start) for said in wrong_with(db, file, live.text))
     if live.expected is not None and live.expected_span is not None:
-        yield from (_placed(said, start, live.expected_span) for said in wrong_with(db, file, live.expected))
+        yield from (_shifted(said, live.expected_span.start) for said in wrong_with(db, file, live.expected))
 
 
 @query(keep=8192)
@@ -62,7 +74,6 @@ def wrong_with(db: Database, file: str, text: str) -> tuple[Diagnostic, ...]:
     return parsed.diagnostics or infer_expression(db, file, parsed.expr).diagnostics
 
 
-def _placed(said: Diagnostic, start: int, where: Span) -> Diagnostic:
-    shift = start + where.start
+def _shifted(said: Diagnostic, shift: int) -> Diagnostic:
     related = tuple(r if r.file else replace(r, span=r.span.shift(shift)) for r in said.related)
     return replace(moved(said, shift), related=related)

@@ -5,7 +5,7 @@ Owns `Point`, `points` and `point_of`. Only texts are made here; numbers are for
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from msgspec import Struct
 
@@ -13,7 +13,7 @@ from potto.ide.names.documents import kind_of
 from potto.ide.names.function_arguments import fits, numbers
 from potto.ide.names.symbols import callee
 from potto.modules import is_diffeo, names, parsed
-from potto.modules.texts import piece, pieces
+from potto.modules.texts import groups_of_pieces, piece
 from potto.query import Database, query
 from potto.syntax import children, live_expressions, nodes, parse_expression
 from potto.syntax.written import without_parentheses
@@ -39,35 +39,38 @@ def points(db: Database, file: str, name: str) -> tuple[Point, ...]:
     kind = kind_of(db, file, name)
     if kind != "function":
         return (Point(name),) if kind == "constant" else ()
-    found: dict[str, Point] = {}
-    for text in looking(db, file):
-        for target, point in points_in(db, file, text) if name in text else ():
-            if target == (file, name) and len(found) < MOST:
-                found.setdefault(point.text, point)
-    return tuple(found.values()) or _chosen(db, file, name)
+    return db.entry(_written, (file,), (file, name)) or _chosen(db, file, name)
 
 
-def looked_at(db: Database, file: str) -> Iterator[tuple[str, str]]:
+def looked_at(db: Database, file: str) -> tuple[tuple[str, str], ...]:
     """The definitions that the expressions of a file look at."""
-    found = (target for text in looking(db, file) for target, _ in points_in(db, file, text))
-    yield from dict.fromkeys(found)
+    return tuple(_written(db, file))
 
 
 @query
-def looking(db: Database, file: str) -> tuple[str, ...]:
-    """The expressions of a file that look at its definitions: those of live expressions and of statements."""
-    return tuple([text for piece in pieces(db, file) for text in _piece_looking(db, piece, is_diffeo(file))])
+def _written(db: Database, file: str) -> Mapping[tuple[str, str], tuple[Point, ...]]:
+    """The points in a file's expressions, under the definitions that they are of."""
+    found: dict[tuple[str, str], dict[str, Point]] = {}
+    for group in groups_of_pieces(db, file):
+        for target, point in _group_points(db, file, group):
+            those = found.setdefault(target, {})
+            if len(those) < MOST:
+                those.setdefault(point.text, point)
+    return {target: tuple(those.values()) for target, those in found.items()}
 
 
 @query(keep=512)
-def _piece_looking(db: Database, text: str, diffeo: bool) -> tuple[str, ...]:
-    """Those of a piece of the file."""
-    return tuple([found for chunk in piece(db, text, diffeo).chunks for found in _looking(db, chunk.text, diffeo)])
+def _group_points(db: Database, file: str, group: tuple[str, ...]) -> tuple[tuple[tuple[str, str], Point], ...]:
+    """Those of some pieces of the file: in live expressions and in statements."""
+    diffeo = is_diffeo(file)
+    chunks = (chunk for text in group for chunk in piece(db, text, diffeo).chunks)
+    looking = (look for chunk in chunks for look in _looking(db, chunk.text, diffeo))
+    return tuple([found for look in looking for found in points_in(db, file, look)])
 
 
 @query(keep=8192)
 def _looking(db: Database, text: str, diffeo: bool) -> tuple[str, ...]:
-    """Those of a chunk."""
+    """The expressions of a chunk that look at definitions: its live expressions, and what a statement shows."""
     found = [live.text for live in live_expressions(text)] if "#>" in text else []
     shown: tuple[nodes.Expr, ...] = ()
     if not text.startswith("def "):
