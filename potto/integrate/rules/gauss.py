@@ -54,7 +54,8 @@ def truncation(size: Array, singular: Bools | bool = False) -> Array:
     followed for fewer than n further steps: for analytic integrands, where the decay is geometric, that is safe by
     orders of magnitude. Where the decay slows down, and on the pieces that are `singular` (P,), at whose ends an
     integrand may be no more than a power of the distance, the coefficients are taken to go on as those of a power: they
-    first fall as if geometrically. A slow decay means that the integrand is not resolved: then the last
+    first fall as if geometrically, and where they stop to, single ones may be small by a change of sign, so that the
+    pairs before are asked as well. A slow decay means that the integrand is not resolved: then the last
     coefficients themselves. (`benchmarks/calibration.py truncation` counts by which functions the bound is exceeded: by
     peaks that fall between the nodes and, up to 20,000 times, by powers at an end beneath something that grows; where
     either may be, panels are looked at in other ways as well.)
@@ -70,6 +71,9 @@ def truncation(size: Array, singular: Bools | bool = False) -> Array:
     share = np.fmax(decay**power, np.fmin(1.0, (decay - 0.3) / 0.3))
     slowing = (last > 1.15 * mean) | singular
     if slowing.any():
+        if n >= 8:
+            fall = np.fmin(before / (size[..., -5] + size[..., -6]), 1.0)
+            last, end = (np.where(singular, np.fmax(*pair), pair[0]) for pair in ((last, fall), (end, before * fall)))
         share = np.where(slowing, np.fmax(share, decay_of_power(n, last)), share)
     return 8 * end * share  # type: ignore[no-any-return]
 
