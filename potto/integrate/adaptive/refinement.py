@@ -68,23 +68,34 @@ class Tally:
         self.add(work, old, -1)
         self.add(work, new, 1)
 
+    def sizes(self, work: PanelBatch, spared: Array | None) -> Array:
+        """The size of the answer that each of these integrals goes into, as it counts there: (m * (1 + k), B)."""
+        own = np.abs(self.total)
+        if not work.number:
+            return own
+        counts = own if spared is None else own / spared
+        return np.stack([siblings(row, work.root) for row in counts])
+
     def whole(self, work: PanelBatch) -> Array:
-        """The size of the answer that each of these integrals goes into, values and tangents together: (B,)."""
-        largest = np.abs(self.total).max(axis=0)
-        return siblings(largest, work.root) if work.number else largest
+        """The same, or its own size where it is larger, of tangents together with their values: (m * (1 + k), B)."""
+        largest = np.maximum(self.sizes(work, spared(work)), np.abs(self.total))
+        rows = largest.reshape(work.width, 1 + work.k, -1)
+        rows[:, 1:] = rows.max(axis=1, keepdims=True)
+        return rows.reshape(largest.shape)
 
     def shares(self, work: PanelBatch, owner: Ints) -> Array:
         """The error that one piece of each of these integrals may have: (m * (1 + k), P)."""
+        less = spared(work)
         if self.scale is None:
-            scale = np.abs(self.total)
-            if work.number:
-                scale = np.stack([siblings(row, work.root) for row in scale])
-            self.scale = np.maximum(work.machine.atol, work.machine.rtol * scale)
+            self.scale = np.maximum(work.machine.atol, work.machine.rtol * self.sizes(work, less))
         shares: Array = self.scale[:, owner] / (2 * self.count[owner])
-        if work.slack is not None:  # what is not resolved at all says nothing of its error
-            most = np.maximum(1.0, LEAST / work.machine.rtol)
-            shares = shares * np.minimum(work.slack[owner], most)
-        return shares
+        return shares if less is None else shares * less[owner]
+
+
+def spared(work: PanelBatch) -> Array | None:
+    """How many times the error of each integral may be larger than that of others, since it counts so much less: (B,).
+    What is not resolved at all says nothing of its error."""
+    return None if work.slack is None else np.minimum(work.slack, np.maximum(1.0, LEAST / work.machine.rtol))
 
 
 def filled(work: PanelBatch, p: Pieces) -> Array:
@@ -120,7 +131,7 @@ def too_coarse(work: PanelBatch, p: Pieces, ends: Any, tally: Tally) -> Any:
         error[:, 1 : 1 + k] = np.where(work.endless[:, owner] == 0, error[:, 1 : 1 + k], 0.0)
     off, rounding = error.reshape(-1, p.segment.size), floor.reshape(-1, p.segment.size)
     bad = (off > tally.shares(work, owner)) & (off > 8 * rounding)
-    bad = bad.any(axis=0) & ~noisy(p, np.where(bad, off, 0.0), tally.gross[owner], tally.whole(work)[owner])
+    bad = bad.any(axis=0) & ~noisy(p, np.where(bad, off, 0.0), tally.gross[owner], tally.whole(work)[:, owner])
     wide = (p.u1 - p.u0) >= 1e-14
     waiting = np.zeros(bad.size, dtype=bool)
     if ends is not None:
@@ -150,15 +161,16 @@ def stragglers(work: PanelBatch, p: Pieces, bad: Bools) -> Bools:
 def noisy(p: Pieces, off: Array, gross: Array, whole: Array) -> Bools:
     """Pieces whose errors are small and stay as they are however they are refined: what is left is rounding.
 
-    off: (C, P) the errors that are too large; gross: (P,) what is added up, without regard to sign; whole: (P,) the
-    size of the answer, values and tangents together.
+    off: (C, P) the errors that are too large; gross: (P,) what is added up, without regard to sign; whole: (C, P) the
+    size of the answer.
     """
     worst = off.max(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
         excess = np.where(gross > 0, worst / gross, np.inf)
     p.stuck = np.where((p.excess > 0) & (excess > STUCK * p.excess), p.stuck + 1, 0)
     p.excess = excess
-    return np.asarray(((excess <= NOISE[0]) & (p.stuck >= 1)) | ((worst <= NOISE[1] * whole) & (p.stuck >= 3)))
+    small = (off <= NOISE[1] * whole).all(axis=0)
+    return np.asarray(((excess <= NOISE[0]) & (p.stuck >= 1)) | (small & (p.stuck >= 3)))
 
 
 def missed_peak(work: PanelBatch, p: Pieces, ends: Ends) -> Any:

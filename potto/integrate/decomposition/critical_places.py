@@ -32,7 +32,9 @@ BOXES, BOXES_EACH = 1 << 14, 1 << 8  # at most so many open at once, or so many 
 FEW = 256  # boxes up to which all sides of one are halved at once
 FINEST = 2.0**-40  # of the range: a box so narrow along the variable that is cut is not looked at more closely
 INFLATED = 0.1  # by how much a box is larger on which a solution is looked for: it may lie on the edge of one
+ROUNDED = 64 * EPS  # the same of the size of its place: a side that shrank to rounding holds no step of the operator
 SAME = 2.0**-44  # of the range: solutions no farther apart are one
+FLAT = 2.0**-20  # of its place: how long a box is in which what touches is 0 to rounding, at the most
 POLISH, STUCK = 12, 0.9  # steps at most; the part of each of its sides that the last one leaves of a box
 BEYOND = 0.125  # how far beyond its range a turning place is looked for, which the map of nodes takes care of
 
@@ -132,7 +134,8 @@ class _Search(Struct):
             owner, box = self.narrowed(owner, box)
             narrow = ~(box[0, 1] - box[0, 0] > np.maximum(tiny[owner], 4 * EPS * np.abs(box[0]).max(axis=0)))
             self.leave(owner[narrow], box[:, :, narrow])
-            owner, box = self.halved(owner[~narrow], box[:, :, ~narrow])
+            owner, box = self.told(owner[~narrow], box[:, :, ~narrow])
+            owner, box = self.halved(owner, box)
         self.leave(owner, box)
         if not self.found:
             return _none(len(self.names))
@@ -142,6 +145,25 @@ class _Search(Struct):
         """Both ends of boxes that may hold solutions, as such."""
         for end in (box[:, 0], box[:, 1]):
             self.found.append((owner, end, np.zeros(owner.size)))
+
+    def told(self, owner: Ints, box: Array) -> tuple[Ints, Array]:
+        """The boxes in which rounding tells places from one another; the others are left, as places that are so far
+        off: parts of them would say nothing more."""
+        size = (box[:, 1] - box[:, 0]) / np.maximum(1.0, np.abs(box).max(axis=1))
+        short = np.nonzero((size[0] <= FLAT) & (size[1:] <= ROUNDED).all(axis=0))[0]
+        if not short.size:
+            return owner, box
+        here = box[:, :, short]
+        thin = here.copy()
+        thin[0] = 0.5 * (here[0, 0] + here[0, 1])
+        whole, part = (self.enclosed(self.equations, owner[short], of) for of in (here, thin))
+        rounded = (whole[:, 1] - whole[:, 0] <= 2 * (part[:, 1] - part[:, 0])).all(axis=0)
+        gone = short[rounded]
+        middle, radius = 0.5 * (here[:, 0] + here[:, 1]), 0.5 * (here[0, 1] - here[0, 0])
+        self.found.append((owner[gone], middle[:, rounded], radius[rounded]))
+        rest = np.ones(owner.size, dtype=bool)
+        rest[gone] = False
+        return owner[rest], box[:, :, rest]
 
     def whole(self, low: Array, high: Array) -> tuple[Ints, Array]:
         """The box of each member that has one: of the variables further in what their bounds allow."""
@@ -172,7 +194,8 @@ class _Search(Struct):
             return owner, box
         side = box[:, 1] - box[:, 0]
         with np.errstate(all="ignore"):
-            wide = np.stack((box[:, 0] - INFLATED * side, box[:, 1] + INFLATED * side), axis=1)
+            more = INFLATED * side + ROUNDED * np.maximum(1.0, np.abs(box).max(axis=1))
+            wide = np.stack((box[:, 0] - more, box[:, 1] + more), axis=1)
             step = self.step(owner, wide)
             known = np.isfinite(step).all(axis=(0, 1)) & np.isfinite(wide).all(axis=(0, 1))
             one = known & ((step[:, 0] > wide[:, 0]) & (step[:, 1] < wide[:, 1])).all(axis=0)
@@ -218,13 +241,14 @@ class _Search(Struct):
 
     @staticmethod
     def halved(owner: Ints, box: Array) -> tuple[Ints, Array]:
-        """Boxes halved along all sides while they are few, else each along its longest."""
+        """Boxes halved along all sides that rounding leaves while they are few, else each along its longest."""
         n = box.shape[0]
         every = owner.size <= FEW
         size = (box[:, 1] - box[:, 0]) / np.maximum(1.0, np.abs(box).max(axis=1))
+        sides = ~(size <= ROUNDED)
         longest = np.where(np.isnan(size), np.inf, size).argmax(axis=0)
         for i in range(n):
-            cut = np.ones(owner.size, dtype=bool) if every else longest == i
+            cut = sides[i] if every else longest == i
             if not cut.any():
                 continue
             left, right = box.copy(), box[:, :, cut].copy()
@@ -232,6 +256,7 @@ class _Search(Struct):
             left[i, 1] = np.where(cut, middle, box[i, 1])
             right[i, 0] = middle[cut]
             owner, box = np.concatenate((owner, owner[cut])), np.concatenate((left, right), axis=2)
+            sides = np.concatenate((sides, sides[:, cut]), axis=1)
             longest = np.concatenate((longest, np.full(int(cut.sum()), -1)))
         return owner, box
 

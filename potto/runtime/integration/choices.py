@@ -1,10 +1,11 @@
 """What is tried for an integral: variables eliminated, cut along, or sampled, and which of them innermost.
 
-Owns `too_many`, `many`, `orders`, `preferred` and `trials`.
+Owns `too_many`, `many`, `orders`, `preferred` and `trial`.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Iterator
 
@@ -25,7 +26,7 @@ FEW_NODES = 30_000  # up to which iterated quadrature is no slower
 FEW_OF_PRODUCT = 500
 # Evaluations that are spent on one order of two variables before another one is tried; how many times those of one
 # variable more.
-TRIAL, TRIAL_FACTOR = 12_000, 25
+TRIAL, TRIAL_FACTOR = 50_000, 6
 
 
 def too_many(problem: Problem) -> bool:
@@ -70,16 +71,15 @@ def orders(term: Integral) -> Iterator[Integral]:
         yield reordered(term, [*(i for i in range(count) if i != last), last])
 
 
-def trials(problem: Problem) -> Iterator[tuple[Integral, int | None]]:
-    """Orders, and how many evaluations may go into trying them: where a jump is searched for, roots that merge further
-    out at places that are not known may make one order a hundred times as expensive as another."""
-    found = preferred(problem)
-    most = TRIAL * TRIAL_FACTOR ** max(len(problem.term.variables) - 2, 0)
-    if isinstance(found, list) and problem.outermost and len(found) > 1 and problem.plan(found[0]).searches:
-        yield from ((order, most) for order in found)
-    elif problem.outermost and passes_on(problem):
-        yield problem.term, most
-    yield from ((order, None) for order in found)
+def trial(problem: Problem) -> int | None:
+    """How many evaluations may go into trying one order of the variables before another one is; None: all that there
+    are, where there is no other way, or somebody else asks for the integral."""
+    count = len(problem.term.variables)
+    if not problem.outermost or problem.batch > 1 or count < 2:
+        return None
+    if len(list(itertools.islice(orders(problem.term), 2))) < 2 and not passes_on(problem):
+        return None
+    return TRIAL * TRIAL_FACTOR ** (count - 2)  # type: ignore[no-any-return]
 
 
 def passes_on(problem: Problem) -> bool:
@@ -89,7 +89,7 @@ def passes_on(problem: Problem) -> bool:
 
 
 def preferred(problem: Problem) -> Iterable[Integral]:
-    """The orders, those first in which the fewest jumps have to be searched for; a list where any have."""
+    """The orders, those first in which the fewest jumps have to be searched for."""
     if not problem.plan().searches:
         return orders(problem.term)
     return sorted(orders(problem.term), key=lambda order: problem.plan(order).searches)

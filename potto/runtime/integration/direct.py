@@ -27,7 +27,7 @@ from potto.runtime.evaluation.duals import merge, split
 from potto.runtime.evaluation.functions import Closure
 from potto.runtime.evaluation.machine import Linker, Machine
 from potto.runtime.integration.arrays import met
-from potto.runtime.integration.choices import many, trials
+from potto.runtime.integration.choices import many, preferred
 from potto.runtime.integration.preparation import filled, placed, prepared
 from potto.runtime.integration.problem import Mixed, Problem, linked
 from potto.runtime.integration.solving import solve
@@ -100,8 +100,7 @@ class Direct(Struct, frozen=True):
             problem = Problem(machine.apart(), term, *linked(env), solve, 1, True)
             if many(problem):
                 return None
-            order, _ = next(iter(trials(problem)))
-            plan = problem.plan(order)
+            plan = problem.plan(next(iter(preferred(problem))))
         except (PottoError, Mixed, TooDeep, RecursionError):
             return None
         return None if plan.decisions or plan.premise is not None else plan.straight

@@ -1,6 +1,6 @@
 """Integrals over many variables by eliminating these one after the other, where that does.
 
-Owns `step_by_step`.
+Owns `step_by_step` and `eliminated`.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from potto.integrate.elimination.recursion import AFFORDABLE, Eliminated, one_by
 from potto.integrate.events import Fold
 from potto.integrate.pieces import Sums
 from potto.runtime.evaluation.machine import Machine
+from potto.runtime.integration.attempts import Attempt
 from potto.runtime.integration.one_sided import beside_folds
 from potto.runtime.integration.problem import Problem
 
@@ -18,24 +19,29 @@ from potto.runtime.integration.problem import Problem
 ACCURATE, WORTH = 1e-8, 1e-4
 
 
-def step_by_step(problem: Problem, limit: float, affordable: int = AFFORDABLE) -> Sums | None:
+def step_by_step(problem: Problem, limit: float) -> Sums | None:
     """The integrals of a batch, where each variable hands one number on; None where errors are larger than `limit`, or
     one of them takes more evaluations than can be afforded."""
-    known = problem.steps()
-    if known is None:
-        return None
     rows = []
     for i in range(problem.batch):
         alone = problem.member(i)
-        row = _member(known, alone, affordable)
-        if row is None or alone.events or not accurate(row, max(limit, alone.machine.rtol), alone.machine):
+        found = eliminated(alone)
+        if not found or not accurate(found[0].sums, max(limit, alone.machine.rtol), alone.machine):
             return None
-        rows.append(row)
+        rows.append(found[0].sums)
     problem.machine.record.methods.add("quadrature")
     return Sums.joined(rows)
 
 
-def _member(known: Eliminated, problem: Problem, affordable: int) -> Sums | None:
+def eliminated(problem: Problem) -> list[Attempt]:
+    """What one integral comes to where each variable hands one number on; nothing where none does, where it takes more
+    evaluations than can be afforded, or something was met that tables do not tell."""
+    known, apart = problem.steps(), problem.apart()
+    row = None if known is None else _member(known, apart)
+    return [] if row is None or apart.events else [Attempt(problem.term, row, apart.events, tabled=True)]
+
+
+def _member(known: Eliminated, problem: Problem) -> Sums | None:
     """One integral, looked at from both sides where a surface folds in the outermost variable."""
 
     def tabled(there: Problem) -> Sums:
@@ -44,7 +50,7 @@ def _member(known: Eliminated, problem: Problem, affordable: int) -> Sums | None
             raise _NotEvaluated
         return found
 
-    row = one_by_one(known, problem.machine, problem.env, affordable)
+    row = one_by_one(known, problem.machine, problem.env, AFFORDABLE)
     folds = problem.events.every(Fold)
     if row is None or not folds or any(fold.number for fold, _ in folds):
         return row

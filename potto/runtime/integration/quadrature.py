@@ -1,11 +1,10 @@
 """Iterated quadrature of a batch by one plan: whole boxes first, the rest cut, so many members at a time.
 
-Owns `within`, `in_parts`, `whole_boxes`, `cut_up` and `iterated`.
+Owns `in_parts`, `whole_boxes`, `cut_up` and `iterated`.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from contextlib import AbstractContextManager
 from functools import lru_cache
@@ -13,7 +12,6 @@ from itertools import chain
 from typing import Any
 
 import numpy as np
-from msgspec.structs import replace
 
 from potto.integrate.adaptive.iterated import Iteration
 from potto.integrate.fixed.alike import by_shapes
@@ -30,19 +28,6 @@ BATCH = 4096  # members integrated at once
 FEW_TURNED = 16  # members up to which it does not pay to look for rules along other variables
 FEW = 64  # members for which it does not pay to look for those that nothing cuts
 MOST_AXES = 2  # of a product rule for one member: with 4,096 nodes 14 of each of three, which hardly ever are enough
-
-
-def within(most: int | None, plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> Sums | None:
-    """Quadrature; None where it takes more than so many evaluations a member."""
-    if most is None or machine.record.spent + most >= machine.settings.max_evals:
-        return in_parts(plan, machine, env, batch)
-    settings = replace(machine.settings, max_evals=math.ceil(machine.record.spent + most))
-    tight = machine.apart().changed(settings=settings)
-    sums = in_parts(plan, tight, env, batch)
-    if tight.exhausted():
-        return None
-    machine.events.take(tight.events, np.arange(batch))
-    return sums
 
 
 def in_parts(plan: Plan, machine: Machine, env: dict[str, Value], batch: int) -> Sums:

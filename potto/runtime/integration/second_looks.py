@@ -16,13 +16,15 @@ from potto.integrate.events import Degenerate, Fold, Shortfall, TwoSided, Unsear
 from potto.integrate.pieces import Sums
 from potto.kernels.cells import Array
 from potto.runtime.answers.convergence import missing
-from potto.runtime.integration.choices import TRIAL, orders
+from potto.runtime.integration.attempts import attempted, uncertainty
+from potto.runtime.integration.choices import orders
 from potto.runtime.integration.problem import Problem
-from potto.runtime.integration.quadrature import in_parts, iterated, within
+from potto.runtime.integration.quadrature import in_parts, iterated
 
 ENOUGH = 1e-3  # a relative error from which on it is tried with less
 TOLERANCES = (1e-6, 1e-3)  # that are asked for instead, one after the other, until one is reached
 EXTRA = 0.125  # the part of the budget that each may take beyond it
+LOOK = 12_000  # evaluations that may go into another order
 OTHER_NODES = 14  # in other places than those of the first time
 # From how many errors of the value on an error of a derivative is looked at again from another side, and for how many
 # members at most.
@@ -38,7 +40,7 @@ def by_less(problem: Problem, order: Integral, sums: Sums) -> Sums:
     Not where the integrand calls for integrals, which would go far beyond any budget once more.
     """
     machine, plan = problem.machine, problem.plan(order)
-    if not machine.exhausted() or (sums.e <= ENOUGH * np.abs(sums.v)).all() or machine.inexact(plan.term.body):
+    if not machine.exhausted() or uncertainty(sums) <= ENOUGH or machine.inexact(plan.term.body):
         return sums
     for rtol in TOLERANCES:
         most = math.ceil(machine.record.spent + EXTRA * machine.settings.max_evals)
@@ -46,9 +48,9 @@ def by_less(problem: Problem, order: Integral, sums: Sums) -> Sums:
         loose = machine.apart().changed(settings=settings)
         other = in_parts(plan, loose, problem.env, problem.batch)
         met = loose.events.touched(problem.batch, TwoSided, Fold, Degenerate).any()
-        if (other.e < sums.e).all() and (other.et <= sums.et).all() and not met:
+        if uncertainty(other) < uncertainty(sums) and not met:
             sums = other
-        if (sums.e <= rtol * np.abs(sums.v)).all():
+        if uncertainty(sums) <= rtol:
             break
     return sums
 
@@ -62,7 +64,7 @@ def beside_another(problem: Problem, order: Integral, sums: Sums) -> Sums:
     plan = problem.plan(order)
     if not plan.folds and not problem.events.every(Unsearched):
         return sums
-    other = _within_a_trial(problem, order)
+    other = _within_a_look(problem, order)
     if other is None:
         other = iterated(plan, problem.machine.apart(), problem.env, problem.batch, OTHER_NODES)
     return replace(
@@ -78,17 +80,16 @@ def _covering(gap: Array, own: Array, others: Array) -> Array:
     return np.where(gap > own + others, np.maximum(own, 2 * gap), own)
 
 
-def _within_a_trial(problem: Problem, order: Integral) -> Sums | None:
+def _within_a_look(problem: Problem, order: Integral) -> Sums | None:
     """The sums with another variable innermost; None where that tells nothing, or costs too much, as it does where the
     first order has taken more already."""
-    if problem.machine.record.spent > TRIAL:
+    if problem.machine.record.spent > LOOK:
         return None
     for turned in itertools.islice(orders(order), 1, None):
-        part = problem.apart()
-        other = within(TRIAL, part.plan(turned), part.machine, part.env, part.batch)
-        known = other is not None and np.isfinite(other.e).all() and np.isfinite(other.et).all()
-        if known and not part.events.every(Degenerate):
-            return other
+        other = attempted(problem, turned, LOOK)
+        known = np.isfinite(other.sums.e).all() and np.isfinite(other.sums.et).all()
+        if known and not other.stopped and not other.events.every(Degenerate):
+            return other.sums
     return None
 
 

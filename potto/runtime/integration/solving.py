@@ -25,20 +25,18 @@ from potto.integrate.pieces import Sums, still
 from potto.integrate.plan import Plan
 from potto.kernels.cells import Ints
 from potto.runtime.integration.at_kinks import at_kinks
-from potto.runtime.integration.choices import many, passes_on, too_many, trials
+from potto.runtime.integration.attempts import Attempt, attempted, best, uncertainty
+from potto.runtime.integration.choices import many, passes_on, preferred, too_many, trial
 from potto.runtime.integration.differences import by_differences
-from potto.runtime.integration.elimination import ACCURATE, WORTH, accurate, step_by_step
+from potto.runtime.integration.elimination import ACCURATE, WORTH, accurate, eliminated, step_by_step
 from potto.runtime.integration.members import by_members, one_by_one
 from potto.runtime.integration.one_sided import at_folds, beside_axes, on_both_sides
 from potto.runtime.integration.problem import Problem
-from potto.runtime.integration.quadrature import within
 from potto.runtime.integration.second_looks import beside_another, by_less, in_another_order
 
-# How many times the evaluations that iteration was tried with elimination may take after that, if only three variables
-# are to be eliminated: a ridge in space takes twice as many (0.4 s). It gets all that there is where iteration then
-# leaves more than a relative error of ROUGH: of a torus as a quartic 8e-7, of which tables leave 2e-12 after 2.7
-# million; of one with a root 5e-8, and three million come to nothing.
-TABLES, ROUGH = 3, 1e-7
+# How many times what a trial took the most promising order gets before variables are eliminated, or it gets all that
+# there is: a torus takes 2.8 times as many evaluations, and tables of it 8 times.
+LONGER = 4
 
 Method = Callable[[Problem], Sums | None]
 Improver = Callable[[Problem, Integral, Sums], Sums]
@@ -90,32 +88,64 @@ def _settled(part: Problem, order: Integral, sums: Sums) -> Sums:
 
 
 def along_cuts(problem: Problem) -> Sums:
-    """Iterated quadrature, in the first order of the variables in which no surface runs along the one that it cuts."""
-    machine, env, batch, events = problem.machine, problem.env, problem.batch, problem.events
+    """Iterated quadrature, in the first order of the variables that a trial settles, and in which no surface runs along
+    the one that it cuts; where none does, the best of what is found with all evaluations."""
+    machine, events = problem.machine, problem.events
     machine.record.methods.add("quadrature")
-    tried, stopped = 0, False
-    for order, most in trials(problem):
-        events.forget(Degenerate)
-        if most is None and tried and batch == 1 and passes_on(problem):
-            eliminated = step_by_step(problem, ACCURATE, TABLES * tried)
-            if eliminated is not None:
-                return eliminated
-            stopped = True
-        tried = most or 0
+    most = trial(problem)
+    stopped: list[Attempt] = []
+    for order in preferred(problem):
         plan = problem.plan(order)
-        if batch == 1 and plan.straight is not None:
-            plain = certain(plan.straight, machine, env)
+        if problem.batch == 1 and plan.straight is not None:
+            plain = certain(plan.straight, machine, problem.env)
             if plain is not None:
                 return plain
-        found = within(most, plan, machine, env, batch)
-        if found is not None:
-            sums = counted(problem, plan, found)
-            if not events.every(Degenerate):
-                sums = improved(problem, order, sums, ALONE if problem.outermost else INSIDE)
-                if stopped and not accurate(sums, ROUGH, machine):
-                    sums = step_by_step(problem, ACCURATE) or sums
-                return unbounded(problem, sums) if problem.outermost else sums
-    return _along_axes(problem, plan, sums)
+        found = attempted(problem, order, most)
+        along = found.events.every(Degenerate)
+        if not along and not found.stopped:
+            return finished(problem, found)
+        if not along:
+            stopped.append(found)
+    if stopped:
+        return with_all(problem, stopped, most or 0)
+    events.take(found.events, np.arange(problem.batch))
+    return _along_axes(problem, plan, found.sums)
+
+
+def with_all(problem: Problem, tried: list[Attempt], most: int) -> Sums:
+    """The best answer where trials in some orders of the variables did not come to an end: in the order of which most
+    is known, or by tables, with more and more evaluations.
+
+    most: the evaluations that each trial took.
+    """
+    machine, longer = problem.machine, list[Attempt]()
+    for known in sorted(tried, key=lambda attempt: uncertainty(attempt.sums)):
+        found = attempted(problem, known.order, LONGER * most)
+        if found.events.every(Degenerate):
+            continue
+        longer.append(found)
+        if found.stopped or accurate(found.sums, machine.rtol, machine):
+            break  # those that are not accurate though they came to an end may be in another order
+    if not longer or not longer[-1].stopped:
+        return finished(problem, best(longer or tried))
+    tables = eliminated(problem) if passes_on(problem) else []
+    if tables and accurate(tables[0].sums, max(ACCURATE, machine.rtol), machine):
+        return tables[0].sums
+    if len(longer) == 1:
+        longer.append(attempted(problem, longer[0].order, None))
+    return finished(problem, best((*tried, *tables, *longer)))
+
+
+def finished(problem: Problem, found: Attempt) -> Sums:
+    """The sums of an attempt, made better by whatever may help; the problem has met what it met."""
+    problem.events.take(found.events, np.arange(problem.batch))
+    if found.tabled:
+        return found.sums
+    own = problem.changed(term=found.order)
+    sums = counted(own, own.plan(), found.sums)
+    if not problem.outermost:
+        return improved(own, found.order, sums, INSIDE)
+    return unbounded(problem, improved(own, found.order, sums, ALONE))
 
 
 def _along_axes(problem: Problem, plan: Plan, sums: Sums) -> Sums:

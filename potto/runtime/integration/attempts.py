@@ -1,0 +1,60 @@
+"""Answers to one integral by several ways, of which the best one counts.
+
+Owns `Attempt`, `attempted`, `uncertainty` and `best`. An order of the variables that runs into roots that merge, or
+into kinks at places that nobody knows, takes a hundred times what another one takes. So each is tried with few
+evaluations before any of them gets all, and what was found on the way is kept: no way makes an answer worse that
+another one had.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from msgspec import Struct
+from msgspec.structs import replace
+
+from potto.core.terms import Integral
+from potto.integrate.events import Events
+from potto.integrate.pieces import Sums
+from potto.runtime.integration.problem import Problem
+from potto.runtime.integration.quadrature import in_parts
+
+
+class Attempt(Struct, frozen=True):
+    """An answer by an order of the variables, with what was met on the way to it.
+
+    stopped: whether it had to stop for want of evaluations. tabled: whether it comes from variables eliminated.
+    """
+
+    order: Integral
+    sums: Sums
+    events: Events
+    stopped: bool = False
+    tabled: bool = False
+
+
+def attempted(problem: Problem, order: Integral, most: int | None) -> Attempt:
+    """What quadrature in an order of the variables comes to with so many evaluations a member; None: with all."""
+    machine = problem.machine.apart()
+    limit = math.inf if most is None else machine.record.spent + most
+    bounded = limit < machine.settings.max_evals
+    if bounded:
+        machine = machine.changed(settings=replace(machine.settings, max_evals=math.ceil(limit)))
+    sums = in_parts(problem.plan(order), machine, problem.env, problem.batch)
+    return Attempt(order, sums, machine.events, bounded and machine.exhausted())
+
+
+def uncertainty(sums: Sums) -> float:
+    """The largest error of values and derivatives, each as a part of the largest of them; infinite where one is not
+    known."""
+    size = np.maximum(np.abs(sums.v), np.abs(sums.t).max(axis=1, initial=0.0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        parts = np.maximum(sums.e, sums.et.max(axis=1, initial=0.0)) / size
+    return float(np.where(np.isfinite(parts), parts, np.inf).max(initial=0.0))
+
+
+def best(attempts: Sequence[Attempt]) -> Attempt:
+    """The one of which most is known; of equals the last one."""
+    return min(reversed(attempts), key=lambda attempt: uncertainty(attempt.sums))
