@@ -51,13 +51,7 @@ BODIES: list[tuple[str, str, dict[str, float], str, str, Any, float]] = [
 ]  # fmt: skip
 
 
-UNMET = {"cone": "a bar of 1e-6: surfaces meet at its apex"}
-
-
-@pytest.mark.parametrize(("name", "text", "at", "one", "two", "exact", "most"), [
-    pytest.param(*row, id=row[0], marks=pytest.mark.xfail(row[0] in UNMET, reason=UNMET.get(row[0], ""), strict=True))
-    for row in BODIES
-])  # fmt: skip
+@pytest.mark.parametrize(("name", "text", "at", "one", "two", "exact", "most"), BODIES, ids=[row[0] for row in BODIES])
 def test_second_derivatives_of_bodies_are_covered(
     name: str, text: str, at: dict[str, float], one: str, two: str, exact: Any, most: float
 ) -> None:
