@@ -13,8 +13,9 @@ TESTS := $(BIN)/python -m pytest -n auto --maxprocesses 8 --dist worksteal --dur
 demo: $(STAMP)  ## the paper's programs, evaluated and differentiated
 	@PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python examples/demo.py
 
-gallery: $(STAMP)  ## docs/gallery: pictures of the examples with times and errors, in a few minutes
+gallery: $(STAMP)  ## docs/gallery: pictures of the examples with times and errors, held to other methods, in a few minutes
 	$(BIN)/python examples/gallery
+	$(BIN)/python tests/worlds/checked_gallery.py
 
 test: $(STAMP)  ## every test
 	$(TESTS)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from itertools import product
 from typing import Any
 
 import mpmath as mp
 import pytest
+from exact_dynamics import held, stepped, thrown, warmed
 from worlds_references import agrees, dual, program, reference
 
 import potto
@@ -32,18 +32,6 @@ def test_the_wall_is_found() -> None:
     assert found.converged and abs(found["wall"] - 7 / 6) < 1e-6
 
 
-def thrown(u: Any, v: Any, end: Any) -> tuple[Any, Any]:
-    """Flight by flight: each begins on the floor with the speeds that the bounce has left."""
-    g, left = mp.mpf(9.81), end
-    x = mp.mpf(0)
-    for _ in range(3):
-        flight = 2 * v / g
-        if left < flight:
-            break
-        x, left, u, v = x + u * flight, left - flight, u * mp.mpf(0.9), v * mp.mpf(0.8)
-    return x + u * left, v * left - g * left**2 / 2
-
-
 @pytest.mark.parametrize("speed", [1.5, 4.0, 5.0, 7.0, 12.0])  # three impacts, two, one, none
 @pytest.mark.parametrize("part", [0, 1])
 def test_thrown_through_the_impacts(speed: float, part: int) -> None:
@@ -57,22 +45,6 @@ def test_a_throw_through_three_impacts_is_found() -> None:
     found = potto.fit(THROW.landing, start, given={"end": 2.2}, target=target)
     assert found.converged
     assert abs(found["u"] - 1.7) < 1e-6 and abs(found["v"] - 4.1) < 1e-6
-
-
-def stepped(stop: Any, steps: int, h: Any) -> Any:
-    """The steps of the program, the contact by the formula for a quadratic instead of an integral."""
-    x, v = mp.mpf(1), mp.mpf(0)
-    for _ in range(steps):
-        a = -(x + h * v / 2)
-        y = x + h * v + h * h * a / 2
-        if y > stop:
-            x, v = y, v + h * a
-            continue
-        gap = x - stop
-        free = 2 * gap / (-v + mp.sqrt(v * v - 2 * a * gap))
-        w = -mp.mpf(0.8) * (v + a * free)
-        x, v = stop + w * (h - free) + a * (h - free) ** 2 / 2, w + a * (h - free)
-    return x
 
 
 @pytest.mark.parametrize("stop", [-0.5, -0.77])
@@ -98,33 +70,10 @@ def test_the_cart_is_parked() -> None:
     assert found.converged and abs(found["end"] - 3) < 1e-6 and abs(found["switch"] - 1.5) < 1e-6
 
 
-def held(speed: Any, steps: int) -> Any:
-    """The pole by 60-digit arithmetic: the mean of a sign over even noise is a clamped line."""
-    x, v, h, noise = mp.mpf(0.1), mp.mpf(0), mp.mpf(0.005), mp.mpf(0.4)
-    for _ in range(steps):
-        mean = max(mp.mpf(-1), min(mp.mpf(1), (x + speed * v) / noise))
-        v = v + h * (mp.sin(x) - mean / 2 * mp.cos(x))
-        x = x + h * v
-    return x
-
-
 @pytest.mark.parametrize("speed", [0.8, 1.3])
 def test_the_pole_is_held_up(speed: float) -> None:
     with potto.settings(rtol=1e-8):  # a thousand integrals, each with the error of all before
         agrees(dual(POLE, "tilt", speed), reference(lambda s: held(s, 1000), speed), 1e-11)
-
-
-def warmed(set_point: Any, cost: bool) -> Any:
-    """All ways through the three hours, each with its probability."""
-    noise, total = mp.mpf(3), mp.mpf(0)
-    for way in product((True, False), repeat=3):
-        t, share = mp.mpf(18.5), mp.mpf(1)
-        for on in way:
-            chance = max(mp.mpf(0), min(mp.mpf(1), (set_point - t + noise) / (2 * noise)))
-            share *= chance if on else 1 - chance
-            t = t - mp.mpf(0.1) * (t - 5) + (3 if on else 0)
-        total += share * ((t - 20) ** 2 if cost else t)
-    return total
 
 
 @pytest.mark.parametrize("set_point", [17.0, 20.0, 22.25])

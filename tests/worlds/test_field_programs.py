@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
 
 import mpmath as mp
 import numpy as np
 import pytest
+from exact_fields import ARROW, SITES, WAVES, balls, bright, clipped, gained, shoelace, two_bands
 from scipy.optimize import brentq
 from worlds_references import agrees, dual, program, reference
 
@@ -27,11 +27,6 @@ def test_states_of_a_chain(energy: float) -> None:
     exact = reference(lambda e: mp.acos(-e / 2) / mp.pi, energy)
     agrees(dual(BANDS, "below", energy), exact, 1e-11)
     assert abs(float(BANDS.density(energy)) - exact[1]) < 1e-11 * exact[1]
-
-
-def two_bands(e: Any, v: Any, w: Any) -> Any:
-    below = mp.acos(((v * v + w * w) - e * e) / (2 * v * w)) / mp.pi
-    return 1 + below if e > 0 else 1 - below
 
 
 @pytest.mark.parametrize("energy", [-1.4, -0.7, 0.6, 1.0, 1.45])
@@ -58,40 +53,12 @@ def test_density_of_a_square_lattice(energy: float) -> None:
     assert abs(dual(BANDS, "square", energy)[1] - float(density)) < 1e-9
 
 
-def balls(apart: Any, level: Any, weight: Callable[[Any], Any]) -> tuple[float, float]:
-    """By sections: y^2 < log(g(x)/level); by the distance, the sections' ends move."""
-
-    def g(x: Any) -> Any:
-        return mp.exp(-((x + apart) ** 2)) + mp.exp(-((x - apart) ** 2))
-
-    def rate(x: Any) -> Any:
-        return 2 * ((x - apart) * mp.exp(-((x - apart) ** 2)) - (x + apart) * mp.exp(-((x + apart) ** 2))) / g(x)
-
-    end = mp.findroot(lambda x: g(x) - level, apart + mp.sqrt(-mp.log(level)))
-    places = [0, apart, end]
-    value = 4 * mp.quad(lambda x: weight(x) * mp.sqrt(abs(mp.log(g(x) / level))), places)
-    slope = 2 * mp.quad(lambda x: weight(x) * rate(x) / mp.sqrt(abs(mp.log(g(x) / level))), places)
-    return float(value), float(slope)
-
-
 @pytest.mark.parametrize("apart", [0.3, 0.7, 1.05])
 @pytest.mark.parametrize("moment", [0, 1])
 def test_metaballs(apart: float, moment: int) -> None:
     with mp.workdps(40):
         exact = balls(mp.mpf(apart), mp.mpf(1) / 2, lambda x: x ** (2 * moment))
     agrees(dual(BALLS, rf"\a . moments(a, 1, 0.5).{moment}", apart), exact, 1e-10)
-
-
-def gained(w: list[Any], weight: Any) -> Any:
-    """The plate by sections: (y - 1/2)^2 < log(2 g(x))/4, along which the stress has an arc tangent."""
-
-    def section(x: Any) -> Any:
-        g = sum(wi * mp.exp(-4 * (x - mp.mpf(i) / 2) ** 2) for i, wi in enumerate(w))
-        half, root = mp.sqrt(mp.log(2 * g)) / 2, mp.sqrt(1 + 4 * (x - mp.mpf(1) / 2) ** 2)
-        low, high = mp.mpf(1) / 2 - half, mp.mpf(1) / 2 + half
-        return (mp.atan(2 * high / root) - mp.atan(2 * low / root)) / (2 * root) - weight * (high - low)
-
-    return mp.quad(section, [0, mp.mpf(1) / 2, 1])
 
 
 @pytest.mark.parametrize("bump", [0, 1, 2])
@@ -121,19 +88,11 @@ def test_the_best_ellipse_is_found(weight: float) -> None:
     assert abs(found["a"] - (1 - weight) ** 0.5) < 1e-6 and abs(found["b"] - ((1 - weight) / 2) ** 0.5) < 1e-6
 
 
-def bright(t: Any) -> Any:
-    """Sections of the cell: from x = t on, y > (t - 1 + x)/(2 x - 1), and the same in the other corner."""
-    return 2 * mp.quad(lambda x: 1 - (t - 1 + x) / (2 * x - 1), [t, 1])
-
-
 @pytest.mark.parametrize("threshold", [0.55, 0.75, 0.95])
 def test_a_bilinear_cell(threshold: float) -> None:
     with mp.workdps(40):
         exact = float(bright(mp.mpf(threshold))), float(mp.diff(bright, threshold, h=mp.mpf(10) ** -12))
     agrees(dual(NOISE, "bright", threshold), exact, 1e-10)
-
-
-WAVES = [(1.0, 2.3, 0.4), (-2.9, 1.1, 1.7), (2.1, -3.7, 4.2), (4.3, 3.1, 2.9)]
 
 
 def length(x: float, t: float) -> float:
@@ -161,39 +120,10 @@ def test_clouds() -> None:
     assert abs(slope - (covered(0.11) - covered(0.09)) / 0.02) < 2e-3
 
 
-def clipped(sites: list[tuple[Any, Any]], own: int) -> Any:
-    """The area of a cell: the square, cut with one half plane after another."""
-    corners = [(mp.mpf(x), mp.mpf(y)) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
-    px, py = sites[own]
-    for number, (qx, qy) in enumerate(sites):
-        if number == own:
-            continue
-
-        def side(c: tuple[Any, Any], qx: Any = qx, qy: Any = qy) -> Any:
-            return (c[0] - qx) ** 2 + (c[1] - qy) ** 2 - (c[0] - px) ** 2 - (c[1] - py) ** 2
-
-        kept = []
-        for a, b in zip(corners, corners[1:] + corners[:1]):
-            if side(a) >= 0:
-                kept.append(a)
-            if (side(a) >= 0) != (side(b) >= 0):
-                share = side(a) / (side(a) - side(b))
-                kept.append((a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])))
-        corners = kept
-    return shoelace(corners)
-
-
-def shoelace(corners: list[tuple[Any, Any]]) -> Any:
-    return sum(a[0] * b[1] - a[1] * b[0] for a, b in zip(corners, corners[1:] + corners[:1])) / 2
-
-
 def moved(places: list[tuple[float, float]], which: int, axis: int, t: Any) -> list[tuple[Any, Any]]:
     found = [[mp.mpf(x), mp.mpf(y)] for x, y in places]
     found[which][axis] += t
     return [(x, y) for x, y in found]
-
-
-SITES = [(0.2, 0.3), (0.7, 0.2), (0.5, 0.6), (0.15, 0.8), (0.85, 0.75)]
 
 
 @pytest.mark.parametrize("own", [0, 2])
@@ -204,9 +134,6 @@ def test_cells_by_all_sites(own: int) -> None:
             exact = reference(lambda t, w=which, a=axis: clipped(moved(SITES, w, a, t), own), 0.0)
             assert abs(float(np.asarray(slopes)[which, axis]) - exact[1]) < 1e-12
     assert abs(float(CELLS.cell(SITES, own)) - exact[0]) < 1e-13
-
-
-ARROW = [(0.1, 0.1), (0.9, 0.5), (0.2, 0.9), (0.4, 0.45)]
 
 
 def test_a_polygon_by_all_corners() -> None:

@@ -6,6 +6,7 @@ from typing import Any
 
 import mpmath as mp
 import pytest
+from exact_probability import VOLATILITY, accepted, call, digital, expected_cost, knocked_out, truncated_moments
 from worlds_references import agrees, dual, program, reference
 
 import potto
@@ -16,11 +17,6 @@ NEWS = program("probability/newsvendor")
 OPTIONS = program("probability/options")
 THRESHOLD = program("probability/threshold")
 ACCEPTANCE = program("probability/acceptance")
-
-
-def truncated_moments(a: Any, b: Any) -> tuple[Any, Any]:
-    mass = mp.ncdf(b) - mp.ncdf(a)
-    return (mp.npdf(a) - mp.npdf(b)) / mass, 1 + (a * mp.npdf(a) - b * mp.npdf(b)) / mass
 
 
 @pytest.mark.parametrize("bound", [-3.0, -1.0, 0.7])
@@ -59,12 +55,6 @@ def test_the_effect_of_the_treatment_is_found(shape: float) -> None:
     assert abs(found["rate"] - rates[0]) < 1e-6 and abs(found["treatment"] - float(mp.log(rates[0] / rates[1]))) < 1e-6
 
 
-def expected_cost(q: Any) -> Any:
-    m, s = mp.mpf(3), mp.mpf(0.4)
-    z, mean = (mp.log(q) - m) / s, mp.exp(m + s * s / 2)
-    return q * mp.ncdf(z) - mean * mp.ncdf(z - s) + 3 * (mean * mp.ncdf(s - z) - q * mp.ncdf(-z))
-
-
 @pytest.mark.parametrize("order", [5.0, 20.0, 26.0, 60.0])
 def test_cost_of_an_order(order: float) -> None:
     agrees(dual(NEWS, "best", order), reference(expected_cost, order), 1e-12)
@@ -74,32 +64,6 @@ def test_the_best_order_is_found() -> None:
     found = potto.fit(NEWS.best, {"q": 20.0})
     quantile = mp.exp(3 + mp.mpf(0.4) * mp.sqrt(2) * mp.erfinv(mp.mpf(1) / 2))
     assert found.converged and abs(found["q"] - float(quantile)) < 1e-6 * float(quantile)
-
-
-RATE, VOLATILITY = mp.mpf(0.03), mp.mpf(0.2)
-
-
-def call(spot: Any, volatility: Any, strike: int) -> Any:
-    d = (mp.log(spot / strike) + (RATE - volatility**2 / 2)) / volatility
-    return spot * mp.ncdf(d + volatility) - strike * mp.exp(-RATE) * mp.ncdf(d)
-
-
-def digital(spot: Any, volatility: Any, strike: int) -> Any:
-    return mp.exp(-RATE) * mp.ncdf((mp.log(spot / strike) + (RATE - volatility**2 / 2)) / volatility)
-
-
-def knocked_out(spot: Any, volatility: Any, strike: int, barrier: int) -> Any:
-    """The second half of the year in closed form, the first by quadrature up to the barrier."""
-    drift, spread = (RATE - volatility**2 / 2) / 2, volatility / mp.sqrt(2)
-
-    def later(half: Any) -> Any:
-        low, high = ((mp.log(k / half) - drift) / spread for k in (strike, barrier))
-        mean = half * mp.exp(drift + spread**2 / 2)
-        return mean * (mp.ncdf(high - spread) - mp.ncdf(low - spread)) - strike * (mp.ncdf(high) - mp.ncdf(low))
-
-    top = (mp.log(barrier / spot) - drift) / spread
-    places = mp.linspace(-12, top, 10)
-    return mp.exp(-RATE) * mp.quad(lambda z: mp.npdf(z) * later(spot * mp.exp(drift + spread * z)), places)
 
 
 @pytest.mark.parametrize("spot", [80.0, 100.0, 125.0])
@@ -165,12 +129,6 @@ def test_the_best_classifier_looks_along_the_means() -> None:
     assert found.converged
     assert abs(found["angle"] - float(mp.atan(0.5))) < 1e-6
     assert abs(found["threshold"] - (length / 2 + float(mp.log(mp.mpf(4) / 5)) / length)) < 1e-6
-
-
-def accepted(seen: Any, near: Any) -> Any:
-    """The posterior mean: x is normal with variance 5, p given x has the mean 4 x/5."""
-    low, high = (seen - near) / mp.sqrt(5), (seen + near) / mp.sqrt(5)
-    return 4 / mp.sqrt(5) * (mp.npdf(low) - mp.npdf(high)) / (mp.ncdf(high) - mp.ncdf(low))
 
 
 @pytest.mark.parametrize("near", [0.05, 0.5, 3.0])

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import runpy
 import time
-from itertools import product
 from typing import Any
 
 import mpmath as mp
 import numpy as np
 import pytest
+from exact_rays import half_shadow
 from sections_reference import curve, integral
 from worlds_references import EXAMPLES, agrees
 
@@ -209,29 +209,9 @@ def test_a_hard_shadow(at: tuple[float, float]) -> None:
     agrees(found(SHADOWS, "triangle", "lx", 0.5, at, q=0.9), by_light, 1e-8)
 
 
-def half_shadow(lx: Any, x: float, y: float) -> Any:
-    """With a level edge the border is a hyperplane in four dimensions: a box that is cut by one, corner by corner.
-
-    The edge is cast to 1.5 a - 0.5 l, its direction stays; p is lit where it is on the other side of it.
-    """
-    (ax, ay), (ex, ey) = (mp.mpf("0.4"), mp.mpf(0)), (mp.mpf("0.2"), mp.mpf(1))  # a, and the direction of the edge
-    x0, x1, y0, y1 = box(x, y)
-    wide = mp.mpf("0.4") / 2
-
-    def lit(x: Any, y: Any, lx: Any, ly: Any) -> Any:
-        return ey * (x - 3 * ax / 2 + lx / 2) - ex * (y - 3 * ay / 2 + ly / 2)
-
-    ends = ((x0, x1), (y0, y1), (lx - wide, lx + wide), (mp.mpf("0.4") - wide, mp.mpf("0.4") + wide))
-    total = mp.mpf(0)
-    for corner in product((0, 1), repeat=4):
-        value = lit(*(ends[i][c] for i, c in enumerate(corner)))
-        total += (-1) ** sum(corner) * max(value, mp.mpf(0)) ** 4
-    return total / (24 * mp.fprod((ey, -ex, ey / 2, -ex / 2))) / mp.mpf(H) ** 2 / mp.mpf("0.4") ** 2
-
-
 @pytest.mark.parametrize("at", [(0.4, 0.3), (0.33, 0.1), (0.5, 0.6), (0.1, 0.9), (0.8, 0.2)])
 def test_a_soft_shadow(at: tuple[float, float]) -> None:
-    exact = slope(lambda lx: half_shadow(lx, *at), 0.5)
+    exact = slope(lambda lx: half_shadow(lx, *at, H), 0.5)
     agrees(found(SHADOWS, "edge", "lx", 0.5, at, q=1.0), exact, 1e-8)
 
 
