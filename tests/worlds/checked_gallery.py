@@ -30,8 +30,8 @@ EACH = 4  # places of each kind
 
 
 class Checked(NamedTuple):
-    """An entry; how many places were looked at, how far off those are that are good, where; how many are off by more but
-    within their errors, and how many by more than these; the slowest by the median."""
+    """An entry; how many places were looked at, how far off those are that are good, where; how many are off by more
+    but within their errors, and how many by more than these; the slowest by the median."""
 
     title: str
     places: int
