@@ -312,7 +312,7 @@ def _judged(folder: str) -> tuple[str | None, str | None]:
     except OSError:
         return None, None
     if not stat.S_ISDIR(status.st_mode):
-        return None, f"nothing is kept between runs: {folder} is no folder; delete it, or set POTTO_CACHE=off"
+        return None, f"nothing is kept between runs: {folder} is not a folder; delete it, or set POTTO_CACHE=off"
     if sys.platform == "win32":  # where a user's folders are the user's own
         return folder, None
     others = _open_to_others(folder)

@@ -70,7 +70,7 @@ class Protocol(JsonRPCProtocol):
             logger.error("a message that is not JSON: %s", message)
             self.fail(None, errors.PARSE_ERROR, "this is not JSON")
         elif not isinstance(message, dict):
-            logger.error("a message that is no object")
+            logger.error("a message that is not an object")
             self.fail(None, errors.INVALID_REQUEST, "a message is an object")
         elif not isinstance(method := message.get("method"), str):
             self._handle_response(cast(Id, message.get("id")), message.get("result"), message.get("error"))

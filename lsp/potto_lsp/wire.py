@@ -53,7 +53,7 @@ def _header(stream: BinaryIO) -> int | None:
             if colon and name.strip().lower() == b"content-length":
                 length = _length(value)
             elif not colon:
-                logger.error("a line that is no header field: %r", line[:80])
+                logger.error("a line that is not a header field: %r", line[:80])
         elif length is not None:
             return length
     return None

@@ -24,7 +24,7 @@ def kept(path: str, start: Mapping[str, float]) -> dict[str, float]:
     except FileNotFoundError:
         return dict(start)
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise wrong_call(f"`{path}` is no checkpoint of a fit: {error}", "name another file, or remove it") from None
+        raise wrong_call(f"`{path}` is not a checkpoint of a fit: {error}", "name another file, or remove it") from None
     if numbers.keys() != start.keys():
         has, wanted = ", ".join(numbers), ", ".join(start)
         raise wrong_call(f"`{path}` is a checkpoint of a fit of {has}, not of {wanted}", "name another file")

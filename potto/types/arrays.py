@@ -83,7 +83,7 @@ def _whole(inference: Inference, index: nodes.Expr) -> None:
     near = dict.fromkeys((lower, lower + 1)) if 0 < value < 1e9 else (0,)
     inference.report(kinds.NOT_WHOLE(
         index.span, f"an index must be a whole number, but this is {value:g}", label="not a whole number",
-        help="elements are counted: `xs[0]`, `xs[1]`; between them looks `interp(places, xs, x)`",
+        help="elements are counted: `xs[0]`, `xs[1]`; to look between them, write `interp(places, xs, x)`",
         suggestions=tuple(suggest(index.span, str(number)) for number in near),
     ))  # fmt: skip
 

@@ -71,7 +71,7 @@ def _rising(inference: Inference, places: nodes.Expr) -> None:
         first, second = number(before), number(place)
         if first is not None and second is not None and not first < second:
             inference.report(kinds.NO_RISE(
-                place.span, f"`interp` looks between places that rise, but {second:g} stands behind {first:g}",
+                place.span, f"`interp` needs places that rise, but {second:g} follows {first:g}",
                 label="not above the one before", related=(Related(before.span, "the place before"),),
                 help="sort the places, with the values beside them",
             ))  # fmt: skip

@@ -81,7 +81,7 @@ def test_a_checkpoint_is_where_the_next_fit_goes_on(tmp_path: Path) -> None:
     with pytest.raises(potto.PottoError, match="a fit of x, y"):
         potto.fit(m.cover, {"r": 0.5}, checkpoint=file)
     Path(file).write_text("[")
-    with pytest.raises(potto.PottoError, match="no checkpoint"):
+    with pytest.raises(potto.PottoError, match="not a checkpoint"):
         potto.fit(m.cover, {"r": 0.5}, checkpoint=file)
 
 

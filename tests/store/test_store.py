@@ -188,7 +188,7 @@ class TestFolder:
         (tmp_path / "elsewhere").mkdir(mode=0o700)
         (folder / "store").symlink_to(tmp_path / "elsewhere")
         store.put("text", b"a", b"1")
-        assert not list((tmp_path / "elsewhere").iterdir()) and "is no folder" in str(store.complaint())
+        assert not list((tmp_path / "elsewhere").iterdir()) and "is not a folder" in str(store.complaint())
 
     def test_cannot_be_made(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         folder.write_text("a file")

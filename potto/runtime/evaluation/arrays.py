@@ -178,7 +178,7 @@ def _see_that_it_rises(whole: Value) -> None:
     if bad.size:
         place, *member = map(int, bad[0])
         first, second = (float(numbers[at, *member]) for at in (place, place + 1))
-        message = f"`interp` looks between places that rise, but {second!r} stands behind {first!r}"
+        message = f"`interp` needs places that rise, but {second!r} follows {first!r}"
         note = f"they are the elements {place} and {place + 1} of its first argument"
         help = "sort them, with the values beside them"
         raise PottoError([NO_RISE(errors.NOWHERE, message, notes=(note,), help=help)])

@@ -81,7 +81,7 @@ def _text_to_edit(session: Conversation, text: str) -> str:
         raise Refusal(f"there is no entry {text}", "`:history` lists them")
     target = session.target(text)
     if target is None:
-        raise Refusal(f"`{text}` is no definition, entry or file", "`:browse` lists the definitions")
+        raise Refusal(f"`{text}` is not a definition, an entry or a file", "`:browse` lists the definitions")
     return (chunk_text(session.db, target.file, target.name) or "") + "\n"
 
 
