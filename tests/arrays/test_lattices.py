@@ -222,7 +222,7 @@ def test_places_that_do_not_rise_are_told(programs: potto.Module, xs: list[float
         with pytest.raises(potto.PottoError) as told:
             call()
         assert [d.code for d in told.value.diagnostics] == ["P0514"]
-        assert f"{second} stands behind {first}" in told.value.diagnostics[0].message
+        assert f"{second} follows {first}" in told.value.diagnostics[0].message
 
 
 def test_places_made_in_the_program() -> None:
