@@ -32,6 +32,28 @@ def pixels(side: int = SIDE) -> tuple[Rows, Rows]:
     return x.ravel(), y.ravel()
 
 
+# A mean over random points, a chunk at a time that stays in the cache
+
+
+def smooth_samples(c: float, n: int) -> tuple[float, float]:
+    """The mean of exp(-c x y) over n points of the unit square, and its standard error."""
+    return _sampled(lambda x, y: np.exp(-c * x * y), n)
+
+
+def cut_samples(c: float, n: int) -> tuple[float, float]:
+    """The same of eq. (1), which jumps."""
+    return _sampled(lambda x, y: np.where(x + y + c >= 0, 1 / (ROOT * (x + y + c) + 2) ** 2, 0.0), n)
+
+
+def _sampled(integrand: Callable[[Rows, Rows], Rows], n: int) -> tuple[float, float]:
+    random, total, squares = np.random.default_rng(0), 0.0, 0.0
+    for start in range(0, n, 1 << 13):
+        values = integrand(*random.random((2, min(1 << 13, n - start))))
+        total, squares = total + values.sum(), squares + values @ values
+    mean = total / n
+    return mean, float(np.sqrt(max(squares / n - mean * mean, 0.0) / n))
+
+
 # Eq. (1), quadratic shader s(z) = 1/(sqrt(2) z + 2)^2, z = x + y + c >= 0, over the square of side h with z = c at its
 # corner: Gauss rules on the part where the edge cuts lines along y, and on the part where it does not
 

@@ -209,6 +209,35 @@ def kernel_points(asked: Asked) -> Iterator[Row]:
             yield held("points", n, timed(ours, asked), far, (theirs, by_c), asked, (1.5, 1.5))
 
 
+# Samples
+
+SAMPLED = """
+def smooth(c) integral ([0, 1], [0, 1]) exp(-c*x*y) d(x, y)
+def cut(c) integral ([0, 1], [0, 1]) 1/(sqrt(2)*(x + y + c) + 2)^2*[x + y + c >= 0] d(x, y)
+"""
+SAMPLE = 50e-9  # seconds a sample may take whose integrand takes 20 to 50 ns
+
+
+def sampling(asked: Asked) -> Iterator[Row]:
+    """A million samples, beside random numbers, integrand and mean by numpy; of the derivative, too; and by
+    `qmc`, whose evaluations are nodes of rules along lines."""
+    m, n = potto.compile(SAMPLED), 1_000_000
+    wanted = (
+        ("smooth", m.smooth, 0.5, hand.smooth_samples, 0.8876841582354967),  # mpmath
+        ("cut", m.cut, -0.7, hand.cut_samples, exact_quad(-0.7)[0]),
+    )
+    for method in ("mc", "qmc"):
+        for name, function, at, by_numpy, exact in wanted:
+            slope, by_hand_too = potto.grad(function, "c"), method == "mc"
+            with potto.settings(method=method, samples=n):
+                found = function(at)
+                assert abs(found.value - exact) <= found.error < 1e-2, (found.value, exact)
+                theirs = timed((lambda f=by_numpy, at=at: f(at, n)) if by_hand_too else None, asked)
+                ours = timed(lambda f=function, at=at: f(at), asked)
+                yield Row(f"{name}, {method}", n, ours, 0.0, theirs, goal=SAMPLE * n if by_hand_too else math.nan)
+                yield Row(f"its derivative, {method}", n, timed(lambda f=slope, at=at: f(at), asked), 0.0)
+
+
 # Programs, from their text
 
 NAMES = ("ax", "ay", "bx", "by", "cx", "cy", "k0", "k1", "k2", "k3")
@@ -357,6 +386,7 @@ LINES: dict[str, tuple[str, Callable[[Asked], Iterator[Row]]]] = {
     "sweep": ("the same at many values of c in one call", sweep),
     "pictures": ("512 x 512 pixels, value and derivative", pictures),
     "pairs": ("(triangle, pixel) pairs, value and 6 derivatives each", mesh_pairs),
+    "samples": ("a million samples", sampling),
     "kernel": ("a kernel: the shader and its derivative at points", kernel_points),
     "shading": ("a pixel of a coloured triangle, squared loss, gradient in 10 parameters", shading),
     "eighty": ("80 conditions, source text to first answer", eighty),
