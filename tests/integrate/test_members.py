@@ -188,3 +188,16 @@ def test_members_of_any_shape() -> None:
     assert answer.reasons_of((1, 3)) and not answer.reasons_of((0, 3))
     (mask,) = answer.shortfalls.values()
     assert mask[1].all() and not mask[0].any()
+
+
+def test_roots_that_merge_for_one_member_leave_the_bounds_of_all_moving() -> None:
+    """sin(3x) reaches y + t in one point, the corner (pi/6, 0.5) of the last member's box, where its roots move
+    infinitely fast; elsewhere the integrand is 1, so that the derivative is the height times the speed of the bound."""
+    program = """
+def f(a, b, t)
+    integral ([a, a + t/16], [b, b + 1/16]) (if [sin(3*x) - y - t >= 0] then 2 else 1) d(x, y)
+"""
+    a = np.append(np.linspace(0.05, 0.25, 11), [math.pi / 6])
+    answer = potto.deriv(potto.compile(program).f)((a, 0.0), (0.5, 0.0), (0.5, 1.0))
+    assert (np.abs(answer.tangent - 1 / 256) <= answer.tangent_error + 1e-17).all()
+    assert (answer.tangent_error[:-1] <= 1e-14).all()

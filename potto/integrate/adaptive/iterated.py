@@ -15,7 +15,7 @@ from potto.integrate.adaptive.refining import integrated
 from potto.integrate.adaptive.root_sums import Rows, over_roots
 from potto.integrate.columns import distinct
 from potto.integrate.decomposition.critical_places import critical_rows
-from potto.integrate.decomposition.cuts import Cuts, at_rest, frame_rows, segments, standing
+from potto.integrate.decomposition.cuts import Cuts, at_rest, finite_speeds, frame_rows, segments, standing
 from potto.integrate.decomposition.effective_range import concentrated, pulled_in
 from potto.integrate.decomposition.meetings import Row
 from potto.integrate.decomposition.sections import searched_rows
@@ -184,8 +184,8 @@ class Iteration(Struct):
             if row.cut >= 0 and level.level.cuts[row.cut].surface in self.still:
                 row.t = ()
         cuts = segments(level, lo, hi, rows, batch, machine.directions, kin)
-        if self.resting(level, lo, hi, cuts.segments):
-            cuts = at_rest(cuts)
+        if not any(c.decides for c in level.level.cuts):
+            cuts = at_rest(cuts) if self.resting(level, lo, hi) else finite_speeds(cuts)
         cuts.lost = lost
         collapsed = collapsed_ranges(level, lo, hi, rows, batch, machine.directions)
         if machine.frozen:
@@ -200,18 +200,16 @@ class Iteration(Struct):
         found, lost = self.searched(level, env, lo, hi, batch, machine)
         return lo, hi, rows + found, lost
 
-    def resting(self, level: LevelPlan, lo: Cell, hi: Cell, seg: Segments) -> bool:
-        """Whether nothing needs to move with the cuts of a variable: what is integrated is continuous there.
+    def resting(self, level: LevelPlan, lo: Cell, hi: Cell) -> bool:
+        """Whether no nodes are to move with the cuts of a variable along which what is integrated is continuous.
 
         Then the derivative along it, which nodes that move would need, is best left alone: near critical places it is
-        the hardest of all. Where there is but one variable further in it costs little, and serves as a check, unless
-        roots merge just here, and so move infinitely fast.
+        the hardest of all. Where there is but one variable further in it costs little, and serves as a check. Nodes
+        have to move where bounds do.
         """
         levels = self.plan.levels
-        if any(c.decides for c in level.level.cuts):
-            return False
         if len(levels) < 3 or any(own is level for own in levels[-2:]):
-            return not np.isfinite(seg.ta).all()
+            return False
         return not any(np.any(t) for bound in (lo, hi) for t in bound.t if t is not None)
 
     def searched(

@@ -174,6 +174,18 @@ def at_rest(cuts: Cuts) -> Cuts:
     return replace(cuts, moving=False)
 
 
+def finite_speeds(cuts: Cuts) -> Cuts:
+    """The same cuts, those at rest that would move infinitely fast, as roots do that merge just here: for cuts along
+    which what is integrated is continuous, where any motion of nodes does."""
+    seg = cuts.segments
+    for name, beside in (("ta", "da"), ("tb", "db")):
+        fast = ~np.isfinite(getattr(seg, name))
+        if fast.any():
+            setattr(seg, name, np.where(fast, 0.0, getattr(seg, name)))
+            setattr(seg, beside, np.where(fast, 0.0, getattr(seg, beside)))
+    return cuts
+
+
 def _edges(
     plan: LevelPlan, rows: list[Row], roots: Array, off: Array, speeds: Array, ends: tuple[_End, _End]
 ) -> tuple[list[Edge], list[Edge]]:
