@@ -1,40 +1,71 @@
-"""The text of a product rule over boxes (`tensor_product`), as LLVM reads it.
+"""The text of a function that integrates over boxes which nothing cuts (`lowered_boxes`), as LLVM reads it.
 
-Owns `BoxText`. Bounds are columns of numbers that stand still, there are no cuts, and what is integrated may be a tuple
-of numbers. How far off the rule is is worked out on the spot, as `tensor_product` and `gauss.truncation` do it by
-numpy.
+Owns `Look` and `BoxText`. A function works out the bounds of each member, on which side of every surface its box lies,
+and by a product rule what is integrated there; what is integrated may be a tuple of numbers. How far off the rule is is
+worked out on the spot, as `tensor_product` and `gauss.truncation` do it by numpy.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Mapping, Sequence
+from functools import reduce
 
-from potto.core.terms import Term, Tuple, children
-from potto.integrate.fixed.rule_text import Place, RuleText, Symbol
+from msgspec import Struct
+
+from potto.core.terms import Lam, Term, Tuple, children, function_of
+from potto.integrate.fixed.rule_text import Place, RuleText, Symbol, still
 from potto.integrate.fixed.straight import Straight
 from potto.integrate.pieces import Evaluator
 from potto.integrate.rules.gauss import EPS, gauss
+from potto.integrate.rules.lowered_intervals import Written
 from potto.kernels.native.straight import NotStraight
 
+# How near to 0, of its size, a surface at a corner may be before it counts as crossing.
+NEAR = 1e-9
 NODE_ROUNDING = 0.5
 # From how many nodes on `gauss.truncation` looks whether the decay slows down; then it is left to numpy.
 SLOWING = 8
+
+
+# What became of a member: a surface may cross it, nothing is there to be integrated, it is done, or left to others.
+CROSSED, DARK, DONE, LEFT = range(4)
+
+
+class Look(Struct, frozen=True):
+    """What boxes are looked at for.
+
+    bounds: of the variables, a tuple. flat: the surfaces that are affine in each variable, a tuple; curved: the others.
+    deciding: of all of them, in this order, those on which it depends what is integrated. faces: what is integrated,
+    each with its sides, as numbers with a bit for each of `deciding`. known: the sides are told by a column: CROSSED,
+    DARK, or from DONE on the number of a face.
+    """
+
+    plan: Straight
+    bounds: Lam
+    flat: Lam
+    curved: tuple[Term, ...]
+    deciding: tuple[int, ...]
+    faces: tuple[tuple[Term, tuple[int, ...]], ...]
+    known: bool = False
 
 
 class BoxText(RuleText):
     """Writes the function, for so many nodes of each variable, which are exact for a polynomial or not.
 
     Rows of results: the integrals of all numbers with their tangents, how far off these are, the most that is added up
-    for values and for tangents, and whether the rule does. The first two constants are the accuracy that is asked for.
+    for values and for tangents, all of them 0 for members that are not done; and what became of the member. The first
+    two constants are the accuracy that is asked for.
     """
 
     reserved = 2
 
-    def __init__(
-        self, plan: Straight, face: Term, machine: Evaluator, orders: Sequence[int], exact: Sequence[bool]
-    ) -> None:
-        super().__init__(plan, face, machine)
-        self.channels = numbers(face) * self.k1
+    def __init__(self, look: Look, machine: Evaluator, orders: Sequence[int], exact: Sequence[bool]) -> None:
+        super().__init__(look.plan, look.faces[0][0] if look.faces else look.plan.body, machine)
+        sizes = {numbers(face) for face, _ in look.faces} or {1}
+        if len(sizes) > 1:
+            raise NotStraight("tuples of several sizes")
+        self.look, self.channels = look, sizes.pop() * self.k1
         self.orders, self.exact = orders, exact
 
     def text(self, places: Sequence[Place]) -> str:
@@ -42,15 +73,92 @@ class BoxText(RuleText):
         self.begin(places)
         self.added = [at.room(n * each) for n in self.orders]
         self.most = [at.room(1) for _ in range(each)]
-        here, columns = self.parameters(places, 2 * len(self.plan.variables))
-        self.low, self.high = columns[::2], columns[1::2]
+        here, columns = self.parameters(places, int(self.look.known))
+        ends = self.evaluated(self.look.bounds, here, self.machine)
+        if any(end.e is not None or any(x is not None for x in end.t) for end in ends):
+            raise NotStraight("bounds that move have boundary terms of their own")
+        self.low, self.high = [end.v for end in ends[::2]], [end.v for end in ends[1::2]]
         self.sizes = [at.apply("sub", b, a) for a, b in zip(self.low, self.high, strict=True)]
-        for added, n in zip(self.added, self.orders, strict=True):
-            self.fill(added, str(n), each)
-        for room in self.most:
-            at.store(self.zero, room)
-        self.results([x or self.zero for x in self.mean(0, here, self.one)])
+        lit = self.told_sides(columns[0]) if self.look.known else self.sides(here)
+        for row in range(rows_of(each) - 1):
+            at.store(self.zero, self.place(row))
+        for (face, _), mask in zip(self.look.faces, lit, strict=True):
+            at.begin("1", at.any(mask))
+            self.face = function_of(face)
+            for added, n in zip(self.added, self.orders, strict=True):
+                self.fill(added, str(n), each)
+            for room in self.most:
+                at.store(self.zero, room)
+            self.results([x or self.zero for x in self.mean(0, here, self.one)], mask)
+            at.end()
         return self.end()
+
+    # Sides
+
+    def told_sides(self, column: str) -> list[str]:
+        """For each face of which members it is the integrand, as a column says; what it says of others is kept."""
+        at = self.at
+        at.store(column, self.state)
+        return [at.apply("eq", column, at.number(float(DONE + n))) for n in range(len(self.look.faces))]
+
+    def sides(self, env: Mapping[str, Symbol]) -> list[str]:
+        """For each face of which members it is the integrand; what became of the others is noted."""
+        at, look = self.at, self.look
+        here = {name: still(symbol) for name, symbol in env.items()}
+        clear = [at.apply("and", at.apply("lt", size, at.number(float("inf"))), at.apply("gt", size, self.zero))
+                 for size in self.sizes]  # fmt: skip
+        known, sides = [], []
+        for least, most in self.corners(here):
+            near = at.apply("mul", at.number(NEAR), self.larger(least, most))
+            sides.append((at.apply("gt", least, near), at.apply("lt", most, at.apply("neg", near))))
+        for least, most in self.enclosed(here):
+            sides.append((at.apply("gt", least, self.zero), at.apply("lt", most, self.zero)))
+            known.append(at.apply("lt", self.larger(least, most), at.number(float("inf"))))
+        clear += [at.apply("or", above, below) for above, below in sides]
+        decided = self.all(clear)
+        lit = [self.among(decided, sides, codes) for _, codes in look.faces]
+        dark = self.all([decided, *(at.apply("not", mask) for mask in lit)])
+        state = at.apply("select", dark, at.number(float(DARK)), at.number(float(CROSSED)))
+        if known:  # an enclosure that does not tell: numpy may know more
+            state = at.apply("select", self.all(known), state, at.number(float(LEFT)))
+        at.store(state, self.state)
+        return lit
+
+    def corners(self, here: Mapping[str, Symbol]) -> list[tuple[str, str]]:
+        """The least and the most of surfaces that are affine in each variable: they are at corners."""
+        found: list[tuple[str, str]] = []
+        if not children(self.look.flat.body):
+            return found
+        for ends in itertools.product(*zip(self.low, self.high, strict=True)):
+            corner = {x: Symbol(end, None, (), ()) for x, end in zip(self.plan.variables, ends, strict=True)}
+            cells = self.evaluated(self.look.flat, {**here, **corner}, self.machine.with_directions(0))
+            pairs = found or [(cell.v, cell.v) for cell in cells]
+            found = [(self.at.apply("min", least, cell.v), self.at.apply("max", most, cell.v))
+                     for (least, most), cell in zip(pairs, cells, strict=True)]  # fmt: skip
+        return found
+
+    def enclosed(self, here: Mapping[str, Symbol]) -> list[tuple[str, str]]:
+        """Bounds of the other surfaces."""
+        box = {name: (symbol.v, symbol.v) for name, symbol in here.items()}
+        box |= dict(zip(self.plan.variables, zip(self.low, self.high, strict=True), strict=True))
+        return Written(self.at).walk(self.look.curved, box, {}) if self.look.curved else []
+
+    def among(self, decided: str, sides: Sequence[tuple[str, str]], codes: Sequence[int]) -> str:
+        """Whose sides are one of these."""
+        at = self.at
+        masks = []
+        for code in codes:
+            own = [sides[place][0 if code >> bit & 1 else 1] for bit, place in enumerate(self.look.deciding)]
+            masks.append(self.all([decided, *own]))
+        return reduce(lambda a, b: at.apply("or", a, b), masks)
+
+    def all(self, masks: Sequence[str]) -> str:
+        return reduce(lambda a, b: self.at.apply("and", a, b), masks)
+
+    @property
+    def state(self) -> str:
+        """Where it is noted what became of members."""
+        return self.place(rows_of(self.channels) - 1)
 
     # Nodes
 
@@ -97,7 +205,8 @@ class BoxText(RuleText):
 
     # What they amount to
 
-    def results(self, means: Sequence[str]) -> None:
+    def results(self, means: Sequence[str], mask: str) -> None:
+        """Put the integrals of the members of a mask for whom the rule does."""
         at, k1 = self.at, self.k1
         volume = self.sizes[0]
         for size in self.sizes[1:]:
@@ -132,9 +241,15 @@ class BoxText(RuleText):
             for other in row[1:]:
                 largest = at.apply("max", largest, other)
             rows.append(largest)
+        done = at.apply("and", mask, good)
         for number, value in enumerate(rows):
-            at.store(at.apply("mul", value, volume), self.place(number))
-        at.store(at.apply("select", good, self.one, self.zero), self.place(len(rows)))
+            self.keep(done, at.apply("mul", value, volume), self.place(number))
+        state = at.apply("select", good, at.number(float(DONE)), at.number(float(LEFT)))
+        self.keep(mask, state, self.state)
+
+    def keep(self, mask: str, value: str, place: str) -> None:
+        """Put a number for the members of a mask."""
+        self.at.store(self.at.apply("select", mask, value, self.at.load(place)), place)
 
     def truncation(self, sizes: Sequence[str]) -> str:
         """`gauss.truncation` of the sizes of coefficients; infinite where the decay slows down."""
@@ -167,6 +282,11 @@ class BoxText(RuleText):
         """The greater one; of a number and what is none, the number."""
         at = self.at
         return at.apply("select", at.apply("gt", x, y), x, at.apply("select", at.apply("eq", y, y), y, x))
+
+
+def rows_of(channels: int) -> int:
+    """How many rows of results there are of so many numbers."""
+    return 2 * channels + 3
 
 
 def numbers(face: Term) -> int:

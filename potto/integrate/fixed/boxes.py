@@ -1,11 +1,9 @@
-"""Members of a batch that nothing cuts: which they are, and on which side of every surface they lie.
+"""On which side of every surface boxes lie: members of a batch that nothing cuts.
 
-Owns `Box`, `box_of` and `uncut`. Of a picture's pixels all but a few lie on one side of every surface. Members that
+Owns `Box`, `box_of` and `sides_of`. Of a picture's pixels all but a few lie on one side of every surface. Members that
 come one after the other are enclosed together, so that most are settled by the dozen; those whose run a surface may
 cross are looked at one by one. Where a surface is affine in each variable of integration, its extremes over a box are
-at the corners, so that signs there tell whether it crosses; of others an enclosure tells. Such a box needs no cuts and
-has no boundary terms: what is integrated over it is the integrand on those sides, by a product rule (`tensor_product`).
-What is not shown to be smooth and accurate here is left to the ways that cut.
+at the corners, so that signs there tell whether it crosses; of others an enclosure tells.
 """
 
 from __future__ import annotations
@@ -22,10 +20,10 @@ from potto.calculus.algebra.degree import degree, plane
 from potto.calculus.solving.enclosable import enclosable
 from potto.core.kinds import union_of
 from potto.core.terms import Branch, Const, Integral, Lam, Term, Tuple, children, function_of, postorder, tuple_
-from potto.integrate.columns import distinct
+from potto.integrate.fixed.box_text import NEAR
 from potto.integrate.fixed.straight import MOST_TERMS, Straight
-from potto.integrate.fixed.tensor_product import Face, integrated
-from potto.integrate.pieces import Evaluator, Sums, gather, still
+from potto.integrate.fixed.tensor_product import Face
+from potto.integrate.pieces import Evaluator, gather, still
 from potto.integrate.rules.intervals import Interval
 from potto.integrate.rules.lowered_intervals import enclosures
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays
@@ -33,9 +31,16 @@ from potto.kernels.cells import Array, Bools, Cell, Ints, Value, map_arrays
 MOST_VARIABLES = 3
 # Members that are enclosed together; and that are done at once, whose numbers stay in the cache.
 RUN, AT_ONCE = 32, 1 << 15
-# How near to 0, of its size, a surface at a corner may be before it counts as crossing.
-NEAR = 1e-9
-CROSSED = -1
+UNCLEAR = -1  # of sides
+
+
+class Sides(Struct, frozen=True):
+    """Of the boxes of members their bounds, (variables, B) each, and their sides: a bit for each surface on which it
+    depends what is integrated, or UNCLEAR."""
+
+    low: Array
+    high: Array
+    codes: Ints
 
 
 class Box(Struct, frozen=True, dict=True, eq=False):
@@ -64,6 +69,11 @@ class Box(Struct, frozen=True, dict=True, eq=False):
             degrees = tuple(degree(term, variable) for variable in self.variables)
             found = self.faces[code] = Face(self.plan, term, function, degrees)
         return found
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """All parameters."""
+        return tuple(sorted(self.depends.union(self.plan.names, self.bounds.params)))
 
     @cached_property
     def together(self) -> bool:
@@ -129,34 +139,19 @@ def _plan(term: Integral, inlined: Term, decided: tuple[Term, ...]) -> Straight:
     return Straight(term.variables, frames, nothing, turning, inlined, surfaces, tuple(sorted(free)))
 
 
-def uncut(box: Box, machine: Evaluator, env: dict[str, Value], batch: int) -> tuple[Sums, Ints] | None:
-    """The sums of a batch, and the members that were not integrated here, whose sums are 0; None if none were."""
-    sums: Sums | None = None
-    done: Bools = np.zeros(batch, dtype=bool)
+def sides_of(box: Box, machine: Evaluator, env: dict[str, Value], batch: int) -> Sides | None:
+    """On which side of every surface the box of each member lies; None if a bound moves, or has an error."""
+    low, high = np.empty((2, len(box.variables), batch))
+    codes = np.empty(batch, dtype=np.int64)
     for start in range(0, batch, AT_ONCE):
         part = slice(start, min(start + AT_ONCE, batch))
         here = env if part.stop - start == batch else gather(env, part)
         ends = _ends(box, machine, here, part.stop - start)
         if ends is None:
             return None
-        codes = _sides(box, machine, here, *ends)
-        for code in distinct(codes):
-            face = None if code == CROSSED else box.face(int(code))
-            if face is None:
-                continue
-            index = np.nonzero(codes == code)[0]
-            if dark(face.term):
-                done[start + index] = True
-                continue
-            for where, found in integrated(face, machine, here, index, *ends):
-                if sums is None:
-                    sums = Sums.zeros(found.v.shape[0], machine.directions, batch)
-                done[start + where] = True
-                sums.put(start + where, found)
-    rest = np.nonzero(~done)[0]
-    if rest.size == batch:
-        return None
-    return Sums.zeros(1, machine.directions, batch) if sums is None else sums, rest
+        low[:, part], high[:, part] = ends
+        codes[part] = _codes(box, machine, here, *ends)
+    return Sides(low, high, codes)
 
 
 def dark(face: Term) -> bool:
@@ -177,9 +172,9 @@ def _ends(box: Box, machine: Evaluator, env: Mapping[str, Value], batch: int) ->
     return ends[0], ends[1]
 
 
-def _sides(box: Box, machine: Evaluator, env: Mapping[str, Value], low: Array, high: Array) -> Ints:
+def _codes(box: Box, machine: Evaluator, env: Mapping[str, Value], low: Array, high: Array) -> Ints:
     """Per member a number whose bits are the sides on which its box lies of the surfaces that the integrand depends on;
-    CROSSED where it is not on one side of every surface, or is not finite, or empty."""
+    UNCLEAR where it is not on one side of every surface, or is not finite, or empty."""
     size = high - low
     plain: Bools = np.asarray((np.isfinite(size) & (size > 0)).all(axis=0))
     codes = np.zeros(plain.size, dtype=np.int64)
@@ -187,7 +182,7 @@ def _sides(box: Box, machine: Evaluator, env: Mapping[str, Value], low: Array, h
         todo = _by_runs(box, machine, env, low, high, codes)
         some = low[:, todo], high[:, todo]
         codes[todo] = _one_by_one(box, machine, gather({name: env[name] for name in box.asked}, todo), *some)
-    codes[~plain] = CROSSED
+    codes[~plain] = UNCLEAR
     return codes
 
 
@@ -231,20 +226,20 @@ def _ranges(
 
 
 def _one_by_one(box: Box, machine: Evaluator, env: dict[str, Value], low: Array, high: Array) -> Ints:
-    """The same as `_sides` for members each by itself, with boxes that are neither empty nor infinite."""
+    """The same as `_codes` for members each by itself, with boxes that are neither empty nor infinite."""
     count = low.shape[1]
     codes = np.zeros(count, dtype=np.int64)
     for number, (above, below) in enumerate(_at_corners(box, machine, env, low, high)):
-        codes[~(above | below)] = CROSSED
+        codes[~(above | below)] = UNCLEAR
         if number in box.places:
             codes |= np.asarray(above, dtype=np.int64) << box.places.index(number)
-    index: Ints = np.nonzero(codes != CROSSED)[0]
+    index: Ints = np.nonzero(codes != UNCLEAR)[0]
     curved = box.surfaces[box.flat :]
     if curved and index.size:
         here = {name: map_arrays(env[name], lambda a: a[index]) for name in box.depends_curved}
         ranges = _ranges(box, here, here, low[:, index], high[:, index])
         for number, (least, most) in enumerate(enclosures(curved, ranges, index.size, machine.backend), box.flat):
-            codes[index[~((least > 0) | (most < 0))]] = CROSSED
+            codes[index[~((least > 0) | (most < 0))]] = UNCLEAR
             if number in box.places:
                 codes[index] |= np.asarray(least > 0, dtype=np.int64) << box.places.index(number)
     return codes

@@ -25,7 +25,9 @@ from potto.kernels.native.vectors import LANES, Vectors
 
 NAME = "rule"
 ONE = "1.0"
-PER_AXIS = 9  # numbers of the frame: how many nodes, coefficients and nodes with rounding, then where tables are
+# Numbers of the frame: how many members, how long the rows of results are, and where; for each variable how many nodes,
+# coefficients and nodes with rounding, then where tables are.
+HEAD, PER_AXIS = 3, 9
 
 
 class Place(Struct, frozen=True):
@@ -92,7 +94,7 @@ class RuleText:
         sizes, off = self.few(0, here, bounds)
         for least, most in bounds:
             self.only(at.apply("gt", at.load(least), at.apply("mul", at.number(EDGE), at.load(most))))
-        self.ends(0, {name: _still(symbol) for name, symbol in here.items()}, corners)
+        self.ends(0, {name: still(symbol) for name, symbol in here.items()}, corners)
         self.told([*number, *sizes, *off, at.load(clear), at.load(corners), at.load(largest)], k1)
         return self.end()
 
@@ -101,8 +103,9 @@ class RuleText:
     def begin(self, places: Sequence[Place]) -> None:
         """Begin the loop over the members, eight at a time; the last ones are done twice."""
         at, count = self.at, len(self.plan.variables)
-        self.count, self.out = at.address("%frame", 0), at.address("%frame", 1, "ptr")
-        self.tables = [[at.address("%frame", 2 + PER_AXIS * i + j, "i64" if j < 3 else "ptr")
+        self.count, self.length = at.address("%frame", 0), at.address("%frame", 1)
+        self.out = at.address("%frame", 2, "ptr")
+        self.tables = [[at.address("%frame", HEAD + PER_AXIS * i + j, "i64" if j < 3 else "ptr")
                         for j in range(PER_AXIS)] for i in range(count)]  # fmt: skip
         self.sums = [at.room(at.whole("mul", table[1], self.channels)) for table in self.tables]
         last = at.whole("sub", self.count, LANES)
@@ -112,7 +115,7 @@ class RuleText:
 
     def parameters(self, places: Sequence[Place], more: int) -> tuple[Env, list[str]]:
         """The parameters of the members of a block, and so many columns more."""
-        at, start = self.at, 2 + PER_AXIS * len(self.plan.variables)
+        at, start = self.at, HEAD + PER_AXIS * len(self.plan.variables)
         known: dict[tuple[str, Part], str] = {}
         arrays = [place for place in places if place.kind == "array"]
         numbers = [place for place in places if place.kind == "number"]
@@ -154,7 +157,7 @@ class RuleText:
     def place(self, row: int | str) -> str:
         """Where the results of a block are in a row."""
         at = self.at
-        return at.at(self.out, at.whole("add", at.whole("mul", row, self.count), self.first), "double")
+        return at.at(self.out, at.whole("add", at.whole("mul", row, self.length), self.first), "double")
 
     def end(self) -> str:
         self.at.end()
@@ -243,7 +246,7 @@ class RuleText:
         return self.product(largest, sizes), list(errors)
 
     def at_edges(self, env: Env, bounds: Sequence[tuple[str, str]]) -> None:
-        here = {name: _still(symbol) for name, symbol in env.items()}
+        here = {name: still(symbol) for name, symbol in env.items()}
         for edge, (least, most) in zip(self.edges, bounds, strict=True):
             (cell,) = self.evaluated(edge, here, self.machine.with_directions(0))
             size = self.at.apply("abs", cell.v)
@@ -377,5 +380,6 @@ class RuleText:
         self.at.store(self.at.apply("select", mask, self.at.load(self.clear), self.zero), self.clear)
 
 
-def _still(symbol: Symbol) -> Symbol:
+def still(symbol: Symbol) -> Symbol:
+    """A cell without tangents."""
     return Symbol(symbol.v, None, (), ())

@@ -1,36 +1,31 @@
-"""A product of Gauss rules over boxes that nothing cuts.
+"""A product of Gauss rules over boxes that nothing cuts, by numpy.
 
 Owns `Face` and `integrated`. Of a polynomial the rule takes as many nodes per variable as its degree asks for; of
-anything else few, then more where the Legendre coefficients say that these were not enough. By numpy all nodes of so
-many boxes are evaluated at once; machine code (`lowered`) goes through the boxes eight at a time.
+anything else few, then more where the Legendre coefficients say that these were not enough. All nodes of so many boxes
+are evaluated at once. (`lowered_boxes` does the same by machine code.)
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from functools import cached_property, lru_cache
-from typing import Any
 
 import numpy as np
 from msgspec import Struct
 
 from potto.core.terms import Lam, Term
 from potto.integrate.columns import run_of
-from potto.integrate.fixed.box_text import NODE_ROUNDING, SLOWING
-from potto.integrate.fixed.lowered import lowered_boxes
+from potto.integrate.fixed.box_text import NODE_ROUNDING
 from potto.integrate.fixed.straight import Straight
 from potto.integrate.pieces import Evaluator, Sums, components, gather
 from potto.integrate.rules.gauss import EPS, gauss, truncation
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
-from potto.kernels.native.promotion import Promotion
 
 # Nodes per variable: first few, then more for the boxes that need them.
 ORDERS = (4, 8)
-# Nodes that are evaluated at once by numpy; boxes at once by machine code.
-POINTS, BOXES = 1 << 16, 1 << 13
-
-Way = Callable[[dict[str, Value], Array, Array], "tuple[Sums, Bools] | None"]
+# Nodes that are evaluated at once.
+POINTS = 1 << 16
 
 
 class Face(Struct, frozen=True, dict=True, eq=False):
@@ -43,11 +38,6 @@ class Face(Struct, frozen=True, dict=True, eq=False):
     term: Term
     function: Lam
     degrees: tuple[int | None, ...]
-
-    @cached_property
-    def names(self) -> tuple[str, ...]:
-        """The parameters of the term."""
-        return tuple(sorted(self.term.free.difference(self.plan.variables)))
 
     @cached_property
     def exact(self) -> tuple[int | None, ...]:
@@ -72,60 +62,26 @@ def integrated(
 
     index: of the boxes, among the members of `env`; low, high: (variables, B), the bounds of all members.
     """
-    given = {name: env[name] for name in (*face.function.params, *face.names) if name in env}
+    given = {name: env[name] for name in face.function.params if name in env}
     for orders in dict.fromkeys(tuple(order if n is None else n for n in face.exact) for order in ORDERS):
-        for rule, step in _ways(face, machine, env, orders):
-            left = []
-            for start in range(0, index.size, step):
-                some = index[start : start + step]
-                machine.count(some.size * math.prod(orders))
-                span = run_of(some)
-                where = some if span is None else span
-                found = rule(gather(given, where), low[:, where], high[:, where])
-                if found is None:
-                    return
-                sums, good = found
-                if good.all():
-                    yield some, sums
-                else:
-                    left.append(some[~good])
-                    yield some[good], sums.pick(good)
-            if not left:
+        step, left = max(1, POINTS // math.prod(orders)), []
+        for start in range(0, index.size, step):
+            some = index[start : start + step]
+            machine.count(some.size * math.prod(orders))
+            span = run_of(some)
+            where = some if span is None else span
+            found = _at_nodes(face, machine, gather(given, where), low[:, where], high[:, where], orders)
+            if found is None:
                 return
-            index = np.concatenate(left)
-
-
-def _ways(
-    face: Face, machine: Evaluator, env: Mapping[str, Value], orders: tuple[int, ...]
-) -> Iterator[tuple[Way, int]]:
-    """The ways to do a rule, with the number of boxes at a time: machine code, and numpy for what that leaves.
-
-    A way tells the integrals over some boxes, and for which of them the rule does; None where values have errors of
-    their own.
-    """
-
-    def by_numpy(here: dict[str, Value], low: Array, high: Array) -> tuple[Sums, Bools] | None:
-        return _at_nodes(face, machine, here, low, high, orders)
-
-    step = max(1, POINTS // math.prod(orders))
-    cells = [env[name] for name in face.names]
-    if not all(isinstance(cell, Cell) and cell.e is None and not any(x is not None for x in cell.et) for cell in cells):
-        yield by_numpy, step
-        return
-    exact = tuple(n is not None for n in face.exact)
-    way = lowered_boxes(face.plan, face.term, face.names, machine.directions, env, orders, exact)
-    function = way.function(machine)
-    if function is None:
-        yield lambda *boxes: _timed(way.promotion, by_numpy, *boxes), step
-        return
-    yield lambda *boxes: way.run(function, machine, *boxes), BOXES
-    if max(orders) >= SLOWING and not all(exact):
-        yield by_numpy, step
-
-
-def _timed(promotion: Promotion, way: Way, *boxes: Any) -> tuple[Sums, Bools] | None:
-    with promotion.by_numpy():
-        return way(*boxes)
+            sums, good = found
+            if good.all():
+                yield some, sums
+            else:
+                left.append(some[~good])
+                yield some[good], sums.pick(good)
+        if not left:
+            return
+        index = np.concatenate(left)
 
 
 @lru_cache(maxsize=64)
@@ -141,7 +97,7 @@ def _tensor(orders: tuple[int, ...]) -> tuple[tuple[Array, ...], tuple[Array, ..
 def _at_nodes(
     face: Face, machine: Evaluator, env: dict[str, Value], low: Array, high: Array, orders: tuple[int, ...]
 ) -> tuple[Sums, Bools] | None:
-    """A rule by numpy, all nodes at once."""
+    """A rule at all of its nodes at once; None where values have errors of their own."""
     size = high - low
     volume = size.prod(axis=0)
     found = _means(face, machine, env, low, size, orders)

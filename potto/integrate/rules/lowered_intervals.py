@@ -1,7 +1,8 @@
 """Enclosures of many boxes by machine code, as `intervals` finds them by numpy.
 
-Owns `enclosures`. The bounds are the same but for how they are rounded outwards, which neither promises to the bit. A
-box on which something divides by what may be 0, or overflows, is left to numpy, which knows what follows from that.
+Owns `enclosures`, and `Written` for who encloses as a part of something else. The bounds are the same but for how they
+are rounded outwards, which neither promises to the bit. A box on which something divides by what may be 0, or
+overflows, is left to numpy, which knows what follows from that.
 """
 
 from __future__ import annotations
@@ -34,11 +35,11 @@ MOST_POWER = 8
 Names = tuple[str, str]
 
 
-class _Written(Domain[Names]):
-    """Intervals whose bounds are names of vectors."""
+class Written(Domain[Names]):
+    """Intervals whose bounds are names of vectors, written down in a text."""
 
-    def __init__(self) -> None:
-        self.at = Vectors()
+    def __init__(self, at: Vectors) -> None:
+        self.at = at
 
     def constant(self, node: Const) -> Names:
         return self.number(node.value), self.number(node.value)
@@ -143,7 +144,7 @@ class _Enclosing(Struct, frozen=True):
 
     def text(self) -> str:
         """A function of a frame (how many, where columns are, where those of the results are) and of constants."""
-        domain = _Written()
+        domain = Written(Vectors())
         at, box, columns, constants = domain.at, dict[str, Names](), 1, 0
         last = at.whole("sub", at.address("%frame", 0), LANES)
         vectors = at.whole("udiv", at.whole("add", at.address("%frame", 0), LANES - 1), LANES)

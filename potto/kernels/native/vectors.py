@@ -40,7 +40,7 @@ class Vectors:
         self.bodies: list[list[str]] = [[]]
         self.known: list[dict[str, str]] = [{}]
         self.depths: dict[str, int] = {}
-        self.loops: list[tuple[str, str]] = []
+        self.loops: list[tuple[str, str, str]] = []
         self.used: dict[str, int] = {}
         self.count = 0
 
@@ -73,23 +73,24 @@ class Vectors:
             self.depths[found] = depth
         return found
 
-    def begin(self, count: str) -> str:
-        """Begin a loop of so many rounds, at least one; the number of the round."""
+    def begin(self, count: str, only: str = "true") -> str:
+        """Begin a loop of so many rounds, at least one, or none where `only`, an i1, is false; the round's number."""
         self.count += 1
         stem = str(self.count)
         self.bodies.append([])
         self.known.append({})
-        self.loops.append((stem, count))
+        self.loops.append((stem, count, only))
         self.depths[f"%j{stem}"] = self.depth
         return f"%j{stem}"
 
     def end(self) -> None:
         """End the innermost loop."""
-        stem, count = self.loops.pop()
+        stem, count, only = self.loops.pop()
         body = self.bodies.pop()
         self.known.pop()
         self.bodies[-1] += [
-            f"  br label %before{stem}", f"before{stem}:", f"  br label %loop{stem}", f"loop{stem}:",
+            f"  br label %before{stem}", f"before{stem}:",
+            f"  br i1 {only}, label %loop{stem}, label %after{stem}", f"loop{stem}:",
             f"  %j{stem} = phi i64 [0, %before{stem}], [%next{stem}, %last{stem}]", *body,
             f"  br label %last{stem}", f"last{stem}:", f"  %next{stem} = add i64 %j{stem}, 1",
             f"  %more{stem} = icmp ult i64 %next{stem}, {count}",
@@ -101,6 +102,10 @@ class Vectors:
     def whole(self, code: str, a: str | int, b: str | int) -> str:
         """An operation (add, mul, ...) on whole numbers."""
         return self.once(f"{code} i64 {a}, {b}", *(x for x in (a, b) if isinstance(x, str)))
+
+    def any(self, mask: str) -> str:
+        """Whether a mask holds anywhere, as an i1."""
+        return self.once(f"call i1 @llvm.vector.reduce.or.v{LANES}i1({MASK} {mask})", mask)
 
     def room(self, count: str | int) -> str:
         """Memory for so many vectors."""
