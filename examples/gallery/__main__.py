@@ -41,7 +41,7 @@ def main(arguments: list[str] | None = None) -> int:
             entries.append(make(entry, chapter, options.out, options.quick))
         made.append((chapter.title, chapter.about, entries))
     seconds = time.perf_counter() - start
-    (options.out / "index.html").write_text(index(made, seconds), encoding="utf-8")
+    (options.out / "index.html").write_text(index(made, options.out, seconds), encoding="utf-8")
     (options.out / "contact.svg").write_text(contact_sheet(made, options.out), encoding="utf-8")
     failures = [e for _, _, entries in made for e in entries if e.failure]
     for failed in failures:

@@ -11,7 +11,7 @@ import numpy as np
 WIDTH, HEIGHT, PANEL = 480.0, 320.0, 118.0
 LEFT, RIGHT, TOP, GAP = 62.0, 14.0, 26.0, 34.0
 STYLE = (
-    "text{font:11px system-ui,sans-serif;fill:#333}.axis{stroke:#999;fill:none}.grid{stroke:#8884;fill:none}"
+    "text{font:12px system-ui,sans-serif;fill:#333}.axis{stroke:#999;fill:none}.grid{stroke:#8884;fill:none}"
     ".value{stroke:#1b6ca8;fill:none;stroke-width:2}.slope{stroke:#c0392b;fill:none;stroke-width:2}"
     ".paper{fill:#fff}"
     "@media(prefers-color-scheme:dark){text{fill:#ddd}.axis{stroke:#777}.paper{fill:#16181d}"
@@ -30,7 +30,8 @@ def ticks(low: float, high: float, most: int = 5) -> list[float]:
 
 def _ends(numbers: Any) -> tuple[float, float]:
     low, high = float(np.min(numbers)), float(np.max(numbers))
-    slack = 0.06 * (high - low) or 0.5 * abs(high) or 0.5
+    size = max(abs(low), abs(high))
+    slack = 0.06 * (high - low) if high - low > 1e-9 * size else 0.5 * size or 0.5  # what rounding leaves is no shape
     return low - slack, high + slack
 
 

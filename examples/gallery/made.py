@@ -10,6 +10,7 @@ import runpy
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from curves import plot
@@ -19,6 +20,7 @@ import potto
 from potto.__main__ import main as command
 
 POINTS, QUICK_POINTS = 241, 9
+GOOD = 1e-8  # how far off a number of a curve may be, as a part of its size or of 1, that nothing is said of it
 
 
 @dataclass(frozen=True)
@@ -74,9 +76,18 @@ def _curve(entry: Curve, chapter: Chapter, out: Path, stem: str, quick: bool) ->
         raise RuntimeError("it has no value somewhere")
     (out / f"{stem}.svg").write_text(plot(places, value, slope, entry.over), encoding="utf-8")
     error = float(max(np.max(found.error), np.max(found.tangent_error)))
-    shown = Shown(f"{stem}.svg", f"value and derivative by {entry.over}")
+    shown = Shown(f"{stem}.svg", f"by {entry.over}")
     source = f"{chapter.name}/{entry.program}.po"
-    return Made(entry.title, entry.about, source, (shown,), seconds, error, None, f"{places.size} values")
+    detail = f"{places.size} values"
+    rough = int((np.maximum(_relative(found.error, value), _relative(found.tangent_error, slope)) > GOOD).sum())
+    if rough:
+        detail += f", of which {rough} are less sure than {GOOD:.0e}"
+    return Made(entry.title, entry.about, source, (shown,), seconds, error, None, detail)
+
+
+def _relative(error: Any, number: Any) -> Any:
+    """Errors as parts of the numbers' size, or of 1."""
+    return np.asarray(error, dtype=float) / np.maximum(np.abs(number), 1)
 
 
 def _picture(entry: Picture, chapter: Chapter, out: Path, stem: str, quick: bool) -> Made:
@@ -100,11 +111,19 @@ def _picture(entry: Picture, chapter: Chapter, out: Path, stem: str, quick: bool
         raise RuntimeError(trouble.getvalue().strip() or said.getvalue().strip())
     answer = json.loads(said.getvalue())
     if not answer["converged"]:
-        raise RuntimeError(f"{answer['holes']} pixels have no value, or not as accurate a one as was asked for")
+        raise RuntimeError(_trouble(answer["holes"], trouble.getvalue()))
     files = tuple(Shown(Path(file["file"]).name, file["shows"]) for file in answer["files"])
     source, error = f"{chapter.name}/{entry.program}.po", float(answer["largest_error"])
     detail = f"{width} x {height}, {answer['evals']:,} evaluations"
     return Made(entry.title, entry.about, source, files, answer["seconds"], error, answer["evals"], detail)
+
+
+def _trouble(holes: int, said: str) -> str:
+    """Why a picture is not as it should be, by what the command said beside it."""
+    if holes:
+        return f"{holes:,} of its pixels have no value"
+    warnings = [line.removeprefix("warning: ") for line in said.splitlines() if line.startswith("warning: ")]
+    return "; ".join(warnings) or "it is not as accurate as was asked"
 
 
 def _driver(entry: Driver, chapter: Chapter, out: Path, quick: bool) -> Made:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import html
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -21,7 +22,9 @@ figure img{height:15rem;max-width:100%;border-radius:6px;border:1px solid var(--
 .drawn img{image-rendering:pixelated}
 code{font-size:.85em}.measured{font-size:.85rem}
 """
-ACROSS, CELL, LABEL = 5, 200, 34
+# Of the sheet: its width, what is between cells, above a chapter and below a picture, and how wide a letter is
+SHEET, GAP, HEADING, LABEL, LETTER = 1072, 12, 40, 62, 5.6
+DRAWN, ENLARGED = ' class="drawn"', 240  # the index shows pictures 15 rem high
 
 
 def _measured(entry: Made) -> str:
@@ -34,13 +37,20 @@ def _measured(entry: Made) -> str:
     return " · ".join(part for part in parts if part)
 
 
-def _figure(shown: Shown) -> str:
-    caption = html.escape(shown.caption)
-    kind = ' class="drawn"' if shown.file.endswith(".png") else ""
+def _figure(shown: Shown, folder: Path) -> str:
+    caption, kind = html.escape(shown.caption), _kind(folder / shown.file)
     return f'<figure{kind}><img src="{shown.file}" alt="{caption}"><figcaption>{caption}</figcaption></figure>'
 
 
-def index(chapters: Chapters, seconds: float) -> str:
+def _kind(file: Path) -> str:
+    """The class of pictures whose pixels are enlarged, and are to be seen; of larger ones thin lines would be lost."""
+    if file.suffix != ".png":
+        return ""
+    width = int.from_bytes(file.read_bytes()[16:20], "big")  # the first number of a PNG's header
+    return DRAWN if width < ENLARGED else ""
+
+
+def index(chapters: Chapters, folder: Path, seconds: float) -> str:
     count = sum(len(entry.files) for _, _, entries in chapters for entry in entries)
     parts = [
         '<!doctype html><html lang="en"><meta charset="utf-8"><title>Potto: the gallery</title>',
@@ -53,29 +63,51 @@ def index(chapters: Chapters, seconds: float) -> str:
         for entry in entries:
             parts.append(f"<h3>{html.escape(entry.title)}</h3><p>{html.escape(entry.about)}</p>" if entry.about
                          else f"<h3>{html.escape(entry.title)}</h3>")  # fmt: skip
-            parts.append(f'<div class="row">{"".join(map(_figure, entry.files))}</div>')
+            parts.append(f'<div class="row">{"".join(_figure(shown, folder) for shown in entry.files)}</div>')
             said = f"not made: {html.escape(entry.failure)}" if entry.failure else _measured(entry)
             parts.append(f'<p class="measured">{said}</p>')
     return "\n".join([*parts, "</html>\n"])
 
 
 def contact_sheet(chapters: Chapters, folder: Path) -> str:
-    """All pictures in one SVG, which holds them: it can be shown by itself."""
-    cells = [(entry.title, shown) for _, _, entries in chapters for entry in entries for shown in entry.files]
-    rows = -(-len(cells) // ACROSS)
-    width, height = ACROSS * (CELL + 12) + 12, rows * (CELL + LABEL + 12) + 12
-    parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}"><style>'
-        "text{font:11px system-ui,sans-serif;fill:#333}.paper{fill:#f6f6f4}image{image-rendering:pixelated}"
-        "@media(prefers-color-scheme:dark){text{fill:#ddd}.paper{fill:#101216}}</style>"
-        f'<rect class="paper" width="{width}" height="{height}"/>'
-    ]
-    for number, (title, shown) in enumerate(cells):
-        x, y = 12 + number % ACROSS * (CELL + 12), 12 + number // ACROSS * (CELL + LABEL + 12)
-        kind = "image/svg+xml" if shown.file.endswith(".svg") else f"image/{shown.file.rpartition('.')[2]}"
-        data = base64.b64encode((folder / shown.file).read_bytes()).decode()
-        parts.append(f'<image x="{x}" y="{y}" width="{CELL}" height="{CELL}" href="data:{kind};base64,{data}"/>')
-        for line, text in enumerate((title, shown.caption)):
-            short = text if len(text) <= 34 else text[:33] + "…"
-            parts.append(f'<text x="{x}" y="{y + CELL + 13 + 14 * line}">{html.escape(short)}</text>')
-    return "".join([*parts, "</svg>\n"])
+    """All pictures in one SVG, which holds them: it can be shown by itself. Chapters and their curves begin rows."""
+    parts: list[str] = []
+    y = GAP
+    for title, _, entries in chapters:
+        y += HEADING
+        parts.append(f'<text class="heading" x="{GAP}" y="{y - 12}">{html.escape(title)}</text>')
+        shown = [(entry.title, picture) for entry in entries for picture in entry.files]
+        curves = [cell for cell in shown if cell[1].file.endswith(".svg")]
+        for cells, across, shape in (([c for c in shown if c not in curves], 6, 1.0), (curves, 4, 2 / 3)):
+            width = (SHEET - GAP) / across - GAP
+            for row in range(0, len(cells), across):
+                for number, (name, picture) in enumerate(cells[row : row + across]):
+                    x = GAP + number * (width + GAP)
+                    parts.append(_cell(name, picture, folder, (x, y, width, shape * width)))
+                y += round(shape * width) + LABEL
+    return "".join([
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {SHEET} {y}" width="{SHEET}"><style>'
+        "text{font:11px system-ui,sans-serif;fill:#666}.heading{font-size:17px;fill:#222}.name{fill:#222}"
+        ".paper{fill:#f6f6f4}.frame{fill:none;stroke:#8883}.drawn{image-rendering:pixelated}"
+        "@media(prefers-color-scheme:dark){text{fill:#9a9a9a}.heading,.name{fill:#e4e4e4}.paper{fill:#101216}}</style>"
+        f'<rect class="paper" width="{SHEET}" height="{y}"/>',
+        *parts,
+        "</svg>\n",
+    ])  # fmt: skip
+
+
+def _cell(name: str, shown: Shown, folder: Path, box: tuple[float, float, float, float]) -> str:
+    """A picture with its frame, its name and what it shows. box: x, y, width, height."""
+    x, y, width, height = box
+    vector = shown.file.endswith(".svg")
+    kind = "image/svg+xml" if vector else f"image/{shown.file.rpartition('.')[2]}"
+    data = base64.b64encode((folder / shown.file).read_bytes()).decode()
+    place = f'x="{x:.1f}" y="{y}" width="{width:.1f}" height="{height:.1f}"'
+    parts = [f'<image{_kind(folder / shown.file)} {place} href="data:{kind};base64,{data}"/>']
+    parts.append(f'<rect class="frame" {place}/>')
+    letters = int(width / LETTER)
+    lines = textwrap.wrap(shown.caption, letters, max_lines=2, placeholder="…")
+    for line, text in enumerate([textwrap.shorten(name, letters, placeholder="…"), *lines]):
+        style = "" if line else ' class="name"'
+        parts.append(f'<text{style} x="{x:.1f}" y="{y + height + 15 + 14 * line:.1f}">{html.escape(text)}</text>')
+    return "".join(parts)
