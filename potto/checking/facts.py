@@ -20,7 +20,7 @@ from potto.calculus.inlining.expand import expanded
 from potto.calculus.surfaces.branch_cuts import opened
 from potto.core.printer import format_term
 from potto.core.simplify import simplify
-from potto.core.terms import App, Branch, Delta, Deriv, Global, Lam, Term, postorder
+from potto.core.terms import App, Branch, Const, Delta, Deriv, Global, Lam, Term, postorder
 from potto.elaborate import core, elaborate_expression
 from potto.modules import is_recursive
 from potto.query import Database
@@ -130,7 +130,8 @@ def _surfaces(db: Database, term: Term) -> dict[str, None]:
            for node in postorder(opened(term)) if isinstance(node, Branch | Delta)]  # fmt: skip
     known = [condition.surface for condition in found]
     readable = [surface for surface in own if not any(isinstance(node, App) for node in postorder(surface))]
-    texts = (format_term(simplify(surface)) for surface in (*known, *readable))
+    simplified = map(simplify, (*known, *readable))
+    texts = (format_term(surface) for surface in simplified if not isinstance(surface, Const))  # that crosses nothing
     return dict.fromkeys(f"{_COPY.sub('', text)} = 0" for text in texts)
 
 

@@ -34,3 +34,19 @@ def test_formulas_are_potto(program: str, where: tuple[str, ...]) -> None:
         assert "?" not in text and "'" not in text
         assert not parse_expression(text).diagnostics, text
     assert all(f"has a value where {condition}" in shown.notes for condition in where)
+
+
+DECIDED = [
+    ("def f(t, a) integral ([0, 1], [0, 1]) [x < t]*[0*x >= a - a]*[x + y < 1] d(x, y)", "[t > 0 and t < 1 and t + y < 1]"),
+    ("def f(t) integral ([0, 1], [0, 1]) [x < t]*[x <= t]*[x + y <= t + y] d(x, y)", "[t > 0 and t < 1]"),
+    ("def f(t) integral ([0, 1], [0, 1]) [x < t]*[y - y + 1 > 0] d(x, y)", "[t > 0 and t < 1]"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("program", "conditions"), DECIDED)
+def test_conditions_that_say_nothing_are_not_shown(program: str, conditions: str) -> None:
+    library = Library()
+    file = library.put("<text>", program + "\n")
+    shown = str(derivative_facts(library.db, file, "f"))
+    assert f"dt*{conditions}" in shown
+    assert "0 = 0" not in shown and "0 >= 0" not in shown and "1 = 0" not in shown

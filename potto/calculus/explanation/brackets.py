@@ -84,6 +84,8 @@ def opposite(first: Condition, second: Condition) -> bool:
 
 def sided(surface: Term) -> Term:
     """What is added less what is taken away, so that it reads as a comparison of the two."""
+    if isinstance(surface, Prim) and surface.op == "neg":
+        surface = _turned(surface.args[0])
     parts = surface.args if isinstance(surface, Prim) and surface.op == "add" else (surface,)
     taken = [p.args[0] for p in parts if isinstance(p, Prim) and p.op == "neg"]
     added = [p for p in parts if not (isinstance(p, Prim) and p.op == "neg")]
@@ -93,10 +95,22 @@ def sided(surface: Term) -> Term:
     return sub(add(*added), add(*taken)) if taken and added else surface
 
 
+def _turned(term: Term) -> Term:
+    """A term with its sign turned, a sum part by part."""
+    if isinstance(term, Prim) and term.op == "add":
+        return add(*map(neg, term.args))
+    return neg(term)
+
+
 def _plain(item: Condition) -> list[Condition]:
-    """A condition as conditions without roots, and without factors whose sign is known."""
+    """A condition as conditions without roots, and without factors whose sign is known; none if it always holds."""
     found = normal(item.surface)
-    if found is None or not found.top:
+    if found is None:
+        return [item]
+    if found.whole and not set(found.top) - {()}:  # a number
+        number = found.top.get((), Fraction(0))
+        return [] if number > 0 or (number == 0 and not item.strict) else [NEVER]
+    if not found.top:
         return [item]
     if found.whole:
         without_root = _squared(found.top, item.strict)
