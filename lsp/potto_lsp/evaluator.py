@@ -265,6 +265,13 @@ def _sample(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
         raise Unanswerable(str(error)) from None
 
 
+def _pixel(world: World, task: Mapping[str, Any]) -> dict[str, Any]:
+    """On which side of each surface a place of a picture is, and how far from it."""
+    from potto_lsp.sampling import sides
+
+    return {"seen": sides(world, task["file"], task["surfaces"], task["values"], task["cell"])}
+
+
 _VIEWS: dict[str, Any] = {}  # by file: what the views of its integrals have compiled
 
 
@@ -287,6 +294,7 @@ TASKS: Mapping[str, Callable[[World, Mapping[str, Any]], dict[str, Any]]] = {
     "run": _run,
     "preview": _preview,
     "sample": _sample,
+    "pixel": _pixel,
     "view": _view,
 }
 

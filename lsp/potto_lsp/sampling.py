@@ -1,7 +1,7 @@
 """The values of a function over a grid, with its derivative and the errors of both. For the evaluation process alone.
 
-Owns `sample`. All places are one batch. Numbers travel as base64 of little-endian floats: values in 64 bits, bounds of
-errors in 32, rounded up. Where a function has no value there is a nan.
+Owns `sample` and `sides`. All places are one batch. Numbers travel as base64 of little-endian floats: values in 64
+bits, bounds of errors in 32, rounded up. Where a function has no value there is a nan.
 """
 
 from __future__ import annotations
@@ -60,6 +60,34 @@ def sample(
         **found, "evals": estimate.evals, "seconds": estimate.seconds, "compileSeconds": estimate.compile_seconds,
         "converged": estimate.converged, "reasons": list(estimate.reasons), "method": estimate.method,
     }  # fmt: skip
+
+
+FAR = 1e300  # pixels: farther than any picture goes
+
+
+def sides(
+    world: World, file: str, surfaces: Sequence[Mapping[str, Any]], values: Mapping[str, Any],
+    cell: Mapping[str, float],
+) -> list[dict[str, Any]]:  # fmt: skip
+    """Of each surface on which `side` a pixel's middle is (1, -1, or 0 where it has no value), and about how many
+    `pixels` off it is: within half of one it goes through the pixel. `cell`: the sides of the pixel."""
+    module = Module(world, file)
+    around = [{}, *({axis: turn * size / 2} for axis, size in cell.items() for turn in (-1, 1))]
+    found = []
+    for surface in surfaces:
+        function = argument(module, "surface", surface["text"])
+        named = {name: argument(module, name, values[name]) for name in surface["parameters"]}
+        places = [
+            np.array([named[name] + shift.get(name, 0.0) for shift in around]) if name in cell else named[name]
+            for name in surface["parameters"]
+        ]
+        at = np.broadcast_to(np.asarray(function(*places).value, dtype=float), len(around))
+        slope = float(np.abs(at[1::2] - at[2::2]).sum())
+        if not np.isfinite(at[0]):
+            found.append({"side": 0, "pixels": FAR})
+        else:
+            found.append({"side": int(np.sign(at[0])), "pixels": min(abs(float(at[0])) / slope, FAR) if slope else FAR})
+    return found
 
 
 def _places(axes: Sequence[Mapping[str, Any]]) -> tuple[dict[str, Array], tuple[int, ...]]:

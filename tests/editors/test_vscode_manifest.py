@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from potto_lsp.features import COMMANDS, TOKEN_MODIFIERS, TOKEN_TYPES
+from potto_lsp.features import COMMANDS, TOKEN_MODIFIERS, TOKEN_TYPES, hinting, lenses
 
 from potto.modules.builtins import CONSTANTS, PROJECTIONS, SPECIALS
 from potto.primitives import PRIMITIVES
@@ -111,3 +111,16 @@ def test_the_lock_files_name_no_host() -> None:
 def test_nothing_that_is_built_is_kept() -> None:
     ignored = (EDITORS / ".gitignore").read_text(encoding="utf-8").split()
     assert {"node_modules/", "dist/", "*.vsix", "test-results/"} <= set(ignored)
+
+
+def test_every_setting_of_the_server_can_be_set_and_is_explained() -> None:
+    read_by_the_server = {*hinting.SETTINGS.values(), *lenses.SETTINGS.values()}
+    sources = (EDITORS.parent / "lsp/potto_lsp").rglob("*.py")
+    known = r'(?:settings\.get|_setting)\("([\w.]+)"'
+    for source in sources:
+        read_by_the_server |= set(re.findall(known, source.read_text(encoding="utf-8")))
+    offered = {name.removeprefix("potto.") for name in CONTRIBUTES["configuration"]["properties"]}
+    ours = {name for name in offered if name.partition(".")[0] in ("server", "trace", "preview")}
+    assert offered - ours == read_by_the_server - {"potto"}  # what clients send may have that around it
+    page = (EDITORS.parent / "docs/lsp.md").read_text(encoding="utf-8")
+    assert [name for name in offered - ours if f"`{name}`" not in page] == []

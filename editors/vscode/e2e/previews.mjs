@@ -39,6 +39,17 @@ export const PREVIEWS = {
     await picture("preview-slider");
   },
 
+  async "a click on a pixel selects the condition behind it"({ page, picture }) {
+    const frame = await preview(page);
+    const box = await frame.locator("#value").boundingBox();
+    await page.mouse.click(box.x + box.width * 0.3, box.y + box.height * 0.3);
+    await frame.locator("#probe", { hasText: /(goes through this pixel|pixels off)/ }).waitFor();
+    const selected = page.locator(".part.editor .view-overlays .selected-text").first();
+    await selected.waitFor();
+    await picture("preview-pixel");
+    await frame.locator("#value").hover();
+  },
+
   async "a probe reads a pixel; the mouse pans and zooms"({ page, picture }) {
     const frame = await preview(page);
     const value = frame.locator("#value");

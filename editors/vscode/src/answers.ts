@@ -2,7 +2,7 @@
 import * as vscode from "vscode";
 import type { Server } from "./server";
 
-const SCHEME = "potto-derivative";
+const SCHEME = "potto-derivative"; // also the language of these documents: that of programs, with long lines wrapped
 const PAUSE = 150; // ms after the last change, before a derivative that is shown is written anew
 
 interface Answer {
@@ -29,18 +29,25 @@ export async function evaluate(server: Server, uri: vscode.Uri, expression: stri
   }
 }
 
-/** Derivatives in symbols, as documents that follow the program. */
+/** A definition as its document names it, and the definitions of the program when it was last found, in their order. */
+interface Followed {
+  readonly name: string;
+  readonly all: readonly string[];
+}
+
+/** Derivatives in symbols, as documents that follow the program: also when the definition is renamed. */
 export class Derivatives implements vscode.TextDocumentContentProvider, vscode.Disposable {
   private readonly changed = new vscode.EventEmitter<vscode.Uri>();
   readonly onDidChange = this.changed.event;
   private readonly gone: vscode.Disposable;
+  private readonly followed = new Map<string, Followed>();
   private timer: NodeJS.Timeout | undefined;
 
   constructor(private readonly server: Server) {
     this.gone = vscode.Disposable.from(
       vscode.workspace.registerTextDocumentContentProvider(SCHEME, this),
       vscode.workspace.onDidChangeTextDocument((event) => {
-        if (event.document.languageId === "potto" && event.document.uri.scheme !== SCHEME) this.refreshSoon();
+        if (event.document.languageId === "potto") this.refreshSoon();
       }),
     );
   }
@@ -53,22 +60,46 @@ export class Derivatives implements vscode.TextDocumentContentProvider, vscode.D
 
   async show(uri: vscode.Uri, name: string): Promise<void> {
     const shown = vscode.Uri.from({ scheme: SCHEME, path: `/derivative of ${name}`, query: uri.toString(), fragment: name });
+    this.followed.delete(shown.toString()); // whatever it was renamed to before, this is its name now
     const document = await vscode.workspace.openTextDocument(shown);
-    await vscode.languages.setTextDocumentLanguage(document, "potto");
+    await vscode.languages.setTextDocumentLanguage(document, SCHEME);
     await vscode.window.showTextDocument(document, {
       viewColumn: vscode.ViewColumn.Beside,
       preserveFocus: true,
       preview: true,
     });
+    this.changed.fire(shown);
   }
 
   async provideTextDocumentContent(uri: vscode.Uri): Promise<string> {
     try {
-      const answer = await ask(this.server, "potto.differentiate", uri.query, uri.fragment);
+      const name = await this.nameNow(uri);
+      const answer = await ask(this.server, "potto.differentiate", uri.query, name);
       return answer?.text ?? "# the language server is not running";
     } catch (error) {
       return `# ${error instanceof Error ? error.message : String(error)}`;
     }
+  }
+
+  /** What the definition of a document is called now. One that is gone is the one that came in its place, if all others
+   * are as they were. */
+  private async nameNow(uri: vscode.Uri): Promise<string> {
+    const before = this.followed.get(uri.toString()) ?? { name: uri.fragment, all: [] };
+    const found = await vscode.commands.executeCommand<vscode.DocumentSymbol[] | undefined>(
+      "vscode.executeDocumentSymbolProvider",
+      vscode.Uri.parse(uri.query),
+    );
+    const all = (found ?? []).map((symbol) => symbol.name);
+    if (all.length === 0) return before.name;
+    let { name } = before;
+    if (!all.includes(name)) {
+      const place = before.all.indexOf(name);
+      const others = before.all.length === all.length && all.every((other, n) => n === place || other === before.all[n]);
+      if (place < 0 || !others) return name;
+      name = all[place] ?? name;
+    }
+    this.followed.set(uri.toString(), { name, all });
+    return name;
   }
 
   private refreshSoon(): void {

@@ -121,6 +121,7 @@ _ALL = (
     Feature("workspace/diagnostic", "diagnosing.workspace", pace="slow"),
     Feature("potto/scenes", "previewing.scenes", pace="slow"),
     Feature("potto/sample", "previewing.sample"),
+    Feature("potto/pixel", "previewing.pixel"),
     Feature("potto/viewPage", "viewing.page"),
     Feature("potto/viewed", "viewing.viewed"),
     Feature("potto/view", "viewing.view"),

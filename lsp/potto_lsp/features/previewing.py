@@ -1,4 +1,4 @@
-"""`potto/scenes` and `potto/sample`: what a preview may show, and the numbers that it draws.
+"""`potto/scenes`, `potto/sample` and `potto/pixel`: what a preview may show, its numbers, and the code behind a place.
 
 Beyond the protocol: a client that draws for itself asks for numbers, others for the picture of `potto.preview`.
 """
@@ -9,6 +9,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from potto import ide
+from potto.ide.display.pixels import pixel_conditions
+from potto.modules import chunk_start, chunk_text
+from potto.source import Span
 from potto_lsp.asking import Ask
 from potto_lsp.deferred import Deferred
 from potto_lsp.errors import InvalidParams
@@ -54,6 +57,32 @@ def sample(ask: Ask) -> Deferred:
         raise InvalidParams("`rtol` is between 0 and 1")
     more = {"axes": axes, "values": values or {}, "wrt": wrt, "rtol": rtol}
     return task(ask, "sample", ask.file, name, more, quiet=True)  # what is drawn shows how far it is
+
+
+def pixel(ask: Ask) -> Deferred:
+    """Where in the program a place of a picture comes from: the definition's conditions there, the nearest first."""
+    name, values, cell = ask.string("name"), ask.get("values"), ask.get("cell")
+    if not isinstance(values, Mapping) or not isinstance(cell, Mapping) or not all(map(_is_number, cell.values())):
+        raise InvalidParams("`values` is an object, and `cell` the sides of a pixel by the names of its axes")
+    if not cell or not all(_is_number(values.get(axis)) for axis in cell):
+        raise InvalidParams("`values` has a number for each axis of `cell`")
+    found = pixel_conditions(ask.db, ask.file, name)
+    start = chunk_start(ask.db, ask.file, name)
+    chunk = chunk_text(ask.db, ask.file, name) or ""
+    whole = ask.range(Span(start, start + len(chunk.rstrip())))
+    written = [{"equation": each.equation, "range": ask.range(each.span.shift(start))} for each in found]
+    surfaces = [{"text": each.text, "parameters": list(each.parameters)} for each in found]
+
+    def placed(result: Mapping[str, Any]) -> dict[str, Any]:
+        there = sorted(({**where, **one} for where, one in zip(written, result["seen"])), key=lambda c: c["pixels"])
+        return {"range": whole, "conditions": there}
+
+    more = {"surfaces": surfaces, "values": values, "cell": cell}
+    return task(ask, "pixel", ask.file, name, more, placed, quiet=True)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _is_axis(axis: Any) -> bool:

@@ -194,12 +194,16 @@ const TESTS = {
     await vscode.commands.executeCommand("potto.differentiate", document.uri.toString(), "cover");
     const shown = () => vscode.workspace.textDocuments.find((other) => other.uri.scheme === "potto-derivative" && other.getText());
     const derivative = await eventually(shown, Boolean);
-    assert.equal(derivative.languageId, "potto");
+    assert.equal(derivative.languageId, "potto-derivative");
+    assert.equal(vscode.workspace.getConfiguration("editor", derivative).get("wordWrap"), "on");
     assert.match(derivative.getText(), /boundary/);
     const before = derivative.getText();
     const { editor } = await open("renderer.po");
     await editor.edit((edit) => edit.insert(find(document, "[x + y < t]"), "3*"));
     await eventually(() => derivative.getText(), (now) => now !== before);
+    const renamed = await run("DocumentRenameProvider", document.uri, find(document, "cover"), "shaded");
+    assert.ok(await vscode.workspace.applyEdit(renamed));
+    await eventually(() => derivative.getText(), (now) => /^shaded : /.test(now));
   },
 
   async "rename after extracting moves the cursor to the new name"() {

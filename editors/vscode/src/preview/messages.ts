@@ -54,14 +54,34 @@ export interface Samples {
   readonly method: string;
 }
 
+/** A place of a picture: the values of all parameters there, and the sides of a pixel by its axes. */
+export interface PixelRequest {
+  readonly name: string;
+  readonly values: Readonly<Record<string, Given>>;
+  readonly cell: Readonly<Record<string, number>>;
+}
+
+export interface Range {
+  readonly start: { readonly line: number; readonly character: number };
+  readonly end: { readonly line: number; readonly character: number };
+}
+
+/** Where a pixel comes from: the definition, and its conditions, the nearest first; `pixels` is how far off one is. */
+export interface Pixel {
+  readonly range: Range;
+  readonly conditions: readonly { readonly equation: string; readonly range: Range; readonly side: number; readonly pixels: number }[];
+}
+
 export type ToPreview =
   | { readonly type: "scenes"; readonly scenes: readonly Scene[]; readonly show: string | null; readonly finest: number }
   | { readonly type: "samples"; readonly id: number; readonly samples: Samples }
+  | { readonly type: "pixel"; readonly text: string }
   | { readonly type: "failed"; readonly id: number; readonly message: string; readonly outdated: boolean };
 
 export type FromPreview =
   | { readonly type: "ready" }
   | { readonly type: "sample"; readonly id: number; readonly request: SampleRequest }
   | { readonly type: "cancel"; readonly id: number }
+  | { readonly type: "pixel"; readonly request: PixelRequest }
   | { readonly type: "show"; readonly name: string }
   | { readonly type: "save"; readonly name: string; readonly png: string };

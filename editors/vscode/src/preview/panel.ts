@@ -3,9 +3,10 @@ import { randomBytes } from "node:crypto";
 import { posix } from "node:path";
 import * as vscode from "vscode";
 import type { Server } from "../server";
-import type { FromPreview, Samples, Scene, ToPreview } from "./messages";
+import type { FromPreview, Pixel, PixelRequest, Samples, Scene, ToPreview } from "./messages";
 
 const CONTENT_MODIFIED = -32801;
+const FAR = 1e300; // pixels: a surface that is nowhere in the picture
 const LATER = 500; // ms after a file has changed, when the server knows of it too
 const panels = new Map<string, Preview>();
 
@@ -170,6 +171,8 @@ class Preview {
         return;
       case "sample":
         return this.sample(message);
+      case "pixel":
+        return this.find(message.request);
       case "save":
         return this.save(message.name, message.png);
     }
@@ -194,6 +197,23 @@ class Preview {
     }
   }
 
+  /** A pixel was clicked: select the condition that it is nearest to, or the definition if there is none. */
+  private async find(request: PixelRequest): Promise<void> {
+    try {
+      const params = { textDocument: { uri: this.uri.toString() }, ...request };
+      const found = await this.server.client?.sendRequest<Pixel>("potto/pixel", params);
+      if (!found) return;
+      const nearest = found.conditions.find(({ pixels }) => pixels < FAR);
+      const { start, end } = nearest?.range ?? { start: found.range.start, end: found.range.start };
+      const selection = new vscode.Range(start.line, start.character, end.line, end.character);
+      const column = vscode.window.visibleTextEditors.find(({ document }) => document.uri.toString() === this.uri.toString())?.viewColumn;
+      await vscode.window.showTextDocument(this.uri, { viewColumn: column ?? vscode.ViewColumn.One, selection });
+      this.send({ type: "pixel", text: nearest ? placed(nearest) : `no condition of ${request.name} is seen here` });
+    } catch (error) {
+      this.send({ type: "pixel", text: messageOf(error) });
+    }
+  }
+
   private async save(name: string, png: string): Promise<void> {
     const beside = this.uri.scheme === "untitled" ? undefined : vscode.Uri.joinPath(this.uri, "..");
     const folder = beside ?? vscode.workspace.workspaceFolders?.[0]?.uri;
@@ -210,6 +230,10 @@ class Preview {
     }
   }
 }
+
+/** How far a pixel is from a surface. */
+const placed = ({ equation, pixels }: Pixel["conditions"][number]): string =>
+  pixels <= 0.5 ? `${equation} goes through this pixel` : `${equation} is ${pixels.toPrecision(2)} pixels off`;
 
 /** What stopped for want of time can be given more. */
 const advised = (message: string): string =>

@@ -178,3 +178,15 @@ export function make<K extends keyof HTMLElementTagNameMap>(
 ): HTMLElementTagNameMap[K] {
   return Object.assign(document.createElement(tag), properties);
 }
+
+/** A message with its excerpts of programs: they keep their columns, the sentences are wrapped. */
+export function explained(message: string): HTMLElement[] {
+  const parts: HTMLElement[] = [];
+  for (const line of message.split("\n")) {
+    const tag = /^\s*(\d+\s*\||\||-->)/.test(line) ? "pre" : "p";
+    const last = parts.at(-1);
+    if (tag === "pre" && last?.tagName === "PRE") last.textContent = `${last.textContent ?? ""}\n${line}`;
+    else parts.push(make(tag, { textContent: tag === "p" ? line.replace(/^\s*= /, "") : line }));
+  }
+  return parts;
+}

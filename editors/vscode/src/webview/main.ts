@@ -1,6 +1,6 @@
 // The page of a preview: what is shown, what is asked for, and what the mouse does.
 import type { FromPreview, Scene, ToPreview } from "../preview/messages";
-import { type Choice, choiceFor, Controls, make, missing } from "./controls";
+import { type Choice, choiceFor, Controls, explained, make, missing } from "./controls";
 import { decoded, estimated, type Field, type Grid, short } from "./numbers";
 import { type Cells, cells, drawCells, drawCurve, type Palette, pictureHeight, type View } from "./picture";
 import { type Outcome, Sampler, type Wish } from "./sampler";
@@ -46,6 +46,7 @@ const controls = new Controls(at("choices"), at("parameters"), changed, [
 
 window.addEventListener("message", ({ data }: MessageEvent<ToPreview>) => {
   if (data.type === "scenes") show(data);
+  else if (data.type === "pixel") probe.textContent = data.text;
   else if (data.type === "samples") sampler.samples(data.id, data.samples);
   else sampler.failure(data.id, data.message, data.outdated);
 });
@@ -67,18 +68,6 @@ function complain(message: string, needed = false): void {
   problem.hidden = false;
   pictures.classList.add(drawn ? "stale" : "blank");
   if (status.dataset["settled"] !== "true") status.textContent = "";
-}
-
-/** A message with its excerpts of programs: they keep their columns, the sentences are wrapped. */
-function explained(message: string): HTMLElement[] {
-  const parts: HTMLElement[] = [];
-  for (const line of message.split("\n")) {
-    const tag = /^\s*(\d+\s*\||\||-->)/.test(line) ? "pre" : "p";
-    const last = parts.at(-1);
-    if (tag === "pre" && last?.tagName === "PRE") last.textContent = `${last.textContent ?? ""}\n${line}`;
-    else parts.push(make(tag, { textContent: tag === "p" ? line.replace(/^\s*= /, "") : line }));
-  }
-  return parts;
 }
 
 /** The functions are these now: go on with the one that is shown, or with the one that is asked for. */
@@ -275,7 +264,7 @@ function draw(): void {
 function read(): void {
   const found = cross && drawn && index(drawn, cross);
   if (!cross || !drawn || !choice || found === undefined) {
-    probe.textContent = "Move over the picture to read values; drag to pan, scroll to zoom.";
+    probe.textContent = "Move over the picture to read values; drag to pan, scroll to zoom, click for the code behind a pixel.";
     return;
   }
   const { grid } = drawn;
@@ -337,6 +326,12 @@ function watchMouse(canvas: HTMLCanvasElement): void {
     draw();
   });
   canvas.addEventListener("pointerup", () => (held = undefined));
+  let pressed: readonly [number, number] = [0, 0];
+  canvas.addEventListener("mousedown", ({ clientX, clientY }) => (pressed = [clientX, clientY]));
+  canvas.addEventListener("click", (event) => {
+    const still = Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) < 3;
+    if (still) findCode(place(canvas, event.offsetX, event.offsetY));
+  });
   canvas.addEventListener("pointerleave", () => {
     if (held) return;
     cross = undefined;
@@ -363,6 +358,15 @@ function watchMouse(canvas: HTMLCanvasElement): void {
     event.preventDefault();
     setView(next);
   });
+}
+
+/** Ask for the code that a place comes from. */
+function findCode(here: readonly [number, number]): void {
+  if (!scene || !choice) return;
+  const sides = [view.x1 - view.x0, view.y1 - view.y0];
+  const cell = Object.fromEntries(choice.axes.map((name, n) => [name, (sides[n] ?? 0) / finest]));
+  const there = Object.fromEntries(choice.axes.map((name, n) => [name, here[n] ?? 0]));
+  host.postMessage({ type: "pixel", request: { name: scene.name, values: { ...Object.fromEntries(choice.values), ...there }, cell } });
 }
 
 // A picture to keep

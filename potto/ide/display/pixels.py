@@ -1,0 +1,80 @@
+"""What a place of a picture comes from: the conditions of a function that is drawn, as functions of its parameters.
+
+Owns `PixelCondition` and `pixel_conditions`. A pixel's integral goes over a small part of the plane, so its conditions
+are looked at in the middle of their ranges, as `checking/outlines` does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from msgspec import Struct
+
+from potto.calculus.checking.conditions import conditions_of
+from potto.calculus.checking.diffeo import exported
+from potto.core.printer import format_term
+from potto.core.simplify import simplify
+from potto.core.terms import App, Integral, Lam, Term, add, const, mul, postorder, substitute
+from potto.elaborate import core, core_term
+from potto.ide.hover.derivatives import condition_infos, sound
+from potto.query import Database, query
+from potto.source import Span
+
+
+class PixelCondition(Struct, frozen=True):
+    """A condition of a definition. span: where it is written, or the call that leads to it, relative to its chunk.
+    text: a Potto function of `parameters` that is positive on one side of its surface and negative on the other."""
+
+    equation: str
+    span: Span
+    parameters: tuple[str, ...]
+    text: str
+
+
+@query
+def pixel_conditions(db: Database, file: str, name: str) -> tuple[PixelCondition, ...]:
+    """The conditions of a definition that its parameters alone decide, in the order of the text."""
+    if not sound(db, file, name):
+        return ()
+    elaborated = core(db, file, name)
+    spans, params, middles = dict(elaborated.origins), _parameters(elaborated.term), _middles(elaborated.term)
+    shown = {info.span: info.equation for info in condition_infos(db, file, name) if not info.problem}
+    found: dict[PixelCondition, None] = {}
+    for condition in conditions_of(
+        elaborated.term, lambda g: exported(db, g.module, g.name), lambda g: core_term(db, g.module, g.name)
+    ):
+        span, surface = spans.get(condition.anchor), _in_the_middle(condition.surface, middles)
+        if span not in shown or surface.free - set(params) or any(isinstance(n, App) for n in postorder(surface)):
+            continue
+        free = tuple(p for p in params if p in surface.free)
+        text = f"\\({', '.join(free)}) . {format_term(simplify(surface))}"
+        found[PixelCondition(shown[span], span, free, text)] = None
+    return tuple(sorted(found, key=lambda each: each.span))
+
+
+def _parameters(term: Term) -> list[str]:
+    names: list[str] = []
+    while isinstance(term, Lam):
+        names += term.params
+        term = term.body
+    return names
+
+
+def _middles(term: Term) -> dict[str, Term]:
+    """The middle of each variable of integration's range."""
+    return {
+        name: mul(const(0.5), add(low, high))
+        for node in postorder(term)
+        if isinstance(node, Integral)
+        for name, (low, high) in zip(node.variables, node.bounds, strict=True)
+    }
+
+
+def _in_the_middle(surface: Term, middles: Mapping[str, Term]) -> Term:
+    """A surface with each variable in the middle; those of inner ranges first, which may depend on outer ones."""
+    for _ in middles:
+        inside = {name: middles[name] for name in surface.free & middles.keys()}
+        if not inside:
+            break
+        surface = substitute(surface, inside)
+    return surface
