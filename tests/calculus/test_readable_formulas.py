@@ -37,10 +37,13 @@ def test_formulas_are_potto(program: str, where: tuple[str, ...]) -> None:
 
 
 DECIDED = [
-    ("def f(t, a) integral ([0, 1], [0, 1]) [x < t]*[0*x >= a - a]*[x + y < 1] d(x, y)", "[t > 0 and t < 1 and t + y < 1]"),
+    (
+        "def f(t, a) integral ([0, 1], [0, 1]) [x < t]*[0*x >= a - a]*[x + y < 1] d(x, y)",
+        "[t > 0 and t < 1 and t + y < 1]",
+    ),
     ("def f(t) integral ([0, 1], [0, 1]) [x < t]*[x <= t]*[x + y <= t + y] d(x, y)", "[t > 0 and t < 1]"),
     ("def f(t) integral ([0, 1], [0, 1]) [x < t]*[y - y + 1 > 0] d(x, y)", "[t > 0 and t < 1]"),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("program", "conditions"), DECIDED)
