@@ -26,6 +26,7 @@ class DataMistake(Struct, frozen=True):
 
     row: the line of a text, or the first index of an array in numpy's files, both counted from 1.
     column: the column of a table, or of an array, counted from 1.
+    place: from which character of that line to which, where it is less than all of it.
     found, expected: what stands there, and what ought to.
     meant: names of files beside a missing one that may have been meant.
     """
@@ -38,6 +39,7 @@ class DataMistake(Struct, frozen=True):
     expected: str = ""
     hint: str = ""
     meant: tuple[str, ...] = ()
+    place: tuple[int, int] | None = None
 
 
 class Refused(Exception):
@@ -53,9 +55,12 @@ def malformed(message: str, *, row: int | None = None, found: str = "", hint: st
     return Refused(DataMistake(MALFORMED, message, row, None, found, "", hint))
 
 
-def bad_row(message: str, row: int | None, column: int | None, found: str, expected: str, hint: str) -> Refused:
+def bad_row(
+    message: str, row: int | None, column: int | None, found: str, expected: str, hint: str,
+    place: tuple[int, int] | None = None,
+) -> Refused:  # fmt: skip
     """One place of the file is not right."""
-    return Refused(DataMistake(BAD_ROW, message, row, column, found, expected, hint))
+    return Refused(DataMistake(BAD_ROW, message, row, column, found, expected, hint, (), place))
 
 
 def quoted(text: str) -> str:

@@ -191,7 +191,7 @@ def _careful(lines: Sequence[str], layout: _Layout) -> list[array[float]]:
         if len(record) != layout.width:
             raise _ragged(layout, row, len(record))
         for at, (column, text) in enumerate(zip(columns, record)):
-            column.append(_number(layout, row, at, text.strip()))
+            column.append(_number(layout, row, at, text.strip(), lines[row - 1]))
     return columns
 
 
@@ -205,7 +205,7 @@ def _ragged(layout: _Layout, row: int, length: int) -> Refused:
     return bad_row(f"line {row} has {counted(length, 'value')}, but {usual}", row, None, str(length), expected, hint)
 
 
-def _number(layout: _Layout, row: int, at: int, text: str) -> float:
+def _number(layout: _Layout, row: int, at: int, text: str, line: str) -> float:
     plain = text.replace(",", ".", 1) if layout.comma else text
     value = float(plain) if _NUMBER.fullmatch(plain) else None
     if value is not None and isfinite(value):
@@ -220,4 +220,19 @@ def _number(layout: _Layout, row: int, at: int, text: str) -> float:
         what, hint = f"{found} is not a number", "write numbers without separators of thousands, with a decimal point"
     else:
         what, hint = f"{found} is text, not a number", "only numbers can be read: take columns of text out of the file"
-    raise bad_row(f"{where}: {what}", row, at + 1, text, "a number", hint)
+    raise bad_row(f"{where}: {what}", row, at + 1, text, "a number", hint, _place(line, layout.delimiter, at))
+
+
+def _place(line: str, delimiter: str, at: int) -> tuple[int, int] | None:
+    """Where the value of a column stands in a line; None in a row that runs over several."""
+    if delimiter == WHITE:
+        found = [word.span() for word in _WORD.finditer(line)]
+    else:
+        outside = [n for n, char in enumerate(line) if char == delimiter and line.count('"', 0, n) % 2 == 0]
+        found = list(zip([0, *(n + 1 for n in outside)], [*outside, len(line)]))
+    if at >= len(found):
+        return None
+    start, end = found[at]
+    text = line[start:end]
+    first = start + len(text) - len(text.lstrip())
+    return first, max(first, start + len(text.rstrip()))

@@ -31,7 +31,6 @@ from potto.types.types import (
     Truth,
     TupleOf,
     Type,
-    Unknown,
     resolve,
 )
 from potto.types.unify import MAX_LEAVES, free_metas, instantiate, leaves, open_type, unify
@@ -73,13 +72,10 @@ def _member(inference: Inference, node: nodes.Member) -> Type:
     meaning = inference.outside.find(node.path, node.name) if local is None else None
     if meaning is None:
         whole = local or inference.outside.find(None, head)
-        type = UNKNOWN if whole is None or isinstance(whole, Module) else resolve(_meant(inference, node, whole))
-        if whole is not None and not isinstance(type, Unknown | Meta | Real):
+        type = REAL if whole is None or isinstance(whole, Module) else resolve(_meant(inference, node, whole))
+        if whole is not None and not isinstance(type, Meta | Real):  # what is unknown is told where it is bound
             inference.owners[id(node)] = whole
             return fields(inference, type, node)
-        if isinstance(local, Local) and isinstance(type, Unknown):
-            local.used = True
-            return UNKNOWN  # what is wrong with it is said where it is bound
         inference.say(undefined_member(inference.outside, inference.scope, node))
         return UNKNOWN
     inference.meanings[id(node)] = meaning

@@ -6,8 +6,9 @@ import re
 
 from potto.data.mistakes import TITLES, DataMistake
 from potto.data.values import Columns, Row, Shape, Sizes
-from potto.diagnostics import Diagnostic, declare
+from potto.diagnostics import Diagnostic, Related, declare
 from potto.modules.data import data_file, path_of
+from potto.modules.texts import source
 from potto.reports.near import instead
 from potto.source import Span
 from potto.syntax import nodes
@@ -15,6 +16,7 @@ from potto.types import kinds
 from potto.types.context import Inference
 from potto.types.types import REAL, UNKNOWN, ArrayOf, Count, RecordName, TupleOf, Type
 
+TEXTS = (".csv", ".tsv", ".json")
 KINDS = {code: declare(code, title) for code, title in TITLES.items()}
 
 
@@ -32,7 +34,7 @@ def loaded(inference: Inference, node: nodes.Apply) -> Type:
         return UNKNOWN
     found = data_file(inference.outside.db, inference.outside.file, given.text)
     if isinstance(found, DataMistake):
-        inference.report(_wrong(found, given))
+        inference.report(_wrong(found, given, _within(inference, found, given.text)))
         return UNKNOWN
     return type_of(found.shape, path_of(inference.outside.file, given.text))
 
@@ -50,13 +52,28 @@ def type_of(shape: Shape, path: str) -> Type:
     return found
 
 
-def _wrong(mistake: DataMistake, text: nodes.Text) -> Diagnostic:
+def _within(inference: Inference, mistake: DataMistake, written: str) -> tuple[Related, ...]:
+    """The place in the file of data, where that is a text."""
+    if mistake.row is None or not written.lower().endswith(TEXTS):
+        return ()
+    path = path_of(inference.outside.file, written)
+    text = source(inference.outside.db, path)
+    if text is None or mistake.row > len(text.line_starts):
+        return ()
+    start = text.line_starts[mistake.row - 1]
+    line = text.text[start:].split("\n", 1)[0].rstrip("\r")
+    first, last = mistake.place or (len(line) - len(line.lstrip()), len(line.rstrip()))
+    message = f"expected {mistake.expected}" if mistake.expected else "here"
+    return (Related(Span(start + first, start + last), message, path, ""),)
+
+
+def _wrong(mistake: DataMistake, text: nodes.Text, related: tuple[Related, ...]) -> Diagnostic:
     where = "" if mistake.row is None else f"row {mistake.row}"
     if mistake.column is not None:
         where += f"{', ' if where else ''}column {mistake.column}"
     message = mistake.message if mistake.row is None else f"{text.text}: {mistake.message}"
     folder = text.text[: len(text.text) - len(re.split(r"[/\\]", text.text)[-1])]
     return KINDS[mistake.code](
-        text.span, message, label=where or "named here", help=mistake.hint,
+        text.span, message, label=where or "named here", related=related, help=mistake.hint,
         suggestions=instead(Span(text.span.start + 1, text.span.end - 1), [folder + name for name in mistake.meant]),
     )  # fmt: skip

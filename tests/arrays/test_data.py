@@ -87,3 +87,28 @@ def test_data_on_the_command_line(folder: Path, capsys: pytest.CaptureFixture[st
     assert main(["eval", program, "sum h in hs (h)", "--set", f"hs=@{table}:height"]) == 0
     assert main(["eval", program, "len(t.weight) + k", "--set", f"t=@{table}", "--set", "k=0.5"]) == 0
     assert capsys.readouterr().out.split() == ["7", "5.25", "3.5"]
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "place", "said"),
+    [
+        ("d.csv", "a,b\n1,2\n3, x\n", "d.csv:3:4", "expected a number"),
+        ("d.csv", 'a,b\n"1",2\n"35",\n', "d.csv:3:6", "expected a number"),
+        ("d.csv", "a;b\r\n1;2\r\n3;4\r\n-;5\r\n", "d.csv:4:1", "expected a number"),
+        ("d.tsv", "a\tb\n1\t2\n# three\n3\n", "d.tsv:4:1", "expected 2 values"),
+        ("d.json", '{"a": [1],\n  "b": [true]}', "d.json:2:3", "expected a number"),
+    ],
+)
+def test_a_bad_row_is_shown_where_it_stands(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, content: str, place: str, said: str
+) -> None:
+    (tmp_path / name).write_bytes(content.encode())
+    program = tmp_path / "main.po"
+    program.write_text(f'd = load("{name}")\ndef f(t) d.a[0]*t\n')
+    assert main(["check", str(program)]) == 1
+    shown = capsys.readouterr().out
+    assert f"{place}\n" in shown and said in shown
+    assert "P0201" not in shown  # a part of what was not read is nothing that the program does wrong
+    found = potto.Workspace(tmp_path)
+    with pytest.raises(potto.PottoError, match=name):
+        found.module("main")
