@@ -7,6 +7,7 @@ import difflib
 from msgspec.structs import replace
 
 from potto.projects.settings import CHOICES, METHODS, Settings, problem
+from potto.runtime.answers.printing import format_digits
 from potto_repl import options
 from potto_repl.registry import command
 from potto_repl.reply import Part, Refusal, answer
@@ -25,7 +26,7 @@ def set_option(session: Conversation, text: str) -> Part:
     name, _, value = text.replace("=", " ").strip().partition(" ")
     name, value = name.replace("-", "_"), value.strip()
     if not name:
-        rows = {n: f"{getattr(session.settings, n)}" for n in NUMBERS}
+        rows = {n: _shown(getattr(session.settings, n)) for n in NUMBERS}
         rows |= {n: options.shown(session.options, n) for n in options.NAMES}
         return answer("\n".join(f"{n:<10} {value}" for n, value in rows.items()), settings=rows)
     if name in NUMBERS:
@@ -50,7 +51,11 @@ def _number(session: Conversation, name: str, text: str) -> Part:
             raise Refusal(complaint)
         session.settings = replace(session.settings, **{name: value})
     value = getattr(session.settings, name)
-    return answer(f"{name} {value}", **{name: value})
+    return answer(f"{name} {_shown(value)}", **{name: value})
+
+
+def _shown(value: float | str) -> str:
+    return format_digits(value, 15) if isinstance(value, float) else str(value)
 
 
 def read_number(text: str) -> int | float | str:
