@@ -17,6 +17,7 @@ from potto.reports.render import Located, ProgramError
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.printing import (
     format_bars,
+    format_count,
     format_digits,
     format_error,
     format_numbers,
@@ -109,7 +110,7 @@ def show_time(session: Conversation, text: str) -> Iterator[Part]:
     kernels = counts.compiled - made
     total = sum(phases.values())
     rows = [f"{name:<9} {format_seconds(spent):>9}  {spent / total:4.0%}" for name, spent in phases.items()]
-    cost = f"{kernels} kernels made, {estimate.evals:,} evaluations"
+    cost = f"{format_count(kernels, 'kernel')} made, {format_count(estimate.evals, 'evaluation')}"
     if counts.native_points > by_machine:
         cost += f", {counts.native_points - by_machine:,} points by machine code"
     rows += [f"{'total':<9} {format_seconds(total):>9}", cost]
