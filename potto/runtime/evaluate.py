@@ -74,7 +74,10 @@ class Program:
         self._direct: dict[Term, Direct | None] = {}
 
     def machine(self, settings: Settings) -> Machine:
-        return Machine(self.linker, settings, Record())
+        record = Record()
+        if record.gauge is not None:
+            record.gauge.most = settings.max_evals
+        return Machine(self.linker, settings, record)
 
     def value(self, machine: Machine, term: Term, env: Mapping[str, Value] | None = None) -> Value:
         """The value of a term, with every internal limit turned into a PottoError."""

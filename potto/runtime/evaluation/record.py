@@ -26,14 +26,16 @@ class Gauge(Struct):
 
     start: when it began, by `time.perf_counter`. evaluations: of integrands so far. share: how much of the work is
     done, 0 while nobody knows. limit: whether that is a share of the most that is allowed, so that it may be over
-    sooner. samplings: integrals that are sampled; of the second one on, nobody knows how many are to come. told: is
-    called after each block of a large batch.
+    sooner. most: the evaluations of one member that are allowed in all; what is tried first is given fewer. samplings:
+    integrals that are sampled; of the second one on, nobody knows how many are to come. told: is called after each
+    block of a large batch.
     """
 
     start: float = 0.0
     evaluations: int = 0
     share: float = 0.0
     limit: bool = True
+    most: int = 0
     samplings: int = 0
     told: Callable[[], None] | None = None
 
@@ -158,4 +160,4 @@ class Record(Struct):
         if self.costs is not None:
             self.costs.add(evaluations)
         if self.gauge is not None:
-            self.gauge.spent(self.evaluations, most * self.members)
+            self.gauge.spent(self.evaluations, max(most, self.gauge.most) * self.members)
