@@ -7,7 +7,7 @@ their cancellation, requests and notifications to the client, the codes of error
   ends early for a message: `Carrier.carry` is given what `wire.messages` reads.
 - `structure_message` is called for every object inside of a message, and makes classes that are taken apart again:
   messages stay plain JSON here.
-- `handle_message` raises for what is no message of JSON-RPC, and its sender waits for ever; a request before
+- `handle_message` raises for anything that is not a JSON-RPC message, and its sender waits for ever; a request before
   `initialize` is served, one after `shutdown` is not answered.
 - Requests of both sides share a table by id, so that a client that counts as the server does gets wrong answers.
 - What a synchronous handler returns is its answer at once, so that it cannot be cancelled: a handler may return a

@@ -42,7 +42,7 @@ class Documents:
         return tuple(self._open.values())
 
     def open(self, params: Mapping[str, Any]) -> Document:
-        """`textDocument/didOpen`. One that is open already starts anew."""
+        """`textDocument/didOpen`. One that is already open starts over."""
         item = params["textDocument"]
         uri, text = item["uri"], item["text"]
         if not isinstance(uri, str) or not isinstance(text, str):

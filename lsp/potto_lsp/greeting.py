@@ -14,7 +14,7 @@ from potto_lsp.wire import Outbox
 
 
 def answer(params: Any) -> dict[str, Any]:
-    """What the server is able to do, for a client. Raises `RequestError` for what is no greeting."""
+    """What the server is able to do, for a client. Raises `RequestError` for anything that is not a greeting."""
     if not isinstance(params, Mapping) or not isinstance(params.get("capabilities", {}), Mapping):
         raise RequestError(errors.INVALID_PARAMS, "the client's capabilities are missing")
     info = {"name": "potto", "version": __version__}

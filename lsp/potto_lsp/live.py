@@ -269,7 +269,7 @@ class LiveValues:
         self._tell("inlayHint", "live")
 
     def _tell(self, what: str, do: str) -> None:
-        """Let the client ask anew for what shows values of some kind: when the last one has come, and not often."""
+        """Have the client ask again for what shows values of this kind: when the last one has come, and not often."""
         now = time.monotonic()
         last = not any(waiting.do == do for waiting in self._waiting)
         due = last or now - self._told.get(what, 0.0) > PAUSE

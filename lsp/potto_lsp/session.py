@@ -134,7 +134,7 @@ class Session:
             if number == len(self.analysis.documents):  # what is open is told; the next thing is to be asked about it
                 yield None
                 yield self._load_features
-                yield from steps[:number]  # what was known from an earlier session is found anew, for the edits to come
+                yield from steps[:number]  # what an earlier session had found is found again, for the edits to come
             while self.analysis.helpers_have_found:
                 yield self.analysis.take_over
             yield step

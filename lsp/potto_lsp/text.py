@@ -35,7 +35,7 @@ def line_starts(text: str) -> list[int]:
 
 
 class Lines(Struct, frozen=True):
-    """Where the lines of a text start, in blocks: an edit makes one or two of them anew and moves the others.
+    """Where the lines of a text start, in blocks: an edit makes one or two new blocks and moves the others.
 
     offsets: where each block starts; numbers: of its first line; blocks: the starts of its lines, relative to it.
     """

@@ -150,7 +150,7 @@ class Worker:
             return
 
     def check_again(self) -> None:
-        """Begin what is done in idle time anew."""
+        """Start the work of idle time over."""
         self._inbox.put(None)
 
     def _do(self, job: Job) -> None:
@@ -174,7 +174,7 @@ class Worker:
             self._running = None
 
     def _give_way(self, job: Job) -> None:
-        """Come back to a job after all that is more urgent; to a step of idle time only if no edit starts them anew."""
+        """Return to a job after all that is more urgent; to a step of idle time only if no edit starts these over."""
         if job.kind == "idle":
             self._steps = chain([lambda: job.run(job)], self._steps or ())
         elif not job.claimed:

@@ -27,7 +27,7 @@ def placed(cell: str) -> Iterator[str]:
 
 
 def result(part: Part) -> dict[str, str] | None:
-    """An answer in all forms that a notebook may show; None if the part is no answer to an expression.
+    """An answer in all forms that a notebook may show; None if the part is not an answer to an expression.
 
     Its name is left out, for the notebook writes `Out[3]` beside it.
     """

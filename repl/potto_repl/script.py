@@ -23,7 +23,7 @@ _ALONE = re.compile(r":|\S+\?{1,2}\s*$")
 
 
 def entries(lines: Iterable[str]) -> Iterator[str]:
-    """Lines as entries, as soon as each is over: a command is a line; a line in the first column starts anew.
+    """Lines as entries, as soon as each is over: a command is a line; a line in the first column starts a new one.
 
     Comments above a definition belong to it, and so do the indented lines below.
     """

@@ -246,7 +246,7 @@ class Terminal:
             self.checker.look(text)
 
     def _checked(self) -> None:
-        """Draw the text again: prompt_toolkit colours the same text anew only for another lexer."""
+        """Draw the text again: prompt_toolkit recolours the same text only for another lexer."""
         app = self.prompt_session.app
         if app.is_running:
             self.prompt_session.lexer = self.lexers[self.prompt_session.lexer is self.lexers[0]]

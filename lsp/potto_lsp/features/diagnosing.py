@@ -20,7 +20,7 @@ def document(ask: Ask) -> dict[str, Any]:
 
 
 def workspace(ask: Ask) -> dict[str, Any]:
-    """All programs. What did not change is `unchanged`; what the client knows and is no more, is empty."""
+    """All programs. What did not change is `unchanged`; what the client knows of and is gone is empty."""
     known = ask.optional("previousResultIds")
     ids = {
         to_key(str(item.get("uri"))): item.get("value")

@@ -2,7 +2,7 @@
 
 A name of the file, one that it imports, or one of any module of the workspace, the nearest first; else a constant
 function of the type that is asked for. What is found depends on interfaces alone, file by file, so that an edit of a
-body finds nothing anew.
+body looks for nothing again.
 """
 
 from __future__ import annotations

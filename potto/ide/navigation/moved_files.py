@@ -1,6 +1,6 @@
 """Files that move: the imports that must follow.
 
-Owns `rename_files`. Imports of what moves are written anew, and so are the imports in what moves.
+Owns `rename_files`. Imports of what moves are rewritten, and so are the imports in it.
 """
 
 from __future__ import annotations
