@@ -67,6 +67,17 @@ class _Text(Struct, frozen=True):
 _Texts = dict[Term, _Text]
 
 
+LONGEST = 120  # characters of a term that a message shows whole
+
+
+def abridged(term: Term) -> str:
+    """A term that fits a line of a message, by its beginning and its end."""
+    text = format_term(term)
+    if len(text) <= LONGEST:
+        return text
+    return f"{text[: LONGEST // 2]} … {text[-LONGEST // 3 :]} ({len(text):,} characters)"
+
+
 def format_term(term: Term, limit: int = 20_000) -> str:
     """A term as Potto source on one line. Parts longer than `limit` characters are left out as `...`.
 

@@ -17,7 +17,6 @@ from msgspec import Struct
 from potto.core.terms import Term
 from potto.kernels.cells import Array
 
-LONGEST = 120  # characters of a surface that is shown whole
 _wanted: ContextVar[bool] = ContextVar("potto_counting", default=False)
 
 
@@ -131,9 +130,9 @@ class Costs(Struct):
 
     def told(self) -> dict[str, Any]:
         """As a part of an estimate's `stats`."""
-        from potto.core.printer import format_term
+        from potto.core.printer import abridged
 
-        surfaces = [{"surface": f"{_short(format_term(s))} = 0", "kept": seen.kept, "why": seen.why}
+        surfaces = [{"surface": f"{abridged(s)} = 0", "kept": seen.kept, "why": seen.why}
                     for s, seen in self.surfaces.items()]  # fmt: skip
         return {
             "interior evaluations": self.interior,
@@ -145,10 +144,3 @@ class Costs(Struct):
             "members looked at": self.looked,
             "surfaces": surfaces,
         }
-
-
-def _short(formula: str) -> str:
-    """A formula that fits a line, by its beginning and its end."""
-    if len(formula) <= LONGEST:
-        return formula
-    return f"{formula[: LONGEST // 2]} … {formula[-LONGEST // 3 :]} ({len(formula):,} characters)"

@@ -174,6 +174,42 @@ def _half_shadow(x: float, y: float, h: float, given: Mapping[str, float]) -> Se
     return value, {"lx": slope}
 
 
+def soft_triangle(x: float, y: float, h: float, given: Mapping[str, float]) -> Seen:
+    """Of a level triangle by a square lamp: p is dark for a light at l where p + l/2 is in 1.5 times the triangle.
+
+    Both coordinates of p + l/2 are a sum of two even ones, of widths h and 0.2: their densities are trapezes.
+    """
+    half, slant = (0.2 + h) / 2, (0.2 - h) / 2
+
+    def density(t: Any) -> Any:
+        inwards = np.where(np.real(t) > 0, half - t, half + t) / (0.2 * h)
+        return np.where(np.abs(np.real(t)) < slant, 5.0, inwards)
+
+    def away(x: Any, y: Any, given: Given) -> tuple[Any, Any]:
+        return x - middle[0] - 0.5 * (given["lx"] - place), y - middle[1]
+
+    def sides(x: Any, y: Any, given: Given) -> list[Any]:
+        corners = [(1.5 * a, 1.5 * b) for a, b in ((0.3, 0.3), (given["q"], 0.35), (0.4, 0.8))]
+        return [(b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])
+                for a, b in zip(corners, corners[1:] + corners[:1])]  # fmt: skip
+
+    def dark(x: Any, y: Any, given: Given) -> Any:
+        dx, dy = away(x, y, given)
+        inside = _all(*sides(x, y, given)) & (np.abs(np.real(dx)) < half)
+        return np.where(inside, density(dx) * density(dy), 0.0)
+
+    place = given["lx"]
+    middle = x + 0.5 * place, y + 0.5 * 0.4
+    lines: list[Function] = [lambda x, y, g, k=k: sides(x, y, g)[k] for k in range(3)]
+    lines += [lambda x, y, g, a=a, s=s: away(x, y, g)[a] - s for a in (0, 1) for s in (slant, -slant)]
+    lines += [lambda x, y, g, s=s: away(x, y, g)[0] - s for s in (0.0, half, -half)]
+    lines += [lambda x, y, g: away(x, y, g)[1]]
+    reach = half + 0.01, half
+    box = middle[0] - reach[0], middle[0] + reach[0], middle[1] - reach[1], middle[1] + reach[1]
+    value, slopes = integral(lines, dark, box, given)
+    return 1 - value, {name: -slope for name, slope in slopes.items()}
+
+
 ROOT = np.sqrt(2)
 PICTURES: dict[tuple[str, str, str], Callable[[float, float, float, Mapping[str, float]], Seen]] = {
     ("paper", "image", "const_shader"): _light(lambda u: 1.0 + 0 * u),

@@ -13,7 +13,9 @@ from typing import Any
 import mpmath as mp
 import numpy as np
 import pytest
+from exact_pictures import soft_triangle
 from exact_rays import half_shadow
+from level_sets_reference import integral as by_level_sets
 from sections_reference import curve, integral
 from worlds_references import EXAMPLES, agrees
 
@@ -213,6 +215,51 @@ def test_a_hard_shadow(at: tuple[float, float]) -> None:
 def test_a_soft_shadow(at: tuple[float, float]) -> None:
     exact = slope(lambda lx: half_shadow(lx, *at, H), 0.5)
     agrees(found(SHADOWS, "edge", "lx", 0.5, at, q=1.0), exact, 1e-8)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("at", [(0.25, 0.4), (0.35, 0.98)], ids=["an edge", "a corner"])
+def test_a_soft_shadow_of_a_triangle(at: tuple[float, float]) -> None:
+    """Sampled, with three or so digits: the error that is given covers what is missing, and is small."""
+    with potto.settings(rtol=1e-2):
+        found = potto.deriv(SHADOWS.triangle_softly)(*at, dq=(0.9, 0.0), dlx=(0.5, 1.0))
+    value, slopes = soft_triangle(*at, H, {"q": 0.9, "lx": 0.5})
+    assert abs(found.value - value) <= found.error < 0.01
+    assert abs(found.tangent - slopes["lx"]) <= found.tangent_error < 0.05
+
+
+NAMED = """
+from geometry import Camera
+from sphere import pixel, tones
+def seen(x, y, mx, mz, r, ex, focal, shader)
+    pixel((mx, 0.1, mz), r, Camera((ex, 0, -2), focal), shader, x - 1/32, y - 1/32, 1/16)
+def silhouette(x, y, mx, mz, r, ex, focal) seen(x, y, mx, mz, r, ex, focal, \\(p, n, s) . 1)
+def shaded(x, y, mx, mz, r, ex, focal, lx, th)
+    seen(x, y, mx, mz, r, ex, focal, \\(p, n, s) . tones(p, n, (lx, 1, -1.5), th))
+"""
+
+
+@pytest.mark.parametrize("wrt", ["mx", "mz", "r", "ex", "focal"])
+def test_a_sphere_all_of_whose_numbers_have_names(wrt: str) -> None:
+    given = {"mx": 0.2, "mz": 1.0, "r": 0.8, "ex": 0.0, "focal": 1.0}
+
+    def under(x: Any, y: Any, g: Any) -> Any:
+        m, d = (g["mx"] - g["ex"], 0.1, g["mz"] + 2), (x, y, g["focal"])
+        md, dd, mm = (sum(a * b for a, b in zip(*two)) for two in ((m, d), (d, d), (m, m)))
+        return md * md - dd * (mm - g["r"] ** 2)
+
+    at, named = (0.32, 0.05), FOLDER.compile(NAMED, "named sphere")
+    lit = lambda x, y, g: np.where(np.real(under(x, y, g)) > 0, 1.0, 0.0)  # noqa: E731
+    box = at[0] - H / 2, at[0] + H / 2, at[1] - H / 2, at[1] + H / 2
+    value, slopes = by_level_sets([under], lit, box, given)
+    others = {name: number for name, number in given.items() if name != wrt}
+    agrees(found(named, "silhouette", wrt, given[wrt], at, **others), (value / H**2, slopes[wrt] / H**2), 1e-8)
+
+
+def test_what_is_said_of_a_condition_fits_a_line() -> None:
+    """The condition of the tones has 3,800 characters where everything has a name."""
+    said = [d.message for d in FOLDER.compile(NAMED, "named sphere").diagnostics if d.code == "P0616"]
+    assert len(said) == 1 and "searched for" in said[0] and len(said[0]) < 250
 
 
 @pytest.mark.parametrize("kind", ["by_depth", "two_tones", "by_law"])

@@ -22,7 +22,7 @@ from potto.calculus.solving.enclosable import searchable
 from potto.calculus.solving.inverse_map import Failure, Inverse, dependence, invert, jacobian, listed
 from potto.calculus.solving.solve import Sections, sections
 from potto.calculus.surfaces.nested_brackets import in_loops, pieces
-from potto.core.printer import format_term
+from potto.core.printer import abridged, format_term
 from potto.core.terms import App, Branch, Global, If, Integral, Prim, Term, postorder, var
 from potto.diagnostics import Kind, declare
 from potto.primitives import PRIMITIVES
@@ -176,7 +176,7 @@ def monotone(surface: Term, name: str, box: Box) -> bool:
 
 
 def shown(terms: Sequence[Term]) -> str:
-    return ", ".join(f"`{format_term(t)}`" for t in terms)
+    return ", ".join(f"`{abridged(t)}`" for t in terms)
 
 
 def singular(coordinates: Sequence[Term], variables: Sequence[str]) -> Problem | None:
@@ -234,7 +234,7 @@ _ADVICE: dict[Role, str] = {
 def no_inverse(
     surface: Term, variables: Sequence[str], reasons: Sequence[str], role: Role = "bracket", searchable: bool = False
 ) -> Problem:
-    help = _ADVICE[role if searchable else "bracket"].format(format_term(surface))
+    help = _ADVICE[role if searchable else "bracket"].format(format_term(surface))  # it is to be written
     inner = next((node for node in postorder(surface) if isinstance(node, Integral)), None)
     if inner is not None:  # neither can be done: an inverse is a formula, and is verified as one
         reasons = (*reasons, "an integral is evaluated by numbers, and the surface has to be known before")
@@ -247,7 +247,7 @@ def no_inverse(
         help = f"make `{named.name}` a parameter, and give the definition as its argument"
     return Problem(
         NO_INVERSE,
-        f"no inverse was found for `{format_term(surface)}` in {listed(variables, 'or')}",
+        f"no inverse was found for `{abridged(surface)}` in {listed(variables, 'or')}",
         "cannot be solved for where it is 0",
         tuple(reasons),
         help,
