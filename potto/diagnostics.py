@@ -7,9 +7,10 @@ Owns `Diagnostic` and the table of kinds. A kind is declared beside the check th
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, Self
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from potto.source import Span
 
@@ -120,7 +121,18 @@ class PottoError(Exception):
 
     def __init__(self, diagnostics: tuple[Diagnostic, ...] | list[Diagnostic]) -> None:
         self.diagnostics = tuple(diagnostics)
+        self.met: list[object] = []
         super().__init__("\n".join(map(_said, self.diagnostics)))
+
+    def of(self, met: object) -> Self:
+        """The same error on its way out of something that was evaluated, innermost first."""
+        self.met.append(met)
+        return self
+
+    def beside(self, related: Related) -> PottoError:
+        """The same error with another place that its first message talks about, which had none but its own."""
+        first, *rest = self.diagnostics
+        return PottoError([replace(first, related=(*first.related, related)), *rest])
 
     def __reduce__(self) -> tuple[object, ...]:
         return type(self), (self.diagnostics,)

@@ -72,8 +72,10 @@ def call(elaboration: Elaboration, function: Value, given: Arguments, span: Span
                 args = [elaboration.as_term(argument.value) for argument in given]
                 look_up = {"interp": interp, "image": image}.get(name)
                 if look_up is None:
-                    return of_vectors(elaboration, name, args)
-                return look_up(elaboration, *args) if len(args) == 3 else hole(f"`{name}` takes three arguments")
+                    return elaboration.note(of_vectors(elaboration, name, args), span)
+                if len(args) != 3:
+                    return hole(f"`{name}` takes three arguments")
+                return elaboration.note(look_up(elaboration, *args), span)
             found = builtins.applied(elaboration.db, name, [elaboration.as_term(a.value) for a in given])
             return elaboration.note(found, span) if isinstance(found, Delta) else found
         case Hole():

@@ -77,7 +77,7 @@ def _chain(elaboration: Elaboration, node: nodes.Chain, scope: Scope) -> Value:
     rest = [(operand.op, elaboration.term(operand.value, scope)) for operand in node.rest]
     if any(is_vector(elaboration.shapes.of(term)) for term in (first, *(term for _, term in rest))):
         for op, term in rest:
-            first = combined(elaboration, op, first, term)
+            first = elaboration.note(combined(elaboration, op, first, term), node.span)
         return first
     if node.rest[0].op in "+-":
         if len(rest) == 1 and rest[0][0] == "-" and rest[0][1] is first:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import threading
 import weakref
-from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, TypeVar
 
 from msgspec import Struct
@@ -17,8 +17,8 @@ from msgspec.structs import replace
 
 from potto.checking.check import absolute, definition_diagnostics, has_errors
 from potto.checking.library import Library
-from potto.core.terms import Term
-from potto.diagnostics import Diagnostic, PottoError
+from potto.core.terms import Term, postorder
+from potto.diagnostics import Diagnostic, PottoError, Related
 from potto.elaborate import core, elaborate_expression
 from potto.kernels.cells import Value
 from potto.modules import chunk_start
@@ -80,7 +80,27 @@ class World(Library):
         if getattr(self._local, "revision", None) != revision:
             self._local.revision = revision
             self._local.memory = {}
-            self._local.program = Program(self.lookup, self._held)
+            self._local.program = Program(self.lookup, self._held, self._place)
+
+    def _place(self, met: Sequence[object], definitions: Mapping[tuple[str, str], Term]) -> Related | None:
+        """Where in a definition that which was met first was written: in the one whose function was met as well, or the
+        only one that holds it. None where that is not known: what is under an integral has been rewritten."""
+        found = []
+        for file, name in definitions:
+            if (_owners.get(file, self)) is self:
+                place = self._narrowest(core(self.db, file, name).origins, met[0])
+                if place is not None:
+                    found.append((file, name, place))
+        inner = [each for each in found if definitions[each[:2]] in met]
+        if len(chosen := inner[:1] or found) != 1:
+            return None
+        file, name, span = chosen[0]
+        return Related(span.shift(chunk_start(self.db, file, name)), f"in `{name}`", file, "")
+
+    def _narrowest(self, origins: Iterable[tuple[Term, Span]], met: object) -> Span | None:
+        """The narrowest place of a text whose term, as it is evaluated, holds what was met."""
+        ready = self.program.linker.ready
+        return min((span for term, span in origins if met in postorder(ready(term))), key=len, default=None)
 
     def hold(self, file: str, name: str, value: Value) -> None:
         """Let a definition have this value, with its error, from now on: its term is not evaluated again."""
@@ -134,8 +154,9 @@ class World(Library):
         except ProgramError:
             raise
         except PottoError as error:
-            whole = Span(0, len(text))
-            raise ProgramError([Located(EXPRESSION, placed(d, whole, 0)) for d in error.diagnostics], sources) from None
+            own = self._narrowest(elaborated.origins, error.met[0]) if error.met else None
+            place = own or Span(0, len(text))
+            raise ProgramError([Located(EXPRESSION, placed(d, place, 0)) for d in error.diagnostics], sources) from None
         warned = [absolute(self.db, EXPRESSION, d, 0) for d in inferred.diagnostics if d.code == NO_TANGENT.code]
         found = [*warned, *remarks(estimate, Span(0, len(text)))]
         said = tuple(Located(EXPRESSION, d) for d in found)

@@ -16,7 +16,7 @@ import numpy as np
 from potto.calculus.surfaces.discontinuities import TooDeep
 from potto.core.printer import format_term
 from potto.core.terms import Integral, Sum, Term
-from potto.diagnostics import PottoError
+from potto.diagnostics import PottoError, Related
 from potto.integrate.events import INFINITE, ROUGH, Shortfall
 from potto.kernels import errors
 from potto.kernels.cells import Cell, Number, Rows, Value, all_cells
@@ -39,6 +39,8 @@ if TYPE_CHECKING:
     from potto.runtime.integration.direct import Direct
 
 Lookup = Callable[[str, str], Term]
+# Where in one of these definitions something was met that was evaluated, innermost first.
+Places = Callable[[Sequence[object], Mapping[tuple[str, str], Term]], Related | None]
 V = TypeVar("V")
 
 
@@ -69,8 +71,10 @@ SEMANTICS = Semantics(
 class Program:
     """The definitions that terms refer to, for any number of evaluations; those `held` have their values already."""
 
-    def __init__(self, lookup: Lookup, held: Mapping[tuple[str, str], Value] | None = None) -> None:
-        self.linker = Linker(lookup, SEMANTICS, held)
+    def __init__(
+        self, lookup: Lookup, held: Mapping[tuple[str, str], Value] | None = None, places: Places | None = None
+    ) -> None:
+        self.linker, self.places = Linker(lookup, SEMANTICS, held), places
         self._direct: dict[Term, Direct | None] = {}
 
     def machine(self, settings: Settings) -> Machine:
@@ -88,8 +92,18 @@ class Program:
             value = None if short is None else guarded(lambda: short.value(machine, given))
             return guarded(lambda: machine.term(self.linker.ready(term), dict(given))) if value is None else value
 
-        value = found(machine)
+        try:
+            value = found(machine)
+        except PottoError as error:
+            raise self.placed(error) from None
         return widened(value, machine, found) if machine.record.used and not machine.directions else value
+
+    def placed(self, error: PottoError) -> PottoError:
+        """An error of evaluation with the place in a definition where it was met, if it is known."""
+        if not error.met or self.places is None or type(error) is not PottoError:  # others know their place
+            return error
+        related = self.places(error.met, self.linker.terms)
+        return error if related is None else error.beside(related)
 
     def _shortest(self, term: Term) -> Direct | None:
         """The one integral that a call is, if it is; found out once."""
@@ -110,7 +124,10 @@ class Program:
         """The estimate of a function's value for arguments; `groups` as the function is curried."""
         machine = self.machine(settings)
         with Clock() as clock:
-            value = guarded(lambda: machine.call(function, tuple(tuple(g) for g in groups), None))
+            try:
+                value = guarded(lambda: machine.call(function, tuple(tuple(g) for g in groups), None))
+            except PottoError as error:
+                raise self.placed(error) from None
         return report(value, machine, clock)
 
 

@@ -28,8 +28,10 @@ from potto.core.terms import (
     Global,
     Hole,
     If,
+    Index,
     Integral,
     Lam,
+    Length,
     Prim,
     Sum,
     Term,
@@ -379,7 +381,10 @@ class Machine:
         args = [function.captured[n] for n in sorted(function.captured)]
         for group, arity in zip(groups, arities):
             args.extend(fit(group, arity))
-        value = self.run(whole, args, trace)
+        try:
+            value = self.run(whole, args, trace)
+        except PottoError as error:
+            raise error.of(function.lam) from None
         self.record.depth -= 1
         return value
 
@@ -423,11 +428,17 @@ class Machine:
     def array(self, term: Array, size: Value, env: dict[str, Value]) -> Value:
         return self.linker.semantics.array(self, term, size, env)
 
-    def index(self, whole: Value, place: Value) -> Value:
-        return self.linker.semantics.element(whole, place)
+    def index(self, term: Index, whole: Value, place: Value) -> Value:
+        try:
+            return self.linker.semantics.element(whole, place)
+        except PottoError as error:
+            raise error.of(term) from None
 
-    def length(self, whole: Value, rising: bool, like: Value | None) -> Value:
-        return self.linker.semantics.length(self, whole, rising, like)
+    def length(self, term: Length, whole: Value, like: Value | None) -> Value:
+        try:
+            return self.linker.semantics.length(self, whole, term.rising, like)
+        except PottoError as error:
+            raise error.of(term) from None
 
     def fold(self, term: Fold, lo: Value, hi: Value, start: Value, env: dict[str, Value]) -> Value:
         return self.linker.semantics.fold(self, term, lo, hi, start, env)
