@@ -90,6 +90,9 @@ def _answered(session: Conversation, text: str) -> Iterator[Part]:
     elif stripped.startswith(":"):
         word, argument = command_words(stripped)
         yield from parts(find(word).run(session, argument))
+    elif stripped.startswith("!"):
+        help = f"a command of the system is written `:{stripped.split()[0]} …`; a condition is negated by `not …`"
+        raise Refusal("nothing begins with `!`", help)
     elif stripped in _WORDS and session.target(stripped.removesuffix("()")) is None:
         yield from parts(find(_WORDS[stripped]).run(session, ""))
     elif stripped:

@@ -46,3 +46,8 @@ def test_the_missing_bracket_is_what_is_told(talk):
     told = talk("def f(r) integral ([0, 1], [0, 1]) [x^2 + y^2 < r^2 d(x, y)").text
     assert told.startswith("error[P0102]: this `[` is never closed") and told.count("error") == 1
     assert "a `]` is missing here" in told
+
+
+def test_an_exclamation_mark_is_told_what_to_write(talk):
+    text = talk("!ls -l").text
+    assert "nothing begins with `!`" in text and "`:!ls …`" in text and "`not …`" in text and "P0201" not in text
