@@ -29,7 +29,7 @@ from potto.python.functions import Function, bound, must_be_function
 from potto.python.moving import each_moving, moved, size, with_places
 from potto.python.remade import remade
 from potto.runtime.answers.estimate import Estimate
-from potto.runtime.evaluate import Clock, number, report, told
+from potto.runtime.evaluate import Clock, bar, number, report, told
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.sides import as_a_whole
 
@@ -332,7 +332,7 @@ class _Run:
         directions = range(len(all_cells(tuple(self.given[name] for name in wrt))) if self.whole
                            else sum(size(name, self.given[name]) for name in wrt))  # fmt: skip
         tangents = [told(moving, lambda cell, d=d: cell.t[d]) for d in directions]  # type: ignore[misc]
-        bounds = [told(moving, lambda cell, d=d: cell.et[d]) for d in directions]  # type: ignore[misc]
+        bounds = [told(moving, lambda cell, d=d: bar(cell.et[d])) for d in directions]  # type: ignore[misc]
         forms = (by_name(part, wrt, self.given, self.whole) for part in (tangents, bounds))
         found = self.answer(value, *(form[0] if len(wrt) == 1 else form for form in forms))
         return Gradient(**asdict(found), wrt=wrt)

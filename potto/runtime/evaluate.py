@@ -207,11 +207,11 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
         moving = any(p.tangent is not None for p in parts)
         tangent, tangent_error = ([getattr(p, side) for p in parts] if moving else None for side in _TANGENTS)
         return answer(values, off, tangent, tangent_error, converged=not missing, shortfalls=missing)
-    numbers, bounds = told(value, lambda cell: cell.v), told(value, lambda cell: cell.e)
+    numbers, bounds = told(value, lambda cell: cell.v), told(value, lambda cell: bar(cell.e))
     tangents = tangent_bounds = None
     if any(cell.t for cell in all_cells(value)):
         tangents = told(value, lambda cell: cell.t[0] if cell.t else None)
-        tangent_bounds = told(value, lambda cell: cell.et[0] if cell.t else None)
+        tangent_bounds = told(value, lambda cell: bar(cell.et[0]) if cell.t else None)
     shown = _flat(numbers, bounds)
     slopes = _slopes(value)
     missing = _missing([*shown, *slopes], machine)
@@ -229,7 +229,7 @@ def _slopes(value: Value) -> list[tuple[Any, Any]]:
         return [pair for row in value.rows() for pair in _slopes(row)] if any(c.t for c in all_cells(value)) else []
     if isinstance(value, tuple | list):
         return [pair for item in value for pair in _slopes(item)]
-    return [(number(t), number(et)) for c in all_cells(value) for t, et in zip(c.t, c.et, strict=True)]
+    return [(number(t), number(bar(et))) for c in all_cells(value) for t, et in zip(c.t, c.et, strict=True)]
 
 
 def _missing(flat: list[tuple[Any, Any]], machine: Machine) -> Shortfalls:
@@ -292,6 +292,13 @@ def told_rows(rows: Rows, part: Callable[[Cell], Number | None]) -> list[Any]:
 def number(part: Number | None) -> Number:
     """A part of a number; 0 where it is missing."""
     return part if isinstance(part, np.ndarray) else 0.0 if part is None else float(part)
+
+
+def bar(error: Number | None) -> Number | None:
+    """How far off a number may be: by anything, where rules of errors come to no number, as for `inf*0`."""
+    if isinstance(error, np.ndarray):
+        return np.where(np.isnan(error), np.inf, error)
+    return np.inf if error is not None and error != error else error
 
 
 def _flat(numbers: Any, bounds: Any) -> list[tuple[Any, Any]]:

@@ -20,7 +20,10 @@ from potto.integrate.rules.intervals import ANYTHING, Interval, enclosure
 from potto.integrate.rules.substitution import Segments, choose
 from potto.kernels.cells import Array, Cell, Ints, Value
 
-SIZES = 4.0 ** np.arange(-22, 23)  # of shells, before one of them is looked at more closely
+# Of shells, before one of them is looked at more closely; far out as large as rounding lets `k*log(x) - x` be told from
+# 0. Of infinity itself that says nothing, so that the last one ends where numbers nearly do.
+SIZES = np.concatenate((4.0 ** np.arange(-22, 23), 2.0 ** np.arange(84, 964, 40)))
+FARTHEST = 2.0**964
 PARTS = 32  # into which that is divided
 NOTHING = EPS * EPS  # of what a shell holds at most
 
@@ -153,7 +156,7 @@ class _Range:
 
     def end(self, side: float, start: Array, volume: Array) -> tuple[Array, Array]:
         """The nearest place beyond which there is next to nothing, inf if there is none, and how much there is."""
-        far = start[:, None] + side * np.concatenate(([0.0], SIZES, [np.inf]))
+        far = start[:, None] + side * np.concatenate(([0.0], SIZES, [FARTHEST]))
         held = self.held(side, far, volume)
         most = np.max(held, axis=1, initial=0.0, where=np.isfinite(held))
         row = np.arange(start.size)

@@ -43,7 +43,7 @@ def attempted(problem: Problem, order: Integral, most: int | None) -> Attempt:
     if bounded:
         machine = machine.changed(settings=replace(machine.settings, max_evals=math.ceil(limit)))
     sums = in_parts(problem.plan(order), machine, problem.env, problem.batch)
-    return Attempt(order, sums, machine.events, bounded and machine.exhausted())
+    return Attempt(order, sums, machine.events, most is not None and machine.exhausted())
 
 
 def uncertainty(sums: Sums) -> float:

@@ -1,6 +1,6 @@
 """What is tried for an integral: variables eliminated, cut along, or sampled, and which of them innermost.
 
-Owns `too_many`, `many`, `orders`, `preferred` and `trial`.
+Owns `too_many`, `many`, `orders`, `preferred`, `trial` and `worth_trials`.
 """
 
 from __future__ import annotations
@@ -27,6 +27,9 @@ FEW_OF_PRODUCT = 500
 # Evaluations that are spent on one order of two variables before another one is tried; how many times those of one
 # variable more.
 TRIAL, TRIAL_FACTOR = 50_000, 6
+# One in so many of all evaluations that there are may go into a trial, and into all of them together: the nodes that an
+# order begins with may be more than was meant for it.
+TRIED, ALL_TRIED = 64, 8
 
 
 def too_many(problem: Problem) -> bool:
@@ -79,7 +82,14 @@ def trial(problem: Problem) -> int | None:
         return None
     if len(list(itertools.islice(orders(problem.term), 2))) < 2 and not passes_on(problem):
         return None
-    return TRIAL * TRIAL_FACTOR ** (count - 2)  # type: ignore[no-any-return]
+    most: int = TRIAL * TRIAL_FACTOR ** (count - 2)
+    return min(most, problem.machine.settings.max_evals // TRIED)
+
+
+def worth_trials(problem: Problem) -> bool:
+    """Whether there are evaluations left for more trials."""
+    machine = problem.machine
+    return machine.record.spent * ALL_TRIED < machine.settings.max_evals
 
 
 def passes_on(problem: Problem) -> bool:

@@ -26,7 +26,7 @@ from potto.integrate.plan import Plan
 from potto.kernels.cells import Ints
 from potto.runtime.integration.at_kinks import at_kinks
 from potto.runtime.integration.attempts import Attempt, attempted, best, uncertainty
-from potto.runtime.integration.choices import many, passes_on, preferred, too_many, trial
+from potto.runtime.integration.choices import many, passes_on, preferred, too_many, trial, worth_trials
 from potto.runtime.integration.differences import by_differences
 from potto.runtime.integration.elimination import ACCURATE, WORTH, accurate, eliminated, step_by_step
 from potto.runtime.integration.members import by_members, one_by_one
@@ -106,6 +106,8 @@ def along_cuts(problem: Problem) -> Sums:
             return finished(problem, found)
         if not along:
             stopped.append(found)
+            if not worth_trials(problem):
+                break
     if stopped:
         return with_all(problem, stopped, most or 0)
     events.take(found.events, np.arange(problem.batch))
@@ -120,14 +122,15 @@ def with_all(problem: Problem, tried: list[Attempt], most: int) -> Sums:
     """
     machine, longer = problem.machine, list[Attempt]()
     for known in sorted(tried, key=lambda attempt: uncertainty(attempt.sums)):
-        found = attempted(problem, known.order, LONGER * most)
+        bounded = passes_on(problem) or worth_trials(problem)
+        found = attempted(problem, known.order, LONGER * most if bounded else None)
         if found.events.every(Degenerate):
             continue
         longer.append(found)
-        if found.stopped or accurate(found.sums, machine.rtol, machine):
+        if machine.exhausted() or found.stopped or accurate(found.sums, machine.rtol, machine):
             break  # those that are not accurate though they came to an end may be in another order
     if not longer or not longer[-1].stopped:
-        return finished(problem, best(longer or tried))
+        return finished(problem, best((*tried, *longer)))
     tables = eliminated(problem) if passes_on(problem) else []
     if tables and accurate(tables[0].sums, max(ACCURATE, machine.rtol), machine):
         return tables[0].sums
