@@ -9,8 +9,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from potto.core.terms import (
+    ZERO,
     App,
     Branch,
+    Const,
     Delta,
     Deriv,
     Global,
@@ -19,6 +21,7 @@ from potto.core.terms import (
     Index,
     Integral,
     Lam,
+    Prim,
     Proj,
     Sum,
     Term,
@@ -42,7 +45,7 @@ from potto.modules.builtins import DERIVATIVES, VECTORS
 from potto.source import Span
 from potto.syntax import nodes
 from potto.types import interface
-from potto.types.still import lacks_tangents
+from potto.types.still import is_dual, lacks_tangents
 from potto.types.types import ArrayOf, SizeVar, Type, resolve
 
 Arguments = Sequence[Given[Value]]
@@ -130,7 +133,8 @@ def _of_one_size(elaboration: Elaboration, function: Term, args: tuple[Term, ...
 
 
 def _with_tangents(elaboration: Elaboration, function: Term, args: tuple[Term, ...]) -> tuple[Term, ...]:
-    """The arguments of a derivative; tuples and records that are given without tangents with those that are 0."""
+    """The arguments of a derivative; numbers, tuples and records that are given without tangents with those that are
+    0."""
     head = function
     while isinstance(head, App):
         head = head.function
@@ -140,14 +144,20 @@ def _with_tangents(elaboration: Elaboration, function: Term, args: tuple[Term, .
     elif not (isinstance(head, Deriv) and isinstance(head.function, Global)):
         return args
     expected = elaboration.shapes.parameters(function)
-    return (
-        tuple(
-            tuple_((arg, standing(elaboration, arg))) if lacks_tangents(elaboration.shapes.of(arg), wanted) else arg
-            for arg, wanted in zip(args, expected)
-        )
-        if len(expected) == len(args)
-        else args
-    )
+    if len(expected) != len(args):
+        return args
+    found = list(args)
+    for place, (arg, wanted) in enumerate(zip(args, expected)):
+        if lacks_tangents(elaboration.shapes.of(arg), wanted):
+            found[place] = tuple_((arg, standing(elaboration, arg)))
+        elif is_dual(wanted) and _is_number(elaboration, arg):
+            found[place] = tuple_((arg, ZERO))
+    return tuple(found)
+
+
+def _is_number(elaboration: Elaboration, arg: Term) -> bool:
+    """Whether a term is a number by its form; others may be duals."""
+    return isinstance(arg, Const | Prim | Sum | Integral) or (isinstance(arg, Var) and arg.name in elaboration.numbers)
 
 
 def _values(elaboration: Elaboration, count: int, filling: Filling[Value]) -> tuple[Value, ...]:

@@ -51,6 +51,7 @@ class Evaluator(Protocol):
     def backend(self) -> str: ...
     def count(self, evaluations: int) -> None: ...
     def exhausted(self) -> bool: ...
+    def overdrawn(self) -> bool: ...
     @property
     def side(self) -> int: ...
     @property
@@ -194,6 +195,14 @@ class Pieces(Columns):
     def places(self, index: Any) -> Pieces:
         """Some of the pieces, not measured yet."""
         return Pieces(self.segment[index], self.u0[index], self.u1[index], self.end[index])
+
+    def unmeasured(self, like: Pieces) -> Pieces:
+        """The pieces as ones of which nothing is known, with as many channels as others have."""
+        for name in ("integral", "floor", "size", "most", "ends", "tail"):
+            setattr(self, name, np.zeros((getattr(like, name).shape[0], self.u0.size)))
+        self.error = np.full(self.integral.shape, np.inf)
+        self.lean = np.zeros(self.u0.size, dtype=np.int64)
+        return self
 
     def held_against(self, again: Pieces, at: Any) -> None:
         """The pieces `at`, measured again with more nodes: off by no more than that changed them."""

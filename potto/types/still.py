@@ -1,8 +1,9 @@
 """Tuples and records without tangents where a derivative takes them with some: they stand still, as a number does.
 
-Owns `lacks_tangents`, which types and elaboration both ask, and `stands_still`, whether a call may leave them out. A
-pair of numbers could be a number with its tangent: what is expected decides. So the derivative has to be one of a
-definition, whose type is known; and a term has to show what an argument is, since elaboration sees nothing else.
+Owns `lacks_tangents` and `is_dual`, which types and elaboration both ask, and `stands_still`, whether a call may leave
+them out. A pair of numbers could be a number with its tangent: what is expected decides. So the derivative has to be
+one of a definition, whose type is known; and a term has to show what an argument is, since elaboration sees nothing
+else.
 """
 
 from __future__ import annotations
@@ -20,6 +21,16 @@ def lacks_tangents(actual: Type, expected: Type) -> bool:
     """Whether a tuple or a record is given for itself and its tangents."""
     values = values_of(expected)
     return values is not None and _alike(actual, values)
+
+
+def is_dual(expected: Type) -> bool:
+    """Whether a number with its tangent is expected."""
+    wanted = resolve(expected)
+    return (
+        isinstance(wanted, TupleOf)
+        and len(wanted.items) == 2
+        and all(isinstance(resolve(t), Real) for t in wanted.items)
+    )
 
 
 def values_of(expected: Type) -> TupleOf | None:

@@ -34,3 +34,12 @@ def f(t) integral [0, 1] fst (dstep ((x, 0), (t, 0))) d(x)
 """)
     got = potto.deriv(m.f)((0.4, 1.0))
     assert abs(got.value - 0.4) <= 1e-15 and abs(got.tangent - 1) <= 1e-15
+
+
+def test_a_variable_of_integration_stands_still_in_a_call_of_a_derivative() -> None:
+    """d/db of [a < b]*a^2*b, with its jump at a = b: int_0^t x^2 dx + t^3."""
+    m = potto.compile("""
+def part(a, b) [a < b]*a^2*b
+def f(t) integral [0, 1] snd(deriv(part)(x, (t, 1))) d(x)
+""")
+    assert abs(m.f(0.5).value - (0.5**3 / 3 + 0.5**3)) <= 1e-15

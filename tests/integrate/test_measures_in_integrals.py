@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -144,3 +145,24 @@ def test_what_grows_fast_towards_a_cut_is_no_power_of_the_distance_to_it() -> No
     found = potto.grad(GROWING.moment, "k")(1.0, 1.0)
     assert found.converged and found.value == pytest.approx(math.exp(0.5), rel=1e-14)
     assert found.error < 1e-12 and found.stats["evaluations"] < 400  # 862, and no more than 10 digits, where graded
+
+
+def test_a_periodic_condition_under_a_gamma_density() -> None:
+    """The mass of gamma(2, r) on the stretches where sin(5x) < t, by its distribution function 1 - (1 + r x) exp(-r x);
+    r x*exp(-r x) is told to be nothing far out, where log(x) grows without end."""
+    r, t = 1.5, 0.35
+    with mp.workdps(30):
+
+        def mass(level: Any) -> Any:
+            low = mp.asin(level)
+            turns = range(60)
+            ends = [(low / 5, (mp.pi - low) / 5)] + [((2 * k * mp.pi + low) / 5, ((2 * k + 1) * mp.pi - low) / 5)
+                                                   for k in turns[1:]]  # fmt: skip
+            tail = [(1 + r * a) * mp.exp(-r * a) - (1 + r * b) * mp.exp(-r * b) for a, b in ends]
+            return 1 - mp.fsum(tail)
+
+        value, slope = mass(mp.mpf(t)), mp.diff(mass, mp.mpf(t))
+    f = potto.compile(f"def f(t) integral (x ~ gamma(2, {r})) [sin(5*x) < t] d(x)").f
+    answer = potto.deriv(f)((t, 1.0))
+    assert abs(answer.value - value) <= answer.error <= 1e-12
+    assert abs(answer.tangent - slope) <= answer.tangent_error <= 1e-11

@@ -90,7 +90,7 @@ def endless(work: PanelBatch, found: Totals) -> Array | None:
 
     None where all are finite, as far as can be told.
     """
-    if work.number or not work.k:
+    if work.number or not work.k or work.machine.overdrawn():
         return None
     error = found.moving[1] if found.fixed is None else np.minimum(found.moving[1], found.fixed[1])
     rough: Any = ~(error <= SETTLED * np.abs(found.moving[0])) & ~(error <= SETTLED * found.size[:, :1])

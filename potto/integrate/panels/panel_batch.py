@@ -11,6 +11,8 @@ from contextlib import nullcontext
 import numpy as np
 from msgspec import Struct
 
+from potto.integrate.columns import distinct
+from potto.integrate.events import BUDGET_SPENT
 from potto.integrate.levels import LevelPlan
 from potto.integrate.panels.iterated import Iterated
 from potto.integrate.panels.mending import mend
@@ -83,8 +85,7 @@ class PanelBatch(Struct, dict=True):
         """
         rows = max(1, CHUNK // order)
         if p.segment.size > rows:
-            chunks = (slice(i, i + rows) for i in range(0, p.segment.size, rows))
-            return all_of([self.measure(p.places(chunk), order) for chunk in chunks])
+            return self.in_chunks(p, order, rows)
         rule = gauss(order)
         if whole:
             seg = self.seg
@@ -112,6 +113,18 @@ class PanelBatch(Struct, dict=True):
         if inner is not None:
             p.floor = p.floor + np.abs(inner) @ rule.weights
         return p
+
+    def in_chunks(self, p: Pieces, order: int, rows: int) -> Pieces:
+        """So many pieces at a time; what is left when far more is spent than there was is not known."""
+        parts: list[Pieces] = []
+        for start in range(0, p.segment.size, rows):
+            if parts and self.machine.overdrawn():
+                rest = p.places(slice(start, None))
+                self.machine.note(BUDGET_SPENT, self.below(distinct(self.seg.owner[rest.segment])))
+                parts.append(rest.unmeasured(parts[0]))
+                break
+            parts.append(self.measure(p.places(slice(start, start + rows)), order))
+        return all_of(parts)
 
     def estimate(self, p: Pieces, seg: Segments, h: Array, rule: Rule, shake: Array) -> None:
         """Integrals of pieces from the values of their channels (C, P, n), their errors and rounding floors."""

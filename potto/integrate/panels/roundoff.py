@@ -52,12 +52,10 @@ def noise(ends: Ends, width: int, p: Pieces, seg: Segments) -> Array:
     More than a few units in the last place where terms of parameters cancel, or where sines of them have large
     arguments. What only grows towards one end is rounding of the variable, which is counted elsewhere.
     """
-    shares = [
-        np.divide(e, np.abs(f), out=np.full(f.shape, np.inf), where=(f != 0) & np.isfinite(f))
-        for f, e in ((ends.low, ends.low_error), (ends.high, ends.high_error))
-    ]
+    here = ((f[:, p.segment], e[:, p.segment]) for f, e in ((ends.low, ends.low_error), (ends.high, ends.high_error)))
+    shares = [np.divide(e, np.abs(f), out=np.full(f.shape, np.inf), where=(f != 0) & np.isfinite(f)) for f, e in here]
     share = np.minimum(*shares)
-    share = np.where((share > 4 * EPS) & (share < 1), share, 0.0)[:, p.segment]
+    share = np.where((share > 4 * EPS) & (share < 1), share, 0.0)
     share = np.where(seg.kind == substitution.LINEAR, share, 0.0)  # at a turning point little is left to be rounded
     sizes = p.size.reshape(width, -1, p.u0.size)
     return np.asarray((share[:, None] * sizes).reshape(p.size.shape))

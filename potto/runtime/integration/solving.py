@@ -121,6 +121,8 @@ def with_all(problem: Problem, tried: list[Attempt], most: int) -> Sums:
     most: the evaluations that each trial took.
     """
     machine, longer = problem.machine, list[Attempt]()
+    if machine.overdrawn():  # so many cuts that the first nodes of a trial are more than there are
+        return finished(problem, best(tried))
     for known in sorted(tried, key=lambda attempt: uncertainty(attempt.sums)):
         bounded = passes_on(problem) or worth_trials(problem)
         found = attempted(problem, known.order, LONGER * most if bounded else None)
