@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
 from contextlib import nullcontext
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from msgspec import Struct, field
@@ -101,12 +102,15 @@ def in_tiles(
         some = [(name, map_arrays(value, lambda a: a[at])) for name, value in arguments]
         return whole(function, given, wrt, some, Batch((part[1] - part[0],)))
 
-    flat = flattened(given, batch)
     chosen = current(function._world.settings(function._file))
     bare = type(function)(function._world, function._file, function._expr, function._whole)
 
+    @cache
+    def flat() -> Any:
+        return flattened(given, batch)
+
     def task(parts: list[Part]) -> Task:
-        return Task(bare, tuple(cut(flat, slice(*part)) for part in parts), wrt, chosen, wanted())
+        return Task(bare, tuple(cut(flat(), slice(*part)) for part in parts), wrt, chosen, wanted())
 
     key = (function._call(given).elaborated, wrt, chosen)
     return batch.shaped(_Tiles(count, here, task, key).run(None if function._world._held else executor()))

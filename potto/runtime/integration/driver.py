@@ -169,7 +169,8 @@ def _in_cases(problem: Problem, flat: dict[str, Value]) -> Sums:
     apart = problem.apart()
     try:
         sums = solve(apart)
-        problem.events.take(apart.events, np.arange(batch))
+        if apart.events:
+            problem.events.take(apart.events, np.arange(batch))
         return sums
     except Mixed as mixed:
         fits = np.asarray(mixed.fits)

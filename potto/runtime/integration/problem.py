@@ -207,7 +207,8 @@ class Problem:
         return known[0]
 
     def courses(self) -> list[Ints]:
-        """The members for which recursions and sums under the integral take the same course, each with the others."""
+        """The members for which recursions and sums under the integral take the same course, each with the others;
+        nothing where that is one for all."""
         known = self.known.deciding
         if not known:
             bounds = (bound for pair in self.term.bounds for bound in pair)
@@ -215,7 +216,7 @@ class Problem:
         cells = (self.env.get(name) for name in sorted(known[0]))
         rows = [c.v for c in cells if isinstance(c, Cell) and isinstance(c.v, np.ndarray) and c.v.size > 1]
         if not rows:
-            return [np.arange(self.batch)]
+            return []
         _, where = np.unique(np.stack(rows), axis=1, return_inverse=True)
         where = np.asarray(where).reshape(-1)
         return [np.nonzero(where == number)[0] for number in range(int(where.max()) + 1)]
