@@ -137,7 +137,7 @@ def test_mistakes(measure: str, says: str) -> None:
 
 @pytest.mark.xfail(strict=True, reason="the far edge of a density is narrow beside the stretch at whose end it lies")
 def test_the_far_edge_of_a_density_under_another_one() -> None:
-    """Along x, outermost, from 1.5 on, is what is left of a normal density's edge: 3e-6 of the whole, within a hundredth
+    """Along x, outermost, from 1.5 on, is what is left of a normal density's edge: 3e-6 of it, within a hundredth
     of the stretch, which 14 nodes do not see. (The other order of variables has no such edge.) d/dt by mpmath."""
     f = potto.compile("""
 def f(t)
