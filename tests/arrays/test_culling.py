@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import potto
+from potto.__main__ import main
 from potto.runtime.integration import culling
 
 MESH = """
@@ -142,3 +144,17 @@ def f(a: [n] Real, p) sum x in a (integral [p, p + 0.1] [x < s]*[s < x + 0.05]*e
     assert np.all(np.abs(found.value - exact) <= found.error + 1e-15)
     assert np.all(found.error < 1e-12)
     assert found.converged
+
+
+def test_the_statistics_say_how_many_were_left_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of a thousand strips, each a thousandth wide, a square of a hundredth meets those that are as near as that."""
+    program = tmp_path / "strips.po"
+    program.write_text(
+        "def strip(i, x) [x > i/1000 and x < (i + 1)/1000]\n"
+        "def seen(a) integral ([a, a + 0.01], [0, 0.01]) sum i in 0..999 (strip(i, x)*y) d(x, y)\n"
+    )
+    assert main(["eval", str(program), "seen(0.3005)", "--stats"]) == 0
+    out, told = capsys.readouterr()
+    assert float(out) == pytest.approx(0.01 * 0.01**2 / 2, rel=1e-12)  # they cover all of it
+    left = int(told.split("integrals culled: ")[1].split()[0].replace(",", ""))
+    assert 985 <= left <= 989  # eleven strips meet it; enclosures may keep a neighbour at either side

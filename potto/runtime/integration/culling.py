@@ -41,7 +41,7 @@ def culled(machine: Machine, term: Sum, first: int, last: int, env: Env) -> Valu
     """The sum over the pairs that may be something; None where that cannot be told, or is most of them."""
     shape = np.broadcast_shapes(*(a.shape for value in env.values() for a in all_arrays(value)))
     members, count = int(np.prod(shape)), last - first + 1
-    if not machine.root or members * count < FEW or machine.costs is not None:
+    if not machine.root or members * count < FEW:
         return None
     integral = _integral(term.body, machine.linker.reach)
     if integral is None:
