@@ -51,7 +51,7 @@ def _truncated() -> Optimum:
 
 
 def _censored() -> Optimum:
-    """After Weibull with shape 3/2, in units of time^(3/2) the rate is how many ended, over how long all were watched."""
+    """After Weibull with shape 3/2, by time^(3/2): the rate is how many ended, over how long all were watched."""
     watched = (0.8, 1.1, 1.9, 2.4), (1.2, 2.9, 2.2, 3.5)
     plain, treated = ((3 / sum(t**1.5 for t in times)) ** (1 / 1.5) for times in watched)
     return {"rate": plain, "treatment": float(mp.log(plain / treated))}
