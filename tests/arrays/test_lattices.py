@@ -18,6 +18,7 @@ def lit(photo: [h, w] Real, a, b, s) integral ([a, a + s], [b, b + s]) image(pho
 def above(photo: [h, w] Real, a, b, s, t) integral ([a, a + s], [b, b + s]) [image(photo, u, v) > t] d(u, v)
 def table(xs: [n] Real, ys: [n] Real, a, b) integral [a, b] interp(xs, ys, x)^2 d(x)
 def higher(xs: [n] Real, ys: [n] Real, a, b, t) integral [a, b] [interp(xs, ys, x) > t]*x d(x)
+def beyond(photo: [h, w] Real, a, b, c) integral ([0, 1], [0, 1]) image(photo, u, v)*[a*u + b*v > c] d(u, v)
 def across(photo: [h, w] Real, c, t) integral [0, 1] [image(photo, c*x, x) > t] d(x)
 """
 
@@ -149,6 +150,30 @@ def test_a_look_up_along_one_variable_in_both_directions(programs: potto.Module)
     found = potto.grad(programs.across, "t")(photo, 1, t)  # (2x - 1/2)^2 > t, from (sqrt(t) + 1/2)/2 on
     assert abs(found.value - (1 - (0.6 + 0.5) / 2)) <= found.error + 1e-16 < 1e-11
     assert abs(found.tangent + 1 / (4 * 0.6)) <= found.tangent_error + 1e-15 < 1e-11
+
+
+@pytest.mark.parametrize(
+    ("size", "a", "b", "c"), [((8, 8), 1.0, 0.7, 0.8), ((3, 5), 0.3, 1.1, 0.6), ((1, 4), 2, 0.5, 1)]
+)
+def test_an_edge_that_leans(programs: potto.Module, size: tuple[int, int], a: float, b: float, c: float) -> None:
+    """The walk is from cell to cell, and cells that the edge crosses are cut by it: eight nodes a cell at most."""
+    photo = np.random.default_rng(3).uniform(0, 1, size)
+    h, w = size
+    start, end, slope = mp.mpf(c) / a, mp.mpf(c - b) / a, mp.mpf(a) / b  # where the edge meets v = 0 and v = 1
+
+    def row(v: mp.mpf) -> mp.mpf:
+        first = min(max(start + (end - start) * v, 0), 1)
+        return exact(lambda u: bilinear(photo, u, v), borders(first, 1, w))
+
+    along_v = [*borders(0, 1, h), *((start - u) / (start - end) for u in borders(0, 1, w))]
+    value = exact(row, sorted(v for v in along_v if 0 <= v <= 1))
+    low, high = max(end, 0), min(start, 1)
+    along_u = [*borders(0, 1, w), low, high, *(start - v / slope for v in borders(0, 1, h))]
+    crossed = exact(lambda u: bilinear(photo, u, (start - u) * slope), sorted(u for u in along_u if low <= u <= high))
+    found = potto.grad(programs.beyond, "c")(photo, a, b, c)
+    assert found.value == pytest.approx(float(value), rel=1e-13)  # polynomials on polygons: nothing but rounding
+    assert found.tangent == pytest.approx(float(-crossed / b), rel=1e-12)
+    assert found.stats["evaluations"] <= 8 * (h + 1) * (w + 1)
 
 
 def test_a_surface_on_the_border_of_two_cells() -> None:
