@@ -187,6 +187,11 @@ NOT_A_NUMBER = Shortfall(
 )
 INFINITE = Shortfall("the integral is infinite, or beyond what numbers can hold", POLE)
 NO_BOUND = Shortfall("the error is not known")
+UNBOUNDED_SAMPLES = Shortfall(
+    "samples give no bound of the error",
+    "use quadrature (`--method quadrature`), or sample more (`--samples`); samples do not settle what has a pole, or a "
+    "tail that falls slowly",
+)
 TOO_FEW = Shortfall("so many samples give fewer digits than were asked for", f"sample more (`--samples`) or {LESS}")
 NO_DIGITS = Shortfall(
     "no accuracy was reached: the integral diverges, its integrand is too rough, or rounding hides it",

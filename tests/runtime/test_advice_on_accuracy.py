@@ -41,6 +41,17 @@ def test_the_accuracy_that_is_proposed_can_be_had(text: str, budget: int) -> Non
     assert abs(again.value - float(HARD[text]())) <= float(proposed[1]) * abs(again.value)
 
 
+@pytest.mark.parametrize("method", ["mc", "qmc"])
+def test_samples_without_a_bound_are_sent_to_quadrature(method: str) -> None:
+    module = potto.compile("")
+    with potto.settings(method=method):
+        answer = module.eval("integral [0, 1] x^(-0.9) d(x)")
+    assert not answer.converged and '`potto.settings(method="quadrature")`' in answer.advice
+    with potto.settings(method="quadrature"):
+        again = module.eval("integral [0, 1] x^(-0.9) d(x)")
+    assert again.converged and abs(again - 10) <= again.error + 1e-13  # 1/(1 - 0.9), to the rounding of 0.9
+
+
 def test_what_is_proposed() -> None:
     assert attainable(2.0, 1e-5) == 3e-5  # five times 5e-6, rounded up
     assert attainable((2.0, 4.0), (1e-5, 1e-4)) == 2e-4 and attainable((2.0, 4.0), (0.0, 1e-4)) == 2e-4

@@ -28,6 +28,7 @@ from potto.integrate.events import (
     ROUNDED,
     TOO_FEW,
     TOO_LARGE,
+    UNBOUNDED_SAMPLES,
     Shortfall,
 )
 from potto.integrate.pieces import Sums, together
@@ -160,6 +161,7 @@ def _told(v: Array, e: Array, drawn: bool) -> Sequence[tuple[Shortfall, Any]]:
         (NO_VALUE, nan & np.isinf(e)),
         (NOT_A_NUMBER, nan),
         (INFINITE, np.isinf(v)),
+        (UNBOUNDED_SAMPLES, ~np.isfinite(e) & drawn),
         (NO_BOUND, ~np.isfinite(e)),
         (TOO_FEW, np.full(v.shape, drawn)),
         (NO_DIGITS, lost),
