@@ -11,6 +11,7 @@ import os
 import statistics
 import sys
 import tempfile
+import time
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from lsp_client import Client
 from lsp_typing import place_of
 from lsp_workspace import definition
 
-SIZES = (100, 1_000, 2_000, 20_000)
+SIZES = (100, 300, 1_000, 2_000, 5_000, 20_000)
 KEYS = 9
 METHODS = (
     "codeLens", "semanticTokens/full", "documentSymbol", "inlayHint", "foldingRange", "documentLink", "formatting",
@@ -49,6 +50,13 @@ class Whole:
         self.client.diagnosed("large")
         self.client.quiet(1.0)
         self.opened = self.client.processor() * 1e3
+
+    def rest(self) -> None:
+        """Wait until live expressions that were asked for are evaluated: the server and its processes do nothing."""
+        before = -1.0
+        while self.client.processor() - before > 0.005:
+            before = self.client.processor()
+            time.sleep(0.5)
 
     def cost(self, method: str) -> float:
         """Milliseconds of processor time for a request."""
@@ -84,6 +92,7 @@ def sizes_measured(sizes: tuple[int, ...] = SIZES) -> Rows:
             rows.setdefault("opened and checked, cold", {})[size] = whole.opened
             for method in METHODS:
                 rows.setdefault(f"{method}, cold", {})[size] = whole.cost(method)
+            whole.rest()
             costs: dict[str, list[float]] = {}
             for turn in range(KEYS):
                 costs.setdefault("a key, with all that follows it", []).append(whole.key(turn))
@@ -104,21 +113,27 @@ def table(rows: Rows) -> str:
 
 
 def drawn(rows: Rows, file: Path) -> None:
-    """A picture of what is asked after a key against the lines of the file."""
+    """A picture of what is asked after a key against the lines of the file; of `NAME-light.png` also the dark one."""
     import matplotlib
 
     matplotlib.use("agg")
     from matplotlib import pyplot
 
-    figure, axes = pyplot.subplots(figsize=(7, 4.5), layout="constrained")
-    for what, costs in rows.items():
-        if "cold" not in what:
-            axes.loglog(list(costs), list(costs.values()), marker="o", markersize=3, label=what)
-    axes.set_xlabel("lines of the file")
-    axes.set_ylabel("ms of processor time")
-    axes.grid(alpha=0.3)
-    axes.legend(fontsize=7)
-    figure.savefig(file)
+    looks = {file: "default"}
+    if "-light." in file.name:
+        looks[file.with_name(file.name.replace("-light.", "-dark."))] = "dark_background"
+    for target, style in looks.items():
+        with pyplot.style.context(style):
+            figure, axes = pyplot.subplots(figsize=(7, 4.5), layout="constrained")
+            for what, costs in rows.items():
+                if "cold" not in what:
+                    axes.loglog(list(map(int, costs)), list(costs.values()), marker="o", markersize=3, label=what)
+            axes.set_xlabel("lines of the file")
+            axes.set_ylabel("ms of processor time")
+            axes.grid(alpha=0.3)
+            axes.legend(fontsize=7)
+            figure.savefig(target, dpi=150)
+            pyplot.close(figure)
 
 
 def main() -> None:

@@ -65,6 +65,15 @@ def test_a_slider_moves_the_numbers(address: str) -> None:
         assert "<svg" in found["svg"]
 
 
+def test_while_a_slider_is_dragged_four_digits_are_asked_for(address: str) -> None:
+    """Of x^2 + y^2 < 1 the area is pi; the error bar holds what is missing."""
+    question = {"name": "disc", "values": {"r": 1.0}, "wrt": "r", "which": 0}
+    quick, fine = (asked(address, "/look", {**question, "quick": quick})["numbers"] for quick in (True, False))
+    assert quick["error"] >= fine["error"]
+    for found in (quick, fine):
+        assert abs(found["value"] - math.pi) <= found["error"] <= 1e-3
+
+
 def test_text_and_picture_call_a_surface_the_same(address: str) -> None:
     found = asked(address, "/open", {"name": "f"})
     (mark,) = found["conditions"]

@@ -30,20 +30,27 @@ const dark = () =>
          : matchMedia("(prefers-color-scheme: dark)").matches;
 const shade = () => document.documentElement.classList.toggle("dark", dark());
 
-// Asking: the newest state wins, nothing queues.
+// Asking: the newest state wins, nothing queues. While a slider is dragged answers are coarse, with error bars that say so,
+// and a fine one follows when it rests.
 
+const REST = 120; // ms
 let busy = false;
-let newest = false;
+let newest = false; // whether something is still to be asked
+let dragged = false;
+let resting = 0;
 async function look() {
   if (busy) { newest = true; return; }
   busy = true;
+  newest = false;
+  clearTimeout(resting);
+  const quick = dragged;
   const opening = begun;
   const since = performance.now();
   const { name, values, wrt, which } = state;
   const body = { name, values: { ...values }, wrt, which, dark: dark(), nodes: $("nodes").checked };
   if ($("ghost").checked) body.ghost = Math.max(1e-9, +$("step").value * Math.max(1, Math.abs(values[wrt] ?? 0)));
   try {
-    const found = await ask("/look", body);
+    const found = await ask("/look", { ...body, quick });
     if (opening === begun) {
       say(found.error ?? "");
       if (!found.error) {
@@ -56,7 +63,11 @@ async function look() {
     say("the view's server has ended; start it again");
   }
   busy = false;
-  if (newest) { newest = false; look(); }
+  if (newest) look();
+  else if (quick) {
+    newest = true;
+    resting = setTimeout(() => { dragged = false; look(); }, REST);
+  }
 }
 
 /** Light or dark has changed: what is pinned is drawn anew too. */
@@ -169,6 +180,7 @@ function sliders() {
     slider.oninput = () => {
       state.values[name] = +slider.value;
       told.textContent = String(+(+slider.value).toPrecision(6));
+      dragged = true;
       look();
     };
     const label = make("label", {}, make("span", { className: "name", textContent: name }), slider, told);
