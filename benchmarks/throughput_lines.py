@@ -19,6 +19,7 @@ import throughput_by_hand as hand
 from run import by_hand, exact_quad, gauss
 
 import potto
+from potto.python.workers import Workers
 
 FAR = 1e-7  # an answer that is further off than this is wrong, and its time not worth telling
 
@@ -209,6 +210,36 @@ def kernel_points(asked: Asked) -> Iterator[Row]:
             yield held("points", n, timed(ours, asked), far, (theirs, by_c), asked, (1.5, 1.5))
 
 
+# Two cores
+
+WAVES = """
+def waves(px, py, c)
+    integral ([px, px + 1/128], [py, py + 1/128]) exp(-x*y)*[sin(7*x + c) + cos(9*y*x) > 0.3] d(x, y)
+"""
+SHARED = 1600  # pixels a side: a few seconds of work, of which a process gets forty blocks
+
+
+def cores(asked: Asked) -> Iterator[Row]:
+    """A picture with edges that are searched, by one process and by two; by the clock, as nothing else tells."""
+    slope, (x, y) = potto.grad(potto.compile(WAVES).waves, "c"), hand.pixels(SHARED)
+
+    def clocked() -> tuple[Any, float]:
+        best, found = math.inf, None
+        for _ in range(3):
+            start = time.perf_counter()
+            found = slope(x, y, 0.2)
+            best = min(best, time.perf_counter() - start)
+        return found, best
+
+    alone, one = clocked()
+    with Workers(2) as pool, potto.settings(executor=pool):
+        slope(x, y, 0.2)  # the processes start
+        shared, two = clocked()
+    far = off((shared.value, shared.tangent), (alone.value, alone.tangent))
+    yield Row("by one process", x.size, one, 0.0)
+    yield Row("by two", x.size, two, far, ratio=1.7 * two / one, note=f"{one / two:.2f} times as fast, goal 1.7")
+
+
 # Samples
 
 SAMPLED = """
@@ -386,6 +417,7 @@ LINES: dict[str, tuple[str, Callable[[Asked], Iterator[Row]]]] = {
     "sweep": ("the same at many values of c in one call", sweep),
     "pictures": ("512 x 512 pixels, value and derivative", pictures),
     "pairs": ("(triangle, pixel) pairs, value and 6 derivatives each", mesh_pairs),
+    "cores": ("a picture by one process and by two, by the clock", cores),
     "samples": ("a million samples", sampling),
     "kernel": ("a kernel: the shader and its derivative at points", kernel_points),
     "shading": ("a pixel of a coloured triangle, squared loss, gradient in 10 parameters", shading),

@@ -4,8 +4,8 @@ Owns `in_tiles` and `Interrupted`. A batch is evaluated in blocks, whose size th
 the clock and the process keeps: so answers are the same to the last bit wherever and in whatever company a block is
 evaluated, by the same backend. (They are not quite if members are blocked otherwise: numpy adds up rows and columns in
 another order then, which changes the last one or two digits, far within the error bars.) A tile is as many blocks as
-take half a second; tiles go to the executor of `potto.settings`. What an executor loses (a process that was killed, a
-machine that is gone) is evaluated again: by it, and then here.
+take half a second, or fewer, so that every worker gets some; tiles go to the executor of `potto.settings`. What an
+executor loses (a process that was killed, a machine that is gone) is evaluated again: by it, and then here.
 """
 
 from __future__ import annotations
@@ -35,12 +35,13 @@ if TYPE_CHECKING:
 
 LEAST = 2048  # members, from which on a batch has blocks: below, the calls for some would cost as much as all
 # Members of a block: as many as take ENOUGH seconds at least, tried from PILOT on; after less than LITTLE with 64 times
-# as many, else with 8 times. What is cut in a block costs a few milliseconds whatever there is of it, so that a picture
-# that takes 28 ms in one block takes 83 in 16.
+# as many, else with twice as many. What is cut in a block costs a few milliseconds whatever there is of it: 16 blocks
+# of what takes 20 ms in one would take 80. Longer blocks could not be shared evenly.
 PILOT, MOST = 1 << 6, 1 << 18
-ENOUGH, LITTLE = 0.25, 0.03
+ENOUGH, LITTLE = 0.1, 0.005
 COLD = 2.0  # seconds, less than which the first run may only have been slow because it was the first
-TILE = 0.5  # seconds of a tile by the clock
+TILE = 0.5  # seconds of a tile by the clock, at the most
+SHARES = 4  # tiles a worker gets at least, where there are enough blocks: who is done first takes more
 WORTH = 0.3  # seconds of work from which on others are asked to help; executors may say otherwise, by `worth`
 TRIES = 2  # of an executor at a tile
 MOST_SIZES = 4096
@@ -164,7 +165,7 @@ class _Tiles(Struct):
                 self._alone((0, size))
             if self.spent >= ENOUGH:
                 break
-            size = min(size * (64 if self.spent < LITTLE else 8), MOST)
+            size = min(size * (64 if self.spent < LITTLE else 2), MOST)
             self.done.clear()
         if len(_sizes) > MOST_SIZES:
             _sizes.clear()
@@ -179,7 +180,7 @@ class _Tiles(Struct):
 
     def _shared(self, pool: Executor, rest: list[Part], told: Callable[[float, int], None]) -> None:
         """The rest by others."""
-        most = max(1, len(rest) // (2 * workers_of(pool)))
+        most = max(1, len(rest) // (SHARES * workers_of(pool)))
         each = max(1, min(most, round(TILE / max(self.spent, 1e-6))))
         waiting: dict[Future[list[Estimate] | None], tuple[list[Part], int]] = {}
         try:
