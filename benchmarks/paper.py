@@ -9,6 +9,7 @@ Every answer is held to another way of finding it before it has a time.
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import sys
 import time
@@ -284,6 +285,7 @@ def plot(path: str, found: list[Compiled], rows: dict[str, list[Row]]) -> None:
     for axis, (title, labels, values) in zip(axes.flat, panels, strict=False):
         axis.barh(labels[::-1], values[::-1], color="#1b6ca8")
         axis.set_xscale("log")
+        axis.set_xlim(10.0 ** math.floor(math.log10(min(values))), 10.0 ** math.ceil(math.log10(max(values))))
         axis.set_title(title, fontsize=9)
         axis.tick_params(labelsize=7)
     figure.tight_layout()
