@@ -212,7 +212,7 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
     if any(cell.t for cell in all_cells(value)):
         tangents = told(value, lambda cell: cell.t[0] if cell.t else None)
         tangent_bounds = told(value, lambda cell: bar(cell.et[0]) if cell.t else None)
-    shown = _flat(numbers, bounds)
+    shown = _flat(numbers, told(value, lambda cell: cell.e))  # nan of nan is another reason than inf of nan
     slopes = _slopes(value)
     missing = _missing([*shown, *slopes], machine)
     shape = np.broadcast_shapes(*(number.shape for number, _ in shown if isinstance(number, np.ndarray)))
