@@ -25,8 +25,19 @@ from tables import Chapter, Curve, Picture, chapters  # noqa: E402
 import potto  # noqa: E402
 
 TOLERANCE, SLOWEST = 1e-8, 20.0
-PLACES = 241  # of a curve in the gallery
-EACH = 4  # places of each kind
+
+
+class Depth(NamedTuple):
+    """How closely an entry is looked at: places of a curve, of the pixels of a row or column each so many-th (and those
+    with corners), those looked at of each kind, calls that are timed."""
+
+    places: int
+    step: int
+    each: int
+    calls: int
+
+
+AS_SHOWN, QUICKLY = Depth(241, 1, 4, 3), Depth(31, 3, 2, 1)
 
 
 class Checked(NamedTuple):
@@ -69,37 +80,38 @@ class Tally:
         return Checked(title, len(self.times), self.off, self.where, self.unsure, self.wrong, slowest)
 
 
-def spread(count: int, seed: int) -> Any:
-    return np.random.default_rng(seed).permutation(count)[:EACH]
+def spread(count: int, each: int, seed: int) -> Any:
+    return np.random.default_rng(seed).permutation(count)[:each]
 
 
-def timed(call: Any) -> float:
-    """The least time of the processor of three calls, the first of which may have had to compile."""
+def timed(call: Any, calls: int) -> float:
+    """The least time of the processor of some calls, the first of which may have had to compile."""
     spent = []
-    for _ in range(3):
+    for _ in range(calls):
         start = time.process_time()
         call()
         spent.append(time.process_time() - start)
     return min(spent)
 
 
-def curve(entry: Curve, chapter: Chapter) -> Checked:
+def curve(entry: Curve, chapter: Chapter, depth: Depth) -> Checked:
     """Where it bends, where it is steep, its ends, where it is least sure, anywhere."""
     text = (chapter.folder / f"{entry.program}.po").read_text(encoding="utf-8")
     module = potto.Workspace(chapter.folder).compile(f"{text}\nshown_in_the_gallery = {entry.function}\n")
     function, exact = potto.deriv(module.shown_in_the_gallery), CURVES[chapter.name, entry.program, entry.function]
-    grid = np.linspace(*entry.range, PLACES)
+    places, _, each, calls = depth
+    grid = np.linspace(*entry.range, places)
     found = function((grid, np.ones_like(grid)))
     parts = found.value, found.tangent, found.error, found.tangent_error
     value, slope, off, error = (np.broadcast_to(np.asarray(x, dtype=float), grid.shape) for x in parts)
-    bends = np.argsort(-np.abs(np.diff(slope, 2)))[:EACH] + 1
-    chosen = {0, PLACES - 1, *bends, *np.argsort(-np.abs(slope))[:1], *np.argsort(-error)[:1], *spread(PLACES, 0)}
+    bends = np.argsort(-np.abs(np.diff(slope, 2)))[:each] + 1
+    chosen = {0, places - 1, *bends, *np.argsort(-np.abs(slope))[:1], *np.argsort(-error)[:1], *spread(places, each, 0)}
     tally = Tally()
     for k in sorted(map(int, chosen)):
         sides = exact(float(grid[k]))
         side = min(sides, key=lambda pair: abs(pair[1] - slope[k]))
         tally.count(f"at {grid[k]:.6g}", (value[k], slope[k]), (off[k], error[k]), side)
-        tally.times.append(timed(lambda k=k: function((float(grid[k]), 1.0))))
+        tally.times.append(timed(lambda k=k: function((float(grid[k]), 1.0)), calls))
     return tally.checked(entry.title)
 
 
@@ -108,7 +120,7 @@ def key(entry: Picture, chapter: Chapter) -> tuple[str, str, str]:
     return chapter.name, entry.program, given.get("shader", entry.function)
 
 
-def picture(entry: Picture, chapter: Chapter) -> Checked:
+def picture(entry: Picture, chapter: Chapter, depth: Depth) -> Checked:
     """All its pixels by each parameter, and some of them by the reference."""
     width, height = entry.size
     x0, x1, y0, y1 = entry.box
@@ -117,6 +129,12 @@ def picture(entry: Picture, chapter: Chapter) -> Checked:
     )
     given = {name: float(text) for name, text in entry.given if name != "shader"}
     module, h = scene(entry, chapter)
+    corners = CORNERS.get(key(entry, chapter)[:2], lambda given: [])(given)
+    taken = np.zeros(x.shape, dtype=bool)
+    taken[:: depth.step, :: depth.step] = True
+    for place in corners:
+        taken |= within(x, y, place, h)
+    x, y = x[taken], y[taken]
     shader = dict(entry.given).get("shader")
     more = {} if shader is None else {"dshader": potto.deriv(getattr(module, shader))}
     function = potto.deriv(getattr(module, entry.function))
@@ -126,7 +144,7 @@ def picture(entry: Picture, chapter: Chapter) -> Checked:
 
     with potto.settings(**accuracy(entry)):
         found = {wrt: seen(x, y, wrt) for wrt in entry.wrt}
-        chosen = pixels(found, x, y, CORNERS.get(key(entry, chapter)[:2], lambda given: [])(given), h)
+        chosen = pixels(found, x, y, corners, h, depth.each)
         tally = Tally()
         for at in chosen:
             px, py = float(x.flat[at]), float(y.flat[at])
@@ -135,7 +153,7 @@ def picture(entry: Picture, chapter: Chapter) -> Checked:
                 parts = part.value, part.tangent, part.error, part.tangent_error
                 numbers = [float(np.broadcast_to(np.asarray(p, dtype=float), x.shape).flat[at]) for p in parts]
                 tally.count(f"at ({px:.5g}, {py:.5g}) by {wrt}", numbers[:2], numbers[2:], (value, slopes[wrt]))
-            tally.times.append(timed(lambda px=px, py=py: seen(px, py, entry.wrt[0])))
+            tally.times.append(timed(lambda px=px, py=py: seen(px, py, entry.wrt[0]), depth.calls))
     return tally.checked(entry.title)
 
 
@@ -156,23 +174,29 @@ def accuracy(entry: Picture) -> dict[str, float]:
     return {name: float(words[f"--{name}"]) for name in ("rtol", "atol") if f"--{name}" in words}
 
 
-def pixels(found: Mapping[str, potto.Estimate], x: Any, y: Any, corners: Any, h: float) -> list[int]:
+def within(x: Any, y: Any, place: tuple[float, float], h: float) -> Any:
+    """Which pixels have a place in them."""
+    return (np.abs(x - place[0]) <= h / 2) & (np.abs(y - place[1]) <= h / 2)
+
+
+def pixels(found: Mapping[str, potto.Estimate], x: Any, y: Any, corners: Any, h: float, each: int) -> list[int]:
     """Numbers of pixels, each once."""
     chosen: dict[int, None] = {}
-    for cx, cy in corners:
-        inside = (np.abs(x - cx) <= h / 2) & (np.abs(y - cy) <= h / 2)
-        chosen.update(dict.fromkeys(map(int, np.nonzero(inside.ravel())[0])))
+    for place in corners:
+        chosen.update(dict.fromkeys(map(int, np.nonzero(within(x, y, place, h))[0])))
     for seed, part in enumerate(found.values()):
         slope = np.abs(np.broadcast_to(np.asarray(part.tangent, dtype=float), x.shape)).ravel()
         error = np.broadcast_to(np.asarray(part.tangent_error, dtype=float), x.shape).ravel()
         edge = np.nonzero(slope > 0.05 * slope.max())[0]
-        chosen.update(dict.fromkeys(map(int, (np.argmax(slope), np.argmax(error), *edge[spread(edge.size, seed)]))))
-    chosen.update(dict.fromkeys(map(int, spread(x.size, 7))))
+        chosen.update(
+            dict.fromkeys(map(int, (np.argmax(slope), np.argmax(error), *edge[spread(edge.size, each, seed)])))
+        )
+    chosen.update(dict.fromkeys(map(int, spread(x.size, each, 7))))
     return list(chosen)
 
 
-def checked(entry: Curve | Picture, chapter: Chapter) -> Checked:
-    return curve(entry, chapter) if isinstance(entry, Curve) else picture(entry, chapter)
+def checked(entry: Curve | Picture, chapter: Chapter, depth: Depth) -> Checked:
+    return curve(entry, chapter, depth) if isinstance(entry, Curve) else picture(entry, chapter, depth)
 
 
 def main() -> None:
@@ -181,7 +205,7 @@ def main() -> None:
         print(chapter.name, flush=True)
         for entry in chapter.entries:
             if isinstance(entry, Curve | Picture):
-                found = checked(entry, chapter)
+                found = checked(entry, chapter, AS_SHOWN)
                 slow = isinstance(entry, Picture) and found.slowest > SLOWEST
                 bad += bool(found.wrong or slow)
                 print(f"{found}{'  WRONG' if found.wrong else ''}{'  SLOW' if slow else ''}", flush=True)

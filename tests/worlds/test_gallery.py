@@ -8,7 +8,7 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
-from checked_gallery import checked
+from checked_gallery import QUICKLY, checked
 from tables import Chapter, Curve, Driver, Picture, chapters
 from worlds_references import EXAMPLES
 
@@ -112,7 +112,8 @@ SHOWN = [
 @pytest.mark.slow
 @pytest.mark.parametrize(("entry", "chapter"), SHOWN, ids=[e.title for e, _ in SHOWN])
 def test_what_is_shown_is_right(entry: Curve | Picture, chapter: Chapter) -> None:
-    """To 1e-8 by another method, at edges and corners too; where Potto is less sure it is so within its own error."""
-    found = checked(entry, chapter)
-    assert found.places >= 9 and not found.wrong, str(found)
+    """To 1e-8 by another method, at edges and corners too; where Potto is less sure it is so within its own error.
+    (`make gallery` looks at more places, and at their times.)"""
+    found = checked(entry, chapter, QUICKLY)
+    assert found.places >= 5 and not found.wrong, str(found)
     assert found.unsure <= 2, str(found)

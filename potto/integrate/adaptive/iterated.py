@@ -185,7 +185,7 @@ class Iteration(Struct):
                 row.t = ()
         cuts = segments(level, lo, hi, rows, batch, machine.directions, kin)
         if not any(c.decides for c in level.level.cuts):
-            cuts = at_rest(cuts) if self.resting(level, lo, hi) else finite_speeds(cuts)
+            cuts = at_rest(cuts) if self.resting(level, lo, hi, cuts.segments) else finite_speeds(cuts)
         cuts.lost = lost
         collapsed = collapsed_ranges(level, lo, hi, rows, batch, machine.directions)
         if machine.frozen:
@@ -200,17 +200,17 @@ class Iteration(Struct):
         found, lost = self.searched(level, env, lo, hi, batch, machine)
         return lo, hi, rows + found, lost
 
-    def resting(self, level: LevelPlan, lo: Cell, hi: Cell) -> bool:
+    def resting(self, level: LevelPlan, lo: Cell, hi: Cell, seg: Segments) -> bool:
         """Whether no nodes are to move with the cuts of a variable along which what is integrated is continuous.
 
         Then the derivative along it, which nodes that move would need, is best left alone: near critical places it is
-        the hardest of all. Where there is but one variable further in it costs little, and serves as a check. Nodes
-        have to move where bounds do.
+        the hardest of all. Where there is but one variable further in it costs little, and serves as a check, unless
+        roots merge just here, and so move infinitely fast. Where bounds move, nodes have to.
         """
-        levels = self.plan.levels
-        if len(levels) < 3 or any(own is level for own in levels[-2:]):
+        if any(np.any(t) for bound in (lo, hi) for t in bound.t if t is not None):
             return False
-        return not any(np.any(t) for bound in (lo, hi) for t in bound.t if t is not None)
+        levels = self.plan.levels
+        return (len(levels) > 2 and not any(own is level for own in levels[-2:])) or not np.isfinite(seg.ta).all()
 
     def searched(
         self, level: LevelPlan, env: dict[str, Value], lo: Cell, hi: Cell, batch: int, machine: Evaluator

@@ -6,6 +6,7 @@ an answer, and what was met on the way to it, to one that is no worse; each says
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -102,7 +103,7 @@ def along_cuts(problem: Problem) -> Sums:
                 return plain
         found = attempted(problem, order, most)
         along = found.events.every(Degenerate)
-        if not along and not found.stopped:
+        if not along and not found.stopped and (most is None or uncertainty(found.sums) < math.inf):
             return finished(problem, found)
         if not along:
             stopped.append(found)
@@ -115,8 +116,8 @@ def along_cuts(problem: Problem) -> Sums:
 
 
 def with_all(problem: Problem, tried: list[Attempt], most: int) -> Sums:
-    """The best answer where trials in some orders of the variables did not come to an end: in the order of which most
-    is known, or by tables, with more and more evaluations.
+    """The best answer where trials in some orders of the variables did not come to an end, or to no bound: in the order
+    of which most is known, or by tables, with more and more evaluations.
 
     most: the evaluations that each trial took.
     """
@@ -124,8 +125,10 @@ def with_all(problem: Problem, tried: list[Attempt], most: int) -> Sums:
     if machine.overdrawn():  # so many cuts that the first nodes of a trial are more than there are
         return finished(problem, best(tried))
     for known in sorted(tried, key=lambda attempt: uncertainty(attempt.sums)):
-        bounded = passes_on(problem) or worth_trials(problem)
-        found = attempted(problem, known.order, LONGER * most if bounded else None)
+        found = known
+        if known.stopped:
+            bounded = passes_on(problem) or worth_trials(problem)
+            found = attempted(problem, known.order, LONGER * most if bounded else None)
         if found.events.every(Degenerate):
             continue
         longer.append(found)
