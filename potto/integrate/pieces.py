@@ -99,6 +99,11 @@ class Sums(Columns):
         v, e, t, et = (np.concatenate([x] + [x[:1]] * missing) for x in (self.v, self.e, self.t, self.et))
         return Sums(v, e, t, et, gross=self.gross)
 
+    def widen(self, m: int) -> None:
+        """Make these sums such of m components."""
+        wide = self.widened(m)
+        self.v, self.e, self.t, self.et = wide.v, wide.e, wide.t, wide.et
+
     def with_members(self, members: Any, part: Sums) -> Sums:
         """These sums with others for some members, in place where there are as many components."""
         whole = self.widened(part.v.shape[0])

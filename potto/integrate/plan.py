@@ -40,7 +40,9 @@ from potto.core.terms import (
     Lam,
     Sum,
     Term,
+    Tuple,
     Var,
+    children,
     function_of,
     integral,
     neg,
@@ -102,6 +104,11 @@ class Plan(Struct, frozen=True, dict=True):
         return None if self.inlined is None else box_of(self.term, self.surfaces, self.body, self.inlined)
 
     @cached_property
+    def width(self) -> int:
+        """How many numbers the integrand comes to, at the least: where it is 0 everywhere nothing else tells."""
+        return _numbers(self.term.body if self.inlined is None else self.inlined)
+
+    @cached_property
     def searches(self) -> int:
         """How many jumps are searched for, having no closed form in the variable that they cut; 0 where none would be.
 
@@ -127,6 +134,17 @@ class Plan(Struct, frozen=True, dict=True):
                 if jump.path:
                     _force(trace, jump.path, mask if jump.orientation > 0 else np.logical_not(mask))
         return trace
+
+
+def _numbers(body: Term) -> int:
+    """How many numbers a term comes to, as far as it says so."""
+    match body:
+        case Tuple():
+            return sum(map(_numbers, children(body)))
+        case If() | Branch():
+            return max(_numbers(body.then), _numbers(body.orelse))
+        case _:
+            return 1
 
 
 def _force(trace: Trace, path: tuple[int, ...], mask: Mask) -> None:

@@ -88,7 +88,11 @@ class Scene(Struct, frozen=True):
                 other, _ = self.inside(owner, here, {**both, g: np.asarray(both[g]) ^ hidden[g]})
                 e = np.where(other == f, e, np.nan)
             found.append((f, e))
-        return np.stack([f for f, _ in found]), np.stack([e for _, e in found])
+        m = max(f.shape[0] for f, _ in found)  # one component stands for all where nothing is integrated
+        values, errors = (
+            np.stack([np.broadcast_to(x, (m, owner.size)) for x in own]) for own in zip(*found, strict=True)
+        )
+        return values, errors
 
     def inside(self, owner: Ints, here: dict[str, Value], sides: dict[int, Mask]) -> tuple[Array, Array]:
         """F at places of some members, on the sides given, and its errors, (m, B): a check, for which nothing moves."""
@@ -126,6 +130,7 @@ def count_places(scene: Scene, cuts: Cuts, sums: Sums) -> None:
         if not owner.size:
             continue
         forward, backward, scale = changes()
+        sums.widen(forward.shape[0])
         unknown = ~(np.isfinite(forward) & np.isfinite(backward))
         if unknown.any():
             _not_known(scene, sums, owner, unknown, named)
@@ -149,6 +154,7 @@ def count_slivers(scene: Scene, cuts: Cuts, sums: Sums) -> None:
             continue
         far = room(cuts.segments, sliver.owner, sliver.x)
         f, _ = scene.flips(sliver.cuts, sliver.owner, sliver.x, not sliver.upper, far)
+        sums.widen(f.shape[1])
         apart = np.abs(f - f[0]).max(axis=0)
         lost = SURE * apart * sliver.width
         lost = np.where(np.isfinite(lost), lost, 0.0)

@@ -8,18 +8,18 @@ be smooth and accurate here is left to the ways that cut.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 
 import numpy as np
 
-from potto.core.terms import Const, Term, Tuple, children
+from potto.core.terms import Const, Term, Tuple, children, function_of, tuple_
 from potto.integrate.columns import distinct
-from potto.integrate.fixed.box_text import CROSSED, DARK, DONE, Look
+from potto.integrate.fixed.box_text import DONE, Look
 from potto.integrate.fixed.boxes import UNCLEAR, Box, Sides, sides_of
 from potto.integrate.fixed.lowered import places_of
 from potto.integrate.fixed.lowered_boxes import LoweredBoxes, Passed
-from potto.integrate.fixed.tensor_product import ORDERS, integrated
+from potto.integrate.fixed.tensor_product import ORDERS, Face, integrated
 from potto.integrate.pieces import Evaluator, Sums, gather
 from potto.kernels.cells import Array, Cell, Ints, Value
 
@@ -30,23 +30,12 @@ MOST_SIDES, MOST_FACES = 4, 4
 def uncut(box: Box, machine: Evaluator, env: dict[str, Value], batch: int) -> tuple[Sums, Ints] | None:
     """The sums of a batch, and the members that were not integrated here, whose sums are 0; None if none were."""
     able = machine.backend != "numpy" and all(map(_exact, map(env.get, box.names)))
-    ways = _ways(box, machine, env, _looking(box)) if able else ()
+    ways = _deciding(box, machine, env) if able else ()
     passed = _passed(ways, machine, env, batch, ())
     if passed is not None:
-        return _with_left(box, passed, machine, env, batch)
+        return _with_left(box, passed, machine, env)
     with _rented(ways):
-        sides = sides_of(box, machine, env, batch)
-        if sides is None:
-            return None
-        if able and not ways:
-            look, column = _told(box, sides.codes)
-            ways = _ways(box, machine, env, look)
-            passed = _passed(ways, machine, env, batch, (column,))
-            if passed is not None:
-                return _with_left(box, passed, machine, env, batch)
-            with _rented(ways):
-                return _by_numpy(box, sides, machine, env, batch)
-        return _by_numpy(box, sides, machine, env, batch)
+        return _by_faces(box, machine, env, batch, able and not ways)
 
 
 def dark(face: Term) -> bool:
@@ -54,12 +43,16 @@ def dark(face: Term) -> bool:
     return all(map(dark, children(face))) if isinstance(face, Tuple) else isinstance(face, Const) and face.value == 0
 
 
-# By numpy
+# Face by face
 
 
-def _by_numpy(
-    box: Box, sides: Sides, machine: Evaluator, env: dict[str, Value], batch: int
+def _by_faces(
+    box: Box, machine: Evaluator, env: dict[str, Value], batch: int, able: bool
 ) -> tuple[Sums, Ints] | None:  # fmt: skip
+    """The same by sides that numpy finds; able: whether machine code may integrate."""
+    sides = sides_of(box, machine, env, batch)
+    if sides is None:
+        return None
     sums: Sums | None = None
     done = np.zeros(batch, dtype=bool)
     for code in distinct(sides.codes).tolist():
@@ -69,7 +62,7 @@ def _by_numpy(
         if dark(face.term):
             done[index] = True
             continue
-        for where, found in integrated(face, machine, env, index, sides.low, sides.high):
+        for where, found in _of_face(box, face, sides, machine, env, index, able):
             if sums is None:
                 sums = Sums.zeros(found.v.shape[0], machine.directions, batch)
             done[where] = True
@@ -77,6 +70,23 @@ def _by_numpy(
     if not done.any():
         return None
     return Sums.zeros(1, machine.directions, batch) if sums is None else sums, np.nonzero(~done)[0]
+
+
+def _of_face(
+    box: Box, face: Face, sides: Sides, machine: Evaluator, env: dict[str, Value], index: Ints, able: bool
+) -> Iterator[tuple[Ints, Sums]]:  # fmt: skip
+    """The integrals over those boxes with one integrand that a rule does for."""
+    ways = _told(box, face, machine, env) if able else ()
+    passed = (
+        _passed(ways, machine, gather(env, index), index.size, (np.full(index.size, float(DONE)),)) if ways else None
+    )
+    if passed is not None:
+        yield index[passed.done], passed.sums.pick(passed.done)
+        index = index[passed.left]
+        ways = ()
+    if index.size:
+        with _rented(ways):
+            yield from list(integrated(face, machine, env, index, sides.low, sides.high))
 
 
 # By machine code
@@ -87,53 +97,40 @@ def _exact(value: Value | None) -> bool:
     return isinstance(value, Cell) and value.e is None and not any(x is not None for x in value.et)
 
 
-def _looking(box: Box) -> Look | None:
-    """What a function looks for that decides about sides by itself; None where there is too much to be told apart."""
-    known: dict[str, Look | None] = box.plan.lowered
-    if "look" not in known:
-        codes = range(1 << len(box.places)) if len(box.places) <= MOST_SIDES else ()
-        known["look"] = _look(box, codes, False) if codes else None
-    return known["look"]
-
-
-def _look(box: Box, codes: Sequence[int], told: bool) -> Look | None:
+def _deciding(box: Box, machine: Evaluator, env: dict[str, Value]) -> tuple[LoweredBoxes, ...]:
+    """The functions that decide about sides by themselves; none where there is too much to be told apart, or more than
+    arithmetic to be enclosed."""
+    if len(box.places) > MOST_SIDES:
+        return ()
     faces: dict[Term, list[int]] = {}
-    for code in codes:
+    for code in range(1 << len(box.places)):
         term = box.face(code).term
         if not dark(term):
             faces.setdefault(term, []).append(code)
     if len(faces) > MOST_FACES:
-        return None
-    flat, curved = box.corners, box.surfaces[box.flat :]
-    lit = tuple((term, tuple(those)) for term, those in faces.items())
-    return Look(box.plan, box.bounds, flat, curved, box.places, lit, told)
-
-
-def _told(box: Box, codes: Ints) -> tuple[Look | None, Array]:
-    """What a function looks for that is told the sides, and the column that tells them."""
-    column = np.full(codes.size, float(CROSSED))
-    clear = [code for code in distinct(codes).tolist() if code != UNCLEAR]
-    look = _look(box, clear, True)
-    if look is not None:
-        column[codes != UNCLEAR] = DARK
-        for number, (_, those) in enumerate(look.faces):
-            column[np.isin(codes, those)] = DONE + number
-    return look, column
-
-
-def _ways(box: Box, machine: Evaluator, env: dict[str, Value], look: Look | None) -> tuple[LoweredBoxes, ...]:
-    """The functions that go for it, with few nodes and with more; none where that is impossible."""
-    if look is None:
         return ()
+    lit = tuple((term, tuple(codes)) for term, codes in faces.items())
+    look = Look(box.plan, box.bounds, box.corners, box.surfaces[box.flat :], box.places, lit)
+    return _ways(box, machine, env, look, [box.face(codes[0]) for codes in faces.values()])
+
+
+def _told(box: Box, face: Face, machine: Evaluator, env: dict[str, Value]) -> tuple[LoweredBoxes, ...]:
+    """The functions for one integrand, which are told where it is one."""
+    look = Look(box.plan, box.bounds, function_of(tuple_(())), (), (), ((face.term, ()),), True)
+    return _ways(box, machine, env, look, [face])
+
+
+def _ways(
+    box: Box, machine: Evaluator, env: dict[str, Value], look: Look, faces: Sequence[Face]
+) -> tuple[LoweredBoxes, ...]:  # fmt: skip
+    """The functions that go for it, with few nodes and with more; none where that is impossible."""
     places = places_of(box.names, env)
     key = look, machine.directions, places
     ways: tuple[LoweredBoxes, ...] | None = box.plan.lowered.get(key)
     if ways is None:
-        nodes = list(zip(*(box.face(codes[0]).exact for _, codes in look.faces), strict=True))
-        exact = tuple(None not in own for own in nodes or [(1,)] * len(box.variables))
-        orders = dict.fromkeys(
-            tuple(max(n or order for n in own) for own in nodes) or (1,) * len(box.variables) for order in ORDERS
-        )
+        nodes = list(zip(*(face.exact for face in faces), strict=True)) or [(1,)] * len(box.variables)
+        exact = tuple(None not in own for own in nodes)
+        orders = dict.fromkeys(tuple(max(n or order for n in own) for own in nodes) for order in ORDERS)
         ways = box.plan.lowered[key] = tuple(LoweredBoxes(look, places, order, exact) for order in orders)
     return () if ways[0].promotion.impossible else ways
 
@@ -159,15 +156,11 @@ def _passed(
     return passed
 
 
-def _with_left(
-    box: Box, passed: Passed, machine: Evaluator, env: dict[str, Value], batch: int
-) -> tuple[Sums, Ints] | None:  # fmt: skip
+def _with_left(box: Box, passed: Passed, machine: Evaluator, env: dict[str, Value]) -> tuple[Sums, Ints] | None:
     """What functions have made of a batch, and what numpy makes of what they left."""
     sums, done, left = passed.sums, passed.done, passed.left
     if left.size:
-        here = gather(env, left)
-        sides = sides_of(box, machine, here, left.size)
-        found = None if sides is None else _by_numpy(box, sides, machine, here, left.size)
+        found = _by_faces(box, machine, gather(env, left), left.size, False)
         if found is not None:
             sums = sums.with_members(left, found[0])
             done[left] = True
