@@ -73,3 +73,12 @@ def arguments_of(function: Lam, groups: tuple[tuple[Term, ...], ...]) -> tuple[T
 def sizes_of(groups: Sequence[Sequence[object]]) -> tuple[int, ...]:
     """How many arguments each group has."""
     return tuple(map(len, groups))
+
+
+def parameters_of(function: Term) -> list[str]:
+    """The names of the parameters of all groups."""
+    names: list[str] = []
+    while isinstance(function, Lam):
+        names += function.params
+        function = function.body
+    return names

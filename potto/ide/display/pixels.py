@@ -12,9 +12,10 @@ from msgspec import Struct
 
 from potto.calculus.checking.conditions import conditions_of
 from potto.calculus.checking.diffeo import exported
+from potto.calculus.inlining.currying import parameters_of
 from potto.core.printer import format_term
 from potto.core.simplify import simplify
-from potto.core.terms import App, Integral, Lam, Term, add, const, mul, postorder, substitute
+from potto.core.terms import App, Integral, Term, add, const, mul, postorder, substitute
 from potto.elaborate import core, core_term
 from potto.ide.hover.derivatives import condition_infos, sound
 from potto.query import Database, query
@@ -37,7 +38,7 @@ def pixel_conditions(db: Database, file: str, name: str) -> tuple[PixelCondition
     if not sound(db, file, name):
         return ()
     elaborated = core(db, file, name)
-    spans, params, middles = dict(elaborated.origins), _parameters(elaborated.term), _middles(elaborated.term)
+    spans, params, middles = dict(elaborated.origins), parameters_of(elaborated.term), _middles(elaborated.term)
     shown = {info.span: info.equation for info in condition_infos(db, file, name) if not info.problem}
     found: dict[PixelCondition, None] = {}
     for condition in conditions_of(
@@ -50,14 +51,6 @@ def pixel_conditions(db: Database, file: str, name: str) -> tuple[PixelCondition
         text = f"\\({', '.join(free)}) . {format_term(simplify(surface))}"
         found[PixelCondition(shown[span], span, free, text)] = None
     return tuple(sorted(found, key=lambda each: each.span))
-
-
-def _parameters(term: Term) -> list[str]:
-    names: list[str] = []
-    while isinstance(term, Lam):
-        names += term.params
-        term = term.body
-    return names
 
 
 def _middles(term: Term) -> dict[str, Term]:

@@ -16,11 +16,12 @@ from potto.calculus.checking.solvability import Problem, Verdict, judge
 from potto.calculus.explanation.explain import equation, explain_derivative
 from potto.calculus.explanation.layout import DerivativeText, IntegralText
 from potto.calculus.explanation.readable import readable
+from potto.calculus.inlining.currying import parameters_of
 from potto.calculus.solving.inverse_map import Inverse, invert
 from potto.checking.check import has_errors
 from potto.core.printer import format_term
 from potto.core.simplify import simplify
-from potto.core.terms import Hole, Lam, Term, postorder
+from potto.core.terms import Hole, Term, postorder
 from potto.elaborate import core, core_term
 from potto.modules import definition, dependencies, is_recursive, references
 from potto.modules.graph import strongly_connected
@@ -88,7 +89,7 @@ def condition_infos(db: Database, file: str, name: str) -> tuple[ConditionInfo, 
     found = conditions_of(
         elaborated.term, lambda g: exported(db, g.module, g.name), lambda g: core_term(db, g.module, g.name)
     )
-    parameters = _parameters(elaborated.term)
+    parameters = parameters_of(elaborated.term)
     out: dict[ConditionInfo, None] = {}
     for condition in found:
         span = spans.get(condition.anchor)
@@ -100,14 +101,6 @@ def condition_infos(db: Database, file: str, name: str) -> tuple[ConditionInfo, 
         )
         out[_info(span, condition.coordinates, condition.variables, verdict, moved, condition.calls)] = None
     return tuple(sorted(out, key=lambda info: info.span))
-
-
-def _parameters(term: Term) -> list[str]:
-    names: list[str] = []
-    while isinstance(term, Lam):
-        names += term.params
-        term = term.body
-    return names
 
 
 def _info(
