@@ -4,17 +4,24 @@ for others.
 What tests start can be interrupted, also where the tests themselves run in the background of a script, which lets them
 ignore interrupts and whatever they start as well: only what is ignored is inherited, a handler is not.
 
+Some hundred tests start Python: what it compiles is kept, also where the environment says otherwise, or each of them
+would compile all of Potto again.
+
 What is kept between runs is kept in a folder of this run alone: no test is answered by an earlier one's cache.
 """
 
 import os
 import signal
+import sys
 import tempfile
 
 from hypothesis import settings
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, lambda *_: None)
+
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 _cache = tempfile.TemporaryDirectory(prefix="potto-tests-")
 os.environ["POTTO_CACHE"] = _cache.name

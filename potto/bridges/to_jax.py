@@ -18,10 +18,12 @@ from potto.extras import install_command
 from potto.kernels.errors import wrong_call
 from potto.python.functions import Function
 from potto.python.gradients import Names
+from potto.python.remade import remade
 
 Sizes = tuple[Shapes, Shapes]
 
 
+@remade
 def to_jax(
     function: Function, *, wrt: Names = None, given: Mapping[str, Any] | None = None, error: bool = False
 ) -> Callable[..., Any]:
@@ -53,8 +55,6 @@ def to_jax(
         value, off = answer((sides[0][0], sides[1][0]), moving, jax.lax.stop_gradient(still))
         return (flat.shaped(value), flat.shaped(off)) if error else flat.shaped(value)
 
-    called.__name__ = called.__qualname__ = function.written
-    called.__doc__ = function.__doc__
     return called
 
 

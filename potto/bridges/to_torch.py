@@ -16,8 +16,10 @@ from potto.extras import install_command
 from potto.kernels.errors import wrong_call
 from potto.python.functions import Function
 from potto.python.gradients import Names
+from potto.python.remade import remade
 
 
+@remade
 def to_torch(
     function: Function, *, wrt: Names = None, given: Mapping[str, Any] | None = None, error: bool = False
 ) -> Callable[..., Any]:
@@ -51,8 +53,6 @@ def to_torch(
         value, off = answer(moving, still.detach(), flat, (sides[0][0], sides[1][0]))
         return (flat.shaped(value), flat.shaped(off)) if error else flat.shaped(value)
 
-    called.__name__ = called.__qualname__ = function.written
-    called.__doc__ = function.__doc__
     return called  # type: ignore[no-any-return]
 
 

@@ -50,7 +50,7 @@ def _symbols(options: argparse.Namespace, console: Console) -> int:
 
     world = Library(["."])
     try:
-        file = opened(world, options.file, options.set)
+        file = opened(world, options.file, options.set, after=options.name)
         world.need(file, nodes.Name(NOWHERE, options.name))
         target = resolve(world.db, file, options.name)
         facts = None
@@ -86,7 +86,7 @@ def _numbers(options: argparse.Namespace, console: Console) -> int:
 
     world = World(["."])
     try:
-        file = opened(world, options.file, options.set)
+        file = opened(world, options.file, options.set, after=options.name)
         with settings(**asdict(chosen)), accounts(options):
             once, twice = _taken(world, file, options)
     except PottoError as error:

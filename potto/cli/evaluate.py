@@ -45,7 +45,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     world = World(["."])
     text = options.expression.strip()
     try:
-        file = opened(world, options.file, options.set)
+        file = opened(world, options.file, options.set, after=options.expression)
         with accounts(options):
             answer = world.evaluate(file, text, settings)
     except ProgramError as error:

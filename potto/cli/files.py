@@ -57,14 +57,22 @@ def main_of(folder: str) -> str:
     raise ProgramError([Located(folder, UNREADABLE(Span(0, 0), message, help=help))], lambda file: None)
 
 
-def missing(path: str) -> Located:
-    """The diagnostic for a path that names nothing, with a near one if there is one."""
+def missing(path: str, after: str | None = None) -> Located:
+    """The diagnostic for a path that names nothing: `after`, what the command has behind it, may be the file that was
+    meant; else a near one, if there is one."""
     import difflib
+    import shlex
 
+    if after is not None and after.endswith(SUFFIXES) and os.path.isfile(after):
+        return _no_file(path, f"the file comes first: `{after} {shlex.quote(path)}`")
     folder = os.path.dirname(path) or "."
     there = sorted(os.listdir(folder)) if os.path.isdir(folder) else []
     near = difflib.get_close_matches(os.path.basename(path), [n for n in there if n.endswith(SUFFIXES)], 1)
     help = f"did you mean `{os.path.join(os.path.dirname(path), near[0])}`?" if near else ""
+    return _no_file(path, help)
+
+
+def _no_file(path: str, help: str) -> Located:
     return Located(path, UNREADABLE(Span(0, 0), f"there is no file `{path}`", help=help))
 
 

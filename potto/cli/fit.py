@@ -90,7 +90,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     world = World(["."])
     answers: list[Estimate] = []
     try:
-        file = opened(world, options.file, options.set)
+        file = opened(world, options.file, options.set, after=options.name)
         with settings(**asdict(chosen)), accounts(options):
             found = _fitted(world, file, options, console, answers)
     except PottoError as error:

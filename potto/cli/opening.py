@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 NO_FILE = "<no file>"
 
 
-def opened(world: Library, path: str | None, given: Sequence[tuple[str, str]] = ()) -> str:
+def opened(world: Library, path: str | None, given: Sequence[tuple[str, str]] = (), *, after: str | None = None) -> str:
     """The key of a file that a command works on, of a folder its `main.po`, of None a file with nothing in it. given:
-    names, and what they stand for instead. Raises ProgramError if there is no program there, or something wrong with
-    what is given."""
-    key = _found(world, path)
+    names, and what they stand for instead. after: the argument behind the file, with which it may be swapped. Raises
+    ProgramError if there is no program there, or something wrong with what is given."""
+    key = _found(world, path, after)
     if given:
         from potto.evaluating.given import give
 
@@ -31,13 +31,13 @@ def opened(world: Library, path: str | None, given: Sequence[tuple[str, str]] = 
     return key
 
 
-def _found(world: Library, path: str | None) -> str:
+def _found(world: Library, path: str | None, after: str | None) -> str:
     if path is None:
         return _nothing(world)
     if path == "-":
         return open_stdin(world)
     if not os.path.exists(path):
-        raise ProgramError([missing(path)], no_sources)
+        raise ProgramError([missing(path, after)], no_sources)
     if os.path.isdir(path):
         path = main_of(path)
     key = world.key(path)

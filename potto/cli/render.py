@@ -252,7 +252,7 @@ def _watched(options: argparse.Namespace) -> Library | None:
 
     library = Library(["."])
     try:
-        library.diagnostics(opened(library, options.file))
+        library.diagnostics(opened(library, options.file, after=options.name))
     except PottoError:
         return None
     return library
@@ -268,7 +268,7 @@ def _once(options: argparse.Namespace, target: str, settings: Settings, console:
     world = World(["."])
     grid = grid_of(options)
     try:
-        file = opened(world, options.file, options.set)
+        file = opened(world, options.file, options.set, after=options.name)
         picture = picture_of(world, file, options, ending_of(target) not in NUMBERS)
         with accounts(options):
             found = drawn(picture, grid, settings, options, console)

@@ -59,7 +59,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         return 2
     world = World(["."])
     try:
-        file = opened(world, options.file, options.set)
+        file = opened(world, options.file, options.set, after=options.name)
         if path is None and not options.json:
             with settings(**asdict(chosen)):
                 return _page(world, file, options, console)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 from typing import Any
 
 import numpy as np
@@ -63,6 +64,15 @@ def test_values_and_derivatives(area: Any) -> None:
     assert np.array(jax.hessian(area, (0, 1))(2.0, 0.5)) == pytest.approx(np.array([[0, E], [E, 6 * E]]), abs=1e-9)
     assert np.array(jax.jit(jax.hessian(area, (0, 1)))(2.0, 0.5))[1, 1] == pytest.approx(6 * E)
     assert area.__name__ == "area" and "field" in area.__doc__
+
+
+def test_they_pickle() -> None:
+    area = pickle.loads(pickle.dumps(potto.to_jax(m.area, wrt=["c"], error=True)))
+    assert area.__name__ == "area" and "to_jax" in repr(area)
+    value, off = area(2.0, 0.5)
+    assert value == pytest.approx(2 * (E - 1), rel=1e-12) and 0 < off < 1e-9
+    slopes = jax.jit(jax.vmap(jax.grad(lambda c: area(2.0, c)[0])))(jnp.array([0.5, 0.2]))
+    assert slopes == pytest.approx(np.array([2 * E, 0.8 * math.exp(0.04)]), rel=1e-10)
 
 
 @pytest.mark.parametrize(

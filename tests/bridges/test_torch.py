@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import math
+import pickle
 from typing import Any
 
 import numpy as np
@@ -51,6 +53,23 @@ def test_values_and_backward(area: Any) -> None:
     found.backward()
     assert found.item() == pytest.approx(2 * (E - 1), rel=1e-12)
     assert (a.grad.item(), c.grad.item()) == pytest.approx((E - 1, 2 * E), rel=1e-10)
+
+
+def test_they_pickle_also_within_a_module() -> None:
+    class Lit(torch.nn.Module):
+        def __init__(self) -> None:
+            super().__init__()
+            self.c = torch.nn.Parameter(torch.tensor(0.5, dtype=torch.float64))
+            self.area = potto.to_torch(m.area, given={"a": 2.0})
+
+        def forward(self) -> Any:
+            return self.area(c=self.c)
+
+    area = copy.deepcopy(Lit())
+    area.area = pickle.loads(pickle.dumps(area.area))
+    assert area.area.__name__ == "area" and "to_torch" in repr(area.area)
+    area().backward()
+    assert area.c.grad.item() == pytest.approx(2 * E, rel=1e-10)
 
 
 @pytest.mark.parametrize(

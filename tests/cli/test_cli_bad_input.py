@@ -56,6 +56,15 @@ def test_no_file_and_a_folder_for_a_file(potto: Potto, tmp_path: Path, command: 
             assert "did you mean `main.po`?" in ran.out + ran.err
 
 
+@pytest.mark.parametrize("command", ["eval", "deriv", "render", "fit", "view"])
+def test_a_file_that_comes_second(potto: Potto, tmp_path: Path, command: str) -> None:
+    (tmp_path / "main.po").write_text(LENGTH)
+    start = ["x=1"] if command == "fit" else []
+    ran = potto(command, "1 + 1" if command == "eval" else "f", "main.po", *start)
+    swapped = "'1 + 1'" if command == "eval" else "f"
+    assert ran.status == 1 and f"the file comes first: `main.po {swapped}`" in ran.err
+
+
 GOOD = {
     "empty": (b"", ""),
     "comment": (b"# nothing\n", ""),
