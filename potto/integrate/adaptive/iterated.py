@@ -64,6 +64,11 @@ class Iteration(Struct):
     extent: Extent | None = None
     face: Face | None = None
 
+    @property
+    def degrees(self) -> tuple[int | None, ...]:
+        """By variable the degree of what is integrated: what crosses a face has speeds, which are no polynomials."""
+        return self.plan.degrees if self.face is None else ()
+
     def whole(self, env: dict[str, Value], batch: int) -> Sums:
         """The integrals of a batch over all variables, with what they could come to at most counted as added up."""
         self.extent = Extent(len(self.plan.levels), batch)

@@ -28,6 +28,7 @@ from potto.integrate.decomposition.meetings import (
     tangents,
 )
 from potto.integrate.levels import LevelPlan
+from potto.integrate.pieces import mostly
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.substitution import Segments, choose
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
@@ -95,11 +96,13 @@ def _ends(lo: Cell, hi: Cell, batch: int, directions: int) -> tuple[_End, _End, 
     return (low, tl, el), (high, th, eh), sign
 
 
-def _counted(row: Row) -> Bools | bool:
-    """For whom a root counts of nodes of variables further out: not where it merges with another just here, at a single
-    one of them, and so moves infinitely fast."""
-    speeds = [speed for speed in row.t if isinstance(speed, np.ndarray)]
-    return np.asarray(np.isfinite(speeds).all(axis=0)) if speeds else True
+def _calmed(t: Array, inside: Bools, kin: Ints) -> None:
+    """Bring speeds to rest (k, rows, B) that are infinite at single nodes of variables further out, where a root merges
+    with another just here. Those that are so at many of them count."""
+    fast = inside & ~np.isfinite(t).all(axis=0)
+    for i in np.nonzero(fast.any(axis=1))[0]:
+        here = np.nonzero(fast[i])[0]
+        t[:, i, np.setdiff1d(here, mostly(here, kin, kin.size))] = 0.0
 
 
 def _stacked(rows: list[Row], batch: int, directions: int) -> tuple[Array, Array, Array]:
@@ -129,10 +132,9 @@ def segments(
     count = len(rows)
     roots, off, t = _stacked(rows, batch, directions)
     inside = np.zeros((count + 2, batch), dtype=bool)
-    inside[1:-1] = (roots > low) & (roots < high)
-    for i, row in enumerate(rows, 1) if nested else ():
-        inside[i] &= _counted(row)
-    inner = inside[1:-1]
+    inner = inside[1:-1] = (roots > low) & (roots < high)
+    if kin is not None:
+        _calmed(t[:directions, 1:-1], inner, kin)
     x, e = np.empty((2, count + 2, batch))
     x[0], x[-1], x[1:-1] = low, high, np.where(inner, roots, high)
     e[0], e[-1], e[1:-1] = el, eh, np.where(inner, off, eh)

@@ -30,6 +30,9 @@ from potto.kernels.cells import Array, Bools, Cell, Ints, Mask, Number, Value, p
 THIN = 1e-13
 # Where between their bounds the variables further in are looked at: no fractions that programs are likely to have.
 FRACTIONS = (0.137, 0.483, 0.829)
+# Where beside a place, in its size, the slope of a surface is looked at, and the part of the steepest that it has to be
+# at the place: that of x^3 is 0 there, and how the place moves cannot be told from it.
+ASIDE, SIMPLE = (0.0, 1e-7, -1e-7), 0.5
 
 
 class Place(Struct, frozen=True):
@@ -42,6 +45,13 @@ class Place(Struct, frozen=True):
     speed: Array
     sides: dict[int, Mask]
     jump: Array
+
+
+class Along(Struct, frozen=True):
+    """Which surfaces run along the variables further in at some places, and which of them cross 0 there: (G, P)."""
+
+    there: Bools
+    simple: Bools
 
 
 class Face(Struct, frozen=True, dict=True):
@@ -89,8 +99,10 @@ def crossing(scene: Scene, place: Place, tolerance: Array) -> Crossing | None:
     if scene.parent.plan.hides or scene.machine.frozen:
         return None
     along = _running_along(scene, place.owner, place.x, place.off)
-    which = None if along is None else _the_only_one(scene, along)
-    if which is None or (which < 0).any() or not np.isfinite(place.speed).all():
+    if along is None or not (along.simple | ~along.there).all() or not np.isfinite(place.speed).all():
+        return None
+    which = _the_only_one(scene, along.there)
+    if (which < 0).any():
         return None
     found = Crossing(*np.zeros((4, place.jump.shape[0], scene.machine.directions, scene.batch)))
     for group in distinct(which).tolist():
@@ -125,20 +137,20 @@ def _crossed(scene: Scene, place: Place, group: int, here: Bools) -> tuple[Array
 def running(scene: Scene, owner: Ints, x: Array, off: Array) -> Bools:
     """At which places, of some members, a surface runs along the variables further in, as far as that can be seen."""
     along = None if scene.parent.plan.hides or scene.machine.frozen else _running_along(scene, owner, x, off)
-    return np.zeros(owner.size, dtype=bool) if along is None else np.asarray(along.any(axis=0))
+    return np.zeros(owner.size, dtype=bool) if along is None else np.asarray(along.there.any(axis=0))
 
 
 def several(scene: Scene, owner: Ints, x: Array, off: Array) -> Bools:
     """At which places, of some members, more than one surface runs along the variables further in: what lies between
     them may be seen from neither side."""
     along = _running_along(scene, owner, x, off)
-    return np.zeros(owner.size, dtype=bool) if along is None else along.sum(axis=0) > 1
+    return np.zeros(owner.size, dtype=bool) if along is None else along.there.sum(axis=0) > 1
 
 
 def running_along(scene: Scene, owner: Ints, x: Array, off: Array) -> Ints:
     """The members that have places at which a surface runs along the variables further in."""
     along = _running_along(scene, owner, x, off)
-    members: Ints = distinct(owner[:0] if along is None else owner[along.any(axis=0)])
+    members: Ints = distinct(owner[:0] if along is None else owner[along.there.any(axis=0)])
     return members
 
 
@@ -150,26 +162,31 @@ def _the_only_one(scene: Scene, along: Bools) -> Ints:
     return found
 
 
-def _running_along(scene: Scene, owner: Ints, x: Array, off: Array) -> Bools | None:
+def _running_along(scene: Scene, owner: Ints, x: Array, off: Array) -> Along | None:
     """Which of the surfaces further in are 0 at some places, all along the variables further in, (G, P); None where
     that cannot be looked at."""
     further = scene.parent.plan.levels[scene.number + 1 :]
     if not any(level.decided for level in further):
         return None
     quiet = scene.machine.with_directions(1).tracking()
-    many = np.tile(owner, len(FRACTIONS))
+    shape = (len(FRACTIONS), len(ASIDE), x.size)
+    there = x + np.array(ASIDE)[:, None] * (1 + np.abs(x))
+    many = np.tile(owner, shape[0] * shape[1])
     here = gather({n: pad(still(v), 1) for n, v in scene.env.items()}, many)
-    here[scene.level.variable] = Cell(np.tile(x, len(FRACTIONS)), None, (1.0,))
-    fraction, off = np.repeat(FRACTIONS, x.size), np.tile(off + EPS * np.abs(x), len(FRACTIONS))
-    along = []
+    here[scene.level.variable] = Cell(np.tile(there.ravel(), shape[0]), None, (1.0,))
+    fraction, off = np.repeat(FRACTIONS, there.size), np.where(np.isfinite(off), off, 0.0) + EPS * np.abs(x)
+    along, simple = [], []
     for level in further:
         ends = quiet.evaluate(level.bounds, {n: here[n] for n in level.bounds.params}, None)
-        lo, hi = (np.broadcast_to(cell.v, off.shape) for cell in components(ends))
+        lo, hi = (np.broadcast_to(cell.v, many.shape) for cell in components(ends))
         here[level.variable] = Cell(lo + fraction * (hi - lo), None, (None,))
         if any(level.turned) or not np.isfinite(lo + hi).all():
             return None
         for psi in components(quiet.evaluate(level.surfaces, {n: here[n] for n in level.surfaces.params}, None)):
-            slope = _size(psi.t[0])
-            near = (np.abs(psi.v) <= CLEAR * (_size(psi.e) + slope * off)) & (slope > 0)
-            along.append(np.broadcast_to(near, off.shape).reshape(len(FRACTIONS), -1).all(axis=0))
-    return np.array(along)
+            parts = (np.broadcast_to(_size(part), many.shape) for part in (psi.v, psi.e, psi.t[0]))
+            size, e, slope = (part.reshape(shape) for part in parts)
+            steepest = slope.max(axis=1)
+            near = (size[:, 0] <= CLEAR * (e[:, 0] + steepest * off)) & (steepest > 0)
+            along.append(near.all(axis=0))
+            simple.append((slope[:, 0] >= SIMPLE * steepest).all(axis=0))
+    return Along(np.array(along), np.array(simple))

@@ -18,7 +18,8 @@ from potto.kernels.cells import Array, Ints, Mask, Value
 class Iterated(Protocol):
     """One plan being evaluated by one machine. order: the number of nodes per piece to start with.
 
-    tracked: whether the integrand brings its rounding along at every node.
+    tracked: whether the integrand brings its rounding along at every node. degrees: by variable that of what is
+    integrated over it, if it is a polynomial.
     """
 
     @property
@@ -29,6 +30,8 @@ class Iterated(Protocol):
     def order(self) -> int: ...
     @property
     def tracked(self) -> bool: ...
+    @property
+    def degrees(self) -> tuple[int | None, ...]: ...
     @property
     def extent(self) -> Extent | None: ...
     def across(self, face: Any) -> Iterated: ...

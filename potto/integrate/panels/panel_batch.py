@@ -74,7 +74,7 @@ class PanelBatch(Struct, dict=True):
         at all of them, since they also tell its size. Where nodes round to others than the rule's, more average out."""
         if not self.last and few_doubles(self.seg, (self.seg.b - self.seg.a)[:, None]):
             return None
-        degrees = self.parent.plan.degrees
+        degrees = self.parent.degrees
         degree = degrees[self.number] if degrees and not self.seg.kind.any() else None
         return None if degree is None or degree >= self.parent.order else degree + 1
 
