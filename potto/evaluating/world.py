@@ -68,12 +68,18 @@ class World(Library):
 
     def remember(self, key: Hashable, make: Callable[[], T]) -> T:
         """What `make` gives, once in each thread for the present texts of all files."""
-        self._forget_old()
-        memory: dict[Hashable, Any] = self._local.memory
+        memory = self.memory
         if key not in memory:
             memory[key] = make()
         found: T = memory[key]
         return found
+
+    @property
+    def memory(self) -> dict[Hashable, Any]:
+        """What this thread remembers for the present texts of all files."""
+        self._forget_old()
+        memory: dict[Hashable, Any] = self._local.memory
+        return memory
 
     def _forget_old(self) -> None:
         revision = self.db.revision

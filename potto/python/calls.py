@@ -7,6 +7,7 @@ parameters are resolved by elaboration, as in a program. Conversion of Python va
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from msgspec import Struct
 
@@ -16,6 +17,7 @@ from potto.evaluating.world import World
 from potto.kernels.cells import Value
 from potto.projects.settings import current
 from potto.python.arguments import Batch
+from potto.python.at_once import AtOnce, at_once
 from potto.reports.render import Located, ProgramError
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.answers.shown import as_dual, gives_dual
@@ -45,7 +47,25 @@ class Call(Struct, frozen=True, eq=False):
         with Clock() as clock:
             value = self.value(values, machine)
         estimate = report(value, machine, clock)
-        return batch.shaped(as_dual(estimate) if self._gives_dual() else estimate)
+        if self._gives_dual():
+            return batch.shaped(as_dual(estimate))
+        if batch.shape is None:
+            self.keep(values, machine, estimate, ())
+        return batch.shaped(estimate)
+
+    def at_once(self, args: tuple[Any, ...], wrt: tuple[str, ...] = ()) -> Estimate | None:
+        """The estimate for plain numbers near those of before, with its derivatives by the parameters named; None
+        where it takes more than the rule of one integral."""
+        known: AtOnce | None = self.world.memory.get((self, wrt))
+        return None if known is None else known.answer(args, current(self.world.settings(self.file)))
+
+    def keep(self, values: Sequence[Value], machine: Machine, found: Estimate, wrt: tuple[str, ...]) -> None:
+        """Keep what answers such calls at once, if anything does."""
+        term = self.elaborated
+        if values and isinstance(term, Lam):
+            known = at_once(self.world.program, term, values, machine, found, wrt)
+            if known is not None:
+                self.world.memory[self, wrt] = known
 
     def _gives_dual(self) -> bool:
         """Whether the answer is a dual; found out once for the present texts."""

@@ -175,6 +175,10 @@ class GradientFunction:
         self._wrt = wrt
 
     def __call__(self, *args: Any, **kwargs: Any) -> Gradient:
+        known = None if kwargs else self._function.at_once(args, self._wrt)
+        if known is not None:
+            assert isinstance(known, Gradient)
+            return known
         found = self._function.in_tiles(args, kwargs, self._wrt)
         assert isinstance(found, Gradient)
         return in_given_form(found, self._function, args, kwargs)
@@ -191,7 +195,10 @@ def gradient(call: Call, arguments: Sequence[tuple[str, Value]], wrt: tuple[str,
     """The estimate of a call with its derivatives by the arguments named in `wrt`, for all of a batch at once."""
     run = _Run(call, arguments, batch, {})
     value = run.along_each(wrt)
-    return run.gradient(value, value, wrt)
+    found = run.gradient(value, value, wrt)
+    if batch.shape is None:
+        run.keep(found, wrt)
+    return found
 
 
 def in_given_form(found: Gradient, function: Function, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Gradient:
@@ -242,6 +249,7 @@ class _Run:
         self.extra = {name: value_of(name, item, batch, lambda _: None) for name, item in extra.items()}
         self.machine = self._machine()
         self.clock = Clock()
+        self.moved: tuple[Sequence[Value], Machine] = (), self.machine  # what was evaluated last, and by what
         self.whole = False  # whether derivatives by all elements of an array are one array, as a tape gives them
 
     def _machine(self) -> Machine:
@@ -302,6 +310,7 @@ class _Run:
         """What `ended` makes of the value that this machine finds where these parameters move."""
         k = machine.directions
         values = [moving[name] if name in moving else pad(value, k) for name, value in self.arguments]
+        self.moved = values, machine
         with self.clock:
             value = in_lists(as_a_whole(machine, lambda own: self.call.value(values, own), kinks=True))
             if not _numbers(value):
@@ -314,6 +323,11 @@ class _Run:
         if name not in self.given:
             raise wrong_call(f"`{name}` is given no value, so there is nothing to differentiate by")
         return self.given[name]
+
+    def keep(self, found: Estimate, wrt: tuple[str, ...]) -> None:
+        """Keep what answers a call of this kind at once, if anything does."""
+        if not self.whole:
+            self.call.keep(*self.moved, found, wrt)
 
     def answer(self, value: Value, tangents: Any, bounds: Any) -> Estimate:
         found = report(value, self.machine, self.clock)

@@ -88,7 +88,7 @@ class Program:
         given = env or {}
 
         def found(machine: Machine) -> Value:
-            short = self._shortest(term) if given else None
+            short = self.shortest(term) if given else None
             value = None if short is None else guarded(lambda: short.value(machine, given))
             return guarded(lambda: machine.term(self.linker.ready(term), dict(given))) if value is None else value
 
@@ -105,7 +105,7 @@ class Program:
         related = self.places(error.met, self.linker.terms)
         return error if related is None else error.beside(related)
 
-    def _shortest(self, term: Term) -> Direct | None:
+    def shortest(self, term: Term) -> Direct | None:
         """The one integral that a call is, if it is; found out once."""
         if term not in self._direct:
             from potto.runtime.integration.direct import direct
@@ -174,26 +174,9 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
     """The estimate of a value; of its tangents the first is told, and all count for whether it converged."""
     record = machine.record
     method = "exact" if not record.methods else "+".join(sorted(record.methods))
-    stats: dict[str, Any] = {
-        "kernels compiled": clock.compiled,
-        "kernels from disk": clock.recalled,
-        "kernels reused": clock.reused,
-        "integrals": record.integrals,
-        "evaluations": record.evaluations,
-    }
-    if record.culled:
-        stats["integrals culled"] = record.culled
-    if clock.native or clock.kept or clock.native_points:
-        stats |= {
-            "machine code compiled": clock.native,
-            "machine code from the cache": clock.kept,
-            "points by machine code": clock.native_points,
-        }
-    if record.costs is not None:
-        stats |= record.costs.told()
     answer = partial(
         Estimate, evals=record.evaluations, seconds=clock.seconds, compile_seconds=clock.spent, method=method,
-        notes=tuple(_notes(record)), stats=stats,
+        notes=tuple(_notes(record)), stats=stats_of(record, clock),
     )  # fmt: skip
     if isinstance(value, Closure):
         kind = "derivative of a function" if isinstance(value, Derivative) else "function"
@@ -221,6 +204,28 @@ def report(value: Value, machine: Machine, clock: Clock) -> Estimate:
         shortfalls={why: members_of(where, shape) if shape else True for why, where in missing.items()},
         member_converged=converged_members(missing, shape) if shape else None,
     )  # fmt: skip
+
+
+def stats_of(record: Record, clock: Clock) -> dict[str, Any]:
+    """What an evaluation was spent on, as its estimate tells."""
+    stats: dict[str, Any] = {
+        "kernels compiled": clock.compiled,
+        "kernels from disk": clock.recalled,
+        "kernels reused": clock.reused,
+        "integrals": record.integrals,
+        "evaluations": record.evaluations,
+    }
+    if record.culled:
+        stats["integrals culled"] = record.culled
+    if clock.native or clock.kept or clock.native_points:
+        stats |= {
+            "machine code compiled": clock.native,
+            "machine code from the cache": clock.kept,
+            "points by machine code": clock.native_points,
+        }
+    if record.costs is not None:
+        stats |= record.costs.told()
+    return stats
 
 
 def _slopes(value: Value) -> list[tuple[Any, Any]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import math
+from typing import Any
 
 import mpmath as mp
 import numpy as np
@@ -11,6 +12,8 @@ import pytest
 
 import potto
 from potto.kernels.making import counts
+from potto.python.at_once import AtOnce
+from potto.python.calls import Call
 from potto.runtime.evaluate import Program
 
 BACKENDS = [
@@ -85,12 +88,61 @@ def test_the_general_way_gives_the_same(monkeypatch: pytest.MonkeyPatch) -> None
     module = potto.compile(RENDERER)
     places = [-1.99, -1.2, -0.7, -0.3, 0.4]
     short = [potto.deriv(module.f)((c, 1.0)) for c in places]
-    monkeypatch.setattr(Program, "_shortest", lambda self, term: None)
+    monkeypatch.setattr(Program, "shortest", lambda self, term: None)
     for c, found in zip(places, short, strict=True):
         general = potto.deriv(module.f)((c, 1.0))
         assert (found.value, found.tangent) == (general.value, general.tangent)
         assert (found.error, found.method, found.evals) == (general.error, general.method, general.evals)
         assert (found.converged, found.notes) == (general.converged, general.notes)
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_calls_near_those_of_before_are_answered_the_same(backend: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Through corners, edges of the domain and far away, back and forth, so that what is known is used and left."""
+    module = potto.compile(RENDERER)
+    random = np.random.default_rng(5)
+    near = [c + d for c in (-0.7, -1.3, 0.4) for d in (0.0, 1e-3, -1e-3, 1e-9)]
+    places = [*near, -1.0, -1 + 1e-9, 0.0, -1e-9, -2.0, -2 + 1e-7, 5.0, -5.0, 1e8, *random.uniform(-2.2, 0.4, 20)]
+    calls = [
+        lambda c: module.f(c),
+        lambda c: potto.grad(module.f)(c),
+        lambda c: potto.grad(module.two, ("b", "a"))(-c, 0.5),
+    ]
+
+    def told(found: potto.Estimate) -> tuple[object, ...]:
+        return (type(found), repr((found.value, found.error, found.tangent, found.tangent_error)), found.method,
+                found.converged, list(map(str, found.notes)), found.evals)  # fmt: skip
+
+    answer, answered = AtOnce.answer, []
+
+    def spied(self: AtOnce, *given: Any) -> potto.Estimate | None:
+        found = answer(self, *given)
+        answered.append(found is not None)
+        return found
+
+    with potto.settings(backend=backend):
+        for call in calls:
+            for c in places * 2:
+                call(c)
+            with monkeypatch.context() as patch:
+                patch.setattr(AtOnce, "answer", spied)
+                found = [told(call(c)) for c in places]
+            with monkeypatch.context() as patch:
+                patch.setattr(Call, "at_once", lambda *_: None)
+                assert found == [told(call(c)) for c in places]
+    assert sum(answered) >= 25 and not all(answered)
+
+
+def test_what_is_known_of_calls_is_left_where_more_is_asked() -> None:
+    f = potto.compile(RENDERER).f
+    for _ in range(3):
+        assert f(-0.7).stats["integrals"] == 1
+    with potto.settings(method="mc", samples=1000):
+        assert f(-0.7).method == "mc"
+    assert f(np.array([-0.7])).value.shape == (1,)
+    assert math.isnan(f(math.nan).value) and f(-5).value == 0
+    with pytest.raises(potto.PottoError, match="bool"):
+        f(True)
 
 
 def test_where_the_edge_lies_on_a_corner_the_general_way_says_so() -> None:

@@ -13,12 +13,14 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from potto.core.terms import Const, children
-from potto.integrate.fixed.alone import summed_alone
-from potto.integrate.fixed.moving_sums import Totals, evaluated
+from potto.integrate.fixed.alone import Face, machine_code, summed_alone, summed_by
+from potto.integrate.fixed.moving_sums import Totals, evaluated, summed
 from potto.integrate.fixed.straight import CLEAR, Straight
 from potto.integrate.pieces import Evaluator, Sums
 from potto.integrate.rules.gauss import EPS
@@ -27,6 +29,7 @@ from potto.integrate.rules.proved_orders import Cell as Stretch
 from potto.integrate.rules.proved_orders import Region, proved
 from potto.kernels.cells import Cell, Value
 from potto.kernels.making import making
+from potto.kernels.native.objects import Loaded
 
 MOST_CELLS, MOST_NODES = 24, 60_000
 # The truncation error that is proved for the value, as a part of the accuracy that is asked for; nobody gains by less
@@ -215,18 +218,12 @@ def certain(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Sums |
 
 def proved_sum(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Totals | None:
     """The same as plain numbers, errors with what rules leave out."""
-    if machine.frozen or machine.side:
+    values = None if machine.frozen or machine.side else _numbers(plan, env)
+    if values is None:
         return None
-    values: dict[str, float] = {}
-    for name in plan.names:
-        cell = env.get(name)
-        if not isinstance(cell, Cell) or cell.arrays() or not math.isfinite(cell.v):
-            return None
-        values[name] = float(cell.v)
     frame = evaluated(plan.frames[0], machine.tracking(), env)
     reach, rtol = float(frame[1].v - frame[0].v), min(machine.rtol, LOOSEST)
-    known = 0 < reach < math.inf and all(env[name].e is None for name in plan.names)  # type: ignore[union-attr]
-    places = _around(values, {n: max(abs(v), reach) for n, v in values.items()}) if known else None
+    places = _near(plan, values, reach, env)
     region = plan.settled.get((places, rtol)) if machine.costs is None else None
     if region is None:
         try:
@@ -244,7 +241,71 @@ def proved_sum(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Tot
             with making:
                 _settle(plan, region, places, rtol)
     found = summed_alone(plan, region, machine, env, frame)
-    return None if found is None else _accurate(found, region, machine, [env[name] for name in plan.names])
+    if found is None:
+        return None
+    machine.count(found.nodes)
+    return _accurate(found, _truncation(plan, region, machine.directions, env), machine.rtol, machine.atol)
+
+
+class Settled(Struct, frozen=True, eq=False):
+    """An integral all over a region of its parameters, which run along tangents that stay the same.
+
+    box: per parameter, between which numbers. truncation: a bound of what the rule leaves out, of the value and each
+    tangent. faces: integrands with their functions of machine code; none where numpy adds up.
+    """
+
+    plan: Straight
+    region: Region
+    machine: Evaluator
+    box: tuple[tuple[str, float, float], ...]
+    truncation: list[float]
+    faces: list[tuple[Face, Loaded]]
+
+    def at(self, env: dict[str, Any]) -> Totals | None:
+        """The value and its tangents; None outside of the region, and where they are not accurate enough."""
+        for name, low, high in self.box:
+            if not low <= env[name].v <= high:
+                return None
+        plan, machine = self.plan, self.machine
+        if self.faces:
+            found = summed_by(self.faces, env)
+        else:
+            with np.errstate(all="ignore"):
+                found = summed(plan.variables, plan.frames, self.region, machine, env)
+        return None if found is None else _accurate(found, self.truncation, machine.rtol, machine.atol)
+
+
+def settled(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Settled | None:
+    """What is known of the integral for all parameters near these; None where that is not settled, or not yet."""
+    values = _numbers(plan, env)
+    if values is None or machine.frozen or machine.side or machine.costs is not None:
+        return None
+    low, high, *_ = evaluated(plan.frames[0], machine.tracking(), env)
+    places = _near(plan, values, float(high.v - low.v), env)
+    region = plan.settled.get((places, min(machine.rtol, LOOSEST)))
+    faces = None if region is None else machine_code(plan, region, machine, env)
+    if places is None or region is None or faces is None:
+        return None
+    box = tuple((name, middle - radius, middle + radius) for name, middle, radius in places)
+    return Settled(plan, region, machine, box, _truncation(plan, region, machine.directions, env), faces)
+
+
+def _numbers(plan: Straight, env: Mapping[str, Value]) -> dict[str, float] | None:
+    """The parameters, if each is one finite number."""
+    values: dict[str, float] = {}
+    for name in plan.names:
+        cell = env.get(name)
+        if not isinstance(cell, Cell) or cell.arrays() or not math.isfinite(cell.v):
+            return None
+        values[name] = float(cell.v)
+    return values
+
+
+def _near(plan: Straight, values: Mapping[str, float], reach: float, env: Mapping[str, Any]) -> Places | None:
+    """The region in which parameters lie that have no errors, where the first variable runs so far."""
+    if not 0 < reach < math.inf or any(env[name].e is not None for name in plan.names):
+        return None
+    return _around(values, {n: max(abs(v), reach) for n, v in values.items()})
 
 
 def _settle(plan: Straight, region: Region, places: Places, rtol: float) -> None:
@@ -255,21 +316,25 @@ def _settle(plan: Straight, region: Region, places: Places, rtol: float) -> None
         plan.settled[places, rtol] = region
 
 
-def _accurate(found: Totals, region: Region, machine: Evaluator, parameters: Sequence[Value]) -> Totals | None:
-    """The answer, if it is as accurate as was asked for, or as its rounding allows."""
-    k = machine.directions
-    truncation = [region.error]
-    for d in range(k):
+def _truncation(plan: Straight, region: Region, directions: int, env: Mapping[str, Any]) -> list[float]:
+    """Bounds of what the rule leaves out of the value and of its tangents."""
+    bounds = [region.error]
+    for d in range(directions):
         speeds = {}
-        for name, cell in zip(region.radius, parameters, strict=True):
-            assert isinstance(cell, Cell)
-            t = cell.t[d] if d < len(cell.t) else None
+        for name, place in zip(region.radius, plan.names, strict=True):
+            tangents = env[place].t
+            t = tangents[d] if d < len(tangents) else None
             speeds[name] = 0.0 if t is None else float(t)
-        truncation.append(region.rate(speeds))
+        bounds.append(region.rate(speeds))
+    return bounds
+
+
+def _accurate(found: Totals, truncation: Sequence[float], rtol: float, atol: float) -> Totals | None:
+    """The answer, if it is as accurate as was asked for, or as its rounding allows."""
     errors, unit = [], EPS * max(found.gross)
     for x, rounding, gross, beyond in zip(found.number, found.error, found.gross, truncation, strict=True):
-        asked = 0.5 * max(machine.atol, machine.rtol * abs(x))
+        asked = 0.5 * max(atol, rtol * abs(x))
         if not (rounding <= asked and beyond <= max(asked, NOISE * gross, unit)):
             return None
         errors.append(rounding + beyond)
-    return Totals(found.number, errors, found.gross)
+    return Totals(found.number, errors, found.gross, found.nodes)

@@ -25,7 +25,7 @@ from potto.integrate.rules.proved_orders import Cell as Stretch
 from potto.integrate.rules.proved_orders import Region
 from potto.kernels.cells import Array, Cell, Ints, Value
 from potto.kernels.making import counts
-from potto.kernels.native.objects import Loaded
+from potto.kernels.native.objects import Loaded, available
 from potto.kernels.native.points import address
 from potto.kernels.native.vectors import LANES
 
@@ -37,8 +37,8 @@ Read = tuple[str, int]
 class _Layout(Struct):
     """What one call of the function for some cells reads and writes.
 
-    frame, constants: what it takes; tables: what the frame points to. out: (rows, LANES or more), of which `told` rows
-    count, and as many columns as there are `cells`.
+    frame, constants: what it takes, which lies at `where`; tables: what the frame points to. out: the part that counts
+    of what it gives, (rows, cells).
     """
 
     reads: tuple[Read, ...]
@@ -46,14 +46,13 @@ class _Layout(Struct):
     out: Array
     frame: Ints
     tables: Sequence[Array]
-    told: int
-    cells: int
+    where: tuple[int, int]
 
     def run(self, function: Loaded, env: Mapping[str, Cell]) -> list[list[float]]:
         """Row by row what the function gives for each of the cells."""
         self.constants[:] = [env[name].v if d < 0 else env[name].t[d] for name, d in self.reads]
-        function.call(address(self.frame), address(self.constants))
-        return self.out[: self.told, : self.cells].tolist()  # type: ignore[no-any-return]
+        function.call(*self.where)
+        return self.out.tolist()  # type: ignore[no-any-return]
 
 
 class Face(Struct, frozen=True):
@@ -79,7 +78,9 @@ class Face(Struct, frozen=True):
             for place in self.way.places
             if place.kind == "number"
         )
-        return _Layout(reads, np.empty(len(reads)), out, frame, ends, told, count)
+        constants = np.empty(len(reads))
+        where = address(frame), address(constants)
+        return _Layout(reads, constants, out[:told, :count], frame, ends, where)
 
     def summed(self, function: Loaded, env: Mapping[str, Cell]) -> Totals | None:
         """The sums over all nodes of the cells; None where cuts cross."""
@@ -92,10 +93,10 @@ class Face(Struct, frozen=True):
         if not min(rows[3 * self.k1]) > 0:
             return None
         k1, share = self.k1, ELSEWHERE if self.nodes > TRACKED else 1.0
-        number = [sum(row) for row in rows[:k1]]
-        gross = [max(sum(most), sum(map(abs, row))) for most, row in zip(rows[k1 : 2 * k1], rows, strict=False)]
-        off = (sum(row) for row in rows[2 * k1 : 3 * k1])
-        return Totals(number, [share * x + ELSEWHERE * SUMMED * y for x, y in zip(off, gross, strict=True)], gross)
+        sums = list(map(sum, rows))
+        gross = [max(sums[k1 + d], sum(map(abs, rows[d]))) for d in range(k1)]
+        error = [share * sums[2 * k1 + d] + ELSEWHERE * SUMMED * gross[d] for d in range(k1)]
+        return Totals(sums[:k1], error, gross, self.nodes)
 
 
 def summed_alone(
@@ -105,29 +106,43 @@ def summed_alone(
 
     frame: the bounds and cuts of the outermost variable.
     """
-    cells: Any = env  # of those among the parameters `a_priori` has seen to it
-    if machine.backend == "numpy" or any(cells[name].e is not None or any(cells[name].et) for name in plan.names):
-        return summed(plan.variables, plan.frames, region, machine, env, frame)
-    faces = _faces(plan, region, machine, cells)
-    promotion = faces[0].way.promotion
-    # For one integral nobody waits for the compiler, whatever the backend: of a swapped shader it is all of the time.
-    functions = [face.way.function(machine) for face in faces] if promotion.spent else [None]
-    if None in functions:
-        with promotion.by_numpy():
+    faces = machine_code(plan, region, machine, env)
+    if faces is None:
+        with _faces(plan, region, machine, env)[0].way.promotion.by_numpy():
             return summed(plan.variables, plan.frames, region, machine, env, frame)
+    return summed_by(faces, env) if faces else summed(plan.variables, plan.frames, region, machine, env, frame)
+
+
+def machine_code(
+    plan: Straight, region: Region, machine: Evaluator, env: Mapping[str, Any]
+) -> list[tuple[Face, Loaded]] | None:
+    """The integrands of a region with their functions; none of them where numpy is to be used, None while it is.
+
+    For one integral nobody waits for the compiler, whatever the backend: of a swapped shader it is all of the time.
+    """
+    uncertain = any(env[name].e is not None or any(env[name].et) for name in plan.names)
+    if machine.backend == "numpy" or uncertain or not available():
+        return []
+    faces = _faces(plan, region, machine, env)
+    promotion = faces[0].way.promotion
+    functions = [face.way.function(machine) for face in faces] if promotion.spent else [None]
+    found = [(face, function) for face, function in zip(faces, functions, strict=False) if function is not None]
+    return found if len(found) == len(faces) else [] if promotion.impossible else None
+
+
+def summed_by(faces: Sequence[tuple[Face, Loaded]], env: Mapping[str, Any]) -> Totals | None:
+    """The sums by machine code; None where cuts cross."""
     total: Totals | None = None
-    for face, function in zip(faces, functions, strict=True):
-        assert function is not None
-        found = face.summed(function, cells)
+    for face, function in faces:
+        found = face.summed(function, env)
         if found is None:
             return None
-        machine.count(face.nodes)
         counts.native_points += face.nodes
         total = found if total is None else total.plus(found)
     return total
 
 
-def _faces(plan: Straight, region: Region, machine: Evaluator, env: dict[str, Any]) -> list[Face]:
+def _faces(plan: Straight, region: Region, machine: Evaluator, env: Mapping[str, Any]) -> list[Face]:
     """The integrands of a region, for parameters that move as these do."""
     kinds = tuple([tuple([None if t is None else t == 1.0 for t in env[name].t]) for name in plan.names])
     key = region, machine.directions, kinds
@@ -143,7 +158,7 @@ def _bodies(region: Region) -> list[Term]:
     return list(dict.fromkeys(cell.body for cell in region.cells))
 
 
-def _face(plan: Straight, region: Region, machine: Evaluator, env: dict[str, Any], body: Term) -> Face:
+def _face(plan: Straight, region: Region, machine: Evaluator, env: Mapping[str, Any], body: Term) -> Face:
     """The cells with one integrand, all by the largest of their orders: what is proved holds for more nodes as well."""
     own = [(cell, order) for cell, order in zip(region.cells, region.outer, strict=True) if cell.body is body]
     cells, orders = zip(*own, strict=True)

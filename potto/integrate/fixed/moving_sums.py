@@ -69,34 +69,39 @@ def _layout(region: Region) -> _Layout:
 
 
 class Totals(Struct, frozen=True):
-    """Values and tangents (1 + k,), how far rounding puts each off, and what each is when nothing cancels."""
+    """Values and tangents (1 + k,), how far rounding puts each off, and what each is when nothing cancels; evaluations
+    of the integrand."""
 
     number: list[float]
     error: list[float]
     gross: list[float]
+    nodes: int = 0
 
     def plus(self, other: Totals) -> Totals:
         mine, theirs = (self.number, self.error, self.gross), (other.number, other.error, other.gross)
-        return Totals(*([x + y for x, y in zip(a, b, strict=True)] for a, b in zip(mine, theirs, strict=True)))
+        number, error, gross = ([x + y for x, y in zip(a, b, strict=True)] for a, b in zip(mine, theirs, strict=True))
+        return Totals(number, error, gross, self.nodes + other.nodes)
 
 
 def summed(
     variables: Sequence[str], frames: Sequence[Lam], region: Region, machine: Evaluator, env: dict[str, Value],
-    frame: tuple[Cell, ...],
+    frame: tuple[Cell, ...] | None = None,
 ) -> Totals | None:  # fmt: skip
     """Weighted sums over the nodes of all cells: value and tangents, with their rounding. None where cuts cross.
 
-    frames: per variable its bounds and cuts, as functions of what is further out; `frame` has the values of the first.
+    frames: per variable its bounds and cuts, as functions of what is further out. frame: the values of the first; None
+    where it is known that no cuts cross.
     """
     tracked, here, layout, k = machine.tracking(), dict(env), _layout(region), machine.directions
     shape: tuple[int, ...] = (1,)
     length = rounded = layout.weights
+    ordered = frame is None
     for i, variable in enumerate(variables):
-        if i:
+        if i or frame is None:
             frame = evaluated(frames[i], tracked, here)
         block = _block(frame, k, shape) if i else _numbers(frame, k)
         ends = block.take(layout.ends[i], axis=2)
-        if i and _crossed(block[0, 0].reshape(len(frame), *shape), *ends[0, 0]):
+        if i and not ordered and _crossed(block[0, 0].reshape(len(frame), *shape), *ends[0, 0]):
             return None
         lo, width, off = _between(ends)
         for name in variables[:i]:
@@ -113,8 +118,7 @@ def summed(
     values = _integrand(layout, tracked, here, shape)
     if len(variables) > 1:
         values = values @ gauss(region.inner[-1]).weights
-    machine.count(layout.count)
-    return _added(values, length * layout.weights, rounded * layout.weights)
+    return _added(values, length * layout.weights, rounded * layout.weights, layout.count)
 
 
 def _deeper(array: Array) -> Array:
@@ -200,7 +204,7 @@ def _integrand(layout: _Layout, machine: Evaluator, here: dict[str, Value], shap
     return out
 
 
-def _added(values: Array, length: Array, rounded: Array) -> Totals:
+def _added(values: Array, length: Array, rounded: Array, nodes: int) -> Totals:
     """Sums over nodes of the integrand (3, 1 + k, P, ...) times the lengths (1 + k, P, ...) with their weights."""
     k1 = len(length)
     factors = np.concatenate((length, np.abs(length), rounded)).reshape(3 * k1, -1)
@@ -213,4 +217,4 @@ def _added(values: Array, length: Array, rounded: Array) -> Totals:
 
     gross = ruled(2, 1)
     off = zip(ruled(1, 1), ruled(2, 2), gross, strict=True)
-    return Totals(ruled(0, 0), [a + b + SUMMED * c for a, b, c in off], gross)
+    return Totals(ruled(0, 0), [a + b + SUMMED * c for a, b, c in off], gross, nodes)

@@ -67,6 +67,11 @@ def watching(gauge: Gauge) -> Iterator[Gauge]:
         _gauge.reset(token)
 
 
+def watched() -> bool:
+    """Whether anyone wants to know how far evaluations have come."""
+    return _gauge.get() is not None
+
+
 @contextmanager
 def advancing() -> Iterator[Callable[[float, int], None]]:
     """In this block a batch is evaluated in parts, and how far it is as a whole is told by who does that: the share of

@@ -18,7 +18,7 @@ from potto.calculus.surfaces.discontinuities import TooDeep
 from potto.calculus.surfaces.trace import spine
 from potto.core.terms import App, Const, Deriv, Integral, Lam, Term, Var
 from potto.diagnostics import PottoError
-from potto.integrate.fixed.a_priori import proved_sum
+from potto.integrate.fixed.a_priori import Settled, proved_sum, settled
 from potto.integrate.fixed.straight import Straight
 from potto.kernels.cells import Cell, Value
 from potto.kernels.making import making
@@ -49,19 +49,8 @@ class Direct(Struct, frozen=True):
 
     def value(self, machine: Machine, env: Mapping[str, Value]) -> Value | None:
         """The value of the call; None where only the general way has it."""
-        if machine.settings.method in ("mc", "qmc") or machine.taping or (self.dual and machine.directions):
-            return None
-        here, functions = self._given(machine, env)
-        if here is None:
-            return None
         working = (machine.with_directions(1) if self.dual else machine).inside()
-        key = functions, working.directions > 0
-        if key not in self.rules:
-            if len(self.rules) >= MOST_FUNCTIONS:
-                self.rules.clear()
-            with making:
-                self.rules[key] = self._rule(working, here)
-        rule = self.rules[key]
+        here, rule = self._prepared(machine, working, env)
         found = None if rule is None else proved_sum(rule, working, here)
         if found is None:
             return None
@@ -72,6 +61,29 @@ class Direct(Struct, frozen=True):
         record.within = widest(record.within, allowance_of_one(self.term, found.gross[0], rates, machine.rtol))
         cell = Cell(found.number[0], found.error[0], tuple(found.number[1:]), tuple(found.error[1:]))
         return split(cell) if self.dual else cell
+
+    def settled(self, machine: Machine, env: Mapping[str, Value]) -> Settled | None:
+        """What is known of the call for all numbers near these, if it is the same for all of them."""
+        working = machine.inside()
+        here, rule = ({}, None) if self.dual else self._prepared(machine, working, env)
+        return None if rule is None else settled(rule, working, here)
+
+    def _prepared(
+        self, machine: Machine, working: Machine, env: Mapping[str, Value]
+    ) -> tuple[dict[str, Value], Straight | None]:
+        """The parameters of the integral, and its rule; None where there is no such rule."""
+        if machine.settings.method in ("mc", "qmc") or machine.taping or (self.dual and machine.directions):
+            return {}, None
+        here, functions = self._given(machine, env)
+        if here is None:
+            return {}, None
+        key = functions, working.directions > 0
+        if key not in self.rules:
+            if len(self.rules) >= MOST_FUNCTIONS:
+                self.rules.clear()
+            with making:
+                self.rules[key] = self._rule(working, here)
+        return here, self.rules[key]
 
     def _given(self, machine: Machine, env: Mapping[str, Value]) -> tuple[dict[str, Value] | None, tuple[Lam, ...]]:
         """The parameters of the integral, and the functions among them; None where these are not plain."""
