@@ -56,6 +56,9 @@ KINKS = [
     ("integral ([0, 1], [0, t]) [y < 0.5]*x d(x, y)", 0.5, 0.5, 0),
     ("integral ([0, 1], [0, t*x]) [y < x/2] d(x, y)", 0.5, 0.5, 0),
     ("integral (x ~ uniform(0, 1), y ~ uniform(0, 1)) [y < t] d(x, y)", 1.0, 1, 0),
+    # to rounding: 18.5 - 0.1*13.5 is 17.15 and a few doubles
+    ("integral [-3, 3] [x + 18.5 - 0.1*(18.5 - 5) < t] d(x)", 20.15, 1, 0),
+    ("integral ([0, 1], [-3, 3]) [y + 18.5 - 0.1*(18.5 - 5) + [x < t - 19.9] < t] d(x, y)", 20.15, 0, -0.75),
     # surfaces that coincide, or run along a bound, an axis or another one
     (f"{CUBE} [max(x, y, z) < t] d(x, y, z)", 1.0, 3, 0),
     (f"{UNIT} [x < t*y] d(x, y)", 0.0, 0, 0.5),

@@ -15,7 +15,7 @@ from potto.integrate.adaptive.refining import integrated
 from potto.integrate.adaptive.root_sums import Rows, over_roots
 from potto.integrate.columns import distinct
 from potto.integrate.decomposition.critical_places import critical_rows
-from potto.integrate.decomposition.cuts import Cuts, at_rest, finite_speeds, frame_rows, segments, standing
+from potto.integrate.decomposition.cuts import Cuts, at_rest, finite_speeds, frame_rows, on_bounds, segments, standing
 from potto.integrate.decomposition.effective_range import concentrated, pulled_in
 from potto.integrate.decomposition.meetings import Row
 from potto.integrate.decomposition.sections import searched_rows
@@ -188,6 +188,8 @@ class Iteration(Struct):
         for row in rows if self.still else ():
             if row.cut >= 0 and level.level.cuts[row.cut].surface in self.still:
                 row.t = ()
+        if machine.side and machine.directions:
+            rows = on_bounds(level, lo, hi, rows, batch, machine.directions, kin)
         cuts = segments(level, lo, hi, rows, batch, machine.directions, kin)
         if not any(c.decides for c in level.level.cuts):
             cuts = at_rest(cuts) if self.resting(level, lo, hi, cuts.segments) else finite_speeds(cuts)

@@ -164,6 +164,30 @@ def segments(
     return cuts
 
 
+def on_bounds(
+    plan: LevelPlan, lo: Cell, hi: Cell, rows: list[Row], batch: int, directions: int, kin: Ints | None
+) -> list[Row]:
+    """The rows, with jumps put on a bound that rounding does not tell from it, or what lies between from nothing: for
+    derivatives to one side, where it is known on which side of the bound they are. kin: as `segments` takes it."""
+    ends = _ends(lo, hi, batch, directions)[:2]
+    roots, off, t = _stacked(rows, batch, directions)
+    reach = ends[1][0] - ends[0][0]
+    found = []
+    for number, row in enumerate(rows):
+        x = roots[number]
+        for bound, speed, e in ends if row.cut >= 0 and plan.level.cuts[row.cut].decides else ():
+            near = np.clip(off[number] + e, NARROW * reach, ONE_PLACE * reach)
+            near = (np.abs(x - bound) <= near) & (x != bound)
+            near &= (t[:directions, number + 1] != speed).any(axis=0)
+            if near.any():
+                owner = np.nonzero(near)[0]
+                owner = owner if kin is None else mostly(owner, kin, batch)
+                x = x.copy()
+                x[owner] = bound[owner]
+        found.append(row if x is roots[number] else replace(row, x=x))
+    return found
+
+
 def standing(cuts: Cuts) -> Cuts:
     """The same cuts, none of which moves."""
     return replace(at_rest(cuts), edges=[], conflict=False, meetings=[], brushes=[], folds=[])

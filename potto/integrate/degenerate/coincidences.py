@@ -147,7 +147,9 @@ def count_places(scene: Scene, cuts: Cuts, sums: Sums) -> None:
 
 
 def count_slivers(scene: Scene, cuts: Cuts, sums: Sums) -> None:
-    """Add to the errors what may lie between surfaces that rounding does not tell apart."""
+    """Add to the errors what may lie between surfaces that rounding does not tell apart, and say where one may be on
+    either side of a bound."""
+    machine = scene.machine
     for found in cuts.slivers:
         sliver = found.pick(scene.counted(found.owner))
         if not sliver.owner.size:
@@ -162,6 +164,9 @@ def count_slivers(scene: Scene, cuts: Cuts, sums: Sums) -> None:
         swept = lost * np.where(np.isfinite(sliver.speed), sliver.speed, 0.0)
         either = apart[:, None] * np.where(np.isfinite(sliver.passes), sliver.passes, 0.0)
         sums.et[:, :, sliver.owner] += swept[:, None] + np.where(np.isfinite(either), either, 0.0)
+        if not machine.side and (hidden := (either > 0) & np.isfinite(either)).any():
+            named = TwoSided(scene.level.variable, scene.surface(sliver.cuts[0]))
+            machine.note(named, scene.below(sliver.owner[hidden.any(axis=(0, 1))]))
         if len(set(sliver.cuts)) < len(sliver.cuts):  # nothing is known of how a surface moves where it folds
             sums.et[:, :, sliver.owner] += np.where((lost > 0) & ~np.isfinite(sliver.speed), np.inf, 0.0)[:, None]
         sums.e[at] += lost

@@ -2,7 +2,8 @@
 
 Owns `count_narrow`. Between two cuts 1e-17 apart a surface is 0 to rounding, and which side is taken is an accident.
 Hardly anything depends on it but a derivative, where the ends of the stretch move apart: so what the integrand is on
-the other side, as far as it differs, is part of the error.
+the other side, as far as it differs, is part of the error. Where one end is a bound, the surface lies on it as far as
+anyone can tell, and the derivative has two sides.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from potto.integrate.degenerate.coincidences import Scene, placed
+from potto.integrate.events import TwoSided
 from potto.integrate.pieces import Sums, take
 from potto.integrate.rules import substitution
 from potto.integrate.rules.substitution import Segments
@@ -42,6 +44,20 @@ def count_narrow(
             np.add.at(sums.e[c], owner, rows * (seg.b - seg.a)[part])
             for d, spreads in enumerate(np.abs(seg.tb - seg.ta)[:, part]):
                 np.add.at(sums.et[c, d], owner, np.where(spreads > 0, rows * spreads, 0.0))
+        if not scene.machine.side and len(groups) == 1:
+            spreads = (np.abs(seg.tb - seg.ta)[:, part] > 0).any(axis=0) & (apart > 0).any(axis=0)
+            met = owner[spreads & _at_ends(seg)[part]]
+            if met.size:
+                surface = scene.parent.plan.groups[groups[0]].cut.surface
+                scene.machine.note(TwoSided(scene.level.variable, surface), scene.below(met))
+
+
+def _at_ends(seg: Segments) -> Bools:
+    """Which segments are the first or the last of their owner's."""
+    first, last = np.full(seg.owner.max() + 1, np.inf), np.full(seg.owner.max() + 1, -np.inf)
+    np.minimum.at(first, seg.owner, seg.a)
+    np.maximum.at(last, seg.owner, seg.b)
+    return np.asarray((seg.a == first[seg.owner]) | (seg.b == last[seg.owner]))
 
 
 def _difference(scene: Scene, seg: Segments, sides: Mapping[int, Mask], groups: list[int], part: Ints) -> Array:

@@ -53,8 +53,8 @@ def on_both_sides(problem: Problem, order: Integral, sums: Sums) -> Sums:
         return sums
     problem.events.forget(TwoSided)
     sides = [_one_side(problem, order, side) for side in (-1, 1)]
-    backward, forward = (np.where(np.isfinite(part.et), part.t, np.nan) for part, _ in sides)
-    before, beyond = (np.where(np.isfinite(part.et), part.et, 0.0) for part, _ in sides)
+    backward, forward = (np.where(np.isfinite(part.et), part.t, np.nan) for part in sides)
+    before, beyond = (np.where(np.isfinite(part.et), part.et, 0.0) for part in sides)
     same = np.abs(forward - backward) <= 1e-12 * (np.abs(forward) + np.abs(backward))
     differ = np.nonzero(~same.all(axis=(0, 1)))[0]
     for cause, members in causes:
@@ -63,27 +63,26 @@ def on_both_sides(problem: Problem, order: Integral, sums: Sums) -> Sums:
             sided = (x[..., there] for x in (backward, forward, before, beyond))
             machine.note(OneSidedDerivatives(cause, *sided), there)
     t, et = np.where(same, forward, sums.t), sums.et
-    if any(turned for _, turned in sides):
-        nearer = np.where(np.abs(t - forward) <= np.abs(t - backward), forward, backward)
-        off = np.maximum(before, beyond)
-        better = np.isfinite(nearer) & (off < et) & (np.abs(t - nearer) <= et)
-        t, et = np.where(better, nearer, t), np.where(better, off, et)
+    nearer = np.where(np.abs(t - forward) <= np.abs(t - backward), forward, backward)
+    off = np.maximum(before, beyond)
+    better = np.isfinite(backward) & np.isfinite(forward) & (off < et) & (np.abs(t - nearer) <= et)
+    t, et = np.where(better, nearer, t), np.where(better, off, et)
     return replace(sums, t=t, et=et)
 
 
-def _one_side(problem: Problem, order: Integral, side: int) -> tuple[Sums, bool]:
-    """The derivatives to one side, and whether they are by another order of the variables: where surfaces are steep in
-    the variable that is innermost rounding leaves them few digits."""
+def _one_side(problem: Problem, order: Integral, side: int) -> Sums:
+    """The derivatives to one side. Where surfaces are steep in the variable that is innermost rounding leaves them few
+    digits, so other orders of the variables are tried."""
     machine = problem.machine.apart().changed(side=side)
-    found, turned = iterated(problem.plan(order), machine, problem.env, problem.batch), False
+    found = iterated(problem.plan(order), machine, problem.env, problem.batch)
     for other in itertools.islice(orders(order), 1, None):
         if (found.et <= ROUGH * np.abs(found.t) + ROUNDED * found.e[:, None]).all() or machine.exhausted():
             break
         apart = machine.apart().changed(side=side)
         part = iterated(problem.plan(other), apart, problem.env, problem.batch)
         if (part.et <= found.et).all() and not apart.events.touched(problem.batch).any():
-            found, turned = part, True
-    return found, turned
+            found = part
+    return found
 
 
 def at_folds(problem: Problem, order: Integral, sums: Sums) -> Sums:
