@@ -161,12 +161,13 @@ class Lines:
             return self.add(args)
         if op == "mul":
             return self.mul(args)
+        if op == "neg":  # exact, so what it may be off by stays as it is
+            (a,) = args
+            return Scalar(self.let(f"-{a.v}"), a.e, *self.negated(a))
         return self.chain(op, args, self.value(op, args))
 
     def value(self, op: str, args: Sequence[Scalar]) -> str:
         a = [x.v for x in args]
-        if op == "neg":
-            return self.let(f"-{a[0]}")
         if op == "pow":
             if a[1] in (ZERO, ONE):
                 return ONE if a[1] == ZERO else a[0]
@@ -192,6 +193,10 @@ class Lines:
         """The tangents of a sum."""
         t = tuple(self.total([x for a in args if (x := a.t[d])]) for d in range(self.directions))
         return t, tuple(self.total([x for a in args if (x := a.et[d])]) for d in range(self.directions))
+
+    def negated(self, x: Scalar) -> Tangents:
+        """The tangents of a number with the other sign."""
+        return tuple(t and self.let(f"-{t}", "t") for t in x.t), x.et
 
     def mul(self, args: Sequence[Scalar]) -> Scalar:
         if all(a.plain for a in args) and not self.rounding:

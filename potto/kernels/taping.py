@@ -28,6 +28,9 @@ class TapeLines(Lines):
     def added(self, args: Sequence[Scalar]) -> Tangents:
         return self.linear([(ONE, x.t[0], None) for x in args if x.t[0]])
 
+    def negated(self, x: Scalar) -> Tangents:
+        return self.linear([("-1.0", x.t[0], None)] if x.t[0] else [])
+
     def linear(self, edges: Sequence[tuple[str, str | None, str | None]]) -> Tangents:
         if not edges:
             return self.none, self.none
