@@ -1,7 +1,8 @@
 """A picture as a mesh of coloured triangles: `python fit.py [constant|linear|quadratic]` fits corners and colours.
 
 The loss and its gradient, in all corners and colours, are those of `stylize.po`; scipy's L-BFGS-B goes down. Triangles
-are kept from turning over by a barrier: the loss grows without end as one loses its area.
+are kept from turning over by a barrier: the loss grows without end as one loses its area. Corners are measured in cells
+of the grid, so that a step moves them about as far as it changes colours, and the first ones turn nothing over.
 """
 
 from __future__ import annotations
@@ -78,11 +79,12 @@ def fitted(kind: str, photo: np.ndarray, side: int, steps: int, slopes: Slopes |
     slopes = slopes or slopes_by_potto(kind)
     mesh = grid(side, kind)
     free = ((mesh.corners > 0) & (mesh.corners < 1)).all(axis=1)
+    cell = (1 + 2 * BEYOND) / side
     first, count = mesh.areas(), 2 * int(free.sum())
 
     def unpacked(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         corners = mesh.corners.copy()
-        corners[free] = x[:count].reshape(-1, 2)
+        corners[free] = cell * x[:count].reshape(-1, 2)
         return corners, x[count:].reshape(mesh.colours.shape)
 
     def down(x: np.ndarray) -> tuple[float, np.ndarray]:
@@ -91,13 +93,13 @@ def fitted(kind: str, photo: np.ndarray, side: int, steps: int, slopes: Slopes |
         if (left <= 0).any():
             return 1e3, np.zeros_like(x)
         loss, by_corner, by_colour = slopes(corners, mesh.faces, colours, photo)
-        by_corner = by_corner + _barrier_slopes(mesh.faces, corners, left)
+        by_corner = cell * (by_corner + _barrier_slopes(mesh.faces, corners, left))
         reached.append(loss)
         return loss - BARRIER * np.log(left / first).sum(), np.concatenate([by_corner[free].ravel(), by_colour.ravel()])
 
     reached: list[float] = []
     start = time.perf_counter()
-    begin = np.concatenate([mesh.corners[free].ravel(), mesh.colours.ravel()])
+    begin = np.concatenate([mesh.corners[free].ravel() / cell, mesh.colours.ravel()])
     found = minimize(down, begin, jac=True, method="L-BFGS-B", options={"maxiter": steps},
                      callback=lambda x: mesh.losses.append(reached[-1]))  # fmt: skip
     mesh.corners, mesh.colours = unpacked(found.x)
