@@ -1,11 +1,11 @@
 """One integral between known cuts, straight through: no pieces, no refinement, as many nodes as were proved enough.
 
-Owns `certain`. Where all cuts are closed forms and on every cell between them the integrand is one
-analytic formula, `proofs` says beforehand how many nodes do. What is left is a short program: bounds and cuts as
-formulas of the variables further out, the nodes between them, the formula at the nodes, weighted sums. Its derivative
-is that of the program, whose nodes move with the parameters (Reynolds' transport theorem: a surface that moves takes
-its nodes along, so that no boundary term is left). Its rounding is kept track of as everywhere outside of integrals, by
-a running error analysis from the bounds to the sums. Whatever is not plain here is left to `levels`.
+Owns `certain`, `proved_sum` and `Crowded`. Where all cuts are closed forms and on every cell between them the integrand
+is one analytic formula, `proved_orders` says beforehand how many nodes do. What is left is a short program: bounds and
+cuts as formulas of the variables further out, the nodes between them, the formula at the nodes, weighted sums. Its
+derivative is that of the program, whose nodes move with the parameters (Reynolds' transport theorem: a surface that
+moves takes its nodes along, so that no boundary term is left). Its rounding is kept track of as everywhere outside of
+integrals, by a running error analysis from the bounds to the sums. Whatever is not plain here is left to `levels`.
 """
 
 from __future__ import annotations
@@ -47,13 +47,19 @@ APART = 1e-6
 UNKNOWN = object()
 
 Path = tuple[tuple[int, int], ...]
+Place = tuple[float, float, int]  # of a bound or cut: where it is, how far off that may be, its row in the frame
 
 
 # Where the cells are
 
 
 class _NotPlain(Exception):
-    """Something that this way does not provide for: a cut on a bound, a surface that is 0 in a cell's middle."""
+    """Something that this way does not provide for: a turning point, a surface that is 0 in a cell's middle."""
+
+
+class Crowded(_NotPlain):
+    """Cuts that are one another, or a bound, to rounding, as where a surface runs along the variable that it cuts; in
+    another order of the variables they may be far apart."""
 
 
 def _cells(
@@ -102,16 +108,27 @@ def _stretches(
             raise _NotPlain
         places.append((x, CLEAR * e, row))
     lo, hi, rest = places[0], places[1], places[2:]
-    kept = [lo]
-    for place in sorted(rest):
-        if place[0] >= lo[0] - lo[1] - place[1] and place[0] <= hi[0] + hi[1] + place[1]:
-            kept.append(place)
+    kept = [lo, *sorted(place for place in rest if not _outside(place, lo, hi))]
     if not plan.turning[i].isdisjoint(row for _, _, row in kept):
+        raise _NotPlain
+    if hi[0] - lo[0] <= lo[1] + hi[1]:
         raise _NotPlain
     kept.append(hi)
     if any(b[0] - a[0] <= a[1] + b[1] for a, b in itertools.pairwise(kept)):
-        raise _NotPlain
+        raise Crowded
     return [(a[2], b[2], 0.5 * (a[0] + b[0]), b[0] - a[0]) for a, b in itertools.pairwise(kept)]
+
+
+def _outside(place: Place, lo: Place, hi: Place) -> bool:
+    """Whether a cut is beyond the bounds with all that it may be off.
+
+    That of a surface all but parallel to the variable is far away, and as uncertain as it is far: a quotient whose
+    divisor is hardly more than its rounding. Its reciprocal is known.
+    """
+    if place[0] < lo[0] - lo[1] - place[1] or place[0] > hi[0] + hi[1] + place[1]:
+        return True
+    away, half = abs(place[0] - 0.5 * (lo[0] + hi[0])), 0.5 * (hi[0] - lo[0]) + lo[1] + hi[1]
+    return half * (away + place[1]) < away * away
 
 
 def _sides(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> tuple[bool, ...]:
@@ -207,8 +224,13 @@ def _region(
 
 
 def certain(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Sums | None:
-    """The integral for one set of parameters; None where something about it is not plain."""
-    found = proved_sum(plan, machine, env)
+    """The integral for one set of parameters; None where something about it is not plain. Raises Crowded."""
+    try:
+        found = _summed(plan, machine, env)
+    except Crowded:
+        raise
+    except _NotPlain:
+        return None
     if found is None:
         return None
     block = np.array((found.number, found.error))[:, None, :, None]
@@ -217,7 +239,14 @@ def certain(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Sums |
 
 
 def proved_sum(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Totals | None:
-    """The same as plain numbers, errors with what rules leave out."""
+    """The same as plain numbers, errors with what rules leave out; None where cuts are crowded, too."""
+    try:
+        return _summed(plan, machine, env)
+    except _NotPlain:
+        return None
+
+
+def _summed(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Totals | None:
     values = None if machine.frozen or machine.side else _numbers(plan, env)
     if values is None:
         return None
@@ -226,10 +255,7 @@ def proved_sum(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Tot
     places = _near(plan, values, reach, env)
     region = plan.settled.get((places, rtol)) if machine.costs is None else None
     if region is None:
-        try:
-            cells, shortest = _cells(plan, machine, env, frame)
-        except _NotPlain:
-            return None
+        cells, shortest = _cells(plan, machine, env, frame)
         if not cells:
             nothing = [0.0] * (1 + machine.directions)
             return Totals(nothing, nothing, nothing)

@@ -1,9 +1,9 @@
 """Answers to one integral by several ways, of which the best one counts.
 
-Owns `Attempt`, `attempted`, `uncertainty` and `best`. An order of the variables that runs into roots that merge, or
-into kinks at places that nobody knows, takes a hundred times what another one takes. So each is tried with few
-evaluations before any of them gets all, and what was found on the way is kept: no way makes an answer worse that
-another one had.
+Owns `proved_beforehand`, `Attempt`, `attempted`, `uncertainty` and `best`. An order of the variables that runs into
+roots that merge, or into kinks at places that nobody knows, takes a hundred times what another one takes. So each is
+tried with few evaluations before any of them gets all, and what was found on the way is kept: no way makes an answer
+worse that another one had.
 """
 
 from __future__ import annotations
@@ -16,21 +16,38 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from potto.core.terms import Integral
-from potto.integrate.events import Events
+from potto.integrate.events import BUDGET_SPENT, Events, Shortfall
+from potto.integrate.fixed.a_priori import Crowded, certain
 from potto.integrate.pieces import Sums
+from potto.runtime.integration.choices import preferred
 from potto.runtime.integration.problem import Problem
 from potto.runtime.integration.quadrature import in_parts
+
+
+def proved_beforehand(problem: Problem) -> Sums | None:
+    """By the rule of the first order of the variables in which the cuts are apart, if there is a proof for it."""
+    for order in preferred(problem):
+        rule = problem.plan(order).straight
+        if rule is None:
+            return None
+        try:
+            return certain(rule, problem.machine, problem.env)
+        except Crowded:
+            continue
+    return None
 
 
 class Attempt(Struct, frozen=True):
     """An answer by an order of the variables, with what was met on the way to it.
 
-    stopped: whether it had to stop for want of evaluations. tabled: whether it comes from variables eliminated.
+    most: how many evaluations a member it was given, None for all. stopped: whether it had to stop for want of them.
+    tabled: whether it comes from variables eliminated.
     """
 
     order: Integral
     sums: Sums
     events: Events
+    most: int | None = None
     stopped: bool = False
     tabled: bool = False
 
@@ -43,7 +60,8 @@ def attempted(problem: Problem, order: Integral, most: int | None) -> Attempt:
     if bounded:
         machine = machine.changed(settings=replace(machine.settings, max_evals=math.ceil(limit)))
     sums = in_parts(problem.plan(order), machine, problem.env, problem.batch)
-    return Attempt(order, sums, machine.events, most is not None and machine.exhausted())
+    stopped = most is not None and machine.exhausted() and BUDGET_SPENT in dict(machine.events.every(Shortfall))
+    return Attempt(order, sums, machine.events, most, stopped)
 
 
 def uncertainty(sums: Sums) -> float:

@@ -16,10 +16,10 @@ from msgspec.structs import replace
 
 from potto.core.terms import Integral
 from potto.integrate.events import Degenerate, Events, Fold, Shortfall, TwoSided, Unsearched
-from potto.integrate.fixed.a_priori import certain
 from potto.integrate.pieces import Sums
 from potto.kernels.cells import Array, Bools, Ints
 from potto.runtime.answers.convergence import missing, rounded
+from potto.runtime.integration.attempts import proved_beforehand
 from potto.runtime.integration.choices import orders, preferred
 from potto.runtime.integration.one_sided import one_direction
 from potto.runtime.integration.problem import Problem
@@ -94,13 +94,10 @@ def _cut(problem: Problem, settled: Settled) -> Sums:
 def _proved(problem: Problem, found: Whole) -> Ints:
     """Put the first members, as long as there is a proof for each; those that are left."""
     everybody = np.arange(problem.batch)
-    plan = problem.plan(next(iter(preferred(problem))))
-    if plan.straight is None:
-        return everybody
     for i in everybody:
         one = everybody[i : i + 1]
         with problem.among(one) as single:
-            sums = certain(plan.straight, single.machine, single.env)
+            sums = proved_beforehand(single)
         if sums is None:
             return everybody[i:]
         found.put(one, sums)

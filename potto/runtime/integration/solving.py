@@ -21,12 +21,11 @@ from potto.integrate.events import (
     Degenerate,
     Shortfall,
 )
-from potto.integrate.fixed.a_priori import certain
 from potto.integrate.pieces import Sums, still
 from potto.integrate.plan import Plan
 from potto.kernels.cells import Ints
 from potto.runtime.integration.at_kinks import at_kinks
-from potto.runtime.integration.attempts import Attempt, attempted, best, uncertainty
+from potto.runtime.integration.attempts import Attempt, attempted, best, proved_beforehand, uncertainty
 from potto.runtime.integration.choices import many, passes_on, preferred, too_many, trial, worth_trials
 from potto.runtime.integration.differences import by_differences
 from potto.runtime.integration.elimination import ACCURATE, WORTH, accurate, eliminated, step_by_step
@@ -36,8 +35,9 @@ from potto.runtime.integration.problem import Problem
 from potto.runtime.integration.second_looks import beside_another, by_less, in_another_order
 
 # How many times what a trial took the most promising order gets before variables are eliminated, or it gets all that
-# there is: a torus takes 2.8 times as many evaluations, and tables of it 8 times.
-LONGER = 4
+# there is: a torus takes 2.8 times as many evaluations, and tables of it 8 times. How uncertain a trial may leave an
+# answer for that to be done at once: of a torus 1e-3 in the order to take and 0.3 in the others, of an arm 1e-10.
+LONGER, PROMISING = 4, 1e-2
 
 Method = Callable[[Problem], Sums | None]
 Improver = Callable[[Problem, Integral, Sums], Sums]
@@ -93,15 +93,15 @@ def along_cuts(problem: Problem) -> Sums:
     the one that it cuts; where none does, the best of what is found with all evaluations."""
     machine, events = problem.machine, problem.events
     machine.record.methods.add("quadrature")
+    plain = proved_beforehand(problem) if problem.batch == 1 else None
+    if plain is not None:
+        return plain
     most = trial(problem)
     stopped: list[Attempt] = []
     for order in preferred(problem):
-        plan = problem.plan(order)
-        if problem.batch == 1 and plan.straight is not None:
-            plain = certain(plan.straight, machine, problem.env)
-            if plain is not None:
-                return plain
         found = attempted(problem, order, most)
+        if most is not None and found.stopped and uncertainty(found.sums) < PROMISING:
+            found = best((found, attempted(problem, order, LONGER * most)))
         along = found.events.every(Degenerate)
         if not along and not found.stopped and (most is None or uncertainty(found.sums) < math.inf):
             return finished(problem, found)
@@ -110,12 +110,12 @@ def along_cuts(problem: Problem) -> Sums:
             if not worth_trials(problem):
                 break
     if stopped:
-        return with_all(problem, stopped, most or 0)
+        return with_all(problem, stopped, most)
     events.take(found.events, np.arange(problem.batch))
-    return _along_axes(problem, plan, found.sums)
+    return _along_axes(problem, problem.plan(order), found.sums)
 
 
-def with_all(problem: Problem, tried: list[Attempt], most: int) -> Sums:
+def with_all(problem: Problem, tried: list[Attempt], most: int | None) -> Sums:
     """The best answer where trials in some orders of the variables did not come to an end, or to no bound: in the order
     of which most is known, or by tables, with more and more evaluations.
 
@@ -126,7 +126,7 @@ def with_all(problem: Problem, tried: list[Attempt], most: int) -> Sums:
         return finished(problem, best(tried))
     for known in sorted(tried, key=lambda attempt: uncertainty(attempt.sums)):
         found = known
-        if known.stopped:
+        if most is not None and known.stopped and known.most == most:
             bounded = passes_on(problem) or worth_trials(problem)
             found = attempted(problem, known.order, LONGER * most if bounded else None)
         if found.events.every(Degenerate):
