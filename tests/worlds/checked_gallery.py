@@ -29,7 +29,7 @@ TOLERANCE, SLOWEST = 1e-8, 20.0
 
 class Depth(NamedTuple):
     """How closely an entry is looked at: places of a curve, of the pixels of a row or column each so many-th (and those
-    with corners), those looked at of each kind, calls that are timed."""
+    with corners), those looked at of each kind, calls that are timed (none: no times are told)."""
 
     places: int
     step: int
@@ -37,7 +37,7 @@ class Depth(NamedTuple):
     calls: int
 
 
-AS_SHOWN, QUICKLY = Depth(241, 1, 4, 3), Depth(31, 3, 2, 1)
+AS_SHOWN, QUICKLY = Depth(241, 1, 4, 3), Depth(31, 3, 2, 0)
 
 
 class Checked(NamedTuple):
@@ -62,7 +62,7 @@ class Tally:
     """What is added up over the places of an entry."""
 
     def __init__(self) -> None:
-        self.off, self.where, self.unsure, self.wrong = 0.0, "", 0, 0
+        self.places, self.off, self.where, self.unsure, self.wrong = 0, 0.0, "", 0, 0
         self.times: list[float] = []
 
     def count(self, where: str, found: Sequence[float], errors: Sequence[float], exact: Sequence[float]) -> None:
@@ -75,23 +75,23 @@ class Tally:
         elif max(gaps) > self.off:
             self.off, self.where = max(gaps), where
 
+    def time(self, call: Any, calls: int) -> None:
+        """The least time of the processor of some calls, the first of which may have had to compile."""
+        spent = []
+        for _ in range(calls):
+            start = time.process_time()
+            call()
+            spent.append(time.process_time() - start)
+        self.places += 1
+        self.times.extend([min(spent)] if spent else [])
+
     def checked(self, title: str) -> Checked:
-        slowest = max(self.times) / float(np.median(self.times))
-        return Checked(title, len(self.times), self.off, self.where, self.unsure, self.wrong, slowest)
+        slowest = max(self.times) / float(np.median(self.times)) if self.times else 0.0
+        return Checked(title, self.places, self.off, self.where, self.unsure, self.wrong, slowest)
 
 
 def spread(count: int, each: int, seed: int) -> Any:
     return np.random.default_rng(seed).permutation(count)[:each]
-
-
-def timed(call: Any, calls: int) -> float:
-    """The least time of the processor of some calls, the first of which may have had to compile."""
-    spent = []
-    for _ in range(calls):
-        start = time.process_time()
-        call()
-        spent.append(time.process_time() - start)
-    return min(spent)
 
 
 def curve(entry: Curve, chapter: Chapter, depth: Depth) -> Checked:
@@ -111,7 +111,7 @@ def curve(entry: Curve, chapter: Chapter, depth: Depth) -> Checked:
         sides = exact(float(grid[k]))
         side = min(sides, key=lambda pair: abs(pair[1] - slope[k]))
         tally.count(f"at {grid[k]:.6g}", (value[k], slope[k]), (off[k], error[k]), side)
-        tally.times.append(timed(lambda k=k: function((float(grid[k]), 1.0)), calls))
+        tally.time(lambda k=k: function((float(grid[k]), 1.0)), calls)
     return tally.checked(entry.title)
 
 
@@ -153,7 +153,7 @@ def picture(entry: Picture, chapter: Chapter, depth: Depth) -> Checked:
                 parts = part.value, part.tangent, part.error, part.tangent_error
                 numbers = [float(np.broadcast_to(np.asarray(p, dtype=float), x.shape).flat[at]) for p in parts]
                 tally.count(f"at ({px:.5g}, {py:.5g}) by {wrt}", numbers[:2], numbers[2:], (value, slopes[wrt]))
-            tally.times.append(timed(lambda px=px, py=py: seen(px, py, entry.wrt[0]), depth.calls))
+            tally.time(lambda px=px, py=py: seen(px, py, entry.wrt[0]), depth.calls)
     return tally.checked(entry.title)
 
 
