@@ -13,13 +13,14 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
 from msgspec import Struct
 
 from potto.core.terms import Const, children
-from potto.integrate.fixed.alone import Face, machine_code, summed_alone, summed_by
+from potto.integrate.fixed.alone import Face, machine_code, promotion, summed_alone, summed_by
 from potto.integrate.fixed.moving_sums import Totals, evaluated, summed
 from potto.integrate.fixed.straight import CLEAR, Straight
 from potto.integrate.pieces import Evaluator, Sums
@@ -30,6 +31,7 @@ from potto.integrate.rules.proved_orders import Region, proved
 from potto.kernels.cells import Cell, Value
 from potto.kernels.making import making
 from potto.kernels.native.objects import Loaded
+from potto.kernels.native.promotion import Promotion
 
 MOST_CELLS, MOST_NODES = 24, 60_000
 # The truncation error that is proved for the value, as a part of the accuracy that is asked for; nobody gains by less
@@ -277,7 +279,8 @@ class Settled(Struct, frozen=True, eq=False):
     """An integral all over a region of its parameters, which run along tangents that stay the same.
 
     box: per parameter, between which numbers. truncation: a bound of what the rule leaves out, of the value and each
-    tangent. faces: integrands with their functions of machine code; none where numpy adds up.
+    tangent. faces: integrands with their functions of machine code; none where numpy adds up: for good, or until
+    the function that it stands in for is due.
     """
 
     plan: Straight
@@ -286,6 +289,7 @@ class Settled(Struct, frozen=True, eq=False):
     box: tuple[tuple[str, float, float], ...]
     truncation: list[float]
     faces: list[tuple[Face, Loaded]]
+    awaited: Promotion | None
 
     def at(self, env: dict[str, Any]) -> Totals | None:
         """The value and its tangents; None outside of the region, and where they are not accurate enough."""
@@ -295,8 +299,10 @@ class Settled(Struct, frozen=True, eq=False):
         plan, machine = self.plan, self.machine
         if self.faces:
             found = summed_by(self.faces, env)
+        elif self.awaited is not None and self.awaited.due:
+            return None
         else:
-            with np.errstate(all="ignore"):
+            with np.errstate(all="ignore"), nullcontext() if self.awaited is None else self.awaited.by_numpy():
                 found = summed(plan.variables, plan.frames, self.region, machine, env)
         return None if found is None else _accurate(found, self.truncation, machine.rtol, machine.atol)
 
@@ -309,11 +315,14 @@ def settled(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Settle
     low, high, *_ = evaluated(plan.frames[0], machine.tracking(), env)
     places = _near(plan, values, float(high.v - low.v), env)
     region = plan.settled.get((places, min(machine.rtol, LOOSEST)))
-    faces = None if region is None else machine_code(plan, region, machine, env)
-    if places is None or region is None or faces is None:
+    if places is None or region is None:
+        return None
+    faces = machine_code(plan, region, machine, env)
+    awaited = promotion(plan, region, machine, env) if faces is None else None
+    if awaited is not None and awaited.due:
         return None
     box = tuple((name, middle - radius, middle + radius) for name, middle, radius in places)
-    return Settled(plan, region, machine, box, _truncation(plan, region, machine.directions, env), faces)
+    return Settled(plan, region, machine, box, _truncation(plan, region, machine.directions, env), faces or [], awaited)
 
 
 def _numbers(plan: Straight, env: Mapping[str, Value]) -> dict[str, float] | None:

@@ -27,6 +27,7 @@ from potto.kernels.cells import Array, Cell, Ints, Value
 from potto.kernels.making import counts
 from potto.kernels.native.objects import Loaded, available
 from potto.kernels.native.points import address
+from potto.kernels.native.promotion import Promotion
 from potto.kernels.native.vectors import LANES
 
 MOST_REGIONS = 512
@@ -108,7 +109,7 @@ def summed_alone(
     """
     faces = machine_code(plan, region, machine, env)
     if faces is None:
-        with _faces(plan, region, machine, env)[0].way.promotion.by_numpy():
+        with promotion(plan, region, machine, env).by_numpy():
             return summed(plan.variables, plan.frames, region, machine, env, frame)
     return summed_by(faces, env) if faces else summed(plan.variables, plan.frames, region, machine, env, frame)
 
@@ -123,11 +124,15 @@ def machine_code(
     uncertain = any(env[name].e is not None or any(env[name].et) for name in plan.names)
     if machine.backend == "numpy" or uncertain or not available():
         return []
-    faces = _faces(plan, region, machine, env)
-    promotion = faces[0].way.promotion
-    functions = [face.way.function(machine) for face in faces] if promotion.spent else [None]
+    faces, of_first = _faces(plan, region, machine, env), promotion(plan, region, machine, env)
+    functions = [face.way.function(machine) for face in faces] if of_first.spent else [None]
     found = [(face, function) for face, function in zip(faces, functions, strict=False) if function is not None]
-    return found if len(found) == len(faces) else [] if promotion.impossible else None
+    return found if len(found) == len(faces) else [] if of_first.impossible else None
+
+
+def promotion(plan: Straight, region: Region, machine: Evaluator, env: Mapping[str, Any]) -> Promotion:
+    """How far the functions of a region are, all of them as the first."""
+    return _faces(plan, region, machine, env)[0].way.promotion
 
 
 def summed_by(faces: Sequence[tuple[Face, Loaded]], env: Mapping[str, Any]) -> Totals | None:

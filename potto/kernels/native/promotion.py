@@ -44,6 +44,11 @@ class Promotion:
             self._get(text, backend == "native")
         return self._ready
 
+    @property
+    def due(self) -> bool:
+        """Whether numpy has done it for long enough, so that the function is to be asked for."""
+        return self._ready is not None or self._pays()
+
     @contextmanager
     def by_numpy(self) -> Iterator[None]:
         """Count the time of the block as that of numpy: the processor's, whoever else is using it."""
