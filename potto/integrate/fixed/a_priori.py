@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from typing import Any
 
@@ -41,6 +41,9 @@ LOOSEST = 1e-8
 # A region of parameters: this part of the power of two below a parameter's size, or below the first variable's range.
 REGION = 2.0**-5
 TINY = 1e-280
+# Into how many parts a region is cut along each parameter where its cells are not the same all over: odd numbers, so
+# that parts lie in the middle of regions as well.
+PARTS = 1, 15, 225
 # How far off a rule may be for a sum that cancels, as a part of what it is when nothing does.
 NOISE = 1e-12
 MOST_REGIONS = 512
@@ -150,20 +153,20 @@ def _sides(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> tuple[b
 Places = tuple[tuple[str, float, float], ...]  # per parameter the middle of the region in which it lies, the radius
 
 
-def _around(values: Mapping[str, float], size: Mapping[str, float]) -> Places | None:
-    """The region in which parameters of this size lie; None where they are too small for one."""
+def _around(values: Mapping[str, float], size: Mapping[str, float], part: int = 1) -> Places | None:
+    """The region in which parameters of this size lie, or one of its parts; None where they are too small for one."""
     places = []
     for name, value in values.items():
-        step = math.ldexp(REGION, math.frexp(size[name])[1] - 1)
+        step = math.ldexp(REGION, math.frexp(size[name])[1] - 1) / part
         if step < TINY:
             return None
         places.append((name, round(value / (2 * step)) * 2 * step, step))
     return tuple(places)
 
 
-def _all_over(plan: Straight, places: Places) -> tuple[Stretch, ...] | None:
-    """The cells that there are all over a region; None where they may not be the same, or cuts be close together."""
-    box: dict[str, Interval] = {name: (middle - radius, middle + radius) for name, middle, radius in places}
+def _all_over(plan: Straight, of_parameters: Mapping[str, Interval]) -> tuple[Stretch, ...] | None:
+    """The cells that there are all over a box; None where they may not be the same, or cuts be close together."""
+    box = dict(of_parameters)
     cells: list[Stretch] = []
 
     def over(i: int, path: Path) -> bool:
@@ -193,7 +196,7 @@ def _all_over(plan: Straight, places: Places) -> tuple[Stretch, ...] | None:
 
 def _region(
     plan: Straight, cells: tuple[Stretch, ...], values: Mapping[str, float], reach: float, shortest: float, rtol: float
-) -> Region | None:
+) -> tuple[Region, Places] | None:
     """What is known of the rules for these cells, in the region in which the parameters lie; proved once.
 
     Regions are as large as the parameters, or as the domain where that is larger; if nothing can be proved of those,
@@ -218,7 +221,7 @@ def _region(
                 region = proved(plan.variables, plan.items, cells, middle, radius, MARGIN * rtol)
             plan.regions[key] = region
         if region is not None:
-            return region  # type: ignore[return-value]
+            return region, places  # type: ignore[return-value]
     return None
 
 
@@ -254,25 +257,25 @@ def _summed(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Totals
         return None
     frame = evaluated(plan.frames[0], machine.tracking(), env)
     reach, rtol = float(frame[1].v - frame[0].v), min(machine.rtol, LOOSEST)
-    places = _near(plan, values, reach, env)
-    region = plan.settled.get((places, rtol)) if machine.costs is None else None
+    certain = machine.costs is None and all(env[name].e is None for name in plan.names)  # type: ignore[union-attr]
+    region = found.region if certain and (found := _known(plan, values, reach, rtol)) else None
     if region is None:
         cells, shortest = _cells(plan, machine, env, frame)
         if not cells:
             nothing = [0.0] * (1 + machine.directions)
             return Totals(nothing, nothing, nothing)
-        if len(cells) <= MOST_CELLS:
-            region = _region(plan, cells, values, reach, shortest, rtol)
-        if region is None or sum(region.outer) * math.prod(region.inner) > MOST_NODES:
+        proof = _region(plan, cells, values, reach, shortest, rtol) if len(cells) <= MOST_CELLS else None
+        if proof is None or sum(proof[0].outer) * math.prod(proof[0].inner) > MOST_NODES:
             return None
-        if places is not None and region is plan.regions.get((cells, places, rtol)):
+        region = proof[0]
+        if certain:
             with making:
-                _settle(plan, region, places, rtol)
-    found = summed_alone(plan, region, machine, env, frame)
-    if found is None:
+                _settle(plan, *proof, values, reach, rtol)
+    totals = summed_alone(plan, region, machine, env, frame)
+    if totals is None:
         return None
-    machine.count(found.nodes)
-    return _accurate(found, _truncation(plan, region, machine.directions, env), machine.rtol, machine.atol)
+    machine.count(totals.nodes)
+    return _accurate(totals, _truncation(plan, region, machine.directions, env), machine.rtol, machine.atol)
 
 
 class Settled(Struct, frozen=True, eq=False):
@@ -313,15 +316,15 @@ def settled(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Settle
     if values is None or machine.frozen or machine.side or machine.costs is not None:
         return None
     low, high, *_ = evaluated(plan.frames[0], machine.tracking(), env)
-    places = _near(plan, values, float(high.v - low.v), env)
-    region = plan.settled.get((places, min(machine.rtol, LOOSEST)))
-    if places is None or region is None:
+    found = _known(plan, values, float(high.v - low.v), min(machine.rtol, LOOSEST))
+    if found is None or any(env[name].e is not None for name in plan.names):  # type: ignore[union-attr]
         return None
+    region = found.region
     faces = machine_code(plan, region, machine, env)
     awaited = promotion(plan, region, machine, env) if faces is None else None
     if awaited is not None and awaited.due:
         return None
-    box = tuple((name, middle - radius, middle + radius) for name, middle, radius in places)
+    box = tuple((name, lo, hi) for name, (lo, hi) in found.box.items())
     return Settled(plan, region, machine, box, _truncation(plan, region, machine.directions, env), faces or [], awaited)
 
 
@@ -336,19 +339,53 @@ def _numbers(plan: Straight, env: Mapping[str, Value]) -> dict[str, float] | Non
     return values
 
 
-def _near(plan: Straight, values: Mapping[str, float], reach: float, env: Mapping[str, Any]) -> Places | None:
-    """The region in which parameters lie that have no errors, where the first variable runs so far."""
-    if not 0 < reach < math.inf or any(env[name].e is not None for name in plan.names):
-        return None
-    return _around(values, {n: max(abs(v), reach) for n, v in values.items()})
+class _Box(Struct, frozen=True):
+    """A part of a region in which the cells are the same all over, so that they need not be looked for."""
+
+    region: Region
+    box: dict[str, Interval]
 
 
-def _settle(plan: Straight, region: Region, places: Places, rtol: float) -> None:
-    """Keep what was proved of a region where its cells are the same all over, so that they need not be looked for."""
-    if _all_over(plan, places) == region.cells:
+def _parts(values: Mapping[str, float], reach: float) -> Iterator[Places]:
+    """The regions of parameters where the first variable runs so far, and their parts, that get smaller."""
+    if 0 < reach < math.inf:
+        for part in PARTS:
+            places = _around(values, {n: max(abs(v), reach) for n, v in values.items()}, part)
+            if places is not None:
+                yield places
+
+
+def _known(plan: Straight, values: Mapping[str, float], reach: float, rtol: float) -> _Box | None:
+    """What is settled about these parameters."""
+    for places in _parts(values, reach):
+        found: _Box | None = plan.settled.get((places, rtol))
+        if found is not None and _within(values, found.box):
+            return found
+    return None
+
+
+def _settle(
+    plan: Straight, region: Region, proved_in: Places, values: Mapping[str, float], reach: float, rtol: float
+) -> None:
+    """Keep what was proved of a region, for the largest part of it about these parameters that has the same cells all
+    over; of larger ones that they have not."""
+    for places in _parts(values, reach):
+        if (places, rtol) in plan.settled:
+            continue
+        box = {
+            name: (max(middle - radius, least - most), min(middle + radius, least + most))
+            for (name, middle, radius), (_, least, most) in zip(places, proved_in, strict=True)
+        }
+        same = _within(values, box) and _all_over(plan, box) == region.cells
         if len(plan.settled) >= MOST_REGIONS:
             plan.settled.clear()
-        plan.settled[places, rtol] = region
+        plan.settled[places, rtol] = _Box(region, box) if same else None
+        if same:
+            return
+
+
+def _within(values: Mapping[str, float], box: Mapping[str, Interval]) -> bool:
+    return all(box[name][0] <= value <= box[name][1] for name, value in values.items())
 
 
 def _truncation(plan: Straight, region: Region, directions: int, env: Mapping[str, Any]) -> list[float]:

@@ -27,7 +27,6 @@ from potto.core.terms import (
 )
 from potto.integrate.levels import LevelPlan
 from potto.integrate.rules.complex_enclosures import enclosable
-from potto.integrate.rules.proved_orders import Region
 
 MOST_VARIABLES, MOST_CUTS, MOST_TERMS = 3, 13, 600
 # How many times its rounding a surface must be away from 0, and cuts from each other.
@@ -40,7 +39,7 @@ class Straight(Struct, frozen=True, dict=True, eq=False):
     jumps: per variable the surfaces that it crosses, with the rows of the frame that are their places. turning: the
     rows where something is like a square root. surfaces: what the integrand's branches depend on, as one function to a
     tuple. names: parameters. regions: what was proved of the rules for cells in a region, None where nothing
-    could be. settled: of a region in all of which the cells are the same.
+    could be. settled: what is known where the cells are the same all over; None where they are not.
     """
 
     variables: tuple[str, ...]
@@ -54,7 +53,7 @@ class Straight(Struct, frozen=True, dict=True, eq=False):
     regions: dict[Any, object] = {}
     lowered: dict[Any, Any] = {}
     alone: dict[Any, Any] = {}
-    settled: dict[Any, Region] = {}
+    settled: dict[Any, Any] = {}
 
     @cached_property
     def items(self) -> tuple[tuple[Term, ...], ...]:
