@@ -1,8 +1,8 @@
 """Calls with numbers near those of before: from arguments to the answer with nothing in between but its rule.
 
-Owns `AtOnce` and `at_once`. Where a call is nothing but an integral, and all about it is settled in the region where
-its numbers lie (`integrate/fixed/a_priori.Settled`), the general way has nothing left to find out. What it told once
-about such a call, it would tell again.
+Owns `AtOnce` and `at_once`. Where a call is nothing but an integral, or arithmetic with some, and all about them is
+settled in the region where its numbers lie (`integrate/fixed/a_priori.Settled`), the general way has nothing left to
+find out. What it told once about such a call, it would tell again.
 """
 
 from __future__ import annotations
@@ -16,29 +16,24 @@ from msgspec.structs import asdict
 
 from potto.core.terms import Lam, Term
 from potto.integrate.costs import wanted
-from potto.integrate.fixed.a_priori import Settled
 from potto.kernels.cells import Cell, Value
 from potto.projects.settings import Settings
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.evaluate import Clock, Program, stats_of
 from potto.runtime.evaluation.machine import WATCHING, Machine
 from potto.runtime.evaluation.record import Record, watched
+from potto.runtime.integration.direct import SettledAround, SettledCall
 
 # What is not the same when the same is asked again.
 TIMES = {"seconds", "compile_seconds", "stats"}
 
 
 class AtOnce(Struct, frozen=True, eq=False):
-    """What a call, or its gradient, takes for numbers in a region.
-
-    fixed: parameters of the integral that are no arguments. moving: for the others the argument, and tangents.
-    """
+    """What a call, or its gradient, takes for numbers in a region. tangents: of each argument, and their errors."""
 
     settings: Settings
-    settled: Settled
-    fixed: Mapping[str, Cell]
-    moving: tuple[tuple[str, int, tuple[Any, ...], tuple[Any, ...]], ...]
-    count: int
+    settled: SettledCall | SettledAround
+    tangents: tuple[tuple[str, tuple[Any, ...], tuple[Any, ...]], ...]
     stats: Mapping[str, Any]
     made: Callable[..., Estimate]
     wrt: tuple[str, ...]
@@ -46,14 +41,13 @@ class AtOnce(Struct, frozen=True, eq=False):
     def answer(self, args: tuple[Any, ...], settings: Settings) -> Estimate | None:
         """The estimate; None where only the general way has it."""
         start = time.perf_counter()
-        if len(args) != self.count or settings != self.settings or _looked_at():
+        if len(args) != len(self.tangents) or settings != self.settings or _looked_at():
             return None
-        for arg in args:
+        env: dict[str, Cell] = {}
+        for (name, t, et), arg in zip(self.tangents, args, strict=True):
             if arg.__class__ is not float:
                 return None
-        env = dict(self.fixed)
-        for name, place, t, et in self.moving:
-            env[name] = Cell(args[place], None, t, et)
+            env[name] = Cell(arg, None, t, et)
         found = self.settled.at(env)
         if found is None:
             return None
@@ -86,19 +80,16 @@ def at_once(
     env = dict(zip(term.params, cells, strict=True))
     direct = program.shortest(term.body)
     settled = None if direct is None else direct.settled(_clean(machine), env)
-    if direct is None or settled is None:
+    if settled is None:
         return None
-    fixed = {name: place for name, place in direct.places if isinstance(place, Cell)}
-    own = [(name, place) for name, place in direct.places if isinstance(place, str)]
-    moving = tuple((name, term.params.index(place), env[place].t, env[place].et) for name, place in own)
-    k = machine.directions
-    fixed = {name: Cell(cell.v, None, (None,) * k, (None,) * k) for name, cell in fixed.items()}
     with Clock() as clock:
-        totals = settled.at({**fixed, **{name: env[place] for name, place in own}})
+        totals = settled.at(env)
     if totals is None:
         return None
-    stats = stats_of(Record(evaluations=totals.nodes, integrals=1), clock)
-    kept = AtOnce(machine.settings, settled, fixed, moving, len(values), stats, type(found), wrt)
+    integrals = found.stats["integrals"]
+    stats = stats_of(Record(evaluations=totals.nodes, integrals=integrals), clock)
+    tangents = tuple((name, cell.t, cell.et) for name, cell in env.items())
+    kept = AtOnce(machine.settings, settled, tangents, stats, type(found), wrt)
     again = kept.answer(tuple([cell.v for cell in cells]), machine.settings)
     return kept if again is not None and _told(again) == _told(found) else None
 

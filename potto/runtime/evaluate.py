@@ -36,7 +36,7 @@ from potto.runtime.evaluation.selection import chosen, lazy
 from potto.runtime.evaluation.sums import total
 
 if TYPE_CHECKING:
-    from potto.runtime.integration.direct import Direct
+    from potto.runtime.integration.direct import Around, Direct
 
 Lookup = Callable[[str, str], Term]
 # Where in one of these definitions something was met that was evaluated, innermost first.
@@ -75,7 +75,7 @@ class Program:
         self, lookup: Lookup, held: Mapping[tuple[str, str], Value] | None = None, places: Places | None = None
     ) -> None:
         self.linker, self.places = Linker(lookup, SEMANTICS, held), places
-        self._direct: dict[Term, Direct | None] = {}
+        self._direct: dict[Term, Direct | Around | None] = {}
 
     def machine(self, settings: Settings) -> Machine:
         record = Record()
@@ -105,8 +105,8 @@ class Program:
         related = self.places(error.met, self.linker.terms)
         return error if related is None else error.beside(related)
 
-    def shortest(self, term: Term) -> Direct | None:
-        """The one integral that a call is, if it is; found out once."""
+    def shortest(self, term: Term) -> Direct | Around | None:
+        """The one integral that a call is, or the arithmetic with some, if it is nothing else; found out once."""
         if term not in self._direct:
             from potto.runtime.integration.direct import direct
 

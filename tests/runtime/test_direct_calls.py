@@ -29,6 +29,7 @@ def f(c) integral ([0, 1], [0, 1]) quad(x, y, c)*[x + y + c >= 0] d(x, y)
 def twice(a) f(a)
 def two(a, b) integral [0, 2] (if [x < a] then exp(-b*x) else x^2) d(x)
 def shaded(c, shader) integral [0, 1] shader(x, c)*[x < c] d(x)
+def loss(c, d) (f(c) - integral [0, 1] [x < d]*exp(-x) d(x))^2/abs(c - 0.2)
 shader = \(x, c) . exp(c*x)
 """
 

@@ -1,14 +1,15 @@
-"""Calls that are nothing but an integral of numbers: on the shortest way from arguments to the answer.
+"""Calls that are nothing but integrals of numbers: on the shortest way from arguments to the answer.
 
-Owns `Direct` and `direct`. A call from outside mostly leads through a few definitions straight to an integral whose
-plan holds for all parameters and whose orders are proved (`a_priori`). Which parameter of the integral has which
-argument is found out once; then nothing is left between the arguments and the rule. What the rule does not settle, or
-what the arguments are not made for, takes the general way, which gives the same.
+Owns `Direct`, `Around` and `direct`. A call from outside mostly leads through a few definitions straight to an integral
+whose plan holds for all parameters and whose orders are proved (`a_priori`), or to arithmetic with such. Which parameter
+of the integral has which argument is found out once; then nothing is left between the arguments and the rule. What the
+rule does not settle, or what the arguments are not made for, takes the general way, which gives the same.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from msgspec import Struct
@@ -16,11 +17,26 @@ from msgspec import Struct
 from potto.calculus.inlining.currying import arguments_of, sizes_of, uncurry
 from potto.calculus.surfaces.discontinuities import TooDeep
 from potto.calculus.surfaces.trace import spine
-from potto.core.terms import App, Const, Deriv, Integral, Lam, Term, Var
+from potto.core.terms import (
+    App,
+    Const,
+    Deriv,
+    Integral,
+    Lam,
+    Prim,
+    Term,
+    Var,
+    children,
+    lam,
+    postorder,
+    replaced,
+    var,
+)
 from potto.diagnostics import PottoError
 from potto.integrate.fixed.a_priori import Settled, proved_sum, settled
+from potto.integrate.fixed.moving_sums import Totals
 from potto.integrate.fixed.straight import Straight
-from potto.kernels.cells import Cell, Value
+from potto.kernels.cells import Cell, Value, pad
 from potto.kernels.making import making
 from potto.runtime.answers.convergence import allowance_of_one, widest
 from potto.runtime.evaluation.duals import merge, split
@@ -62,11 +78,16 @@ class Direct(Struct, frozen=True):
         cell = Cell(found.number[0], found.error[0], tuple(found.number[1:]), tuple(found.error[1:]))
         return split(cell) if self.dual else cell
 
-    def settled(self, machine: Machine, env: Mapping[str, Value]) -> Settled | None:
+    def settled(self, machine: Machine, env: Mapping[str, Value]) -> SettledCall | None:
         """What is known of the call for all numbers near these, if it is the same for all of them."""
         working = machine.inside()
         here, rule = ({}, None) if self.dual else self._prepared(machine, working, env)
-        return None if rule is None else settled(rule, working, here)
+        found = None if rule is None else settled(rule, working, here)
+        if found is None:
+            return None
+        fixed = {name: pad(place, machine.directions) for name, place in self.places if isinstance(place, Cell)}
+        given = tuple((name, place) for name, place in self.places if isinstance(place, str))
+        return SettledCall(found, fixed, given)
 
     def _prepared(
         self, machine: Machine, working: Machine, env: Mapping[str, Value]
@@ -118,15 +139,91 @@ class Direct(Struct, frozen=True):
         return None if plan.decisions or plan.premise is not None else plan.straight
 
 
-def direct(term: Term, linker: Linker) -> Direct | None:
-    """The integral that a term with free variables is, through the calls around it."""
+class SettledCall(Struct, frozen=True):
+    """An integral all about which is settled near the arguments of a call. fixed, given: its parameters that are
+    numbers, and those that are arguments."""
+
+    integral: Settled
+    fixed: Mapping[str, Value]
+    given: tuple[tuple[str, str], ...]
+
+    def at(self, env: Mapping[str, Cell]) -> Totals | None:
+        """The value and its tangents; None where they take more."""
+        here = dict(self.fixed)
+        for name, place in self.given:
+            here[name] = env[place]
+        return self.integral.at(here)
+
+
+class SettledAround(Struct, frozen=True):
+    """The same of what is computed with such integrals."""
+
+    around: Around
+    machine: Machine
+    integrals: tuple[SettledCall, ...]
+
+    def at(self, env: Mapping[str, Cell]) -> Totals | None:
+        """As of `SettledCall`; None also where arithmetic meets something that is to be told."""
+        found: list[Value] = []
+        nodes = 0
+        for integral in self.integrals:
+            totals = integral.at(env)
+            if totals is None:
+                return None
+            nodes += totals.nodes
+            (value, *tangents), (bound, *bounds) = totals.number, totals.error
+            found.append(Cell(value, bound, tuple(tangents), tuple(bounds)))
+        machine = self.machine.apart()
+        with np.errstate(all="ignore"):
+            cell = self.around.put_together(machine, env, found)
+        if machine.events or not isinstance(cell, Cell):
+            return None
+        number: list[Any] = [cell.v, *cell.t]
+        error: list[Any] = [cell.e, *cell.et]
+        if None in number or None in error:  # what does not move, or has no error
+            return None
+        return Totals([float(x) for x in number], [float(e) for e in error], [], nodes)
+
+
+class Around(Struct, frozen=True):
+    """Arithmetic with integrals, as a function of them and of parameters, whose places are as in `Direct`."""
+
+    function: Lam
+    places: tuple[tuple[str, str | Cell], ...]
+    integrals: tuple[Direct, ...]
+
+    def value(self, machine: Machine, env: Mapping[str, Value]) -> Value | None:
+        """As of `Direct`."""
+        found: list[Value] = []
+        for integral in self.integrals:
+            value = integral.value(machine, env)
+            if value is None:
+                return None
+            found.append(value)
+        return self.put_together(machine, env, found)
+
+    def put_together(self, machine: Machine, env: Mapping[str, Value], found: Sequence[Value]) -> Value:
+        """The value where the integrals have these."""
+        k = machine.directions
+        own = [env[place] if isinstance(place, str) else pad(place, k) for _, place in self.places]
+        return machine.run(self.function, [*own, *found], None)
+
+    def settled(self, machine: Machine, env: Mapping[str, Value]) -> SettledAround | None:
+        """As of `Direct`."""
+        found = [integral.settled(machine, env) for integral in self.integrals]
+        parts = tuple(part for part in found if part is not None)
+        return SettledAround(self, machine, parts) if len(parts) == len(found) else None
+
+
+def direct(term: Term, linker: Linker) -> Direct | Around | None:
+    """The integral that a term with free variables is, through the calls around it, or what is computed of some."""
     places: dict[str, str | Cell] = {name: name for name in term.free}
     dual = False
     for _ in range(DEEPEST):
         if isinstance(term, Integral):
             return Direct(term, tuple((name, places[name]) for name in sorted(term.free)), dual)
         if not isinstance(term, App):
-            return None
+            return None if dual else _around(term, places, linker)
         head, groups = spine(term)
         function = linker.function(head)
         if isinstance(function, Deriv) and not dual:
@@ -147,3 +244,24 @@ def direct(term: Term, linker: Linker) -> Direct | None:
                 return None
         places, term = found, body
     return None
+
+
+def _around(term: Term, places: Mapping[str, str | Cell], linker: Linker) -> Around | None:
+    """A term that computes with integrals, and with nothing else that has to be found out."""
+    parts = postorder(term, below=lambda node: () if isinstance(node, Integral | App) else children(node))
+    integrals: dict[Term, Direct] = {}
+    for part in parts:
+        if isinstance(part, Integral | App):
+            found = direct(part, linker)
+            if not isinstance(found, Direct) or found.dual:
+                return None
+            given = tuple((name, places[at] if isinstance(at, str) else at) for name, at in found.places)
+            integrals[part] = Direct(found.term, given, False)
+        elif not isinstance(part, Prim | Var | Const):
+            return None
+    if not integrals:
+        return None
+    names = [f"integral'{number}" for number in range(1, len(integrals) + 1)]
+    outer = replaced(term, dict(zip(integrals, map(var, names), strict=True)))
+    own = tuple(sorted(outer.free.difference(names)))
+    return Around(lam((*own, *names), outer), tuple((name, places[name]) for name in own), tuple(integrals.values()))
