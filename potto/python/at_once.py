@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
 from msgspec import Struct
 from msgspec.structs import asdict
 
@@ -18,6 +19,7 @@ from potto.core.terms import Lam, Term
 from potto.integrate.costs import wanted
 from potto.kernels.cells import Cell, Value
 from potto.projects.settings import Settings
+from potto.python.arguments import LARGEST
 from potto.runtime.answers.estimate import Estimate
 from potto.runtime.evaluate import Clock, Program, stats_of
 from potto.runtime.evaluation.machine import WATCHING, Machine
@@ -46,7 +48,9 @@ class AtOnce(Struct, frozen=True, eq=False):
         env: dict[str, Cell] = {}
         for (name, t, et), arg in zip(self.tangents, args, strict=True):
             if arg.__class__ is not float:
-                return None
+                if arg.__class__ is not np.float64 and (arg.__class__ is not int or abs(arg) > LARGEST):
+                    return None
+                arg = float(arg)
             env[name] = Cell(arg, None, t, et)
         found = self.settled.at(env)
         if found is None:

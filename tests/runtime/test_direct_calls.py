@@ -138,6 +138,8 @@ def test_what_is_known_of_calls_is_left_where_more_is_asked() -> None:
     f = potto.compile(RENDERER).f
     for _ in range(3):
         assert f(-0.7).stats["integrals"] == 1
+    assert repr(f(np.float64(-0.7))).split()[0] == repr(f(-0.7)).split()[0]
+    assert f(-1).value == f(-1.0).value
     with potto.settings(method="mc", samples=1000):
         assert f(-0.7).method == "mc"
     assert f(np.array([-0.7])).value.shape == (1,)

@@ -1,8 +1,8 @@
 """Calls that are nothing but integrals of numbers: on the shortest way from arguments to the answer.
 
 Owns `Direct`, `Around` and `direct`. A call from outside mostly leads through a few definitions straight to an integral
-whose plan holds for all parameters and whose orders are proved (`a_priori`), or to arithmetic with such. Which parameter
-of the integral has which argument is found out once; then nothing is left between the arguments and the rule. What the
+whose plan holds for all parameters and whose orders are proved (`a_priori`), or to arithmetic with such. Which argument
+each parameter of the integral is, is found out once; then nothing is left between the arguments and the rule. What the
 rule does not settle, or what the arguments are not made for, takes the general way, which gives the same.
 """
 
