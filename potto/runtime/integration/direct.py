@@ -249,6 +249,8 @@ def direct(term: Term, linker: Linker) -> Direct | Around | None:
 def _around(term: Term, places: Mapping[str, str | Cell], linker: Linker) -> Around | None:
     """A term that computes with integrals, and with nothing else that has to be found out."""
     parts = postorder(term, below=lambda node: () if isinstance(node, Integral | App) else children(node))
+    if not all(isinstance(part, Integral | App | Prim | Var | Const) for part in parts):
+        return None
     integrals: dict[Term, Direct] = {}
     for part in parts:
         if isinstance(part, Integral | App):
@@ -257,8 +259,6 @@ def _around(term: Term, places: Mapping[str, str | Cell], linker: Linker) -> Aro
                 return None
             given = tuple((name, places[at] if isinstance(at, str) else at) for name, at in found.places)
             integrals[part] = Direct(found.term, given, False)
-        elif not isinstance(part, Prim | Var | Const):
-            return None
     if not integrals:
         return None
     names = [f"integral'{number}" for number in range(1, len(integrals) + 1)]
