@@ -306,7 +306,8 @@ def settled(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Settle
     values = _numbers(plan, env)
     if values is None or machine.frozen or machine.side or machine.costs is not None:
         return None
-    low, high, *_ = evaluated(plan.frames[0], machine.tracking(), env)
+    with np.errstate(all="ignore"):
+        low, high, *_ = evaluated(plan.frames[0], machine.tracking(), env)
     places = _near(plan, values, float(high.v - low.v), env)
     region = plan.settled.get((places, min(machine.rtol, LOOSEST)))
     faces = None if region is None else machine_code(plan, region, machine, env)
