@@ -154,6 +154,14 @@ def test_where_the_edge_lies_on_a_corner_the_general_way_says_so() -> None:
     assert math.isnan(f(math.nan).value)
 
 
+@pytest.mark.filterwarnings("error")
+def test_numbers_without_a_value_are_no_warnings_of_numpy() -> None:
+    f = potto.compile("def f(a, b) integral [0, 1] [b*x < a] d(x)").f
+    for place in ((0.3, 1.0), (0.31, 1.0), (0.3, 0.0), (0.0, 0.0), (1e200, 1e-200)):
+        assert not 0 < f(*place).value < 0.29
+        potto.grad(f, ["a", "b"])(*place)
+
+
 def test_arguments_with_errors_keep_them() -> None:
     f = potto.compile("def f(t) integral [0, 1] [x < t] d(x)").f
     f(0.3)
