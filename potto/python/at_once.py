@@ -11,7 +11,6 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
 from msgspec import Struct
 from msgspec.structs import asdict
 
@@ -55,8 +54,7 @@ class AtOnce(Struct, frozen=True, eq=False):
         env = dict(self.fixed)
         for name, place, t, et in self.moving:
             env[name] = Cell(args[place], None, t, et)
-        with np.errstate(all="ignore"):
-            found = self.settled.at(env)
+        found = self.settled.at(env)
         if found is None:
             return None
         number, error, rtol = found.number, found.error, settings.rtol
@@ -87,8 +85,7 @@ def at_once(
         return None
     env = dict(zip(term.params, cells, strict=True))
     direct = program.shortest(term.body)
-    with np.errstate(all="ignore"):
-        settled = None if direct is None else direct.settled(_clean(machine), env)
+    settled = None if direct is None else direct.settled(_clean(machine), env)
     if direct is None or settled is None:
         return None
     fixed = {name: place for name, place in direct.places if isinstance(place, Cell)}
