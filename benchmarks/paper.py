@@ -9,9 +9,12 @@ Every answer is held to another way of finding it before it has a time.
 from __future__ import annotations
 
 import argparse
+import json
 import math
 import os
+import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -171,6 +174,21 @@ def shaders(options: argparse.Namespace) -> Iterator[Row]:
             first += time.process_time() - start - first
             again, _ = timed(lambda whole=whole: potto.deriv(whole.pixel)(x, y, dc=(-0.8, 1.0)), 3)
             yield Row(f"a whole program with the {name} shader", max(first - again, 0.0))
+    yield from swapped_under_a_triangle()
+
+
+def swapped_under_a_triangle() -> Iterator[Row]:
+    """Shaders with thresholds of their own: by a process that is the first to see them, and by the next one."""
+    with tempfile.TemporaryDirectory() as folder:
+        environment = os.environ | {"POTTO_CACHE": folder}
+        for seen in ("new", "from disk"):
+            script = Path(__file__).with_name("paper_swaps.py")
+            run = subprocess.run([sys.executable, str(script)], env=environment, stdout=subprocess.PIPE, check=True)
+            for name, times in json.loads(run.stdout).items():
+                first = name == "by_depth"
+                title = f"a triangle in space, {'' if first else 'swapped for '}{name}, {seen}"
+                note = f"a pixel {shown(times['pixel'])}"
+                yield Row(title, times["compile"], float("nan") if first else 0.02, note)
 
 
 def second_figure(options: argparse.Namespace) -> Iterator[Row]:

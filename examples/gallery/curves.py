@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-WIDTH, HEIGHT, PANEL = 480.0, 320.0, 118.0
+WIDTH, HEIGHT, PANEL = 480.0, 320.0, 110.0
 LEFT, RIGHT, TOP, GAP = 62.0, 14.0, 26.0, 34.0
 STYLE = (
     "text{font:12px system-ui,sans-serif;fill:#333}.axis{stroke:#999;fill:none}.grid{stroke:#8884;fill:none}"

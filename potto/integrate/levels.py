@@ -14,6 +14,9 @@ from potto.calculus.decomposition.surface_cuts import Cut
 from potto.calculus.decomposition.sweep import Level
 from potto.core.terms import Lam, function_of, tuple_
 
+# What the places are that are no cuts, of which none has a number below 0: hints, and such with which no nodes move.
+HINT, RESTING = -1, -2
+
 
 class LevelPlan(Struct, frozen=True, dict=True):
     """One variable: its frame (bounds, then candidate cuts, as one tuple term) and what the cuts are."""

@@ -55,7 +55,7 @@ from potto.core.terms import (
 from potto.integrate.decomposition.vanishing import vanishing_of
 from potto.integrate.fixed.boxes import Box, box_of
 from potto.integrate.fixed.straight import Straight, straight
-from potto.integrate.levels import Group, LevelPlan
+from potto.integrate.levels import HINT, RESTING, Group, LevelPlan
 from potto.kernels.cells import Mask, Trace
 
 NO_KINKS = function_of(tuple_(()))
@@ -318,7 +318,7 @@ def group_levels(levels: Sequence[Level]) -> tuple[tuple[LevelPlan, ...], tuple[
 def level_plan(level: Level, decided: tuple[int, ...], groups: Sequence[Group]) -> LevelPlan:
     """The terms of one variable; `decided` are the numbers of the groups among its cuts."""
     terms: list[Term] = [level.lo, level.hi]
-    rows: list[tuple[int, bool]] = []  # (which cut, or -1 for a hint; whether turning)
+    rows: list[tuple[int, bool]] = []  # (which cut, HINT or RESTING; whether turning)
     families: list[tuple[int, Any]] = []
     searched: list[Cut] = []
     for number, cut in enumerate(level.cuts):
@@ -329,9 +329,9 @@ def level_plan(level: Level, decided: tuple[int, ...], groups: Sequence[Group]) 
             terms.append(root)
             rows.append((number, cut.turning))
         families.extend((number, family) for family in cut.families)
-    for hint in level.hints:
-        terms.append(hint)
-        rows.append((-1, False))
+    for kind, places in ((HINT, level.hints), (RESTING, level.edges)):
+        terms.extend(places)
+        rows.extend((kind, False) for _ in places)
     deciding, turned = _deciding(decided, groups)
     surfaces = function_of(tuple_(deciding))
     return LevelPlan(

@@ -135,14 +135,15 @@ def test_mistakes(measure: str, says: str) -> None:
         potto.compile(f"def f(t) integral (x ~ {measure}) [x < t] d(x)\n").f(1.0)
 
 
-@pytest.mark.xfail(strict=True, reason="the far edge of a density is narrow beside the stretch at whose end it lies")
-def test_the_far_edge_of_a_density_under_another_one() -> None:
+@pytest.mark.parametrize("rtol", [1e-6, 1e-7, 1e-8, 1e-9])
+def test_the_far_edge_of_a_density_under_another_one(rtol: float) -> None:
     """Along x, outermost, from 1.5 on, is what is left of a normal density's edge: 3e-6 of it, within a hundredth
-    of the stretch, which 14 nodes do not see. (The other order of variables has no such edge.) d/dt by mpmath."""
+    of the stretch. d/dt by mpmath."""
     f = potto.compile("""
 def f(t)
     integral (x ~ exponential(2), y ~ normal(0.5, 0.3)) y*t*[x + 0.5*y >= t] d(x, y)
 """).f
-    with potto.settings(rtol=1e-9):
+    with potto.settings(rtol=rtol):
         answer = potto.deriv(f)(([1.02] * 12, 1.0))
     assert (abs(answer.tangent - -0.137598317314747124) <= answer.tangent_error).all()
+    assert (answer.tangent_error <= rtol).all()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import math
+import warnings
 from typing import Any
 
 import mpmath as mp
@@ -156,6 +157,14 @@ def test_where_the_edge_lies_on_a_corner_the_general_way_says_so() -> None:
     assert math.isnan(f(math.nan).value)
 
 
+@pytest.mark.filterwarnings("error")
+def test_numbers_without_a_value_are_no_warnings_of_numpy() -> None:
+    f = potto.compile("def f(a, b) integral [0, 1] [b*x < a] d(x)").f
+    for place in ((0.3, 1.0), (0.31, 1.0), (0.3, 0.0), (0.0, 0.0), (1e200, 1e-200)):
+        assert not 0 < f(*place).value < 0.29
+        potto.grad(f, ["a", "b"])(*place)
+
+
 def test_arguments_with_errors_keep_them() -> None:
     f = potto.compile("def f(t) integral [0, 1] [x < t] d(x)").f
     f(0.3)
@@ -181,3 +190,14 @@ def test_machine_code_says_that_it_answered() -> None:
     assert counts.native_points > before
     assert found.stats["points by machine code"] == found.evals
     assert found.value == pytest.approx(math.expm1(0.0625 * 0.31) / 0.0625, rel=1e-14, abs=0)
+
+
+def test_cuts_at_infinity_are_nobodys_concern() -> None:
+    """Edges that are parallel to an axis have no sections along it: no warning of numpy's comes through."""
+    edges = "[x*cos(a) + y*sin(a) < 0.6]*[y*cos(a) - x*sin(a) > -0.6]"
+    f = potto.compile(f"def f(a) integral ([-1, 1], [-1, 1]) {edges} d(x, y)").f
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for ask in (f, potto.grad(f, ["a"])):
+            answers = [ask(0.0) for _ in range(2)]
+            assert all(abs(answer.value - 2.56) <= answer.error + 1e-15 for answer in answers)

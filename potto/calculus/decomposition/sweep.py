@@ -8,7 +8,7 @@ decomposition in the manner of Collins, of the surfaces that a scene has, and of
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 from msgspec import Struct
 
@@ -20,6 +20,7 @@ from potto.calculus.decomposition.surface_cuts import (
     Cut,
     Jump,
     Placed,
+    along,
     around_centers,
     cut_along,
     cut_of,
@@ -30,7 +31,7 @@ from potto.calculus.decomposition.surface_cuts import (
 from potto.calculus.differentiation.level_sets import LevelSet
 from potto.calculus.surfaces.case_split import by_extremes
 from potto.calculus.surfaces.discontinuities import Decide, Finding, Kind, Resolve, findings
-from potto.core.terms import Integral, Term
+from potto.core.terms import Integral, Term, substitute
 
 MOST_CUTS = 1200  # per variable; refinement doesn't see every weak kink that is left out
 
@@ -39,7 +40,7 @@ class Level(Struct, frozen=True):
     """One variable of the iteration, with everything that cuts it.
 
     critical: where what lies further in meets, appears or turns, if that has no closed form there. complete: whether
-    all that the cuts leave further out was worked out."""
+    all that the cuts leave further out was worked out. edges: where sections come to hints of variables further in."""
 
     variable: str
     lo: Term
@@ -48,15 +49,18 @@ class Level(Struct, frozen=True):
     cuts: tuple[Cut, ...]
     critical: tuple[Critical, ...] = ()
     complete: bool = True
+    edges: tuple[Term, ...] = ()
 
 
 class _Pool(Struct):
-    """Findings still to be placed: surfaces, the same ones merged, centers of peaks, and critical places."""
+    """Findings still to be placed: surfaces, the same ones merged, centers of peaks, critical places, and edges of
+    densities further in."""
 
     variables: tuple[str, ...]
     surfaces: dict[Term, Placed] = {}
     centers: dict[Term, None] = {}
     critical: dict[Critical, None] = {}
+    edges: dict[Term, None] = {}
 
     def find(self, finding: Finding) -> None:
         if finding.critical is not None:
@@ -101,10 +105,17 @@ class _Pool(Struct):
             del self.critical[system]
         return here, systems
 
+    def take_edges(self, variable: str) -> tuple[Term, ...]:
+        """Where along a variable the edges of densities further in are."""
+        here = [edge for edge in self.edges if variable in edge.free]
+        for edge in here:
+            del self.edges[edge]
+        return points_of(here, variable)[:MOST_CENTERS]
+
     def left(self) -> tuple[Finding, ...]:
         return (
             *(Finding(_kind(placed), placed.face.form) for placed in self.surfaces.values()),
-            *(Finding("center", surface) for surface in self.centers),
+            *(Finding("center", surface) for surface in (*self.centers, *self.edges)),
             *(Finding("critical", c.equations[0], critical=c) for c in self.critical),
         )
 
@@ -150,7 +161,7 @@ def _level(
     further = frozenset(pool.variables[: pool.variables.index(variable)])
     complete = len(others) <= MOST_CUTS and crossing(cuts, variable, further)[1]
     cuts = (*decisive, *others[:MOST_CUTS])
-    here, systems = pool.take_points(variable)
+    (here, systems), edges = pool.take_points(variable), pool.take_edges(variable)
     own = None if over is None else cut_along(over.surface, variable)
     if not last:
         within = Within(variable, *bounds)
@@ -164,9 +175,20 @@ def _level(
             else:
                 pool.put(shadow[0], None, *shadow[1:])
         pool.critical.update(dict.fromkeys(further_systems(systems, cuts, variable, *bounds)))
+        pool.edges.update(dict.fromkeys(_edges(decisive, variable, hints, further)))
     peaks = (*hints, *points_of(here, variable)[:MOST_CENTERS])
     placed = (*cuts, *around_centers(here, variable)) if own is None else (own,)
-    return Level(variable, *bounds, peaks, placed, systems, complete)
+    return Level(variable, *bounds, peaks, placed, systems, complete, edges)
+
+
+def _edges(cuts: Iterable[Cut], variable: str, hints: tuple[Term, ...], further: frozenset[str]) -> Iterator[Term]:
+    """Where sections along a variable come to hints. What it amounts to changes about there: at the edge of a density,
+    far out, by very little and within a narrow stretch."""
+    for cut in cuts:
+        for hint in hints:
+            edge = substitute(along(cut), {variable: hint})
+            if any(points_of((edge,), outer) for outer in edge.free & further):
+                yield edge
 
 
 def _kind(placed: Placed) -> Kind:

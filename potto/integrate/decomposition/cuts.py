@@ -27,7 +27,7 @@ from potto.integrate.decomposition.meetings import (
     slivers,
     tangents,
 )
-from potto.integrate.levels import LevelPlan
+from potto.integrate.levels import RESTING, LevelPlan
 from potto.integrate.pieces import mostly
 from potto.integrate.rules.gauss import EPS
 from potto.integrate.rules.substitution import Segments, choose
@@ -75,6 +75,9 @@ def frame_rows(plan: LevelPlan, values: tuple[Value, ...]) -> tuple[Cell, Cell, 
         Row(cell.v, cell.t, cut, turning, 0.0 if cell.e is None else cell.e, cell.et)  # type: ignore[arg-type]
         for cell, (cut, turning) in zip(cells[2:], plan.rows, strict=True)
     ]
+    for row in rows:
+        if row.cut == RESTING:
+            row.t = row.et = ()
     return cells[0], cells[1], rows
 
 

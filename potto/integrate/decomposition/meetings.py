@@ -186,23 +186,29 @@ def folds_at(
     plan: LevelPlan, rows: list[Row], low: Array, high: Array, directions: int, batch: int, nested: bool
 ) -> list[Fold]:
     """Where roots of one surface are at one place, or one on which the integrand jumps moves infinitely fast; and where
-    they merge to rounding, but for nodes of variables further out, which are cut where that happens."""
+    they merge to rounding, but for nodes of variables further out, which are cut where that happens. Those that only
+    further in are something count where they go apart infinitely fast: what appears between them may be anything."""
     out: list[Fold] = []
     before: dict[int, list[Any]] = {}
     for row in rows:
         others = before.setdefault(row.cut, [])
         others.append(row.x)
-        if row.cut < 0 or not (plan.level.cuts[row.cut].decides or row.turning or plan.level.cuts[row.cut].turning):
+        if row.cut < 0:
             continue
-        x = as_array(row.x, batch)
-        folded: Any = np.zeros(batch, dtype=bool)
-        if plan.level.cuts[row.cut].decides and any(not np.isfinite(t).all() for t in row.t if t is not None):
-            folded = ~np.isfinite(tangents(row.t, batch, directions)).all(axis=0)
-        if row.hides is not None and plan.level.cuts[row.cut].decides and not nested:
+        cut, x = plan.level.cuts[row.cut], as_array(row.x, batch)
+        merged: Any = np.zeros(batch, dtype=bool)
+        for other in others[:-1]:
+            merged = merged | (x == other)
+        plain = not (cut.decides or row.turning or cut.turning)
+        if plain and not merged.any():
+            continue
+        fast: Any = np.zeros(batch, dtype=bool)
+        if (cut.decides or plain) and any(not np.isfinite(t).all() for t in row.t if t is not None):
+            fast = ~np.isfinite(tangents(row.t, batch, directions)).all(axis=0)
+        folded = merged & fast if plain else merged | fast
+        if row.hides is not None and cut.decides and not nested:
             flat = row.hides > FLAT * (1 + np.abs(x))
             folded = folded | (flat & (tangents(row.t, batch, directions) != 0).any(axis=0))
-        for other in others[:-1]:
-            folded = folded | (x == other)
         owner = np.nonzero(folded & (x >= low) & (x <= high))[0]
         if owner.size:
             out.append(Fold(row.cut, owner, x[owner]))

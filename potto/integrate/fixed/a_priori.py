@@ -310,6 +310,7 @@ class Settled(Struct, frozen=True, eq=False):
         return None if found is None else _accurate(found, self.truncation, machine.rtol, machine.atol)
 
 
+@np.errstate(all="ignore")
 def settled(plan: Straight, machine: Evaluator, env: dict[str, Value]) -> Settled | None:
     """What is known of the integral for all parameters near these; None where that is not settled, or not yet."""
     values = _numbers(plan, env)

@@ -26,6 +26,7 @@ from potto.calculus.algebra.ranges import range_of
 from potto.core.terms import Integral, Term
 from potto.integrate.decomposition.meetings import as_array
 from potto.integrate.degenerate.undefined import fallen
+from potto.integrate.levels import HINT
 from potto.integrate.montecarlo.cube_map import Chart, Point, label_of
 from potto.integrate.montecarlo.surface_terms import Surface
 from potto.integrate.pieces import Evaluator, Sums, still
@@ -94,7 +95,7 @@ def peaks(chart: Chart, drawn: int, f: Callable[[Any, int], Sums], seed: int) ->
     f: from a point to samples. The values are (m,) and (m, k).
     """
     levels = chart.plan.levels[:drawn]
-    if not any(cut < 0 for level in levels for cut, _ in level.rows):
+    if not any(cut == HINT for level in levels for cut, _ in level.rows):
         return None
     random = np.random.default_rng((seed, drawn))
     distance = np.repeat(2.0 ** -np.arange(1.0, NEAREST), POINTS)
@@ -102,7 +103,7 @@ def peaks(chart: Chart, drawn: int, f: Callable[[Any, int], Sums], seed: int) ->
     point = chart.start(n, chart.machine.directions)
     for number, level in enumerate(levels):
         u = random.random(n)
-        if any(cut < 0 for cut, _ in level.rows):
+        if any(cut == HINT for cut, _ in level.rows):
             center = _center(chart, number, point.env, random, n)
             near = center + distance * random.uniform(-1.0, 1.0, n)
             u = np.where((near > 0) & (near < 1), near, u)
@@ -120,7 +121,7 @@ def _center(chart: Chart, number: int, env: dict[str, Any], random: np.random.Ge
     machine = chart.machine.with_directions(0)
     values = machine.evaluate(level.frame, {name: still(env[name]) for name in level.frame.params}, None)
     lo, hi, *roots = values
-    rows = [as_array(root.v, n) for root, (cut, _) in zip(roots, level.rows, strict=True) if cut < 0]
+    rows = [as_array(root.v, n) for root, (cut, _) in zip(roots, level.rows, strict=True) if cut == HINT]
     chosen = np.stack(rows)[random.integers(0, len(rows), n), np.arange(n)]
     return label_of(lo, hi, chosen)
 

@@ -1,0 +1,41 @@
+"""Shaders of the paper's first figure swapped under one triangle: what each takes to compile, and its first pixel.
+
+`python benchmarks/paper_swaps.py` prints one line of JSON, as `paper.py` asks for it, in a process of its own: what a
+process has compiled the next one reads from disk. Times are seconds of the processor.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+
+import potto
+
+SCENE = Path(__file__).resolve().parents[1] / "examples" / "raytrace"
+GEOMETRY = {"dq": (-0.2, 1.0), "dex": (0.0, 0.0), "dfocal": (1.0, 0.0)}
+SHADERS = {
+    "by_depth": {},
+    "two_tones": {"dlx": (0.2, 0.0), "dthreshold": (0.8, 0.0)},
+    "by_law": {"dlx": (0.2, 0.0), "dthreshold": (0.3, 0.0)},
+}
+PIXEL = (0.1, 0.05)
+
+
+def swaps() -> dict[str, dict[str, float]]:
+    """By shader: `compile`, what its first pixel takes with its derivative beyond what the same one takes again, and
+    `pixel`, that."""
+    module, found = potto.load(SCENE / "main.po"), {}
+    with potto.settings(backend="numpy", rtol=1e-8, atol=1e-7):
+        for name, numbers in SHADERS.items():
+            times = []
+            for _ in range(3):
+                start = time.process_time()
+                potto.deriv(getattr(module, name))(*PIXEL, **GEOMETRY, **numbers)
+                times.append(time.process_time() - start)
+            found[name] = {"compile": times[0] - min(times[1:]), "pixel": min(times[1:])}
+    return found
+
+
+if __name__ == "__main__":
+    print(json.dumps(swaps()))
