@@ -22,6 +22,7 @@ from potto.integrate.fixed.straight import CLEAR, Straight
 from potto.integrate.pieces import Evaluator, gather
 from potto.kernels.cells import Array, Bools, Cell, Ints, Number, Value
 
+FEW = 16  # numbers, up to which comparing with each of them takes less time than looking them up
 Turning = tuple[tuple[bool, bool], ...]
 
 
@@ -114,7 +115,7 @@ def _gathered(plan: Straight, machine: Evaluator, cells: _Cells, sides: Ints) ->
         face = plan.face(tuple(bool(code >> bit & 1) for bit in range(len(children(plan.surfaces.body)))))
         codes.setdefault(face, []).append(code)
     for face, those in codes.items():
-        own = np.isin(sides, those) if len(those) > 1 else sides == those[0]
+        own = np.any([sides == code for code in those], axis=0) if len(those) < FEW else np.isin(sides, those)
         dark = isinstance(face, Const) and face.value == 0
         if machine.costs is not None:
             machine.costs.stretches(int(own.sum()), 0 if dark else int(own.sum()))
