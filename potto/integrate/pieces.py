@@ -62,6 +62,8 @@ class Evaluator(Protocol):
 
 # The name under which members of a batch that are summands have the number of the sum into which each goes.
 INTO = "#into"
+# The same with the number of the summand that each is, where tangents are added up by these.
+OF = "#of"
 
 
 class Sums(Columns):
@@ -270,15 +272,25 @@ def gather(env: dict[str, Value], index: Ints | Bools | slice | int) -> dict[str
     return {name: map_arrays(value, lambda a: a[index]) for name, value in env.items()}
 
 
-def together(env: dict[str, Value], rows: Array) -> Array:
+def together(env: dict[str, Value], rows: Array, name: str = INTO) -> Array:
     """Numbers of members (..., B), those that go into the same sum added up: what rounding is measured by there."""
-    into = env.get(INTO)
+    into = env.get(name)
     if not isinstance(into, Cell) or not isinstance(into.v, np.ndarray):
         return rows
-    _, place = np.unique(into.v, return_inverse=True)
+    place = into.v.astype(np.int64)
+    if place.max(initial=0) > STRAY * place.size:  # a few members of a large batch
+        place = np.unique(place, return_inverse=True)[1]
     flat = rows.reshape(-1, place.size)
     added: list[Array] = [np.bincount(place, row)[place] for row in flat]  # type: ignore[misc]
-    return np.stack(added).reshape(rows.shape)
+    return np.stack(added).reshape(rows.shape) if added else rows
+
+
+def added_up(env: dict[str, Value], tangents: Array, errors: Array, rtol: float) -> Bools:
+    """Which tangents of members (..., B) are added up with others to something that is as accurate as was asked for,
+    without regard to sign: nobody sees the digits of each."""
+    if OF not in env:
+        return np.zeros(tangents.shape, dtype=bool)
+    return together(env, errors, OF) <= rtol * together(env, np.abs(tangents), OF)
 
 
 def column(env: dict[str, Value]) -> dict[str, Value]:

@@ -122,11 +122,20 @@ def looked_in(db: Database, file: str, dotted: str) -> tuple[str, ...]:
 
 
 def elsewhere(db: Database, file: str, name: str) -> str | None:
-    """A module that defines a name, as it would be written in `file`: one of the same project, if both are in one."""
-    own = _project(file if os.path.isabs(file) else os.path.join(*folders(db, file)[:1], file))
-    inside = (other for other in definers(db, name) if other != file and _project(other) == own)
+    """A module that defines a name, as it would be written in `file`: one of the same project, or where there is none,
+    one beside the file or in a folder beside it."""
+    place = file if os.path.isabs(file) else os.path.join(*folders(db, file)[:1], file)
+    inside = (other for other in definers(db, name) if other != file and _together(place, other))
     found = (module_name(db, file, other) for other in inside)
     return next((module for module in found if module is not None), None)
+
+
+def _together(file: str, other: str) -> bool:
+    own = _project(file)
+    if own is not None or _project(other) is not None:
+        return _project(other) == own
+    here, there = os.path.dirname(file), os.path.dirname(other)
+    return here in (there, os.path.dirname(there))
 
 
 def _project(file: str) -> str | None:

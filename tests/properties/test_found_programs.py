@@ -167,3 +167,12 @@ def test_samples_of_a_surface_across_a_variable_whose_range_follows_another() ->
         answer = potto.deriv(potto.compile(text).f)((0.7, 1.0))
     assert abs(answer.value - 0.7**3 / 6) <= answer.error
     assert abs(answer.tangent - 0.7**2 / 2) <= answer.tangent_error
+
+
+def test_a_section_at_infinity_beside_one_beyond_the_bounds() -> None:
+    """The place y = 0.7/s is anywhere at s = 0: it was integrated up to y = 0.8, far beyond the upper bound."""
+    f = potto.compile("def f(s, v) integral [v, v + 1/8] 1 + [y > 0.8]*[y*s < 0.7] d(y)").f
+    g = potto.compile("def g(s, v) integral ([v, v + 1/8], [0, 1]) 1 + [y > 0.8]*[y*s < 0.7]*x d(y, x)").g
+    for h in (f, g):
+        for answer in (h(0.0, 0.125), h(np.zeros(300), np.full(300, 0.125))):
+            assert (np.abs(answer.value - 1 / 8) <= answer.error).all()

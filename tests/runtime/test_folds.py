@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal, cast
 
 import numpy as np
 import pytest
@@ -101,14 +101,18 @@ def parts(value: Any) -> list[float]:
     ),
     st.floats(0, 1),
     st.integers(1, 60),
+    st.sampled_from(["numpy", "native"]),
 )  # fmt: skip
-@example(("settling", 2.5, 2.5), 0.0, 1000)
-@example(("turning", 1.0, 1.0), 0.0, 3000)
-@example(("growing", 1.0, 1.0), 0.0, 3000)
-def test_errors_of_values_and_derivatives_are_bounded(kind: tuple[str, float, float], share: float, n: int) -> None:
+@example(("settling", 2.5, 2.5), 0.0, 1000, "numpy")
+@example(("turning", 1.0, 1.0), 0.0, 3000, "native")
+@example(("growing", 1.0, 1.0), 0.0, 3000, "native")
+def test_errors_of_values_and_derivatives_are_bounded(
+    kind: tuple[str, float, float], share: float, n: int, backend: Literal["numpy", "native"]
+) -> None:
     name, low, high = kind
     parameter = low + share * (high - low)
-    found = potto.grad(getattr(FOLDS, name))(parameter, float(n))
+    with potto.settings(backend=backend):
+        found = potto.grad(getattr(FOLDS, name))(parameter, float(n))
     with mp.workdps(DIGITS):
         state = in_digits(name, parameter, n)
         sides = (found.value, found.error), (found.tangent, found.tangent_error)
@@ -124,6 +128,35 @@ def test_a_bound_does_not_grow_where_the_state_does_not() -> None:
     assert all(error < 1e-10 * abs(value) for value, error in zip(growing.value, growing.error, strict=True))
     slope = potto.grad(FOLDS.turning)(1.0, 10000.0)
     assert all(e < 1e-8 * abs(t) for t, e in zip(slope.tangent, slope.tangent_error, strict=True))
+
+
+STEPPED = potto.compile("""
+def stopping(k, n)
+    fold (x, v) = (1, 0) for i in 1..n (let w = v - 0.1*k*x in let y = x + 0.1*w in if y < 0 then (-y, -w) else (y, w))
+def nested(k, n)
+    s = fold s = ((k, 1), 2) for i in 0..n-1 (((s.0.1/2, 0.3*s.0.0 + k*i), min(s.1, s.0.0)))
+    (s.0.0, s.0.1, s.1)
+def turned_back(k, n) fold s = k for i in 1-n..0 (if i < -2 then 0.9*s + i else s - k*i)
+def still(k, n) fold (s, t) = (k, 0.5) for i in 1..n ((t, 0.25))
+def bounded(k, n) fold s = 1 for i in 1..n (clamp(s*k, -3, 3) - abs(s)/4)
+""")
+
+
+@pytest.mark.parametrize("name", ["stopping", "nested", "turned_back", "still", "bounded"])
+@given(st.lists(st.floats(0.1, 2), min_size=1, max_size=20), st.integers(1, 30))
+@settings(max_examples=15)
+def test_machine_code_takes_the_steps_that_numpy_takes(name: str, ks: list[float], n: int) -> None:
+    """Nothing but arithmetic: to the last bit, for one member and for a batch of any size."""
+    step = getattr(STEPPED, name)
+    for k in (ks[0], np.array(ks)):
+        by: dict[str, Any] = {}
+        for backend in ("numpy", "native"):
+            with potto.settings(backend=cast("Any", backend)):
+                found = potto.grad(step, "k")(k, float(n))
+            by[backend] = [found.value, found.error, found.tangent, found.tangent_error]
+        assert np.array_equal(by["numpy"][0], by["native"][0])
+        for one, other in zip(by["numpy"], by["native"], strict=True):
+            np.testing.assert_allclose(np.array(one), np.array(other), rtol=1e-12, atol=0)
 
 
 def test_what_is_lost_always_in_one_direction_is_bounded() -> None:

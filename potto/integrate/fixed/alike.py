@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from potto.integrate.fixed.product_rule import CANCELS, FEW, Rule
 from potto.integrate.fixed.straight import MOST_CUTS, Straight
 from potto.integrate.fixed.topologies import Alike, topologies
-from potto.integrate.pieces import Evaluator, Sums, gather, together
+from potto.integrate.pieces import Evaluator, Sums, added_up, gather, together
 from potto.kernels.cells import Array, Bools, Cell, Ints, Value
 
 # Nodes per variable that are tried, one after the other.
@@ -68,7 +68,9 @@ def by_shapes(
     asked = 0.5 * np.maximum(machine.atol, machine.rtol * whole)
     most = CANCELS * added if batch > 1 else 0.0  # for one there are other ways
     left = np.maximum(most, min(machine.rtol, ROUNDED) * np.minimum(added, 1.0)) if batch > 1 else 0.0
-    fine = (rounding <= np.maximum(asked, left)) & (truncated <= np.maximum(asked, most))
+    fine = rounding <= np.maximum(asked, left)
+    fine[1:] |= added_up(env, number[1:], rounding[1:], 0.5 * machine.rtol)
+    fine &= truncated <= np.maximum(asked, most)
     done &= fine.all(axis=0)
     if not done.any():
         return None
@@ -93,12 +95,16 @@ def _settled(
             index = todo[start : start + step]
             found = rule.applied(env, index)
             good = rule.good(found)
-            fine[index[good]] = True
-            owners = cell.members[index[good]]
-            for whole, part in zip(total, (found.number, found.truncated, found.rounding, found.gross), strict=True):
-                for row, numbers in zip(whole, part, strict=True):
-                    row += np.bincount(owners, numbers[good], row.size)
             left.append(index[~good])
+            parts = [found.number, found.truncated, found.rounding, found.gross]
+            if left[-1].size:
+                index, parts = index[good], [part[:, good] for part in parts]
+            fine[index] = True
+            owners = cell.members[index]
+            for whole, part in zip(total, parts, strict=True):
+                for row, numbers in zip(whole, part, strict=True):
+                    if numbers.any():
+                        row += np.bincount(owners, numbers, row.size)
         todo = np.concatenate(left)
         if not todo.size:
             break

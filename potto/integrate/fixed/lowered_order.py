@@ -18,6 +18,9 @@ from potto.kernels.native.vectors import LANES, Vectors
 
 NAME = "in_order"
 LEAST = 256  # members, below which a call takes longer than numpy
+# Where a row is put that may lie anywhere, being at infinity and as far off: before the upper bound, so that it is seen
+# that the order is not sure.
+FARTHEST = np.finfo(float).max / 2
 
 
 def sorted_rows(places: Array, near: Array, backend: str) -> tuple[Array, Array, Array] | None:
@@ -58,14 +61,15 @@ def _text(rows: int) -> str:
 
     places = [at.load(column(row)) for row in range(rows)]
     near = [at.load(column(rows + row)) for row in range(rows)]
-    zero, one, infinite = at.number(0.0), at.number(1.0), at.number(np.inf)
+    zero, one, infinite, farthest = at.number(0.0), at.number(1.0), at.number(np.inf), at.number(FARTHEST)
     lowest = at.apply("sub", places[0], near[0])
     highest = at.apply("add", places[1], near[1])
     keys, counted = [at.number(-np.inf), at.number(np.finfo(float).max)], at.number(2.0)
     for place, room in zip(places[2:], near[2:], strict=True):
         lying = at.apply("and", at.apply("ge", place, at.apply("sub", lowest, room)),
                          at.apply("le", place, at.apply("add", highest, room)))  # fmt: skip
-        keys.append(at.apply("select", lying, place, infinite))
+        near_enough = at.apply("select", at.apply("lt", place, farthest), place, farthest)
+        keys.append(at.apply("select", lying, near_enough, infinite))
         counted = at.apply("add", counted, at.apply("select", lying, one, zero))
     ranks = [zero] * rows
     for i in range(rows):

@@ -16,12 +16,13 @@ from msgspec import Struct
 
 from potto.core.terms import Const, Term, children
 from potto.integrate.columns import distinct
-from potto.integrate.fixed.lowered_order import by_numpy, sorted_rows
+from potto.integrate.fixed.lowered_order import FARTHEST, by_numpy, sorted_rows
 from potto.integrate.fixed.moving_sums import evaluated
 from potto.integrate.fixed.straight import CLEAR, Straight
 from potto.integrate.pieces import Evaluator, gather
 from potto.kernels.cells import Array, Bools, Cell, Ints, Number, Value
 
+FEW = 16  # numbers, up to which comparing with each of them takes less time than looking them up
 Turning = tuple[tuple[bool, bool], ...]
 
 
@@ -114,7 +115,7 @@ def _gathered(plan: Straight, machine: Evaluator, cells: _Cells, sides: Ints) ->
         face = plan.face(tuple(bool(code >> bit & 1) for bit in range(len(children(plan.surfaces.body)))))
         codes.setdefault(face, []).append(code)
     for face, those in codes.items():
-        own = np.isin(sides, those) if len(those) > 1 else sides == those[0]
+        own = np.any([sides == code for code in those], axis=0) if len(those) < FEW else np.isin(sides, those)
         dark = isinstance(face, Const) and face.value == 0
         if machine.costs is not None:
             machine.costs.stretches(int(own.sum()), 0 if dark else int(own.sum()))
@@ -159,12 +160,13 @@ def in_order(places: Array, off: Array, backend: str) -> tuple[Ints, Ints, Bools
 def _in_order(places: Array, near: Array) -> tuple[Ints, Ints, Bools]:
     lying = (places >= places[0] - near[0] - near) & (places <= places[1] + near[1] + near)
     lying[:2] = True
-    key = np.where(lying, places, np.inf)
+    key = np.where(lying, np.minimum(places, FARTHEST), np.inf)
     key[0], key[1] = -np.inf, np.finfo(float).max  # what lies next to a bound counts as within
     order = np.argsort(key, axis=0, kind="stable")
     at, width = np.take_along_axis(places, order, 0), np.take_along_axis(near, order, 0)
     count = lying.sum(axis=0)
-    apart = at[1:] - at[:-1] > width[1:] + width[:-1]
+    with np.errstate(invalid="ignore"):
+        apart = at[1:] - at[:-1] > width[1:] + width[:-1]
     fine: Bools = np.asarray((apart | (np.arange(1, len(places))[:, None] >= count)).all(axis=0))
     fine &= np.isfinite(places[:2]).all(axis=0)
     return order, count, fine

@@ -31,7 +31,7 @@ from potto.integrate.events import (
     UNBOUNDED_SAMPLES,
     Shortfall,
 )
-from potto.integrate.pieces import Sums, together
+from potto.integrate.pieces import Sums, added_up, together
 from potto.kernels.cells import Array, Bools, Value
 from potto.projects.settings import Settings
 
@@ -97,6 +97,8 @@ def missing(term: Integral, sums: Sums, settings: Settings, env: dict[str, Value
         size = np.abs(number)
         speck = SPECK * np.max(size, axis=-1, keepdims=True, initial=0.0, where=np.isfinite(size))
         fine = error <= np.maximum(np.maximum(settings.atol, settings.rtol * size), np.maximum(within, speck))
+        if number is sums.t:
+            fine |= added_up(env, number, error, settings.rtol)
         fine &= np.isfinite(error)  # of what may be infinite, and may be anything, nothing is known yet
         out |= ~fine.reshape(-1, out.size).all(axis=0)
     return out

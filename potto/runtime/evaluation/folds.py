@@ -1,26 +1,28 @@
 """Folds while a program runs: a state stepped from place to place.
 
-Owns `fold`. The steps are a loop of one bare kernel. What that says of no step (derivatives, and how far off all is) is
-found for all steps at once afterwards: a step is nearly linear around the states that were met, `linear` has its
-derivatives, and `steps` puts them together. States of many numbers are stepped with samples of their errors (`signed`),
-and steps that integrate with all that they carry.
+Owns `fold`. The steps are a loop of one bare kernel, by machine code where that pays. What that says of no step
+(derivatives, and how far off all is) is found for all steps at once afterwards: a step is nearly linear around the
+states that were met, `linear` has its derivatives, and `steps` puts them together. States of many numbers are stepped
+with samples of their errors (`signed`), and steps that integrate with all that they carry.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
 from potto.core.terms import Fold, Lam, lam
 from potto.kernels.cells import Cell, Number, Value, all_arrays, map_cells, pad, pattern
-from potto.runtime.evaluation.linear import along, steps_at_once
+from potto.kernels.native.stepping import Stepping
+from potto.runtime.evaluation.linear import States, along, steps_at_once
 from potto.runtime.evaluation.machine import Machine
 from potto.runtime.evaluation.reduction import reduced
 from potto.runtime.evaluation.selection import Pick, apart
 from potto.runtime.evaluation.signed import can_be_sampled, stepped
 from potto.runtime.evaluation.sums import bounds
 
+STEPS = "steps"  # what a kernel's machine code for folds is kept under
 LEAST = 4096  # steps that it pays to look at all at once where there are more
 
 Env = dict[str, Value]
@@ -40,10 +42,10 @@ def fold(machine: Machine, term: Fold, lo: Value, hi: Value, start: Value, env: 
     body = lam(tuple(sorted(term.body.free | {term.variable, term.state})), term.body)
     while 0 < min(LEAST, len(places)) <= (most := steps_at_once(machine, term, start, env)):
         here = places[:most]
-        found = along(machine, term, body, here, _bare(machine, term, body, here, start, env), start, env)
-        if found is None:
+        states = _bare(machine, term, body, here, start, env)
+        if states is None:
             break
-        start, places = found, places[most:]
+        start, places = along(machine, term, body, here, states, start, env), places[most:]
     if not places:
         return start
     if can_be_sampled(machine, term, start):
@@ -51,24 +53,43 @@ def fold(machine: Machine, term: Fold, lo: Value, hi: Value, start: Value, env: 
     return _carrying(machine, term, body, places, start, env)
 
 
-def _bare(machine: Machine, term: Fold, body: Lam, places: range, start: Value, env: Env) -> list[Value]:
-    """All states, numbers only."""
+def _bare(machine: Machine, term: Fold, body: Lam, places: range, start: Value, env: Env) -> States | None:
+    """All states, numbers only; None where they are not of one kind."""
     quiet = machine.changed(directions=0, taping=False, rounding=False)
     here = {name: map_cells(value, _plain) for name, value in env.items()}
-    state = map_cells(start, _plain)
-    params, states, found = body.params, [state], None
-    args: list[Any] = [here.get(name) for name in params]
-    at = params.index(term.variable) if term.variable in params else None
-    own = params.index(term.state)
+    here[term.variable], here[term.state] = Cell(float(places.start)), map_cells(start, _plain)
+    args = [here[name] for name in body.params]
+    kernel = quiet.kernel(body, tuple([pattern(a, 0) for a in args]))
+    at = body.params.index(term.variable) if term.variable in body.params else None
+    own = body.params.index(term.state)
+    if not kernel.plain or machine.backend == "numpy" or not _of_cells(args):
+        return States.told(_one_by_one(quiet, body, places, args, own, at), start, env)
+    found = kernel.native.get(STEPS)
+    if found is None:
+        found = kernel.native[STEPS] = Stepping(kernel, own, at)
+    function = found.promotion.function(machine.backend, found.text)
+    if function is not None:
+        return States.counted(found.run(function, args, places), start, env)
+    with found.promotion.by_numpy():
+        return States.told(_one_by_one(quiet, body, places, args, own, at), start, env)
+
+
+def _one_by_one(machine: Machine, body: Lam, places: range, args: list[Value], own: int, at: int | None) -> list[Value]:
+    """All states, each by the kernel. own, at: which of its parameters are the state and the place."""
+    states, found = [args[own]], None
     for place in places:
         if at is not None:
             args[at] = Cell(float(place))
-        args[own] = state
+        args[own] = states[-1]
         if found is None or len(states) < 3:  # from then on states are of one kind
-            found = quiet.kernel(body, tuple([pattern(a, 0) for a in args]))
-        state = found.run(quiet, None, *args)
-        states.append(state)
+            found = machine.kernel(body, tuple([pattern(a, 0) for a in args]))
+        states.append(found.run(machine, None, *args))
     return states
+
+
+def _of_cells(args: Sequence[Value]) -> bool:
+    """Whether arguments are numbers, and tuples of them."""
+    return all(isinstance(arg, Cell) or (isinstance(arg, tuple) and _of_cells(arg)) for arg in args)
 
 
 def _plain(cell: Cell) -> Cell:

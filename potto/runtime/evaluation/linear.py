@@ -1,8 +1,9 @@
 """The steps of a fold as linear maps around the states that were met, for all steps at once.
 
-Owns `steps_at_once` and `along`. The state of n steps is a batch of n members: the step's kernel gives its derivatives
-by the state and what it rounds off, and `steps` adds up what that does to the end. On a tape the end is a sum over the
-steps of what each takes from elsewhere, times what the steps after it make of that: the cost is that of the steps.
+Owns `steps_at_once`, `States` and `along`. The state of n steps is a batch of n members: the step's kernel gives its
+derivatives by the state and what it rounds off, and `steps` adds up what that does to the end. On a tape the end is a
+sum over the steps of what each takes from elsewhere, times what the steps after it make of that: the cost is that of
+the steps.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from copy import copy
 from typing import Any
 
 import numpy as np
+from msgspec import Struct
 
 from potto.core.terms import Fold, Lam
 from potto.kernels.cells import Array, Cell, Rows, Value, all_arrays, all_cells, map_cells, pad, pattern
@@ -71,34 +73,53 @@ def _shape(state: Value, env: Env) -> Shape:
     return np.broadcast_shapes(*(a.shape for value in (state, *env.values()) for a in all_arrays(value)))
 
 
-def along(
-    machine: Machine, term: Fold, body: Lam, places: range, states: Sequence[Value], start: Value, env: Env
-) -> Value | None:
-    """The last state with all that it carries; None where states are not of one kind."""
-    if any(_form(state) != _form(start) for state in (states[1], states[-1])):
-        return None
-    shape = np.broadcast_shapes(_shape(states[-1], env), _shape(start, {}))
-    steps = _Steps(machine, term, body, places, states, start, env, shape)
+class States(Struct, frozen=True):
+    """The states that were met. met: each number of them as each step began, (*inner, steps, *batch), where `inner` are
+    the axes of places in arrays around it. last: the state after the last step."""
+
+    met: list[Array]
+    last: Value
+    shape: Shape
+
+    @classmethod
+    def told(cls, states: Sequence[Value], start: Value, env: Env) -> States | None:
+        """Of all states, one by one; None where they are not of one kind."""
+        if any(_form(state) != _form(start) for state in (states[1], states[-1])):
+            return None
+        shape = np.broadcast_shapes(_shape(states[-1], env), _shape(start, env))
+        cells = [[state] if isinstance(state, Cell) else all_cells(state) for state in states[:-1]]
+        inner = enumerate(_inner(start, ()))
+        return cls([_along([row[c].v for row in cells], own, shape) for c, own in inner], states[-1], shape)
+
+    @classmethod
+    def counted(cls, numbers: Sequence[Array], start: Value, env: Env) -> States:
+        """Of numbers at the beginning and after each step, (1 + steps, *batch), of a state without arrays."""
+        shape = _shape(start, env)
+        wide = [x.reshape(len(x), *(1,) * (len(shape) + 1 - x.ndim), *x.shape[1:]) for x in numbers]
+        met = [np.broadcast_to(x, (len(x), *shape)) for x in wide]
+        last = iter([Cell(x[-1] if shape else float(x[-1])) for x in met])
+        return cls([x[:-1] for x in met], _with_cells(start, last), shape)
+
+
+def along(machine: Machine, term: Fold, body: Lam, places: range, states: States, start: Value, env: Env) -> Value:
+    """The last state with all that it carries."""
     if not (machine.rounding or machine.directions):
-        return states[-1]
-    return steps.ended()
+        return states.last
+    return _Steps(machine, term, body, places, states, start, env).ended()
 
 
 class _Steps:
     """The steps of one fold. inner: of each cell of the state, the axes of places in arrays around it."""
 
     def __init__(
-        self, machine: Machine, term: Fold, body: Lam, places: range, states: Sequence[Value], start: Value,
-        env: Env, shape: Shape,
-    ) -> None:  # fmt: skip
-        self.machine, self.term, self.body, self.start, self.env, self.shape = machine, term, body, start, env, shape
+        self, machine: Machine, term: Fold, body: Lam, places: range, states: States, start: Value, env: Env
+    ) -> None:
+        self.machine, self.term, self.body, self.start, self.env = machine, term, body, start, env
+        self.shape, self.met, self.last = states.shape, states.met, states.last
         self.inner = _inner(start, ())
         self.count = len(places)
-        self.last = states[-1]
-        wide = (self.count, *(1,) * len(shape))
+        wide = (self.count, *(1,) * len(self.shape))
         self.place = np.arange(places.start, places.stop, dtype=float).reshape(wide)
-        met = [[state] if isinstance(state, Cell) else all_cells(state) for state in states[:-1]]
-        self.met = [_along([cells[c].v for cells in met], inner, shape) for c, inner in enumerate(self.inner)]
         self.d = sum(int(np.prod(inner)) for inner in self.inner)
 
     def ended(self) -> Value:

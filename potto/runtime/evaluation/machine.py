@@ -184,7 +184,8 @@ class Machine:
     frozen: surfaces, bounds and deltas stand still, so that tangents are those of the integrands alone.
     side: -1 or 1 where one-sided derivatives are wanted, for parameters that shrink or grow.
     summed: whether the members of batches are summands, so that nobody sees the digits of each.
-    into: the number of the sum into which each member of a batch of integrals goes, if they are nothing but summands.
+    into: the number of the sum into which each member of a batch of integrals goes, if they are nothing but summands;
+    of: and of the summand that it is, if its tangents are added up by these, as they are on a tape.
     taping: the one tangent is written on a tape (`kernels/tape`).
     """
 
@@ -199,6 +200,7 @@ class Machine:
     side: int = 0
     summed: bool = False
     into: Ints | None = None
+    of: Ints | None = None
     taping: bool = False
 
     @property

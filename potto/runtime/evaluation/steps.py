@@ -87,8 +87,11 @@ def spread(matrices: Array, local: Array, first: Array) -> Array:
 def _turned(moved: Array, sizes: Array, more: Array) -> tuple[Array, Array]:
     """Perpendicular axes for what axes have become, the longest error first, and how far off along them."""
     order = np.argsort(-np.linalg.norm(moved, axis=-2) * sizes, axis=-1)
-    moved = np.take_along_axis(moved, order[..., None, :], axis=-1)
-    sizes = np.take_along_axis(sizes, order, axis=-1)
+    if order.ndim == 1:
+        moved, sizes = moved[:, order], sizes[order]
+    else:
+        moved = np.take_along_axis(moved, order[..., None, :], axis=-1)
+        sizes = np.take_along_axis(sizes, order, axis=-1)
     q, r = np.linalg.qr(moved)
     along = np.abs(np.swapaxes(q, -1, -2)) @ more[..., None]
     return q, (np.abs(r) @ sizes[..., None] + along)[..., 0]

@@ -153,7 +153,7 @@ def _added(machine: Machine, term: Sum, pairs: Pairs, first: int, env: Env, shap
 
         here = {name: map_arrays(env[name], picked) for name in params if name != term.variable}
         here[term.variable] = Cell(first + those.astype(float), None, (None,) * machine.directions)
-        value = _evaluated(machine, term, here, at, size, shape)
+        value = _evaluated(machine, term, here, (at, those), size, shape)
         part = map_cells(value, lambda cell, at=at: _summed(cell, at, size, shape))  # type: ignore[misc]
         whole = part if whole is None else _plus(whole, part)
     return whole
@@ -164,13 +164,17 @@ def _rows(node: Node, shape: tuple[int, ...], at: Ints) -> Any:
     return flat[at]
 
 
-def _evaluated(machine: Machine, term: Sum, here: Env, at: Ints, size: int, shape: tuple[int, ...]) -> Value:
-    """The answers for pairs; what there is to be said of one is said of its member."""
+def _evaluated(
+    machine: Machine, term: Sum, here: Env, pairs: tuple[Ints, Ints], size: int, shape: tuple[int, ...]
+) -> Value:
+    """The answers for pairs, of members and summands; what there is to be said of one is said of its member."""
+    at, those = pairs
     record, body = machine.record, lam(tuple(sorted(here)), term.body)
     kept = record.shortfalls, record.within
     record.shortfalls, record.within = {}, 0.0
     try:
-        alone = machine.changed(into=at) if _plain(term.body, machine.linker.reach) else machine
+        plain = _plain(term.body, machine.linker.reach)
+        alone = machine.changed(into=at, of=those if machine.taping else None) if plain else machine
         value = alone.run(body, [here[name] for name in body.params], None)
         told, within = record.shortfalls, record.within
     finally:

@@ -17,7 +17,7 @@ from potto.calculus.surfaces.discontinuities import TooDeep
 from potto.core.terms import Integral, function_of
 from potto.diagnostics import PottoError
 from potto.integrate.events import BUDGET_SPENT
-from potto.integrate.pieces import INTO, Sums, gather, still
+from potto.integrate.pieces import INTO, OF, Sums, gather, still
 from potto.kernels import errors
 from potto.kernels.cells import Array, Cell, Ints, Value, all_arrays, map_arrays, pad
 from potto.kernels.making import making
@@ -125,7 +125,9 @@ def _integrate(machine: Machine, term: Integral, env: dict[str, Value], outermos
     if batch == 1 and shape:
         flat = {n: map_arrays(v, lambda a: float(a[0])) for n, v in flat.items()}
     if outermost and machine.into is not None and shape == machine.into.shape != (1,):
-        flat[INTO] = pad(Cell(machine.into.astype(float)), machine.directions)
+        for name, numbers in ((INTO, machine.into), (OF, machine.of)):
+            if numbers is not None:
+                flat[name] = pad(Cell(numbers.astype(float)), machine.directions)
     record = machine.record
     record.integrals += 1
     if machine.overdrawn() and not outermost:
