@@ -11,7 +11,6 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
 from msgspec import Struct
 from msgspec.structs import asdict
 
@@ -48,7 +47,7 @@ class AtOnce(Struct, frozen=True, eq=False):
         env: dict[str, Cell] = {}
         for (name, t, et), arg in zip(self.tangents, args, strict=True):
             if arg.__class__ is not float:
-                if arg.__class__ is not np.float64 and (arg.__class__ is not int or abs(arg) > LARGEST):
+                if not isinstance(arg, float) and (arg.__class__ is not int or abs(arg) > LARGEST):
                     return None
                 arg = float(arg)
             env[name] = Cell(arg, None, t, et)
