@@ -29,7 +29,8 @@ def summary(value: Value) -> str:
     if isinstance(value, Table):
         shown = [f"{name} {summary(field)}" for name, field in value.fields[:_MOST]]
         more = len(value.fields) - len(shown)
-        return "; ".join([*shown, *([f"and {more} more"] if more else [])])
+        left_out = [f"without {', '.join(value.texts)}: no numbers"] if value.texts else []
+        return "; ".join([*shown, *([f"and {more} more"] if more else []), *left_out])
     if not isinstance(value, Array):
         return _short(value)
     length = value.item.length if isinstance(value.item, Row) else 1

@@ -27,6 +27,7 @@ _BATCH = 500  # rows that are texts at the same time; of more, the garbage colle
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _INFINITE = re.compile(r"[+-]?inf(?:inity)?", re.IGNORECASE)
 _THOUSANDS = re.compile(r"[+-]?[0-9]{1,3}(?:[,.' ][0-9]{3})+(?:[.,][0-9]+)?")
+_MEANT = re.compile(r"[+-]?[\d.,'_ ]*\d[\d.,'_ ]*(?:[eE][+-]?\d+)?")  # as a number, whoever reads it
 _WORD = re.compile(r'"([^"]*)"|(\S+)')
 
 
@@ -57,18 +58,21 @@ def separated(text: str, tabs: bool) -> Array | Table:
     layout = _Layout(delimiter, comma, names, len(first), row)
     plain = '"' not in text and "_" not in body and body.isascii()
     columns = _fast(body.replace(",", ".").split("\n") if comma else kept, layout) if plain and kept else None
+    texts: frozenset[int] = frozenset()
     if columns is None:
-        columns = _careful(lines, layout)
-    return _value(layout, columns)
+        texts = _of_texts(lines, layout)
+        columns = _careful(lines, layout, texts)
+    return _value(layout, columns, texts)
 
 
-def _value(layout: _Layout, columns: Sequence[array[float]]) -> Array | Table:
-    length = len(columns[0])
+def _value(layout: _Layout, columns: Sequence[array[float]], texts: frozenset[int]) -> Array | Table:
+    length = max(map(len, columns))
     if not length:
         raise malformed("the file has a header and no rows", hint="a table has numbers in rows below its header")
     if layout.names:
-        arrays = (Array((length,), Number(), column) for column in columns)
-        return Table(tuple(zip(identifiers(layout.names), arrays)))
+        names = identifiers(layout.names)
+        kept = ((name, Array((length,), Number(), columns[at])) for at, name in enumerate(names) if at not in texts)
+        return Table(tuple(kept), tuple(names[at] for at in sorted(texts)))
     if layout.width == 1:
         return Array((length,), Number(), columns[0])
     flat = array("d", bytes(8 * length * layout.width))
@@ -185,12 +189,31 @@ def _fast(lines: Sequence[str], layout: _Layout) -> list[array[float]] | None:
     return columns if all(all(map(isfinite, column)) for column in columns) else None
 
 
-def _careful(lines: Sequence[str], layout: _Layout) -> list[array[float]]:
+def _of_texts(lines: Sequence[str], layout: _Layout) -> frozenset[int]:
+    """The columns below a header of which no value is a number, or meant as one: names, dates, labels. Not all."""
+    if not layout.names:
+        return frozenset()
+    of_texts, lacking = set(range(layout.width)), set(range(layout.width))
+    for _, record in islice(_records(lines, layout.delimiter), 1, None):
+        for at in list(of_texts) if len(record) == layout.width else ():
+            text = record[at].strip()
+            if _is_number(text, layout.comma) or _MEANT.fullmatch(text):
+                of_texts.remove(at)
+            elif text.lower() not in MISSING:
+                lacking.discard(at)
+    found = of_texts - lacking
+    return frozenset(found) if len(found) < layout.width else frozenset()
+
+
+def _careful(lines: Sequence[str], layout: _Layout, texts: frozenset[int]) -> list[array[float]]:
+    """The columns, those of texts empty."""
     columns = [array("d") for _ in range(layout.width)]
     for row, record in islice(_records(lines, layout.delimiter), bool(layout.names), None):
         if len(record) != layout.width:
             raise _ragged(layout, row, len(record))
         for at, (column, text) in enumerate(zip(columns, record)):
+            if at in texts:
+                continue
             column.append(_number(layout, row, at, text.strip(), lines[row - 1]))
     return columns
 
@@ -219,7 +242,7 @@ def _number(layout: _Layout, row: int, at: int, text: str, line: str) -> float:
     elif _THOUSANDS.fullmatch(text):
         what, hint = f"{found} is not a number", "write numbers without separators of thousands, with a decimal point"
     else:
-        what, hint = f"{found} is text, not a number", "only numbers can be read: take columns of text out of the file"
+        what, hint = f"{found} is text, not a number", "write a number there, or leave the row out"
     raise bad_row(f"{where}: {what}", row, at + 1, text, "a number", hint, _place(line, layout.delimiter, at))
 
 

@@ -40,9 +40,11 @@ class Sizes(Struct, frozen=True):
 
 
 class Columns(Struct, frozen=True):
-    """A record: names, which are identifiers and differ, and what stands under them."""
+    """A record: names, which are identifiers and differ, and what stands under them. texts: the names of columns that
+    were left out, since no value in them is a number."""
 
     fields: tuple[tuple[str, Number | Sizes], ...]
+    texts: tuple[str, ...] = ()
 
 
 Shape = Number | Sizes | Columns
@@ -76,9 +78,10 @@ class Array(Struct, frozen=True, eq=False, dict=True):
 
 
 class Table(Struct, frozen=True, eq=False):
-    """A record of arrays and numbers, in the order of the file."""
+    """A record of arrays and numbers, in the order of the file. texts: as in `Columns`."""
 
     fields: tuple[tuple[str, float | Array], ...]
+    texts: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> float | Array:
         return dict(self.fields)[name]
@@ -90,7 +93,7 @@ Value = float | Array | Table
 def shape(value: Value) -> Shape:
     """The shape of a value."""
     if isinstance(value, Table):
-        return Columns(tuple((name, _plain(field)) for name, field in value.fields))
+        return Columns(tuple((name, _plain(field)) for name, field in value.fields), value.texts)
     return _plain(value)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from potto.diagnostics import Related, Suggestion, shortened, suggest
+from potto.modules.texts import definition
 from potto.source import Span
 from potto.syntax import nodes
 from potto.syntax.printer import print_expression
@@ -14,7 +15,7 @@ from potto.types.context import Inference, rule
 from potto.types.infer import value_only
 from potto.types.integrals import summed
 from potto.types.mismatches import between, describe, mismatch
-from potto.types.scope import Local
+from potto.types.scope import Global, Local
 from potto.types.types import (
     ANY_SIZE,
     REAL,
@@ -71,7 +72,7 @@ def _in_range(inference: Inference, size: Type, node: nodes.Index, place: int) -
     elif not isinstance(size, Count):
         _from_the_end(inference, known, node, place)
     elif not 0 <= known < size.number:
-        _out_of_range(inference, known, size.number, index)
+        _out_of_range(inference, known, size.number, node, index)
 
 
 def _whole(inference: Inference, index: nodes.Expr) -> None:
@@ -101,7 +102,7 @@ def _from_the_end(inference: Inference, known: int, node: nodes.Index, place: in
     inference.report(kinds.OUT_OF_RANGE(index.span, message, label="below 0", help=help, suggestions=suggestions))
 
 
-def _out_of_range(inference: Inference, known: int, size: int, index: nodes.Expr) -> None:
+def _out_of_range(inference: Inference, known: int, size: int, node: nodes.Index, index: nodes.Expr) -> None:
     last = size - 1
     if last < 0:
         count, label, help = "no elements", "there are none", "an array without elements has no index"
@@ -113,7 +114,32 @@ def _out_of_range(inference: Inference, known: int, size: int, index: nodes.Expr
     message = f"the index {known} is out of range: the array has {count}"
     meant = size + known if -size <= known < 0 else last
     suggestions = (suggest(index.span, str(meant)),) if last >= 0 else ()
-    inference.report(kinds.OUT_OF_RANGE(index.span, message, label=label, help=help, suggestions=suggestions))
+    related = _defined(inference, node.array, f"has {count}")
+    inference.report(
+        kinds.OUT_OF_RANGE(index.span, message, label=label, related=related, help=help, suggestions=suggestions)
+    )
+
+
+def _defined(inference: Inference, array: nodes.Expr, what: str) -> tuple[Related, ...]:
+    """Where the name of an array, or of what it is a part of, gets its meaning."""
+    array = without_parentheses(array)
+    while isinstance(array, nodes.Field | nodes.Index):
+        array = without_parentheses(array.value if isinstance(array, nodes.Field) else array.array)
+        what = "is defined here"
+    if isinstance(array, nodes.Member):
+        meaning, what = inference.owners.get(id(array)) or inference.meanings.get(id(array)), "is defined here"
+    else:
+        meaning = inference.meanings.get(id(array))
+    if isinstance(meaning, Local):
+        return (Related(meaning.span, f"`{meaning.name}` {what}"),)
+    if not isinstance(meaning, Global):
+        return ()
+    file, name = meaning.target.file, meaning.target.name
+    item = definition(inference.outside.db, file, name)
+    if not isinstance(item, nodes.Definition):
+        return ()
+    here = None if file == inference.outside.file else file
+    return (Related(item.name_span, f"`{name}` {what}", here, name),)
 
 
 def _constant(expr: nodes.Expr) -> int | None:

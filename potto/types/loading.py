@@ -42,7 +42,9 @@ def loaded(inference: Inference, node: nodes.Apply) -> Type:
 def type_of(shape: Shape, path: str) -> Type:
     """The type of a kind of value: the columns of a table are a record's fields."""
     if isinstance(shape, Columns):
-        record = RecordName(path, path.replace("\\", "/").rpartition("/")[2], tuple(name for name, _ in shape.fields))
+        record = RecordName(
+            path, path.replace("\\", "/").rpartition("/")[2], tuple(name for name, _ in shape.fields), shape.texts
+        )
         return TupleOf(tuple(type_of(item, path) for _, item in shape.fields), record=record)
     if not isinstance(shape, Sizes):
         return REAL

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from potto.diagnostics import Diagnostic, Related, Replacement, Suggestion, shortened
-from potto.modules.texts import definition
+from potto.modules.texts import definition, source
 from potto.reports.near import did_you_mean, instead, near_names
 from potto.source import Span
 from potto.syntax import nodes
@@ -215,15 +215,34 @@ def no_field(outside: Outside, span: Span, name: str, record: RecordName, label:
     """What is said of a field that a record doesn't have."""
     item = definition(outside.db, record.file, record.name) if "." not in record.name else None  # else it is data
     here = None if record.file == outside.file else record.file
-    related = () if item is None else (Related(item.name_span, f"`{record.name}` is defined here", here, record.name),)
+    related = _header(outside, record, name)
+    if item is not None:
+        related = (Related(item.name_span, f"`{record.name}` is defined here", here, record.name),)
     near = near_names(name, record.fields)
     help = did_you_mean(near) or "it has " + ", ".join(f"`{name}`" for name in record.fields)
     message = f"a record `{record.name}` has no field `{name}`"
     if record.name.endswith(_TABLES):
         message = f"`{record.name}` has no column `{name}`"
+        if name in record.texts:
+            message = f"the column `{name}` of `{record.name}` holds text, which programs cannot use"
+            help = "only columns of numbers are loaded; write a number for each text, such as 0 and 1, in a column more"
     elif "." in record.name:  # another file of data
         message = f"`{record.name}` holds no `{name}`"
     return kinds.UNKNOWN_FIELD(span, message, label=label, related=related, help=help, suggestions=instead(span, near))
+
+
+def _header(outside: Outside, record: RecordName, name: str) -> tuple[Related, ...]:
+    """The place in a table where its columns are named: a name that is there, or all of them."""
+    text = source(outside.db, record.file) if record.name.endswith(_TABLES) else None
+    if text is None:
+        return ()
+    for start, line in zip(text.line_starts, text.text.splitlines(), strict=False):
+        if line.strip() and not line.lstrip().startswith("#"):
+            at = line.find(name) if name in record.texts else -1
+            span = Span(start, start + len(line.rstrip())) if at < 0 else Span(start + at, start + at + len(name))
+            said = "its columns are named here" if at < 0 else "text in every row"
+            return (Related(span, said, record.file, ""),)
+    return ()
 
 
 def around(span: Span, before: str, after: str, title: str) -> Suggestion:

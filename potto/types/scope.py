@@ -11,11 +11,11 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Literal
 
-from potto.diagnostics import Diagnostic
+from potto.diagnostics import Diagnostic, Related, Replacement, Suggestion
 from potto.modules.builtins import CONSTANTS, PROJECTIONS, SPECIALS, VECTORS, is_builtin
 from potto.modules.hints import called_here, elsewhere, known_elsewhere
 from potto.modules.lookup import Defined, DefinitionTarget, find_module, meaning, preludes, resolve_module
-from potto.modules.texts import imports, names
+from potto.modules.texts import definition, imports, names
 from potto.primitives import PRIMITIVES
 from potto.query import Database, query
 from potto.quick import quick, value
@@ -168,7 +168,10 @@ def undefined(outside: Outside, scope: Iterable[str], node: nodes.Name) -> Diagn
 def undefined_member(outside: Outside, scope: Scope, node: nodes.Member) -> Diagnostic | None:
     """What is said of `module.name` where there is no such module, or nothing of that name in it."""
     head, db, file = node.path.partition(".")[0], outside.db, outside.file
-    local = scope.find(head) is not None
+    found = scope.find(head)
+    if found is not None and found.kind == "parameter" and (records := _records_with(outside, node.name)):
+        return _not_annotated(node, found, records)
+    local = found is not None
     module = None if local else resolve_module(db, file, node.path)
     if module is not None:
         near = near_names(node.name, names(db, module))
@@ -185,6 +188,28 @@ def undefined_member(outside: Outside, scope: Scope, node: nodes.Member) -> Diag
     if find_module(db, file, node.path) is not None and not local:
         return _no_module(node, f"the module `{node.path}` is not imported", f"add `import {node.path}`")
     return _no_module(node, f"`{head}` is not a module" if local else f"there is no module `{node.path}` here")
+
+
+def _records_with(outside: Outside, field: str) -> list[str]:
+    """The records of the file that have a field of this name."""
+    found = []
+    for name in names(outside.db, outside.file):
+        item = definition(outside.db, outside.file, name)
+        result = item.result if isinstance(item, nodes.Definition) else None
+        if isinstance(result, nodes.NamedType) and result.name == name and isinstance(item, nodes.Definition):
+            found += [name] * any(parameter.name == field for group in item.groups for parameter in group)
+    return found
+
+
+def _not_annotated(node: nodes.Member, local: Local, records: list[str]) -> Diagnostic:
+    """What is said of a field of a parameter that may be anything."""
+    behind = Span(local.span.end, local.span.end)
+    edits = [Suggestion(f"Write `{node.path}: {name}`", (Replacement(behind, f": {name}"),)) for name in records]
+    return NOT_DEFINED(
+        node.path_span, f"it is not known which record `{node.path}` is, so `{node.path}.{node.name}` is not defined",
+        label="any number", related=(Related(local.span, "said here with its type"),),
+        help=f"say what it is: `{node.path}: {records[0]}`", suggestions=tuple(edits),
+    )  # fmt: skip
 
 
 def _no_module(node: nodes.Member, what: str, help: str = "") -> Diagnostic:

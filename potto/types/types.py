@@ -36,11 +36,13 @@ class Dist:
 
 @value
 class RecordName:
-    """Which record a tuple is: its definition, and the names of the fields."""
+    """Which record a tuple is: its definition, and the names of the fields. texts: the columns of a file of data that
+    are not among them, as they hold no numbers."""
 
     file: str
     name: str
     fields: tuple[str, ...]
+    texts: tuple[str, ...] = ()
 
 
 @value

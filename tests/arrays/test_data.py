@@ -112,3 +112,30 @@ def test_a_bad_row_is_shown_where_it_stands(
     found = potto.Workspace(tmp_path)
     with pytest.raises(potto.PottoError, match=name):
         found.module("main")
+
+
+@pytest.mark.parametrize(
+    ("written", "code", "places"),
+    [
+        ("people.name", "P0332", ["text.po:2:8", "labels.csv:2:6"]),
+        ("people.heigth", "P0332", ["text.po:2:8", "labels.csv:2:1"]),
+        ("people.height[2]", "P0328", ["text.po:2:15", "`people` is defined here"]),
+        ("def f(i) (let xs = people.height in xs[i] + xs[2])", "P0328", ["text.po:2:48", "`xs` has 2 elements"]),
+    ],
+)
+def test_columns_of_text_and_places_beyond_the_end_are_shown_where_they_come_from(
+    folder: Path, capsys: pytest.CaptureFixture[str], written: str, code: str, places: list[str]
+) -> None:
+    (folder / "labels.csv").write_text("# who\nyear,name,height\n1990,anna,1.5\n1991,ben,1.75\n")
+    (folder / "text.po").write_text(f'people = load("labels.csv")\n{written}\n')
+    assert main(["check", str(folder / "text.po")]) == 1
+    shown = capsys.readouterr().out
+    assert f"error[{code}]" in shown
+    assert all(place in shown for place in places)
+
+
+def test_a_table_with_a_column_of_text_is_the_record_of_the_others(folder: Path) -> None:
+    (folder / "people.csv").write_text('name,height,weight\nanna,1.5,60\nben,1.75,80\n"de Vries, C.",2,90\n')
+    module = potto.load(folder / "main.po")
+    assert module.tallest.value == 2
+    assert module.misfit(0.0, 40.0).value == 0 + (80 - 70) ** 2 + (90 - 80) ** 2

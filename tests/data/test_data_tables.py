@@ -16,9 +16,10 @@ from potto.data import DataMistake, shape_of, values_of
 from potto.data.files import MEMORY
 from potto.data.tables import separated
 from potto.data.texts import identifiers
-from potto.data.values import Columns, Sizes
+from potto.data.values import Array, Columns, Sizes, Table
 from potto.syntax.tokens import FIRST_NAME
 
+TEXTS = ["anna", "2020-01-31", "12 kg", "naïve", "a b", "x1"]
 reals = st.floats(allow_nan=False, allow_infinity=False)
 boxes = st.integers(1, 5).flatmap(lambda width: st.lists(st.lists(reals, min_size=width, max_size=width), min_size=1))
 
@@ -116,7 +117,7 @@ def said(text: str, name: str = "t.csv") -> tuple[str, int | None, int | None, s
         ("1\nnan\n", ("P0803", 2, 1, "nan", "line 2, column 1: there is no value, only `nan`")),
         ("NaN\n1\n", ("P0803", 1, 1, "NaN", "line 1, column 1: there is no value, only `NaN`")),
         ("1,-,2\n", ("P0803", 1, 2, "-", "line 1, column 2: there is no value, only `-`")),
-        ("x\tcity\n1\tParis", ("P0803", 2, 2, "Paris", "line 2, column `city`: `Paris` is text, not a number")),
+        ("x\ty\n1\tParis\n2\t3", ("P0803", 2, 2, "Paris", "line 2, column `y`: `Paris` is text, not a number")),
         ("1,2\n3,4\n5,6,7", ("P0803", 3, None, "3", "line 3 has 3 values, but line 1 has 2")),
         ("x,y\n1,2\n3\n", ("P0803", 3, None, "1", "line 3 has 1 value, but the header has 2 names")),
         ("x,y\n1,2\n3,4\n-inf,3", ("P0803", 4, 1, "-inf", "line 4, column `x`: `-inf` is not finite")),
@@ -182,3 +183,31 @@ def test_a_hundred_thousand_rows_take_less_than_a_second() -> None:
 
 def test_comments_within_quotes_are_none() -> None:
     assert separated('"a\n# b"\n1', tabs=False).fields[0][0] == "a___b"  # type: ignore[union-attr]
+
+
+@given(boxes, st.integers(0, 5), st.lists(st.sampled_from(TEXTS), min_size=1), st.sampled_from(",;\t|"), st.booleans())
+def test_columns_of_text_are_left_out(
+    rows: list[list[float]], at: int, texts: list[str], delimiter: str, lacking: bool
+) -> None:
+    at = min(at, len(rows[0]))
+    labels = [texts[n % len(texts)] for n in range(len(rows))]
+    if lacking and len(rows) > 1:
+        labels[0], labels[-1] = "", texts[0]
+    names = [f"x{n}" for n in range(len(rows[0]))]
+    named = [*names[:at], "label", *names[at:]]
+    text = written([named, *([*row[:at], label, *row[at:]] for row, label in zip(rows, labels))], delimiter=delimiter)
+    found = separated(text, delimiter == "\t")
+    assert isinstance(found, Table)
+    assert found.texts == ("label",)
+    assert {name: column.values.tolist() for name, column in found.fields if isinstance(column, Array)} == {
+        name: list(column) for name, column in zip(names, zip(*rows))
+    }
+
+
+@pytest.mark.parametrize("value", ["1,5", "1_000", "1 000", "'5", "٣", "1e400", "inf", ""])
+def test_what_is_meant_as_a_number_is_not_left_out(value: str) -> None:
+    assert isinstance(values_of(Path("a.csv"), f"x;y\n{value};2.5\n{value};3.5\n".encode()), DataMistake)
+
+
+def test_a_table_of_nothing_but_text_is_refused() -> None:
+    assert isinstance(values_of(Path("a.csv"), b"name,city\nanna,Paris\n"), DataMistake)

@@ -50,6 +50,7 @@ def test_indices(text: str, title: str, after: str) -> None:
         ("k = front.$0eyes.x", "Change to `eye`", "k = front.eye.x"),
         ("k = front with $0foca = 3", "Change to `focal`", "k = front with focal = 3"),
         ("k = Camera(eye=(0, 0), $0focel=1)", "Change to `focal`", "k = Camera(eye=(0, 0), focal=1)"),
+        ("def f(t, c) t*$0c.focal", "Write `c: Camera`", "def f(t, c: Camera) t*c.focal"),
     ],
 )
 def test_fields(text: str, title: str, after: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any, Literal, cast
 
 import numpy as np
@@ -138,11 +139,14 @@ def nested(k, n)
     (s.0.0, s.0.1, s.1)
 def turned_back(k, n) fold s = k for i in 1-n..0 (if i < -2 then 0.9*s + i else s - k*i)
 def still(k, n) fold (s, t) = (k, 0.5) for i in 1..n ((t, 0.25))
+levels = [0.5, -1, 2, 0.25]
+def reading(k, n) fold s = k for i in 1..n (let d = levels[i - 4*floor(i/4)] in if s < d then s/2 + d*k else -s/4)
+def guarded(k, n) fold s = k for i in 1..n (if s < 0 then s + levels[i] else s/2)
 def bounded(k, n) fold s = 1 for i in 1..n (clamp(s*k, -3, 3) - abs(s)/4)
 """)
 
 
-@pytest.mark.parametrize("name", ["stopping", "nested", "turned_back", "still", "bounded"])
+@pytest.mark.parametrize("name", ["stopping", "nested", "turned_back", "still", "bounded", "reading", "guarded"])
 @given(st.lists(st.floats(0.1, 2), min_size=1, max_size=20), st.integers(1, 30))
 @settings(max_examples=15)
 def test_machine_code_takes_the_steps_that_numpy_takes(name: str, ks: list[float], n: int) -> None:
@@ -157,6 +161,25 @@ def test_machine_code_takes_the_steps_that_numpy_takes(name: str, ks: list[float
         assert np.array_equal(by["numpy"][0], by["native"][0])
         for one, other in zip(by["numpy"], by["native"], strict=True):
             np.testing.assert_allclose(np.array(one), np.array(other), rtol=1e-12, atol=0)
+
+
+def test_steps_read_what_the_array_holds_at_each() -> None:
+    """A filter over data of a batch: against the same in numpy, and its derivative by each element."""
+    smooth = potto.compile("""
+def smooth(xs: [n] Real, r) fold s = xs[0] for i in 1..n-1 (s + r*(xs[i] - s) + 0.1*(xs[i] - xs[i - 1]))
+""").smooth
+    xs, r = np.sin(np.arange(200.0)), np.array([0.1, 0.5, 0.9])
+    wanted, slope = np.full(3, xs[0]), np.zeros(3)
+    for before, now in pairwise(xs):
+        wanted, slope = wanted + r * (now - wanted) + 0.1 * (now - before), slope * (1 - r) + (now - wanted)
+    for backend in ("numpy", "native"):
+        with potto.settings(backend=cast("Any", backend)):
+            found = potto.grad(smooth, "r")(xs, r)
+            swept = potto.grad(smooth, "xs")(xs, 0.5)
+        np.testing.assert_allclose(found.value, wanted, rtol=1e-13)
+        np.testing.assert_allclose(found.tangent, slope, rtol=1e-12)
+        by_hand = [0.6 * 0.5 ** (199 - i) - 0.1 * 0.5 ** (198 - i) for i in range(1, 199)]
+        np.testing.assert_allclose(swept.tangent, [0.5**199 - 0.1 * 0.5**198, *by_hand, 0.6], rtol=1e-12, atol=1e-300)
 
 
 def test_what_is_lost_always_in_one_direction_is_bounded() -> None:

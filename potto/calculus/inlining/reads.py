@@ -1,6 +1,6 @@
-"""What integrands read of arrays at plain places, found once beside the integral.
+"""What integrands and steps of folds read of arrays at plain places, found once beside the integral or the fold.
 
-Owns `hoisted`.
+Owns `hoisted` and `beside`.
 """
 
 from __future__ import annotations
@@ -42,7 +42,16 @@ def hoisted(term: Integral) -> tuple[Integral, tuple[Access, ...]]:
 
     What stands on one side of a plain condition is read only where that holds.
     """
-    inside, arrays = frozenset(bound(term)), Holding(*ARRAYS)
+    found, accesses = beside(term, frozenset())
+    assert isinstance(found, Integral)
+    return found, accesses
+
+
+@lru_cache(maxsize=1024)
+def beside(term: Term, varying: frozenset[str]) -> tuple[Term, tuple[Access, ...]]:
+    """A term with what it reads of arrays under names of its own, where these places hold nothing that varies, and
+    nothing that is bound in it."""
+    inside, arrays = varying | frozenset(bound(term)), Holding(*ARRAYS)
     guards: dict[Term, list[tuple[Term, ...]]] = {}
     _gather(term, (), inside, arrays, guards)
     names, taken = dict[Term, Term](), set(term.free | inside)
@@ -55,7 +64,6 @@ def hoisted(term: Integral) -> tuple[Integral, tuple[Access, ...]]:
     found = transform(
         term, lambda node, new: names.get(node, new), lambda node: () if node in names else children(node)
     )
-    assert isinstance(found, Integral)
     return found, tuple(accesses)
 
 

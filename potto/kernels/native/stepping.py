@@ -27,10 +27,10 @@ HEAD = 3  # numbers of the frame before the columns: how many members, how many 
 
 class Stepping:
     """The steps of a kernel from numbers to numbers. state, place: which of its parameters are the state, and the
-    number of the step, if it asks for that."""
+    number of the step, if it asks for that. rows: which have a number of their own for every step."""
 
-    def __init__(self, kernel: Kernel, state: int, place: int | None) -> None:
-        self.kernel, self.state, self.place = kernel, state, place
+    def __init__(self, kernel: Kernel, state: int, place: int | None, rows: frozenset[int]) -> None:
+        self.kernel, self.state, self.place, self.rows = kernel, state, place, rows
         self.promotion = Promotion(NAME)
 
     def text(self) -> str:
@@ -49,15 +49,20 @@ class Stepping:
         begin = at.whole("mul", at.begin(blocks), LANES)
         first = at.once(f"call i64 @llvm.umin.i64(i64 {begin}, i64 {last})", begin)  # the last ones are done twice
 
-        def column(number: int) -> str:
-            return at.load(at.at(at.address("%frame", HEAD + number, "ptr"), first, "double"))
+        def column(number: int, row: str = "0") -> str:
+            place = at.whole("add", at.whole("mul", row, length), first)
+            return at.load(at.at(at.address("%frame", HEAD + number, "ptr"), place, "double"))
 
         for number, room in enumerate(rooms.values()):
             at.store(column(number), room)
         others = [(name, part) for name, part in straight.parts.items() if part.path[0] not in (self.state, self.place)]
         self.columns = [part for _, part in others]
-        values = {name: column(len(rooms) + number) for number, (name, _) in enumerate(others)}
+        numbered = [
+            (name, len(rooms) + number, part.path[0] in self.rows) for number, (name, part) in enumerate(others)
+        ]
+        values = {name: column(number) for name, number, many in numbered if not many}
         step = at.begin(steps)
+        values |= {name: column(number, step) for name, number, many in numbered if many}
         for name, part in straight.parts.items():
             if part.path[0] == self.state:
                 values[name] = at.load(self.room(rooms, part))
@@ -83,10 +88,12 @@ class Stepping:
         """Each number of the state at the beginning and after every step, (1 + steps, *batch). args: of the kernel,
         with the first state; numbers without errors or tangents."""
         begun = [cell.v for cell in all_cells(args[self.state])]
-        given = [*begun, *(_number(args, part) for part in self.columns)]
-        shape = np.broadcast_shapes(*(a.shape for arg in args for a in all_arrays(arg)))
+        given = [(x, False) for x in begun]
+        given += [(_number(args, part), part.path[0] in self.rows) for part in self.columns]
+        shapes = [a.shape[1:] if at in self.rows else a.shape for at, arg in enumerate(args) for a in all_arrays(arg)]
+        shape = np.broadcast_shapes(*shapes)
         size = max(math.prod(shape), LANES)
-        columns = [np.resize(np.broadcast_to(x, shape), size) for x in given]
+        columns = [_columns(x, (len(places), *shape) if many else (1, *shape), size) for x, many in given]
         out = np.empty((len(begun), len(places), size))
         frame = np.array([size, len(places), address(out), *map(address, columns)], dtype=np.int64)
         numbers = np.array([float(places.start)])
@@ -103,6 +110,12 @@ def _paths(result: Result, path: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
     else:
         for number, item in enumerate(result):
             yield from _paths(item, (*path, number))
+
+
+def _columns(number: float | Array, shape: tuple[int, ...], size: int) -> Array:
+    """A number of each member, of all steps or of each, in rows of this size, for which members may come again."""
+    rows = np.broadcast_to(number, shape).reshape(shape[0], -1)
+    return np.ascontiguousarray(rows if rows.shape[1] == size else rows[:, np.arange(size) % rows.shape[1]])
 
 
 def _number(args: Sequence[Value], part: Part) -> float | Array:
