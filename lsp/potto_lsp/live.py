@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from potto_lsp.session import Session
 
 MOST = 200  # live expressions of one file that are evaluated
+TOGETHER = 20  # definitions whose points are looked at at once
 MOST_ASKED = 50  # definitions of other files whose points are kept
 PAUSE = 0.15  # seconds between two requests to the client to ask for its hints again
 
@@ -99,7 +100,15 @@ def _group_keys(db: Database, file: str, group: tuple[str, ...]) -> Keys:
 @query
 def looked_at_keys(db: Database, file: str) -> Keys:
     """The points of the first definitions that a file's expressions look at."""
-    return tuple([key for target in ide.looked_at(db, file)[:MOST] for key in point_keys(db, *target)])
+    targets = ide.looked_at(db, file)[:MOST]
+    some = [targets[start : start + TOGETHER] for start in range(0, len(targets), TOGETHER)]
+    return tuple([key for each in some for key in _some_point_keys(db, each)])
+
+
+@query(keep=128)
+def _some_point_keys(db: Database, targets: tuple[tuple[str, str], ...]) -> Keys:
+    """The points of some definitions, which are asked about together at every key."""
+    return tuple([key for target in targets for key in point_keys(db, *target)])
 
 
 @query

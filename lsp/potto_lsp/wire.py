@@ -10,7 +10,7 @@ import json
 import logging
 import os
 import select
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from queue import SimpleQueue
 from threading import Lock, Thread
 from typing import Any, BinaryIO
@@ -71,16 +71,17 @@ def _length(value: bytes) -> int | None:
 
 
 class Encoded:
-    """A result that is JSON already: answers about whole files are kept in pieces as they are sent."""
+    """A list of items that is JSON already: answers about whole files are kept in pieces as they are sent. Those of a
+    piece are separated by commas; pieces without any do not count."""
 
-    __slots__ = ("text",)
+    __slots__ = ("pieces",)
 
-    def __init__(self, text: str) -> None:
-        self.text = text
+    def __init__(self, pieces: Iterable[bytes]) -> None:
+        self.pieces = [piece for piece in pieces if piece]
 
     def decoded(self) -> Any:
         """What it says."""
-        return json.loads(self.text)
+        return json.loads(b"[%b]" % b",".join(self.pieces))
 
 
 def framed(message: dict[str, Any]) -> bytes:
@@ -88,11 +89,19 @@ def framed(message: dict[str, Any]) -> bytes:
     # Escaped to ASCII: half of a surrogate pair, which JSON may carry, would not go into UTF-8.
     result = message.get("result")
     if isinstance(result, Encoded):
-        rest = json.dumps({name: value for name, value in message.items() if name != "result"}, separators=(",", ":"))
-        body = f'{rest[:-1]},"result":{result.text}}}'.encode("ascii")
-    else:
-        body = json.dumps(message, separators=(",", ":")).encode("ascii")
+        return _framed_list({name: value for name, value in message.items() if name != "result"}, result.pieces)
+    body = json.dumps(message, separators=(",", ":")).encode("ascii")
     return b"Content-Length: %d\r\n\r\n%b" % (len(body), body)
+
+
+def _framed_list(message: dict[str, Any], pieces: list[bytes]) -> bytes:
+    """A message with a long list as its result. That may be megabytes, which are copied once."""
+    head = json.dumps(message, separators=(",", ":"))[:-1].encode("ascii") + b',"result":['
+    length = len(head) + sum(map(len, pieces)) + max(len(pieces) - 1, 0) + 2
+    first, *rest = pieces or [b""]
+    whole = [b"Content-Length: %d\r\n\r\n%b%b" % (length, head, first), *rest]
+    whole[-1] += b"]}"
+    return b",".join(whole)
 
 
 class Outbox:

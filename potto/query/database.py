@@ -40,13 +40,14 @@ class Database(Engine):
             differs = old.value is MISSING or not same(old.value, value)
             if not differs and old.durability == durability:
                 return False
-            self.revision += 1
+            self._next_revision()
             self._evict()
             for level in range(max(old.durability, durability) + 1):
                 self._last_changed[level] = self.revision
             old.durability = durability
             if differs:
                 old.value, old.changed_at = value, self.revision
+                self._changes[self.revision].add(old)
                 self._log("input", "input", (key,))
             return differs
 
@@ -121,7 +122,7 @@ class Database(Engine):
             memo = memos[args] = Memo(query, args)
         elif memo.verified_at >= self.revision:
             return memo
-        memo.put(value, self.revision)
+        memo.put(value, self.revision, self._changes[self.revision])
         self._depend(memo, dict.fromkeys(deps))
         return memo
 

@@ -11,19 +11,19 @@ import os
 import sys
 import threading
 from collections import defaultdict
-from collections.abc import Callable, Container, Hashable
-from itertools import chain
+from collections.abc import Callable, Hashable
 from threading import get_ident
 from typing import Any, Final, Literal
 
+from potto.query.leaves import leaves_of
 from potto.query.nodes import (
     DURABILITIES,
     FOREVER,
     GONE,
+    Below,
     Cancelled,
     CycleError,
     Event,
-    Leaf,
     Memo,
     Node,
     Query,
@@ -31,7 +31,9 @@ from potto.query.nodes import (
 )
 
 STEPS: Final = 10
-LEAVES: Final = 512  # of a memo that are kept: to look at more takes as long as to walk
+FEW: Final = 16
+RESTING: Final = 32  # revisions until that is found out again of leaves below which something changed
+LOGGED: Final = 16  # revisions of which it is known what changed
 LEAVES_FIRST: Final = 8  # that are run for this on the way to one memo, before it is left to the walk
 SEGMENT: Final = 40  # levels of running queries on one thread: at 20 frames a level still below the limit
 
@@ -44,6 +46,8 @@ class Engine:
         self._memos: defaultdict[Query, dict[tuple[Hashable, ...], Memo]] = defaultdict(dict)
         self._arguments: dict[tuple[Hashable, ...], tuple[Hashable, ...]] = {}  # most stand in a dozen memos
         self._last_changed = [1] * (DURABILITIES + 1)  # by durability; of what reads no input: never
+        self.few = FEW  # leaves that are looked at one by one; of more it is asked first if anything below them changed
+        self._changes: dict[int, set[Node]] = {1: set()}  # what changed in each of the last revisions
         self._lock = threading.Lock()
         self._owner = 0  # the thread that evaluates or writes
         self._evaluation, self._cancelled = 1, 0  # the number of the present evaluation and of the one to cancel
@@ -57,6 +61,11 @@ class Engine:
     def cancel(self) -> None:
         """Make the evaluation that runs now, if any, raise `Cancelled` at its next query."""
         self._cancelled = self._evaluation
+
+    def _next_revision(self) -> None:
+        self.revision += 1
+        self._changes[self.revision] = set()
+        self._changes.pop(self.revision - LOGGED, None)
 
     def _acquire(self) -> None:
         self._lock.acquire()
@@ -177,20 +186,46 @@ class Engine:
         since, revision, leaves = memo.verified_at, self.revision, memo.leaves
         if leaves is None or not steps or memo.index >= 0 or memo.provisional or self._last_changed[1] > since:
             return False
+        found = memo.found
+        if found is not None and found.leaves is leaves and found.since == since > revision - LOGGED:
+            below = self._many_stand(memo, found, steps)
+            if below is not False:
+                return below
         for leaf in leaves:
             source = leaf.source
             if source is not None and source.verified_at < revision:
-                if source.verified_at < 0 or source is memo:
-                    return False
-                below = self._stands(source, steps - 1)
+                below = self._source_stands(source, memo, steps)
                 if below is not True:
-                    cuts = source.cuts or leaf is not source  # the entry of a table stands when the others do not
-                    return source if below is False and cuts and self._runs_alone(source) else below
-                source.verified_at = revision
-                if self._logs:
-                    self._log("reused", source.query.name, source.args)
+                    return below
             if leaf.changed_at > since:
                 return False
+        if len(leaves) > self.few and (found is None or found.since < revision - RESTING):
+            memo.found = Below(leaves, revision)
+        return True
+
+    def _many_stand(self, memo: Memo, found: Below, steps: int) -> bool | Memo:
+        """Whether nothing at all changed below many leaves; if something did, they are to be looked at one by one."""
+        for source in found.sources:
+            if source.verified_at < self.revision:
+                stands = self._source_stands(source, memo, steps)
+                if stands is not True:
+                    return stands
+        for later in range(found.since + 1, self.revision + 1):
+            if not self._changes[later].isdisjoint(found.nodes):
+                return False
+        found.since = self.revision
+        return True
+
+    def _source_stands(self, source: Memo, memo: Memo, steps: int) -> bool | Memo:
+        """Whether what a leaf of a memo belongs to stands; then it is up to date."""
+        if source.verified_at < 0 or source is memo:
+            return False
+        below = self._stands(source, steps - 1)
+        if below is not True:
+            return source if below is False and self._runs_alone(source) else below
+        source.verified_at = self.revision
+        if self._logs:
+            self._log("reused", source.query.name, source.args)
         return True
 
     def _runs_alone(self, memo: Memo) -> bool:
@@ -228,7 +263,7 @@ class Engine:
             self._log("executed", memo.query.name, memo.args)
         changed_at = memo.changed_at
         try:
-            memo.put(self._answer(memo), self.revision)
+            memo.put(self._answer(memo), self.revision, self._changes[self.revision])
             if not fresh and memo.changed_at == changed_at:
                 memo.cuts = True
             self._depend(memo, frame)
@@ -281,7 +316,8 @@ class Engine:
             member.deps, member.verified_at = (), -1
         del self._provisional[mark:]
         if failed:
-            memo.put_error(self.revision, min((dep.durability for dep in frame), default=0))
+            durability = min((dep.durability for dep in frame), default=0)
+            memo.put_error(durability, self.revision, self._changes[self.revision])
         elif fresh:
             self._memos[memo.query].pop(memo.args, None)
 
@@ -325,7 +361,7 @@ class Engine:
         if memo.query.fallback is None:
             path = " -> ".join(map(repr, [*self._running[low:], memo]))
             raise CycleError(f"a query needs its own answer: {path}")
-        memo.put(memo.query.fallback(self, *memo.args), self.revision)
+        memo.put(memo.query.fallback(self, *memo.args), self.revision, self._changes[self.revision])
 
     def _close_cycle(self, first: Memo, mark: int) -> None:
         """All members of a cycle depend on all that any of them read outside it."""
@@ -336,41 +372,6 @@ class Engine:
         for member in members:
             member.provisional = False
             self._depend(member, outside)
-
-
-def leaves_of(deps: tuple[Node, ...]) -> tuple[Leaf, ...] | None:
-    """The undurable leaves below some nodes; None if there are more than `LEAVES`, or not all are known."""
-    widest: tuple[Leaf, ...] = ()
-    others: list[tuple[Leaf, ...]] = []
-    own: list[Leaf] = []
-    for dep in deps:
-        if dep.durability:
-            continue
-        if not isinstance(dep, Memo) or dep.cuts:
-            own.append(dep)
-        elif dep.leaves is None:
-            return None
-        elif dep.leaves is not widest:
-            others.append(dep.leaves)
-            if len(dep.leaves) > len(widest):
-                widest = dep.leaves
-    if len(others) <= 1 and all(dep in widest or _is_covered(dep, widest) for dep in own):
-        return widest
-    union = set(own).union(*others)
-    if len(union) > LEAVES:
-        return None
-    if len(union) == len(widest):
-        return widest  # most chains are straight: they share one
-    own = [dep for dep in own if not _is_covered(dep, union)]
-    return tuple(dict.fromkeys(chain(*others, own)))  # in the order of reading: in a set's they are verified at random
-
-
-def _is_covered(leaf: Leaf, others: Container[Leaf]) -> bool:
-    """Whether a memo that cuts edits off hangs on one of the others alone, which says all that it could say: if that
-    has not changed it has not either, and if that has there is no more to ask."""
-    if not isinstance(leaf, Memo) or leaf.leaves is None or len(leaf.leaves) != 1 or leaf.durability:
-        return False
-    return leaf.leaves[0] in others
 
 
 def drop(table: dict[tuple[Hashable, ...], Memo], memos: list[Memo]) -> int:

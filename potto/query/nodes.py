@@ -11,6 +11,7 @@ from potto.quick import quick, value
 DURABILITIES: Final = 3  # of inputs: 0, 1, 2; a memo that reads no input has this one
 FOREVER: Final = sys.maxsize  # the revision up to which such a memo is verified
 GONE: Final[Any] = object()  # the value of a memo that was forgotten, or that failed
+MOST_BELOW: Final = 2048  # nodes below some leaves that are looked at all at once
 MISSING: Final[Any] = object()  # the value of an input that was never set
 
 
@@ -80,7 +81,8 @@ class Memo:
     `index` is its place on the stack of running queries, or -1. `low` is the lowest place that it reaches by a cycle,
     `leaves` are the undurable nodes that it hangs on in the end: inputs, entries of tables, and memos of which it was
     seen, or is declared, that they cut edits off (`cuts`). As long as none of them and nothing durable changes, it
-    stands. None if they are too many to be worth it, or not known.
+    stands. None if they are too many to be worth it, or not known. `found` has all
+    that lies below many leaves, once somebody asked.
     `cyclic` says that a cycle leads back to it, `provisional` that it has finished but its cycle has not.
     """
 
@@ -92,6 +94,7 @@ class Memo:
         "deps",
         "durability",
         "entries",
+        "found",
         "index",
         "leaves",
         "low",
@@ -106,6 +109,7 @@ class Memo:
         self.query, self.args, self.value = query, args, GONE
         self.deps: tuple[Node, ...] = ()
         self.leaves: tuple[Leaf, ...] | None = None
+        self.found: Below | None = None
         self.cuts = query.cuts
         self.verified_at, self.changed_at, self.durability = -1, -1, 0
         self.entries: dict[Any, Entry] | None = None
@@ -115,11 +119,14 @@ class Memo:
     def __repr__(self) -> str:
         return f"{self.query.name}({', '.join(short(arg) for arg in self.args)})"
 
-    def put(self, value: Any, revision: int) -> None:
-        """Give it a value. An equal one is no change, and the old object stays."""
+    def put(self, value: Any, revision: int, changes: set[Node]) -> None:
+        """Give it a value. An equal one is no change, and the old object stays. What others may have read before is
+        added to `changes`."""
         if self.value is not GONE and same(self.value, value):
             return
         old, entries = self.value, self.entries or {}
+        if self.changed_at >= 0:
+            changes.add(self)
         self.value, self.changed_at = value, revision
         changed: Iterable[Any] = entries
         if isinstance(value, Parted) and isinstance(old, Parted):
@@ -128,13 +135,16 @@ class Memo:
             entry, new = entries[key], value.get(key)
             if not same(entry.value, new):
                 entry.value, entry.changed_at = new, revision
+                changes.add(entry)
 
-    def put_error(self, revision: int, durability: int) -> None:
+    def put_error(self, durability: int, revision: int, changes: set[Node]) -> None:
         """It failed: whatever comes next differs from what it was."""
         self.value, self.verified_at, self.changed_at = GONE, -1, revision
         self.deps, self.leaves, self.durability = (), None, durability
+        changes.add(self)
         for entry in (self.entries or {}).values():
             entry.value, entry.changed_at = GONE, revision
+            changes.add(entry)
 
 
 class Entry:
@@ -148,6 +158,34 @@ class Entry:
     @property
     def durability(self) -> int:
         return self.source.durability
+
+
+class Below:
+    """What lies below some leaves: the nodes on which these hang in turn, and the memos that must be up to date for it
+    to be known which of these changed: those that read inputs themselves. It holds from the revision `since` on, as
+    long as none of the nodes changes.
+    """
+
+    __slots__ = ("leaves", "nodes", "since", "sources")
+
+    def __init__(self, leaves: tuple[Leaf, ...], since: int) -> None:
+        self.leaves, self.since = leaves, since
+        nodes: dict[Node, None] = dict.fromkeys(leaves)
+        sources: dict[Memo, None] = {}
+        seen = set[Memo]()
+        todo = list(leaves)
+        for leaf in todo:
+            source = leaf.source
+            if source is None or source in seen:
+                continue
+            seen.add(source)
+            below = source.leaves
+            if below is None or len(nodes) > MOST_BELOW or any(node.source is None for node in below):
+                sources[source] = None
+                continue
+            todo += [node for node in below if node not in nodes]
+            nodes.update(dict.fromkeys(below))
+        self.nodes, self.sources = frozenset(nodes), tuple(sources)
 
 
 def entry_of(memo: Memo, key: Any) -> Entry:

@@ -28,12 +28,13 @@ class Part(Struct, eq=False):
     template: str
     lines: tuple[int, ...]
     line: int = -1
-    text: str = ""
+    text: bytes = b""
 
-    def placed(self, line: int) -> str:
+    def placed(self, line: int) -> bytes:
         """The items of a piece that starts on a line."""
         if self.line != line:
-            self.line, self.text = line, self.template % tuple([line + own for own in self.lines])
+            text = self.template % tuple([line + own for own in self.lines])
+            self.line, self.text = line, text.encode("ascii")
         return self.text
 
 
@@ -55,4 +56,4 @@ def whole(ask: Ask, part: Callable[[PieceAt], Part], beside: Iterable[Any] = ())
     """The items of all pieces, behind some that belong to none."""
     found = [part_of(beside).placed(0)]
     found += [part(at).placed(line) for at, line in lined(ask)]
-    return Encoded(f"[{','.join([text for text in found if text])}]")
+    return Encoded(found)

@@ -33,6 +33,9 @@ class Point(Struct, frozen=True):
     chosen: bool = False
 
 
+OfTargets = tuple[tuple[tuple[str, str], Point], ...]  # points, each with the definition that it is one of
+
+
 @query
 def points(db: Database, file: str, name: str) -> tuple[Point, ...]:
     """The points of a definition in its own file, a constant's being its name; one that we choose if there are none."""
@@ -51,16 +54,22 @@ def looked_at(db: Database, file: str) -> tuple[tuple[str, str], ...]:
 def _written(db: Database, file: str) -> Mapping[tuple[str, str], tuple[Point, ...]]:
     """The points in a file's expressions, under the definitions that they are of."""
     found: dict[tuple[str, str], dict[str, Point]] = {}
-    for group in groups_of_pieces(db, file):
-        for target, point in _group_points(db, file, group):
+    for group in _points_by_group(db, file):
+        for target, point in group:
             those = found.setdefault(target, {})
             if len(those) < MOST:
                 those.setdefault(point.text, point)
     return {target: tuple(those.values()) for target, those in found.items()}
 
 
+@query(cuts=True)
+def _points_by_group(db: Database, file: str) -> tuple[OfTargets, ...]:
+    """All of them, which most edits leave as they were."""
+    return tuple([_group_points(db, file, group) for group in groups_of_pieces(db, file)])
+
+
 @query(keep=512)
-def _group_points(db: Database, file: str, group: tuple[str, ...]) -> tuple[tuple[tuple[str, str], Point], ...]:
+def _group_points(db: Database, file: str, group: tuple[str, ...]) -> OfTargets:
     """Those of some pieces of the file: in live expressions and in statements."""
     diffeo = is_diffeo(file)
     chunks = (chunk for text in group for chunk in piece(db, text, diffeo).chunks)
