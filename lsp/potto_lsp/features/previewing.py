@@ -9,9 +9,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from potto import ide
-from potto.ide.display.pixels import pixel_conditions
+from potto.ide.display.pixels import PixelCondition, pixel_conditions
 from potto.modules import chunk_start, chunk_text
 from potto.source import Span
+from potto_lsp import convert, protocol
 from potto_lsp.asking import Ask
 from potto_lsp.deferred import Deferred
 from potto_lsp.errors import InvalidParams
@@ -70,7 +71,7 @@ def pixel(ask: Ask) -> Deferred:
     start = chunk_start(ask.db, ask.file, name)
     chunk = chunk_text(ask.db, ask.file, name) or ""
     whole = ask.range(Span(start, start + len(chunk.rstrip())))
-    written = [{"equation": each.equation, "range": ask.range(each.span.shift(start))} for each in found]
+    written = [{"equation": each.equation, **_written(ask, each)} for each in found]
     surfaces = [{"text": each.text, "parameters": list(each.parameters)} for each in found]
 
     def placed(result: Mapping[str, Any]) -> dict[str, Any]:
@@ -79,6 +80,11 @@ def pixel(ask: Ask) -> Deferred:
 
     more = {"surfaces": surfaces, "values": values, "cell": cell}
     return task(ask, "pixel", ask.file, name, more, placed, quiet=True)
+
+
+def _written(ask: Ask, found: PixelCondition) -> protocol.Location:
+    """Where a condition is written."""
+    return convert.location(ask.analysis, found.file, found.span.shift(chunk_start(ask.db, found.file, found.name)))
 
 
 def _is_number(value: Any) -> bool:
