@@ -1,7 +1,7 @@
-"""Messages on a stream: `Content-Length` and JSON, as the base protocol has it.
+"""Messages on a stream: `Content-Length` and JSON, as in the base protocol.
 
-Owns `messages`, which reads them, `framed`, their bytes, and `Outbox`, which writes them from any thread without making
-it wait: a client that does not read for a while must not keep the server from reading, or both would wait for ever.
+Owns `messages`, which reads them, `framed`, which makes their bytes, and `Outbox`, which writes them from any thread
+without waiting: if the server stopped reading because a client does not read for a while, both would wait forever.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def _messages(stream: BinaryIO) -> Iterator[Any]:
 
 
 def _header(stream: BinaryIO) -> int | None:
-    """The length of the next body; None at the end. Field names are in any case; lines may end in LF alone."""
+    """The length of the next body; None at the end. Field names are in any case; lines may end in a bare LF."""
     length: int | None = None
     while line := stream.readline(4096):
         line = line.strip()
@@ -71,8 +71,8 @@ def _length(value: bytes) -> int | None:
 
 
 class Encoded:
-    """A list of items that is JSON already: answers about whole files are kept in pieces as they are sent. Those of a
-    piece are separated by commas; pieces without any do not count."""
+    """A list that is already JSON: answers about whole files are kept in pieces, as they are sent. The items of a piece
+    are separated by commas; empty pieces don't count."""
 
     __slots__ = ("pieces",)
 
@@ -80,7 +80,7 @@ class Encoded:
         self.pieces = [piece for piece in pieces if piece]
 
     def decoded(self) -> Any:
-        """What it says."""
+        """The list."""
         return json.loads(b"[%b]" % b",".join(self.pieces))
 
 
@@ -95,7 +95,7 @@ def framed(message: dict[str, Any]) -> bytes:
 
 
 def _framed_list(message: dict[str, Any], pieces: list[bytes]) -> bytes:
-    """A message with a long list as its result. That may be megabytes, which are copied once."""
+    """A message with a long list as its result. That may be megabytes, so it is copied only once."""
     head = json.dumps(message, separators=(",", ":"))[:-1].encode("ascii") + b',"result":['
     length = len(head) + sum(map(len, pieces)) + max(len(pieces) - 1, 0) + 2
     first, *rest = pieces or [b""]
@@ -105,10 +105,10 @@ def _framed_list(message: dict[str, Any], pieces: list[bytes]) -> bytes:
 
 
 class Outbox:
-    """Writes messages in the order in which they are put.
+    """Writes messages in order.
 
     What the client's pipe takes at once is written at once; a thread writes the rest. (A thread that woke for every
-    message took a third as long as finding out what the messages say: both want the interpreter.)
+    message took a third as long as producing the messages: both need the interpreter.)
     """
 
     def __init__(self, stream: BinaryIO) -> None:
@@ -120,11 +120,11 @@ class Outbox:
         self._thread.start()
 
     def put(self, message: dict[str, Any]) -> None:
-        """Send a message now or some time soon."""
+        """Queue a message."""
         self.write(framed(message))
 
     def write(self, data: bytes) -> None:
-        """Send a framed message now or some time soon."""
+        """Queue a framed message."""
         left = data
         with self._lock:
             if not self._left and self._pipe is not None:
@@ -134,7 +134,7 @@ class Outbox:
                 self._queue.put(left)
 
     def close(self, seconds: float = 2.0) -> None:
-        """Write what is left, for at most so long."""
+        """Write what is left, for at most so many seconds."""
         self._queue.put(None)
         self._thread.join(seconds)
 
@@ -154,14 +154,14 @@ class Outbox:
 
 
 class _Pipe:
-    """A stream of which can be told how much it takes without waiting."""
+    """A pipe that can tell how much it takes without waiting."""
 
     def __init__(self, descriptor: int) -> None:
         self._descriptor, self._poll = descriptor, select.poll()
         self._poll.register(descriptor, select.POLLOUT)
 
     def write(self, data: bytes) -> bytes:
-        """Write what can be written now; what is left."""
+        """Write as much as possible without waiting. Returns what is left."""
         rest = memoryview(data)
         try:
             while rest and self._poll.poll(0) == [(self._descriptor, select.POLLOUT)]:

@@ -1,4 +1,4 @@
-"""What a memo hangs on in the end, so that what lies between need not be walked through."""
+"""What a memo ultimately depends on, so that verification can skip everything in between."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Final
 
 from potto.query.nodes import Leaf, Memo, Node
 
-LEAVES: Final = 512  # of a memo that are kept: to find out about more takes as long as to walk
+LEAVES: Final = 512  # leaves kept for a memo: checking more of them would take as long as walking
 
 
 def leaves_of(deps: tuple[Node, ...]) -> tuple[Leaf, ...] | None:
-    """The undurable leaves below some nodes; None if there are more than `LEAVES`, or not all are known."""
+    """The leaves of durability 0 below some nodes; None if there are more than `LEAVES`, or if some are not known."""
     widest: tuple[Leaf, ...] = ()
     others: list[tuple[Leaf, ...]] = []
     own: list[Leaf] = []
@@ -35,14 +35,14 @@ def leaves_of(deps: tuple[Node, ...]) -> tuple[Leaf, ...] | None:
         if len(union) > LEAVES:
             return None
     if len(union) == len(widest):
-        return widest  # most chains are straight: they share one
+        return widest  # most chains are straight, so all of it is shared
     own = [dep for dep in own if not _is_covered(dep, union)]
-    return tuple(dict.fromkeys(chain(*others, own)))  # in the order of reading: in a set's they are verified at random
+    return tuple(dict.fromkeys(chain(*others, own)))  # in the order of reading, which a set would lose
 
 
 def _is_covered(leaf: Leaf, others: Container[Leaf]) -> bool:
-    """Whether a memo that cuts edits off hangs on one of the others alone, which says all that it could say: if that
-    has not changed it has not either, and if that has there is no more to ask."""
+    """Whether a memo depends on a single leaf that is among `others` anyway. Then the memo adds nothing: as long as
+    that leaf has not changed, neither has the memo."""
     if not isinstance(leaf, Memo) or leaf.leaves is None or len(leaf.leaves) != 1 or leaf.durability:
         return False
     return leaf.leaves[0] in others

@@ -58,7 +58,7 @@ def _hint(text: Text, hint: ide.InlayHint) -> protocol.InlayHint:
 
 
 def _live(ask: Ask, span: Span) -> list[protocol.InlayHint]:
-    """The values that are known, behind their expressions."""
+    """The known values, behind their expressions."""
     found: list[protocol.InlayHint] = []
     for live, value in ask.session.live.values(ask.file):
         if value is not None and span.start <= live.span.end <= span.end:

@@ -1,6 +1,6 @@
-"""`potto/scenes`, `potto/sample` and `potto/pixel`: what a preview may show, its numbers, and the code behind a place.
+"""`potto/scenes`, `potto/sample` and `potto/pixel`: what a preview may show, its numbers, and the code behind a pixel.
 
-Beyond the protocol: a client that draws for itself asks for numbers, others for the picture of `potto.preview`.
+Beyond the protocol: clients that draw by themselves ask for numbers, others for the picture of `potto.preview`.
 """
 
 from __future__ import annotations
@@ -57,11 +57,11 @@ def sample(ask: Ask) -> Deferred:
     if not isinstance(rtol, int | float | None) or (rtol is not None and not 0 < rtol < 1):
         raise InvalidParams("`rtol` is between 0 and 1")
     more = {"axes": axes, "values": values or {}, "wrt": wrt, "rtol": rtol}
-    return task(ask, "sample", ask.file, name, more, quiet=True)  # what is drawn shows how far it is
+    return task(ask, "sample", ask.file, name, more, quiet=True)  # the picture itself shows the progress
 
 
 def pixel(ask: Ask) -> Deferred:
-    """Where in the program a place of a picture comes from: the definition's conditions there, the nearest first."""
+    """The code behind a pixel: the conditions of the function that is drawn, the nearest first."""
     name, values, cell = ask.string("name"), ask.get("values"), ask.get("cell")
     if not isinstance(values, Mapping) or not isinstance(cell, Mapping) or not all(map(_is_number, cell.values())):
         raise InvalidParams("`values` is an object, and `cell` the sides of a pixel by the names of its axes")
