@@ -1,7 +1,7 @@
-"""What a place of a picture comes from: the conditions of a function that is drawn, as functions of its parameters.
+"""The code behind a pixel of a picture: the conditions of the function that is drawn, as functions of its parameters.
 
-Owns `PixelCondition` and `pixel_conditions`. A pixel's integral goes over a small part of the plane, so its conditions
-are looked at in the middle of their ranges, as `checking/outlines` does.
+Owns `PixelCondition` and `pixel_conditions`. A pixel's integral covers a small part of the plane, so its conditions are
+evaluated in the middle of their ranges, as in `checking/outlines`.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class PixelCondition(Struct, frozen=True):
 
 @query
 def pixel_conditions(db: Database, file: str, name: str) -> tuple[PixelCondition, ...]:
-    """The conditions of a definition that its parameters alone decide, in the order of the text."""
+    """The conditions of a definition that depend on its parameters only, in the order of the text."""
     if not sound(db, file, name):
         return ()
     elaborated = core(db, file, name)
@@ -62,8 +62,8 @@ def pixel_conditions(db: Database, file: str, name: str) -> tuple[PixelCondition
 
 
 def _place(db: Database, file: str, name: str, condition: Condition, call: Span) -> tuple[str, str, Span]:
-    """The file, the definition and the span where a condition is written; if it is in none of the definitions that were
-    entered, the call that leads to it."""
+    """The file, the definition and the span where a condition is written. If none of the definitions on the way
+    contains it, the call that leads to it."""
     for module, called in ((g.module, g.name) for g in reversed(condition.path)):
         for term, span in core(db, module, called).origins:
             if isinstance(term, Branch | Delta) and term.coordinates == condition.written:
@@ -72,7 +72,7 @@ def _place(db: Database, file: str, name: str, condition: Condition, call: Span)
 
 
 def _middles(term: Term) -> dict[str, Term]:
-    """The middle of each variable of integration's range."""
+    """The middle of the range of each variable of integration."""
     return {
         name: mul(const(0.5), add(low, high))
         for node in postorder(term)
@@ -82,7 +82,8 @@ def _middles(term: Term) -> dict[str, Term]:
 
 
 def _in_the_middle(surface: Term, middles: Mapping[str, Term]) -> Term:
-    """A surface with each variable in the middle; those of inner ranges first, which may depend on outer ones."""
+    """A surface with each variable in the middle of its range. Inner ranges come first, since they may depend on outer
+    variables."""
     for _ in middles:
         inside = {name: middles[name] for name in surface.free & middles.keys()}
         if not inside:
