@@ -291,6 +291,14 @@ class Events:
                 mask[slice(None) if members is None else members] = True
         return mask
 
+    def uncounted(self, size: int) -> Bools:
+        """The members of a batch that met something that their errors do not count."""
+        rest = Events()
+        for event, members in self:
+            if not (isinstance(event, TwoSided) and event.hidden):
+                rest.note(event, members)
+        return rest.touched(size)
+
     def known(self, *kinds: type[Event]) -> bool:
         """Whether it is known of each of these kinds who met it."""
         return all(members is not None for event, members in self if isinstance(event, kinds))
